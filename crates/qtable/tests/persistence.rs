@@ -1,5 +1,6 @@
 //! Files: what is written comes back, and nothing damaged does.
 #![cfg(feature = "serde")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use std::path::Path;
 
@@ -216,5 +217,7 @@ fn the_bytes_of_version_1_stay() {
     assert_eq!(decode::<QTable>("table/1", &bytes).unwrap(), table);
 }
 
-const GOLDEN: &str = "895154424c0d0a1a010000000700000028000000000000007461626c652f3102040000000000000000000000000000\
-    0000000000f83f0000000000000000040000010000e65c7633";
+const GOLDEN: &str = concat!(
+    "895154424c0d0a1a010000000700000028000000000000007461626c652f3102040000000000",
+    "0000000000000000000000000000000000f83f0000000000000000040000010000e65c7633"
+);
