@@ -94,7 +94,7 @@ impl Agent {
             last_seen: None,
             arm,
         };
-        let result = run.to_the_end();
+        let result = run.until_done();
         if result.is_err() {
             // The first error is the one to report; stopping is all that can still be done.
             let _ = run.arm.stop();
@@ -167,7 +167,7 @@ struct Run<'a, 'e> {
 }
 
 impl Run<'_, '_> {
-    fn to_the_end(&mut self) -> Result<Outcome, AgentError> {
+    fn until_done(&mut self) -> Result<Outcome, AgentError> {
         self.joints = self.arm.joints()?;
         self.arm.set_gripper(Gripper::Open)?;
         let mut phase = Phase::Search;

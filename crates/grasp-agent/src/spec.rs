@@ -234,7 +234,8 @@ mod tests {
         assert!(moves[40].iter().all(|d| d.abs() < 1e-12));
         assert!((moves[41][2] - 0.5).abs() < 1e-9 && moves[41][1].abs() < 1e-12);
         for (i, a) in moves.iter().enumerate() {
-            assert!(moves[..i].iter().all(|b| a != b), "action {i} repeats");
+            let same = |b: &[f64; 6]| a.iter().zip(b).all(|(p, q)| (p - q).abs() < 1e-9);
+            assert!(!moves[..i].iter().any(same), "action {i} repeats");
         }
     }
 }
