@@ -41,9 +41,9 @@ impl Workspace {
             .map(|pan| Joints([pan, self.search_elbow.0, self.search_elbow.1, 0.0, jt5, 0.0]))
     }
 
-    /// A ball somewhere in the workspace: distance, azimuth and height uniform and independent.
+    /// A ball somewhere in the workspace, uniform in volume.
     pub fn sample_ball<R: Rng + ?Sized>(&self, rng: &mut R) -> Ball {
-        let rho = rng.random_range(self.rho.0..=self.rho.1);
+        let rho = rng.random_range(self.rho.0.powi(2)..=self.rho.1.powi(2)).sqrt();
         let azimuth = rng.random_range(self.azimuth.0..=self.azimuth.1);
         let z = rng.random_range(self.height.0..=self.height.1);
         Ball::at(rho * azimuth.cos(), rho * azimuth.sin(), z)
