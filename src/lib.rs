@@ -1,1 +1,3 @@
 //! puma-grasp
+mod training;
+pub use training::*;

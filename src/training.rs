@@ -1,17 +1,17 @@
 //! From samples of the cell to two learned behaviours: the paper's "first learned in a simulated environment".
 
-use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Percept, exploring_start};
-use pipeline_sim::{CentreModel, FitError, MoveSamples, Quality, ReachForm, ReachModel};
+use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Percept};
+use pipeline_sim::{CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample};
 use puma_val2::{Joint, JointDelta};
 use qtable::{Progress, QTable, TrainConfig, TrainReport, train};
-use rand::Rng;
+use rand::{Rng, RngExt};
 
 /// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted to samples.
 #[derive(Clone, Debug)]
 pub struct Simulator {
     centre: CentreModel,
     reach: ReachModel,
-    elbow_range: (f64, f64),
+    starts: Vec<Percept>,
 }
 
 /// Elbow angles at which one interval of theta 3 ends and the next begins, in degrees of `JT3`.
@@ -20,16 +20,22 @@ const ELBOW_EDGES: [f64; 2] = [175.0, 190.0];
 /// Working range of `JT3`, degrees: a move beyond it is refused, and nothing changes.
 const ELBOW_RANGE: (f64, f64) = (120.0, 215.0);
 
+/// `JT3` where theta 3 is zero, degrees.
+const THETA3_ZERO: f64 = 170.0;
+
 impl Simulator {
-    /// Fits the simulator to `samples` by least squares.
+    /// Fits the simulator to samples of the cell by least squares.
     ///
     /// # Errors
     /// Too few samples, or samples that do not determine the model.
-    pub fn fit(samples: &MoveSamples, form: ReachForm) -> Result<Self, FitError> {
+    pub fn fit(centring: &[CentreSample], reaching: &[ReachSample], form: ReachForm) -> Result<Self, FitError> {
         Ok(Self {
-            centre: CentreModel::fit(&samples.centre)?,
-            reach: ReachModel::fit(&samples.reach, form, &ELBOW_EDGES)?,
-            elbow_range: ELBOW_RANGE,
+            centre: CentreModel::fit(centring)?,
+            reach: ReachModel::fit(reaching, form, &ELBOW_EDGES)?,
+            starts: reaching
+                .iter()
+                .map(|sample| Percept { features: sample.before, theta3: sample.jt3_degrees - THETA3_ZERO })
+                .collect(),
         })
     }
 
@@ -40,11 +46,16 @@ impl Simulator {
         all
     }
 
+    /// A start for an episode: what one of the samples began with. All of them were in view and within reach.
+    pub fn start(&self, rng: &mut dyn Rng) -> Percept {
+        self.starts[rng.random_range(0..self.starts.len())]
+    }
+
     /// What the camera shows after the move, `None` when the ball is out of view.
     pub fn predict(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let [d1, d2, d3, ..] = delta.degrees();
-        let elbow = percept.theta3 + 170.0;
-        if !(self.elbow_range.0..=self.elbow_range.1).contains(&(elbow + d3)) {
+        let elbow = percept.theta3 + THETA3_ZERO;
+        if !(ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&(elbow + d3)) {
             return Some(*percept);
         }
         let mut features = percept.features;
@@ -82,7 +93,7 @@ pub fn learn(
     let config = TrainConfig::paper(actions);
     let mut table = QTable::new(spec.states(), spec.actions())?;
     let simulate = |percept: &Percept, delta: &JointDelta| simulator.predict(percept, delta);
-    let mut task = BehaviourTask::new(&spec, config.gamma, simulate, exploring_start);
+    let mut task = BehaviourTask::new(&spec, config.gamma, simulate, |rng: &mut dyn Rng| simulator.start(rng));
     let report = train(&mut task, &mut table, &config, rng, on_progress)?;
     Ok(Lesson { behaviour: Behaviour::new(spec, table)?, report })
 }

@@ -76,7 +76,7 @@ impl Agent {
     /// The camera or the arm failing. The arm is told to stop before the error is returned.
     pub fn run(
         &self,
-        eye: &mut Eye<'_>,
+        eye: &mut dyn Eye,
         arm: &mut dyn Manipulator,
         proximity: &mut dyn ProximitySensor,
         observe: &mut dyn FnMut(&Event<'_>),
@@ -152,11 +152,11 @@ impl<'a> Memory<'a> {
 }
 
 /// A run under way.
-struct Run<'a, 'e> {
+struct Run<'a> {
     config: &'a AgentConfig,
     centering: Memory<'a>,
     approaching: Memory<'a>,
-    eye: &'a mut Eye<'e>,
+    eye: &'a mut dyn Eye,
     arm: &'a mut dyn Manipulator,
     proximity: &'a mut dyn ProximitySensor,
     observe: &'a mut dyn FnMut(&Event<'_>),
@@ -166,7 +166,7 @@ struct Run<'a, 'e> {
     last_seen: Option<Sighting>,
 }
 
-impl Run<'_, '_> {
+impl Run<'_> {
     fn until_done(&mut self) -> Result<Outcome, AgentError> {
         self.joints = self.arm.joints()?;
         self.arm.set_gripper(Gripper::Open)?;
@@ -219,8 +219,10 @@ impl Run<'_, '_> {
         }
         let (config, from) = (self.config, self.joints);
         let admitted = |delta: JointDelta| config.admits(&(from + delta));
-        let turn = self.centering.choose(&percept, config.kappa, admitted);
-        let reach = self.approaching.choose(&percept, config.kappa, admitted);
+        let turn = self.centering.choose(&percept, config.centering_kappa, admitted);
+        let reach = self
+            .approaching
+            .choose(&percept, config.approaching_kappa, admitted);
         let delta = match (turn, reach) {
             (Ok(turn), Ok(reach)) => JointDelta(std::array::from_fn(|i| turn.0[i] + reach.0[i])),
             (Err(reason), _) | (_, Err(reason)) => return Ok(Phase::End(Some(reason))),
@@ -299,10 +301,10 @@ impl Run<'_, '_> {
             let look = self.eye.look()?;
             if let Some(sighting) = look.ball {
                 self.last_seen = Some(sighting);
-                self.tell(EventKind::Seen(sighting), Some(&look.frame));
+                self.tell(EventKind::Seen(sighting), look.frame.as_ref());
                 return Ok(Some(sighting));
             }
-            self.tell(EventKind::NotSeen, Some(&look.frame));
+            self.tell(EventKind::NotSeen, look.frame.as_ref());
         }
         Ok(None)
     }

@@ -20,9 +20,11 @@ pub struct AgentConfig {
     /// The range that the controller keeps each joint in, radians (low, high), `JT1` first
     /// [-160..160, -150..-20, 120..215, -110..170, -100..100, -266..266 degrees].
     pub limits: [(f64, f64); 6],
-    /// What choosing an action again in the same state costs, in units of Q [20]; see
+    /// What choosing a centering action again in the same state costs, in units of Q [50]; see
     /// [`Behaviour::choose`](crate::Behaviour::choose). 0 is the plain greedy policy.
-    pub kappa: f64,
+    pub centering_kappa: f64,
+    /// The same for approaching [20].
+    pub approaching_kappa: f64,
     /// Moves after the first sighting before the run is given up [60].
     pub max_cycles: usize,
     /// Frames to look at from one pose before the ball counts as not in view [2]. Sampling can miss a circle once.
@@ -58,7 +60,8 @@ impl AgentConfig {
                 (-266.0, 266.0),
             ]
             .map(|(low, high)| (low.to_radians(), high.to_radians())),
-            kappa: 20.0,
+            centering_kappa: 50.0,
+            approaching_kappa: 20.0,
             max_cycles: 60,
             looks: 2,
         }
@@ -89,11 +92,15 @@ impl AgentConfig {
                 "there is no goal; give at least one interval".into(),
             ));
         }
-        if !self.kappa.is_finite() || self.kappa < 0.0 {
-            return Err(AgentError::Config(format!(
-                "kappa is {}; it must be finite and at least 0",
-                self.kappa
-            )));
+        for (name, kappa) in [
+            ("centering_kappa", self.centering_kappa),
+            ("approaching_kappa", self.approaching_kappa),
+        ] {
+            if !kappa.is_finite() || kappa < 0.0 {
+                return Err(AgentError::Config(format!(
+                    "{name} is {kappa}; it must be finite and at least 0"
+                )));
+            }
         }
         if self.looks == 0 {
             return Err(AgentError::Config(

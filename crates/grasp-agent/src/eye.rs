@@ -1,21 +1,23 @@
-//! The eye: a camera and a circle detector, from which the features of the ball come.
+//! The eye: where the features of the ball come from.
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{CircleDetector, Detection, Features, FrameError, FrameSource};
 
-/// A camera with a circle detector behind it.
-pub struct Eye<'a> {
-    source: &'a mut dyn FrameSource,
-    detector: &'a mut dyn CircleDetector,
-    found: Vec<Detection>,
+/// Looks for the ball from where the camera is now.
+pub trait Eye {
+    /// One look.
+    ///
+    /// # Errors
+    /// Whatever kept the camera from delivering a frame.
+    fn look(&mut self) -> Result<Look, FrameError>;
 }
 
 /// What one look brought.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Look {
-    /// The frame that was looked at.
-    pub frame: GrayImage,
-    /// The ball, if it was found: the best circle whose centre lies in the frame.
+    /// The frame that was looked at; `None` from an eye that needs none.
+    pub frame: Option<GrayImage>,
+    /// The ball, if it was found.
     pub ball: Option<Sighting>,
 }
 
@@ -28,8 +30,17 @@ pub struct Sighting {
     pub features: Features,
 }
 
-impl<'a> Eye<'a> {
+/// A camera with a circle detector behind it.
+pub struct CameraEye<'a> {
+    source: &'a mut dyn FrameSource,
+    detector: &'a mut dyn CircleDetector,
+    found: Vec<Detection>,
+}
+
+impl<'a> CameraEye<'a> {
     /// An eye that takes frames from `source` and finds circles with `detector`.
+    ///
+    /// The ball is the best circle whose centre lies in the frame.
     pub fn new(source: &'a mut dyn FrameSource, detector: &'a mut dyn CircleDetector) -> Self {
         Self {
             source,
@@ -37,29 +48,31 @@ impl<'a> Eye<'a> {
             found: Vec::new(),
         }
     }
+}
 
-    /// Grabs a frame and looks for the ball in it.
-    ///
-    /// # Errors
-    /// Whatever kept the source from delivering a frame.
-    pub fn look(&mut self) -> Result<Look, FrameError> {
+impl Eye for CameraEye<'_> {
+    fn look(&mut self) -> Result<Look, FrameError> {
         let frame = self.source.grab()?;
         self.detector.detect_into(&frame, &mut self.found);
+        let height = Features::WIDTH * f64::from(frame.height()) / f64::from(frame.width());
         let ball = self.found.iter().find_map(|detection| {
             let features = Features::from_circle(&detection.circle, frame.width());
-            let inside = (0.0..=Features::WIDTH).contains(&features.x)
-                && (0.0..=Features::HEIGHT).contains(&features.y);
+            let inside =
+                (0.0..=Features::WIDTH).contains(&features.x) && (0.0..=height).contains(&features.y);
             (inside && features.r.is_finite()).then_some(Sighting {
                 detection: *detection,
                 features,
             })
         });
-        Ok(Look { frame, ball })
+        Ok(Look {
+            frame: Some(frame),
+            ball,
+        })
     }
 }
 
-impl std::fmt::Debug for Eye<'_> {
+impl std::fmt::Debug for CameraEye<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Eye").finish_non_exhaustive()
+        f.debug_struct("CameraEye").finish_non_exhaustive()
     }
 }

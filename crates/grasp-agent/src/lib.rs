@@ -8,7 +8,7 @@
 //! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. The paper's two are presets.
 //! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which [`qtable`] learns it.
 //! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked what to do.
-//! * An [`Agent`] runs both on an [`Eye`] (camera and circle detector) and a [`Manipulator`](puma_val2::Manipulator), and tells
+//! * An [`Agent`] runs both on an [`Eye`] ([`CameraEye`]: camera and circle detector) and a [`Manipulator`](puma_val2::Manipulator), and tells
 //!   every [`Event`] as it happens.
 //!
 //! The crate knows no simulator, no renderer and no particular detector, arm or camera: they meet it through the traits of
@@ -19,9 +19,10 @@
 //! Here the "simulator" is one line: a degree of the first joint moves the ball by four units.
 //!
 //! ```
-//! use grasp_agent::{Behaviour, BehaviourSpec, BehaviourTask, Percept, exploring_start};
+//! use grasp_agent::{Behaviour, BehaviourSpec, BehaviourTask, Percept};
+//! use hough_heuristic::Features;
 //! use puma_val2::Joint;
-//! use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+//! use qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 //! use qtable::{QTable, Schedule, TrainConfig, train};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -32,7 +33,11 @@
 //!     (0.0..192.0).contains(&next.features.x).then_some(next)
 //! };
 //! let gamma = 0.9;
-//! let mut task = BehaviourTask::new(&spec, gamma, simulate, exploring_start);
+//! let start = |rng: &mut dyn Rng| Percept {
+//!     features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
+//!     theta3: 0.0,
+//! };
+//! let mut task = BehaviourTask::new(&spec, gamma, simulate, start);
 //! let mut table = QTable::new(spec.states(), spec.actions())?;
 //! let config = TrainConfig {
 //!     gamma,
@@ -67,11 +72,11 @@ pub use behaviour::{Behaviour, Episode};
 pub use config::AgentConfig;
 pub use error::{AgentError, BehaviourError};
 pub use event::{Event, EventKind, GaveUp};
-pub use eye::{Eye, Look, Sighting};
+pub use eye::{CameraEye, Eye, Look, Sighting};
 pub use percept::{Input, Percept, theta3};
 pub use reward::{Reward, RewardTerm};
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
-pub use task::{BehaviourTask, exploring_start};
+pub use task::BehaviourTask;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

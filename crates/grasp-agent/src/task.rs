@@ -3,7 +3,7 @@
 use hough_heuristic::Features;
 use puma_val2::JointDelta;
 use qtable::{Action, Environment, State, Status, Step};
-use rand::{Rng, RngExt};
+use rand::Rng;
 
 use crate::{BehaviourSpec, Percept};
 
@@ -110,19 +110,5 @@ where
                 status: Status::Continuing,
             }
         }
-    }
-}
-
-/// Exploring starts: anything that the camera may show from any elbow angle.
-///
-/// x uniform in 4..188, y uniform in 4..140, r log-uniform in 6..60 feature units, theta 3 uniform in -20..44 degrees.
-pub fn exploring_start(rng: &mut dyn Rng) -> Percept {
-    Percept {
-        features: Features {
-            x: rng.random_range(4.0..188.0),
-            y: rng.random_range(4.0..140.0),
-            r: rng.random_range(6.0_f64.ln()..60.0_f64.ln()).exp(),
-        },
-        theta3: rng.random_range(-20.0..44.0),
     }
 }
