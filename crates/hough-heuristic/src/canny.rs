@@ -13,9 +13,9 @@ use crate::{ConfigError, EdgeDetector, EdgeMap};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CannyConfig {
-    /// A pixel this strong continues an edge [30; 0 < low <= high]. Lower: longer edges, and more of them from texture.
+    /// A pixel this strong continues an edge (default 30; 0 < low <= high). Lower: longer edges, and more of them from texture.
     pub low: f32,
-    /// A pixel this strong starts an edge [70; low..=1140]. Lower: fainter balls are seen, and more clutter.
+    /// A pixel this strong starts an edge (default 70; low..=1140). Lower: fainter balls are seen, and more clutter.
     pub high: f32,
 }
 

@@ -33,32 +33,32 @@ pub enum Sampling {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HeuristicConfig {
-    /// The offset θ that β must exceed [0.65; 0..1]. Lower: balls more hidden are found, and more circles that are none.
+    /// The offset θ that β must exceed (default 0.65; 0..1). Lower: balls more hidden are found, and more circles that are none.
     pub theta: f64,
-    /// How many triples are drawn at most per frame [60000; at least 1]. Bounds the time; more finds fainter and smaller
+    /// How many triples are drawn at most per frame (default 60000; at least 1). Bounds the time; more finds fainter and smaller
     /// balls amid more clutter.
     pub iterations: u32,
-    /// The smallest radius, pixels [15; 1..=max_radius]. Below about 15 px, with a tolerance of 1,
+    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1,
     /// corners and texture begin to pass for circles..
     pub min_radius: f64,
-    /// The largest radius, pixels [300; at least min_radius].
+    /// The largest radius, pixels (default 300; at least min_radius).
     pub max_radius: f64,
-    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels [1; 0..=8]. Larger: rounder than round
+    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than round
     /// is forgiven, and texture matches more by chance.
     pub tolerance: f64,
-    /// How many circles to look for [1; at least 1]. The search ends with the last one found; if there are fewer in the
+    /// How many circles to look for (default 1; at least 1). The search ends with the last one found; if there are fewer in the
     /// frame it uses all of `iterations`.
     pub max_circles: usize,
-    /// The least distance between the centres of two circles found, pixels [8; at least 0]. 0 allows concentric ones.
+    /// The least distance between the centres of two circles found, pixels (default 8; at least 0). 0 allows concentric ones.
     pub min_distance: f64,
-    /// Where the centre may lie [None: anywhere, even outside the frame].
+    /// Where the centre may lie (default None: anywhere, even outside the frame).
     pub region: Option<Region>,
-    /// Whether to fit an accepted circle to its edge pixels by least squares [true]. Beyond the paper: three whole pixels
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). Beyond the paper: three whole pixels
     /// give the centre to about a pixel, the fit to a tenth or two.
     pub refine: bool,
-    /// Where draws come from [`Sampling::Near`].
+    /// Where draws come from (default [`Sampling::Near`]).
     pub sampling: Sampling,
-    /// The seed of the draws [1]. They begin anew with every frame, so that what is found depends on the configuration and
+    /// The seed of the draws (default 1). They begin anew with every frame, so that what is found depends on the configuration and
     /// the frame alone.
     pub seed: u64,
 }
