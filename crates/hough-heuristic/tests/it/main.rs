@@ -1,0 +1,6 @@
+//! Integration tests, one module a theme.
+
+#[path = "../../scenes/scenes.rs"]
+mod scenes;
+
+mod heuristic;
