@@ -12,8 +12,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
+use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Canny, CannyConfig, CircleDetector, Detection, FrameError, FrameSource, Heuristic, HeuristicConfig, ImageFiles,
+    Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic, HeuristicConfig, ImageFiles,
 };
 
 use files::{writable_folder, write_png, write_whole};
@@ -92,57 +93,101 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     if let Some(folder) = &options.overlay {
         writable_folder(folder)?;
     }
-    let mut files = ImageFiles::new(&options.paths);
-    let mut csv = String::from("file,cx,cy,r,score\n");
-    let mut times = String::from("file,cpu_us\n");
-    let mut overlays = HashSet::new();
+    let mut results = Results::default();
     let mut all_read = true;
-    let mut found = Vec::new();
-    loop {
-        let frame = match files.grab() {
-            Ok(frame) => frame,
-            Err(FrameError::End) => break,
+    for path in &options.paths {
+        let mut files = match ImageFiles::open(path) {
+            Ok(files) => files,
             Err(error) => {
                 eprintln!("error: {error}");
                 all_read = false;
                 continue;
             }
         };
-        let path = files.path().unwrap_or(Path::new("")).to_owned();
-        let name = path.display().to_string();
-        if frame.width() == 0 || frame.height() == 0 {
-            eprintln!("error: {name}: the image is {}x{} pixels", frame.width(), frame.height());
-            all_read = false;
-            continue;
+        loop {
+            match files.grab() {
+                Ok(frame) if frame.is_empty() => {
+                    eprintln!(
+                        "error: {}: the image has no pixels",
+                        files.last_path().unwrap_or(path).display()
+                    );
+                    all_read = false;
+                }
+                Ok(frame) => {
+                    results.add(files.last_path().unwrap_or(path), &frame, &mut *detector, options)?
+                }
+                Err(FrameError::End) => break,
+                Err(error) => {
+                    eprintln!("error: {error}");
+                    all_read = false;
+                }
+            }
         }
+    }
+    results.write(options)?;
+    Ok(all_read)
+}
+
+/// What has been found so far.
+#[derive(Default)]
+struct Results {
+    csv: String,
+    times: String,
+    overlays: HashSet<String>,
+    found: Vec<Detection>,
+}
+
+impl Results {
+    /// Finds the circles of one frame.
+    fn add(
+        &mut self,
+        path: &Path,
+        frame: &GrayImage,
+        detector: &mut dyn CircleDetector,
+        options: &Options,
+    ) -> Result<(), Box<dyn Error>> {
         let mut least = Duration::MAX;
         for _ in 0..options.repeat {
             let before = cpu_time();
-            detector.detect_into(&frame, &mut found);
+            detector.detect_into(frame, &mut self.found);
             least = least.min(cpu_time().saturating_sub(before));
         }
-        for Detection { circle, score } in &found {
-            writeln!(csv, "{},{:.3},{:.3},{:.3},{score:.4}", quoted(&name), circle.x, circle.y, circle.radius)?;
+        let name = path.display().to_string();
+        for Detection { circle, score } in &self.found {
+            let Circle { x, y, radius } = circle;
+            writeln!(self.csv, "{},{x:.3},{y:.3},{radius:.3},{score:.4}", quoted(&name))?;
         }
-        writeln!(times, "{},{:.1}", quoted(&name), least.as_secs_f64() * 1e6)?;
+        writeln!(self.times, "{},{:.1}", quoted(&name), least.as_secs_f64() * 1e6)?;
         if options.csv.is_none() {
-            print_table(&name, &found, least);
+            print_table(&name, &self.found, least);
         }
         if let Some(folder) = &options.overlay {
-            let mut picture = Overlay::new(&frame);
-            found.iter().for_each(|detection| picture.circle(&detection.circle));
-            write_png(&folder.join(overlay_name(&path, &mut overlays)), &picture.into_image())?;
+            let mut picture = Overlay::new(frame);
+            self.found
+                .iter()
+                .for_each(|detection| picture.circle(&detection.circle));
+            picture.caption(&format!("{} circles", self.found.len()));
+            write_png(
+                &folder.join(overlay_name(path, &mut self.overlays)),
+                &picture.into_image(),
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Writes the files that were asked for.
+    fn write(&self, options: &Options) -> Result<(), Box<dyn Error>> {
+        let csv = format!("file,cx,cy,r,score\n{}", self.csv);
+        match &options.csv {
+            Some(path) if path.as_os_str() == "-" => print!("{csv}"),
+            Some(path) => write_whole(path, csv.as_bytes())?,
+            None => {}
+        }
+        match &options.times {
+            Some(path) => write_whole(path, format!("file,cpu_us\n{}", self.times).as_bytes()),
+            None => Ok(()),
         }
     }
-    match &options.csv {
-        Some(path) if path.as_os_str() == "-" => print!("{csv}"),
-        Some(path) => write_whole(path, csv.as_bytes())?,
-        None => {}
-    }
-    if let Some(path) = &options.times {
-        write_whole(path, times.as_bytes())?;
-    }
-    Ok(all_read)
 }
 
 fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
@@ -155,26 +200,39 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
                 seed: options.seed,
                 ..HeuristicConfig::default()
             };
-            Box::new(Heuristic::new(config, Box::new(Canny::new(CannyConfig::default())?))?)
+            Box::new(Heuristic::with_canny(config)?)
         }
     })
 }
 
 fn print_table(name: &str, found: &[Detection], cpu: Duration) {
-    println!("{name}: {} circles, {:.1} ms", found.len(), cpu.as_secs_f64() * 1e3);
+    println!(
+        "{name}: {} circles, {:.1} ms",
+        found.len(),
+        cpu.as_secs_f64() * 1e3
+    );
     for Detection { circle, score } in found {
-        println!("  x {:8.2}  y {:8.2}  r {:7.2}  score {score:.3}", circle.x, circle.y, circle.radius);
+        println!(
+            "  x {:8.2}  y {:8.2}  r {:7.2}  score {score:.3}",
+            circle.x, circle.y, circle.radius
+        );
     }
 }
 
 /// A CSV field: in quotes where the name has a comma, a quote or a line break in it.
 fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
 }
 
 /// A file name for the picture of `path` that no picture of this run has yet.
 fn overlay_name(path: &Path, taken: &mut HashSet<String>) -> String {
-    let stem = path.file_stem().map_or("image".into(), |stem| stem.to_string_lossy().into_owned());
+    let stem = path
+        .file_stem()
+        .map_or("image".into(), |stem| stem.to_string_lossy().into_owned());
     let mut name = format!("{stem}.png");
     let mut number = 2;
     while !taken.insert(name.clone()) {

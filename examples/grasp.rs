@@ -196,7 +196,7 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
                 seed: options.seed,
                 ..HeuristicConfig::default()
             };
-            Box::new(Heuristic::new(config, Box::new(Canny::new(CannyConfig::default())?))?)
+            Box::new(Heuristic::with_canny(config)?)
         }
     })
 }

@@ -28,13 +28,20 @@ impl Simulator {
     ///
     /// # Errors
     /// Too few samples, or samples that do not determine the model.
-    pub fn fit(centring: &[CentreSample], reaching: &[ReachSample], form: ReachForm) -> Result<Self, FitError> {
+    pub fn fit(
+        centring: &[CentreSample],
+        reaching: &[ReachSample],
+        form: ReachForm,
+    ) -> Result<Self, FitError> {
         Ok(Self {
             centre: CentreModel::fit(centring)?,
             reach: ReachModel::fit(reaching, form, &ELBOW_EDGES)?,
             starts: reaching
                 .iter()
-                .map(|sample| Percept { features: sample.before, theta3: sample.jt3_degrees - THETA3_ZERO })
+                .map(|sample| Percept {
+                    features: sample.before,
+                    theta3: sample.jt3_degrees - THETA3_ZERO,
+                })
                 .collect(),
         })
     }
@@ -65,7 +72,10 @@ impl Simulator {
         if d2 != 0.0 || d3 != 0.0 {
             features = self.reach.predict(&features, elbow, d2, d3)?;
         }
-        Some(Percept { features, theta3: percept.theta3 + d3 })
+        Some(Percept {
+            features,
+            theta3: percept.theta3 + d3,
+        })
     }
 }
 
@@ -93,9 +103,14 @@ pub fn learn(
     let config = TrainConfig::paper(actions);
     let mut table = QTable::new(spec.states(), spec.actions())?;
     let simulate = |percept: &Percept, delta: &JointDelta| simulator.predict(percept, delta);
-    let mut task = BehaviourTask::new(&spec, config.gamma, simulate, |rng: &mut dyn Rng| simulator.start(rng));
+    let mut task = BehaviourTask::new(&spec, config.gamma, simulate, |rng: &mut dyn Rng| {
+        simulator.start(rng)
+    });
     let report = train(&mut task, &mut table, &config, rng, on_progress)?;
-    Ok(Lesson { behaviour: Behaviour::new(spec, table)?, report })
+    Ok(Lesson {
+        behaviour: Behaviour::new(spec, table)?,
+        report,
+    })
 }
 
 /// Why a behaviour could not be learned.

@@ -7,7 +7,7 @@ use std::path::Path;
 use image::RgbImage;
 
 /// Makes the folder if need be, and makes sure that files can be written into it.
-pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
+pub(crate) fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
     let probe = folder.join(".writable.part");
     fs::create_dir_all(folder)
         .and_then(|()| fs::write(&probe, b""))
@@ -16,7 +16,7 @@ pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 /// Writes a file: first beside its place, then renamed into it.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(".part");
     let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
@@ -27,7 +27,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
 }
 
 /// Writes a picture as PNG.
-pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Box<dyn Error>> {
+pub(crate) fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Box<dyn Error>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png)?;
     write_whole(path, bytes.get_ref())

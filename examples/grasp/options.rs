@@ -9,60 +9,60 @@ use clap::{Parser, ValueEnum};
 /// Without options everything runs here: a controller emulator is started on a pseudo-terminal, opened like a serial line, and the
 /// camera's frames are rendered from the pose of the emulated arm.
 #[derive(Parser, Debug)]
-pub struct Options {
+pub(crate) struct Options {
     /// Folder for the results; made if need be, files of an earlier run in it are replaced
     #[arg(long, value_name = "DIR", default_value = "out/grasp")]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 
     /// Seed of everything random; the same seed gives the same run
     #[arg(long, value_name = "N", default_value_t = 2000)]
-    pub seed: u64,
+    pub(crate) seed: u64,
 
     /// How many balls to go for
     #[arg(long, value_name = "N", default_value_t = 20)]
-    pub runs: usize,
+    pub(crate) runs: usize,
 
     /// Serial device of a VAL II controller (or of an emulator), 9600 8N1, instead of starting one
     #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
-    pub port: Option<String>,
+    pub(crate) port: Option<String>,
 
     /// Socket of a VAL II controller behind a terminal server (or of an emulator), as HOST:PORT
     #[arg(long, value_name = "ADDR")]
-    pub tcp: Option<String>,
+    pub(crate) tcp: Option<String>,
 
     /// Folder with centering.policy and approaching.policy of an earlier run; skips training
     #[arg(long, value_name = "DIR")]
-    pub policy: Option<PathBuf>,
+    pub(crate) policy: Option<PathBuf>,
 
     /// How the circle is found
     #[arg(long, value_enum, default_value_t = DetectorName::Heuristic)]
-    pub detector: DetectorName,
+    pub(crate) detector: DetectorName,
 
     /// Reward while learning: the paper's formulas as printed do not teach the goal
     #[arg(long, value_enum, default_value_t = RewardName::Mended)]
-    pub reward: RewardName,
+    pub(crate) reward: RewardName,
 
     /// Form of the regression simulator
     #[arg(long, value_enum, default_value_t = FormName::Rigid22)]
-    pub simulator: FormName,
+    pub(crate) simulator: FormName,
 
     /// Let the emulated arm take the time that a real one would
     #[arg(long)]
-    pub realtime: bool,
+    pub(crate) realtime: bool,
 
     /// Print the final table only
     #[arg(long)]
-    pub quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum DetectorName {
+pub(crate) enum DetectorName {
     /// Three random edge pixels, belonging against a threshold (the paper's)
     Heuristic,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum RewardName {
+pub(crate) enum RewardName {
     /// Eq. 5 and 6 with denominators of at least 1 and an absorbing goal
     Mended,
     /// Eq. 5 and 6 as printed
@@ -70,7 +70,7 @@ pub enum RewardName {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum FormName {
+pub(crate) enum FormName {
     /// Changes of y and r, linear in the joint moves, per elbow interval (the paper's)
     Linear,
     /// Changes of 1/r and y/r, 8 terms

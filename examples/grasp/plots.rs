@@ -15,7 +15,7 @@ const GOAL: RGBColor = RGBColor(120, 190, 120);
 type Drawn = Result<String, Box<dyn Error>>;
 
 /// Share of episodes that reached the goal and mean size of the error of Q, over the actions made so far.
-pub fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
+pub(crate) fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, (1000, 360 * curves.len() as u32)).into_drawing_area();
@@ -52,7 +52,7 @@ pub fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
 }
 
 /// x, y and r at every step of every run, with the goal interval shaded; three runs from far, middle and near stand out.
-pub fn features_per_step(runs: &[RunRecord]) -> Drawn {
+pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
     let mut tracks: Vec<Vec<(usize, Features)>> = runs.iter().map(RunRecord::track).filter(|t| !t.is_empty()).collect();
     tracks.sort_by(|a, b| a[0].1.r.total_cmp(&b[0].1.r));
     let steps = tracks.iter().flat_map(|t| t.last()).map(|(step, _)| *step).max().unwrap_or(1).max(1) as f64;

@@ -9,39 +9,39 @@ use puma_val2::{JointDelta, Joints};
 use crate::overlay::Overlay;
 
 /// Everything that was recorded of one run.
-pub struct RunRecord {
+pub(crate) struct RunRecord {
     /// The ball's centre, millimetres in the arm's world frame.
-    pub ball_mm: [f64; 3],
-    pub rows: Vec<Row>,
-    pub outcome: Option<Outcome>,
-    pub grasped: bool,
+    pub(crate) ball_mm: [f64; 3],
+    pub(crate) rows: Vec<Row>,
+    pub(crate) outcome: Option<Outcome>,
+    pub(crate) grasped: bool,
     /// From the gripper to the ball's centre when the jaws closed, millimetres.
-    pub miss_mm: Option<f64>,
+    pub(crate) miss_mm: Option<f64>,
 }
 
 /// One event.
-pub struct Row {
-    pub step: usize,
-    pub event: &'static str,
-    pub features: Option<Features>,
-    pub joints: Joints,
-    pub action: Option<JointDelta>,
+pub(crate) struct Row {
+    pub(crate) step: usize,
+    pub(crate) event: &'static str,
+    pub(crate) features: Option<Features>,
+    pub(crate) joints: Joints,
+    pub(crate) action: Option<JointDelta>,
 }
 
 /// A frame with what was found in it drawn in, at half size.
-pub struct Picture {
-    pub run: usize,
-    pub number: usize,
-    pub image: RgbImage,
+pub(crate) struct Picture {
+    pub(crate) run: usize,
+    pub(crate) number: usize,
+    pub(crate) image: RgbImage,
 }
 
 impl RunRecord {
-    pub fn new(ball_mm: [f64; 3]) -> Self {
+    pub(crate) fn new(ball_mm: [f64; 3]) -> Self {
         Self { ball_mm, rows: Vec::new(), outcome: None, grasped: false, miss_mm: None }
     }
 
     /// Takes down an event; returns the picture of its frame, if it has one.
-    pub fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
+    pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
         let (features, action) = match event.kind {
             EventKind::Seen(sighting) => (Some(sighting.features), None),
             EventKind::Moved(delta) => (None, Some(delta)),
@@ -64,7 +64,7 @@ impl RunRecord {
     }
 
     /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.
-    pub fn track(&self) -> Vec<(usize, Features)> {
+    pub(crate) fn track(&self) -> Vec<(usize, Features)> {
         let mut track: Vec<(usize, Features)> = Vec::new();
         for row in &self.rows {
             if let Some(features) = row.features {

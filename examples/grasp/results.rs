@@ -10,45 +10,45 @@ use crate::record::{Picture, RunRecord};
 
 /// What `summary.json` holds.
 #[derive(Serialize)]
-pub struct Summary {
-    pub seed: u64,
-    pub training: TrainingSummary,
-    pub runs: Vec<RunSummary>,
-    pub success_rate: f64,
-    pub mean_cycles: Option<f64>,
+pub(crate) struct Summary {
+    pub(crate) seed: u64,
+    pub(crate) training: TrainingSummary,
+    pub(crate) runs: Vec<RunSummary>,
+    pub(crate) success_rate: f64,
+    pub(crate) mean_cycles: Option<f64>,
 }
 
 #[derive(Serialize)]
-pub struct TrainingSummary {
+pub(crate) struct TrainingSummary {
     /// False when the policies were read from files.
-    pub trained: bool,
-    pub actions: u64,
-    pub seconds: f64,
+    pub(crate) trained: bool,
+    pub(crate) actions: u64,
+    pub(crate) seconds: f64,
     /// Name of the output, e.g. `centering dx`, and its R².
-    pub r2: std::collections::BTreeMap<String, f64>,
+    pub(crate) r2: std::collections::BTreeMap<String, f64>,
 }
 
 #[derive(Serialize)]
-pub struct RunSummary {
-    pub ball_mm: [f64; 3],
-    pub grasped: bool,
-    pub cycles: usize,
-    pub losses: usize,
+pub(crate) struct RunSummary {
+    pub(crate) ball_mm: [f64; 3],
+    pub(crate) grasped: bool,
+    pub(crate) cycles: usize,
+    pub(crate) losses: usize,
     #[serde(rename = "final")]
-    pub last_seen: Option<FinalFeatures>,
-    pub miss_mm: Option<f64>,
-    pub reason: Option<String>,
+    pub(crate) last_seen: Option<FinalFeatures>,
+    pub(crate) miss_mm: Option<f64>,
+    pub(crate) reason: Option<String>,
 }
 
 #[derive(Serialize)]
-pub struct FinalFeatures {
-    pub x: f64,
-    pub y: f64,
-    pub r: f64,
+pub(crate) struct FinalFeatures {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) r: f64,
 }
 
 impl Summary {
-    pub fn new(seed: u64, training: TrainingSummary, records: &[RunRecord]) -> Self {
+    pub(crate) fn new(seed: u64, training: TrainingSummary, records: &[RunRecord]) -> Self {
         let runs: Vec<RunSummary> = records.iter().map(RunSummary::new).collect();
         let grasped: Vec<&RunSummary> = runs.iter().filter(|run| run.grasped).collect();
         let share = |part: usize, whole: usize| if whole == 0 { 0.0 } else { part as f64 / whole as f64 };
@@ -63,7 +63,7 @@ impl Summary {
     }
 
     /// The table that ends the program.
-    pub fn table(&self) -> String {
+    pub(crate) fn table(&self) -> String {
         let mut table = String::from(
             "\n run   ball x,y,z (mm)          cycles  lost   final x, y, r            miss (mm)  result\n",
         );
@@ -119,7 +119,7 @@ impl RunSummary {
 }
 
 /// `features.csv`: a row an event.
-pub fn features_csv(records: &[RunRecord]) -> String {
+pub(crate) fn features_csv(records: &[RunRecord]) -> String {
     let mut csv = String::from("run,step,x,y,r,jt1,jt2,jt3,jt4,jt5,jt6,d1,d2,d3,event\n");
     for (run, record) in records.iter().enumerate() {
         for row in &record.rows {
@@ -136,7 +136,7 @@ pub fn features_csv(records: &[RunRecord]) -> String {
 }
 
 /// Every picture of every run on one sheet, in rows of `columns`; a run begins a new row.
-pub fn contact_sheet(pictures: &[Picture], columns: u32) -> RgbImage {
+pub(crate) fn contact_sheet(pictures: &[Picture], columns: u32) -> RgbImage {
     const TILE: (u32, u32) = (192, 144);
     let mut places = Vec::new();
     let (mut row, mut column) = (0, 0);

@@ -10,15 +10,15 @@ use hough_heuristic::Circle;
 use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 
 /// A frame to draw on.
-pub struct Overlay(RgbImage);
+pub(crate) struct Overlay(RgbImage);
 
 impl Overlay {
-    pub fn new(frame: &GrayImage) -> Self {
+    pub(crate) fn new(frame: &GrayImage) -> Self {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
     }
 
     /// A found circle: its outline and its centre. Parts outside the frame are cut off.
-    pub fn circle(&mut self, circle: &Circle) {
+    pub(crate) fn circle(&mut self, circle: &Circle) {
         let green = Rgb888::new(60, 255, 60);
         let centre = Point::new(circle.x.round() as i32, circle.y.round() as i32);
         let diameter = (2.0 * circle.radius).round().max(1.0) as u32;
@@ -33,14 +33,16 @@ impl Overlay {
     }
 
     /// Words on a dark bar at the top of the frame.
-    pub fn caption(&mut self, words: &str) {
+    pub(crate) fn caption(&mut self, words: &str) {
         let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), 24));
-        let Ok(()) = bar.into_styled(PrimitiveStyle::with_fill(Rgb888::new(20, 20, 40))).draw(self);
+        let Ok(()) = bar
+            .into_styled(PrimitiveStyle::with_fill(Rgb888::new(20, 20, 40)))
+            .draw(self);
         let style = MonoTextStyle::new(&FONT_10X20, Rgb888::YELLOW);
         let Ok(_) = Text::with_baseline(words, Point::new(6, 2), style, Baseline::Top).draw(self);
     }
 
-    pub fn into_image(self) -> RgbImage {
+    pub(crate) fn into_image(self) -> RgbImage {
         self.0
     }
 }
