@@ -2,8 +2,8 @@
 
 use crate::{Action, ScheduleError, State};
 
-/// An error of tables, policies, learners and training. Whatever failed left the table as it was before the
-/// failing step: a table never holds a value that is not finite.
+/// An error of tables, models, policies, learners and training. Whatever failed: a table never holds a value that
+/// is not finite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -120,6 +120,39 @@ pub enum Error {
         high: f64,
         /// The range in words.
         expected: &'static str,
+    },
+    /// A learner that learns from the next action was not given one: its policy must choose in the observed state
+    /// before the update.
+    #[error("the learner needs the action chosen next in state {}, but none was given", state.0)]
+    NextActionMissing {
+        /// The observed state.
+        state: State,
+    },
+    /// A learner that needs the policy's probabilities met a policy that cannot tell them.
+    #[error("the learner needs the probabilities of the policy, which this policy cannot tell")]
+    NoProbabilities,
+    /// Probabilities of a model that are not a distribution.
+    #[error(
+        "the outcomes of action {} in state {} have probabilities that sum to {sum}: each must lie in 0..=1 and the \
+         sum be 1",
+        action.0,
+        state.0
+    )]
+    NotADistribution {
+        /// The state.
+        state: State,
+        /// The action.
+        action: Action,
+        /// Sum of the probabilities.
+        sum: f64,
+    },
+    /// A computation that did not settle. Typical cause: γ = 1 with a policy that never reaches an end.
+    #[error("no convergence after {sweeps} sweeps: the last one still changed a value by {change}")]
+    NotConverged {
+        /// Sweeps done.
+        sweeps: u64,
+        /// Largest change of the last one.
+        change: f64,
     },
     /// A schedule that is not valid in itself.
     #[error(transparent)]

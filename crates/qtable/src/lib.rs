@@ -43,20 +43,25 @@
 //! # Ok::<(), qtable::Error>(())
 //! ```
 
+mod course;
 mod curve;
 mod discretise;
 mod elementary;
 mod environment;
 mod error;
+mod evaluate;
 mod index;
+mod learner;
 mod mask;
+mod model;
 #[cfg(feature = "serde")]
 mod persist;
 mod policy;
-mod q_learning;
 mod schedule;
 mod table;
+pub mod toys;
 mod train;
+mod training;
 mod validated;
 
 pub use rand;
@@ -65,12 +70,18 @@ pub use curve::Record;
 pub use discretise::{DiscretiseError, Intervals, Product};
 pub use environment::{Environment, Status, Step};
 pub use error::Error;
+pub use evaluate::{Evaluation, evaluate};
 pub use index::{Action, State};
+pub use learner::{
+    DoubleQLearning, DynaQ, ExpectedSarsa, Experience, Learner, NStepQ, PrioritizedSweeping, QLambda,
+    QLearning, Sarsa, SarsaLambda,
+};
 pub use mask::ActionMask;
+pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, Outcome, Plan};
 #[cfg(feature = "serde")]
 pub use persist::{PersistError, Problem, decode, encode, load, save};
-pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy};
-pub use q_learning::QLearning;
+pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
 pub use schedule::{Schedule, ScheduleError};
 pub use table::{QTable, Value};
 pub use train::{Progress, TrainConfig, TrainReport, train};
+pub use training::{Training, Until};

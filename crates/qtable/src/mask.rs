@@ -43,11 +43,16 @@ impl ActionMask {
     ///
     /// # Errors
     /// As [`ActionMask::new`].
-    pub fn of(environment: &dyn Environment) -> Result<Option<Self>, Error> {
+    pub fn of<E: Environment + ?Sized>(environment: &E) -> Result<Option<Self>, Error> {
         let mask = Self::new(environment.states(), environment.actions(), |state, action| {
             environment.allows(state, action)
         })?;
-        Ok(mask.allowed.contains(&false).then_some(mask))
+        Ok(mask.restricts().then_some(mask))
+    }
+
+    /// Whether any action of any state is forbidden.
+    pub fn restricts(&self) -> bool {
+        self.allowed.contains(&false)
     }
 
     /// Number of states.

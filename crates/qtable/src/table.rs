@@ -145,15 +145,7 @@ impl<V: Value> QTable<V> {
     #[inline]
     pub fn set(&mut self, state: State, action: Action, value: V) -> Result<(), Error> {
         self.check(state, action)?;
-        if !value.to_f64().is_finite() {
-            return Err(Error::ValueNotFinite {
-                state,
-                action,
-                value: value.to_f64(),
-            });
-        }
-        self.write(state, action, value);
-        Ok(())
+        self.store(state, action, value.to_f64())
     }
 
     /// Counts a visit of a pair. The count stops at 4 294 967 295.
@@ -162,8 +154,7 @@ impl<V: Value> QTable<V> {
     /// A state or action out of range.
     pub fn visit(&mut self, state: State, action: Action) -> Result<(), Error> {
         self.check(state, action)?;
-        let count = &mut self.visits[state.0 * self.actions + action.0];
-        *count = count.saturating_add(1);
+        self.count(state, action);
         Ok(())
     }
 
@@ -295,9 +286,28 @@ impl<V: Value> QTable<V> {
         })
     }
 
-    /// Writes a finite value at a checked place and keeps the best action.
+    /// Counts a visit of a checked pair.
     #[inline]
-    pub(crate) fn write(&mut self, state: State, action: Action, value: V) {
+    pub(crate) fn count(&mut self, state: State, action: Action) {
+        let count = &mut self.visits[state.0 * self.actions + action.0];
+        *count = count.saturating_add(1);
+    }
+
+    /// The value as it would be stored, or an error if that is not finite.
+    #[inline]
+    pub(crate) fn check_value(&self, state: State, action: Action, value: f64) -> Result<V, Error> {
+        let stored = V::from_f64(value);
+        if stored.to_f64().is_finite() {
+            Ok(stored)
+        } else {
+            Err(Error::ValueNotFinite { state, action, value })
+        }
+    }
+
+    /// Writes a value at a checked place, if it is finite, and keeps the best action.
+    #[inline]
+    pub(crate) fn store(&mut self, state: State, action: Action, value: f64) -> Result<(), Error> {
+        let value = self.check_value(state, action, value)?;
         let index = state.0 * self.actions + action.0;
         let old = std::mem::replace(&mut self.values[index], value);
         let best = self.best(state);
@@ -311,6 +321,7 @@ impl<V: Value> QTable<V> {
                 self.best[state.0] = action.0 as u32;
             }
         }
+        Ok(())
     }
 
     fn find_best(&mut self, state: State) {

@@ -4,11 +4,8 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::curve::{Record, Tally};
-use crate::error::check_setting;
-use crate::{
-    ActionMask, Boltzmann, Environment, Error, Policy, QLearning, QTable, Schedule, State, Status, Value,
-};
+use crate::course::{Course, check_count, fit};
+use crate::{Boltzmann, Environment, Error, QLearning, QTable, Record, Schedule, Value};
 
 /// Settings of [`train`].
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +74,8 @@ pub struct TrainReport {
 /// # Errors
 /// A setting out of range, a table of the wrong shape, or a fault of the environment (state out of range, reward
 /// not finite). After the last, the table keeps what was learned before.
+///
+/// [`Training`](crate::Training) does the same with any learner and policy, in pieces that can be saved between.
 pub fn train<V: Value>(
     environment: &mut dyn Environment,
     table: &mut QTable<V>,
@@ -84,50 +83,27 @@ pub fn train<V: Value>(
     rng: &mut dyn Rng,
     on_progress: &mut dyn FnMut(&Progress),
 ) -> Result<TrainReport, Error> {
-    let positive = |name, value: u64| check_setting(name, value as f64, value > 0, "at least 1");
-    positive("actions", config.actions)?;
-    positive("episode_limit", config.episode_limit)?;
-    positive("record_every", config.record_every)?;
+    check_count("actions", config.actions)?;
+    let mut course = Course::new(config.episode_limit, config.record_every)?;
     let mut learner = QLearning::new(config.alpha.clone(), config.gamma)?;
     let mut policy = Boltzmann::new(config.temperature.clone())?;
-    table.check_shape("the environment", environment.states(), environment.actions())?;
-    if let Some(mask) = ActionMask::of(environment)? {
-        table.set_mask(Some(mask))?;
-    }
-
-    let mut report = TrainReport::default();
-    let mut tally = Tally::default();
-    let mut episode: Option<(State, u64, f64)> = None;
-    while report.actions < config.actions {
-        let (state, steps, sum) = match episode.take() {
-            Some(running) => running,
-            None => (environment.reset(rng), 0, 0.0),
-        };
-        table.check_state(state)?;
-        let action = policy.choose(table, state, rng);
-        let mut step = environment.step(action, rng);
-        let (steps, sum) = (steps + 1, sum + step.reward);
-        if step.status == Status::Continuing && steps >= config.episode_limit {
-            step.status = Status::Truncated;
-        }
-        let td_error = learner.update(table, state, action, &step)?;
-        report.actions += 1;
-        tally.add_action(step.reward, td_error);
-        if step.status == Status::Continuing {
-            episode = Some((step.observation, steps, sum));
-        } else {
-            report.episodes += 1;
-            tally.add_episode(steps, sum, environment.succeeded(&step));
-        }
-        if report.actions.is_multiple_of(config.record_every) || report.actions == config.actions {
-            let latest = std::mem::take(&mut tally).record(report.actions, report.episodes);
-            report.curve.push(latest);
+    fit(environment, table)?;
+    let mut curve = Vec::new();
+    while course.actions < config.actions {
+        let due = course.step(environment, table, &mut learner, &mut policy, rng)?;
+        let due = due.or_else(|| (course.actions == config.actions).then(|| course.record()));
+        if let Some(latest) = due {
+            curve.push(latest);
             on_progress(&Progress {
-                actions: report.actions,
+                actions: course.actions,
                 of: config.actions,
                 latest,
             });
         }
     }
-    Ok(report)
+    Ok(TrainReport {
+        actions: course.actions,
+        episodes: course.episodes,
+        curve,
+    })
 }
