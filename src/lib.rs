@@ -33,7 +33,9 @@
 //! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example `grasp`:
 //! `cargo run --release --example grasp`.
 
+mod plane;
 mod training;
+mod trial;
 
 pub use grasp_agent;
 pub use hough_heuristic;
@@ -41,7 +43,9 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
+pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_starts};
 pub use training::{LearnError, Lesson, Simulator, learn};
+pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -46,6 +46,14 @@ pub enum AgentError {
     /// The arm, or the line to it, failed.
     #[error("the arm failed: {0}")]
     Arm(#[from] ArmError),
+    /// The camera delivers the same frame again and again while it is moved.
+    #[error(
+        "the camera seems to be frozen: {looks} frames in a row, each from another pose, show the ball at exactly the same place"
+    )]
+    FrozenCamera {
+        /// How many frames.
+        looks: usize,
+    },
     /// A configuration that cannot work.
     #[error("agent configuration: {0}")]
     Config(String),
