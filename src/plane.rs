@@ -87,12 +87,25 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
-        let config = TrainConfig::paper(actions);
+        self.learn_with(spec, &TrainConfig::paper(actions), rng, on_progress)
+    }
+
+    /// Learns `spec` here.
+    ///
+    /// # Errors
+    /// As for [`learn`](crate::learn).
+    pub fn learn_with(
+        &self,
+        spec: BehaviourSpec,
+        config: &TrainConfig,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Lesson, LearnError> {
         let mut table = QTable::new(spec.states(), spec.actions())?;
         let simulate = |percept: &Percept, delta: &JointDelta| self.after(percept, delta);
         let start = |rng: &mut dyn Rng| self.starts[rng.random_range(0..self.starts.len())];
         let mut task = grasp_agent::BehaviourTask::new(&spec, config.gamma, simulate, start);
-        let report = train(&mut task, &mut table, &config, rng, on_progress)?;
+        let report = train(&mut task, &mut table, config, rng, on_progress)?;
         Ok(Lesson {
             behaviour: Behaviour::new(spec, table)?,
             report,

@@ -42,7 +42,7 @@ pub struct AgentConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ApproachLimit {
-    /// Radius up to which any approach is slow enough, feature units [50].
+    /// Radius up to which any approach is slow enough, feature units [62].
     pub radius: f64,
     /// Greatest growth of the radius in one move beyond that [1.5].
     pub growth: f64,
@@ -79,7 +79,7 @@ impl AgentConfig {
             max_cycles: 60,
             looks: 2,
             approach: ApproachLimit {
-                radius: 50.0,
+                radius: 62.0,
                 growth: 1.5,
             },
             lift: None,

@@ -66,6 +66,8 @@ pub struct Hybrid {
     estimate: Option<Estimate>,
     learning: bool,
     boldness: f64,
+    /// Losses since the last move that kept the ball in view.
+    losses: usize,
 }
 
 /// The ball and the camera as they are taken to be at the moment.
@@ -82,8 +84,10 @@ const MOVED: (f64, f64) = (5.0, 3.0);
 /// Room to the border of the frame, feature units, and the range of radii that a move may lead to.
 const MARGIN: f64 = 4.0;
 const RADII: (f64, f64) = (5.5, 55.0);
-/// Shares of the way to the goal that are tried, the whole way first.
+/// Shares of the way that are tried, the whole way first.
 const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
+/// Least share of a way that is gone after any number of losses.
+const LEAST_BOLDNESS: f64 = 1.0 / 64.0;
 
 impl Hybrid {
     /// A controller that knows nothing but `settings`, and learns.
@@ -101,6 +105,7 @@ impl Hybrid {
             estimate: None,
             learning: true,
             boldness: 1.0,
+            losses: 0,
         }
     }
 
@@ -169,9 +174,12 @@ impl Hybrid {
         let camera = model.arm.wrist(links.stand()) * model.mount;
         let here = camera.inverse_transform_point(&estimate.ball);
         let goal = model.in_camera(&self.settings.goal)?;
+        // On its line in the image at the distance it has: where to bring a ball that cannot be approached yet.
+        let aside = Point3::from(goal.coords * (here.z / goal.z));
+        let ways = [goal, aside].map(|target| SHARES.map(|share| (target, share)));
         let mut last = None;
-        for share in SHARES.map(|share| share * self.boldness) {
-            let wanted = here + (goal - here) * share;
+        for (target, share) in ways.into_iter().flatten() {
+            let wanted = here + (target - here) * (share * self.boldness);
             let (stand, _) = model.pose_placing(&estimate.ball, &wanted, links.stand());
             let motors = links.motors_for(&stand, &now.joints);
             let delta = self.cut(&motors, &now.joints, limits);
@@ -218,6 +226,7 @@ impl Controller for Hybrid {
         self.current = Evidence::default();
         self.estimate = None;
         self.boldness = 1.0;
+        self.losses = 0;
     }
 
     fn arm_at(&mut self, joints: &Joints) {
@@ -225,9 +234,13 @@ impl Controller for Hybrid {
     }
 
     fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        if self.has_moved(&now.features) {
-            self.remember();
+        // A ball that was lost twice, though it should have stayed in view for certain, is not where it was taken to be.
+        if self.has_moved(&now.features) || self.losses >= 2 {
+            if self.losses < 2 {
+                self.remember();
+            }
             self.current.forget_sightings();
+            self.estimate = None;
         }
         self.current.saw(now.features);
         self.estimate = self.estimate();
@@ -236,9 +249,10 @@ impl Controller for Hybrid {
     }
 
     fn judge(&mut self, consequence: &Consequence) {
-        self.boldness = match consequence {
-            Consequence::Seen(_) => (1.5 * self.boldness).min(1.0),
-            Consequence::Lost | Consequence::TakenBack => (0.5 * self.boldness).max(1.0 / 64.0),
+        (self.boldness, self.losses) = match consequence {
+            Consequence::Seen(_) => ((1.5 * self.boldness).min(1.0), 0),
+            Consequence::Lost => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses + 1),
+            Consequence::TakenBack => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses),
         };
     }
 
