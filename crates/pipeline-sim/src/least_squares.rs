@@ -128,11 +128,7 @@ impl Rows {
     ///
     /// `observations` is how many of the rows are real ones (a prior adds rows that are not).
     pub(crate) fn solve(&self, place: &str, observations: usize) -> Result<Fit, FitError> {
-        let n = if self.count > 0 {
-            self.terms.len() / self.count
-        } else {
-            0
-        };
+        let n = self.terms.len().checked_div(self.count).unwrap_or(0);
         if self.count < n || self.count == 0 {
             let needed = n.max(1);
             return Err(FitError::TooFewSamples {

@@ -114,7 +114,7 @@ impl ReachForm {
 ///
 /// let mut rng = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1);
 /// let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-/// let (_, samples) = sample_moves(&cell, 500, 0.5, &mut rng);
+/// let (_, samples) = sample_moves(&cell, 500, 0.125, &mut rng);
 /// let model = ReachModel::fit(&samples, ReachForm::Rigid22, &[])?;
 /// assert!(model.quality().iter().all(|q| q.r2 > 0.99));
 /// # Ok::<(), pipeline_sim::FitError>(())

@@ -22,9 +22,9 @@ fn brute_force(camera: &Camera, centre: &Point3<f64>, radius: f64) -> (f64, f64,
                 let middle = 0.5 * (near + far);
                 let pixel = Point2::new(inside.x + middle * cos, inside.y + middle * sin);
                 if hits(camera, pixel, centre, radius) {
-                    near = middle
+                    near = middle;
                 } else {
-                    far = middle
+                    far = middle;
                 }
             }
             Point2::new(inside.x + near * cos, inside.y + near * sin)
