@@ -32,7 +32,6 @@
 //! [`GrayImage`]: image::GrayImage
 
 mod belonging;
-mod canny;
 mod circle;
 mod detect;
 mod edges;
@@ -45,10 +44,9 @@ mod heuristic;
 mod region;
 mod structure;
 
-pub use canny::{Canny, CannyConfig};
 pub use circle::{Circle, Features};
 pub use detect::{CircleDetector, Detection};
-pub use edges::{EdgeDetector, EdgeMap, EdgePixel};
+pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
 pub use error::ConfigError;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
