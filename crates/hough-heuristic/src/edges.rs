@@ -16,7 +16,7 @@ pub use gradient::EdgeGradient;
 pub use imageproc_canny::ImageprocCanny;
 
 /// The coordinates of one edge pixel: a record of the paper's structure `D`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct EdgePixel {
     /// Column, 0 at the left.
     pub x: u32,

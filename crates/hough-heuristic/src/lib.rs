@@ -33,9 +33,11 @@
 
 mod belonging;
 mod circle;
+mod curve;
 mod detect;
 mod edges;
 mod error;
+mod evidence;
 #[cfg(feature = "files")]
 mod files;
 mod fit;
@@ -45,13 +47,15 @@ mod region;
 mod structure;
 
 pub use circle::{Circle, Features};
+pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
 pub use detect::{CircleDetector, Detection};
 pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
 pub use error::ConfigError;
+pub use evidence::Acceptance;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
 pub use frame::{FrameError, FrameSource};
-pub use heuristic::{Heuristic, HeuristicConfig, Sampling, detect_circles};
+pub use heuristic::{Heuristic, HeuristicConfig, Sampling, StageTimes, detect_circles};
 pub use image;
 pub use region::Region;
 

@@ -92,15 +92,17 @@ pub(super) fn candidates(
 }
 
 impl Rows {
+    /// Makes room for rows of `width` pixels. What an earlier frame left beyond them is never looked at in a way that shows.
     fn resize(&mut self, width: usize, reach: usize) {
+        let blocks = 1 + (width - 2).next_multiple_of(BLOCK) + 1;
         self.across.resize(width + 2 * reach, 0);
         for row in &mut self.smooth {
             row.resize(width + 2, 0);
         }
         for row in &mut self.gradient {
-            row.x.resize(width, 0);
-            row.y.resize(width, 0);
-            row.square.resize(width, 0);
+            row.x.resize(blocks, 0);
+            row.y.resize(blocks, 0);
+            row.square.resize(blocks, 0);
         }
     }
 
@@ -164,7 +166,7 @@ fn smooth<const REACH: usize>(
 /// Sobel's two derivatives of the middle one of three rows.
 #[inline(always)]
 fn differentiate(a: &[i16], b: &[i16], c: &[i16], out: &mut GradientRow) {
-    let width = out.square.len();
+    let width = a.len() - 2;
     let [a0, a1, a2] = [&a[..width], &a[1..][..width], &a[2..][..width]];
     let [b0, b2] = [&b[..width], &b[2..][..width]];
     let [c0, c1, c2] = [&c[..width], &c[1..][..width], &c[2..][..width]];
@@ -181,59 +183,31 @@ fn differentiate(a: &[i16], b: &[i16], c: &[i16], out: &mut GradientRow) {
 /// Marks the pixels of a row whose gradient is above the low threshold and a maximum across the edge.
 #[inline(always)]
 fn maxima(passes: &Passes, rows: [&GradientRow; 3], y: usize, marks: &mut [u8], found: &mut Vec<Candidate>) {
-    let width = marks.len();
+    let last = marks.len() - 1;
     marks[0] = 0;
-    marks[width - 1] = 0;
-    let mut x = 1;
-    while x + BLOCK < width {
+    marks[last] = 0;
+    for (index, out) in marks[1..last].chunks_mut(BLOCK).enumerate() {
+        let x = 1 + index * BLOCK;
         let above = block(&rows[1].square, x)
             .iter()
             .fold(0, |most, &square| square.max(most));
-        let out = &mut marks[x..x + BLOCK];
         if above <= passes.low {
             out.fill(0);
         } else {
-            mark_block(passes, rows, x, out);
-            for eight in 0..BLOCK / 8 {
-                let word = &out[8 * eight..8 * eight + 8];
-                let mut bits = word
-                    .iter()
-                    .rev()
-                    .fold(0u64, |bits, &mark| bits << 8 | u64::from(mark));
-                while bits != 0 {
-                    let offset = bits.trailing_zeros() as usize / 8;
-                    bits &= !(0xff << (8 * offset));
-                    found.push(candidate(rows, x + 8 * eight + offset, y));
-                }
-            }
-        }
-        x += BLOCK;
-    }
-    for x in x..width - 1 {
-        let square = rows[1].square[x];
-        let (before, behind) = neighbours(rows, x);
-        marks[x] = mark(passes, square, before, behind);
-        if marks[x] != 0 {
-            found.push(candidate(rows, x, y));
+            block_maxima(passes, rows, (x, y), out, found);
         }
     }
 }
 
+/// [`maxima`] for a block of pixels: first all marks without a branch, then the list of the few that are set.
 #[inline(always)]
-fn block<T>(row: &[T], x: usize) -> &[T] {
-    &row[x..x + BLOCK]
-}
-
-#[inline(always)]
-fn mark(passes: &Passes, square: i32, before: i32, behind: i32) -> u8 {
-    let maximum = (square > passes.low) & (square > before) & (square >= behind);
-    u8::from(maximum) * (WEAK + u8::from(square > passes.high))
-}
-
-/// Fills a block of marks without branches.
-#[inline(always)]
-fn mark_block(passes: &Passes, rows: [&GradientRow; 3], x: usize, out: &mut [u8]) {
-    let [a, b, c] = rows;
+fn block_maxima(
+    passes: &Passes,
+    [a, b, c]: [&GradientRow; 3],
+    (x, y): (usize, usize),
+    out: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
     let (gx, gy) = (block(&b.x, x), block(&b.y, x));
     let (a0, a1, a2) = (
         block(&a.square, x - 1),
@@ -250,31 +224,61 @@ fn mark_block(passes: &Passes, rows: [&GradientRow; 3], x: usize, out: &mut [u8]
         block(&c.square, x),
         block(&c.square, x + 1),
     );
+    let (mut before, mut behind, mut wide) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
     for i in 0..BLOCK {
-        let (before, behind) = across_edge(
-            gx[i],
-            gy[i],
-            [
-                [a0[i], a1[i], a2[i]],
-                [b0[i], b1[i], b2[i]],
-                [c0[i], c1[i], c2[i]],
-            ],
+        let (ax, ay) = (i32::from(gx[i]).abs(), i32::from(gy[i]).abs());
+        let level = mask(is_shallow(ay, ax));
+        let upright = mask(is_shallow(ax, ay));
+        let falling = mask((gx[i] ^ gy[i]) >= 0);
+        let choose = |mask: i32, yes: i32, no: i32| no ^ (mask & (yes ^ no));
+        before[i] = choose(
+            level,
+            b0[i],
+            choose(upright, a1[i], choose(falling, a0[i], a2[i])),
         );
-        out[i] = mark(passes, b1[i], before, behind);
+        behind[i] = choose(
+            level,
+            b2[i],
+            choose(upright, c1[i], choose(falling, c2[i], c0[i])),
+        );
+    }
+    for i in 0..BLOCK {
+        let maximum = (b1[i] > passes.low) & (b1[i] > before[i]) & (b1[i] >= behind[i]);
+        wide[i] = mask(maximum) & (i32::from(WEAK) - mask(b1[i] > passes.high));
+    }
+    let mut marks = [0; BLOCK];
+    for i in 0..BLOCK {
+        marks[i] = wide[i] as u8;
+    }
+    // The last block of a row reaches over its end.
+    marks[out.len()..].fill(0);
+    out.copy_from_slice(&marks[..out.len()]);
+    for (eight, word) in marks.as_chunks::<8>().0.iter().enumerate() {
+        let mut bits = u64::from_le_bytes(*word);
+        while bits != 0 {
+            let offset = bits.trailing_zeros() as usize / 8;
+            bits &= !(0xff << (8 * offset));
+            // Always below BLOCK; the remainder spares the checks.
+            let i = (8 * eight + offset) % BLOCK;
+            found.push(candidate(
+                (x + i, y),
+                (gx[i], gy[i]),
+                [before[i], b1[i], behind[i]],
+            ));
+        }
     }
 }
 
-/// The squares of the two neighbours across the edge, that is along the gradient's sector of 45 degrees.
+/// The block of a row that begins at `x`, as an array: its fixed length is what makes the loops below vector code.
 #[inline(always)]
-fn across_edge(gx: i16, gy: i16, square: [[i32; 3]; 3]) -> (i32, i32) {
-    let [[a0, a1, a2], [b0, _, b2], [c0, c1, c2]] = square;
-    let (ax, ay) = (i32::from(gx).abs(), i32::from(gy).abs());
-    let level = is_shallow(ay, ax);
-    let upright = is_shallow(ax, ay);
-    let falling = (gx ^ gy) >= 0;
-    let (d1, d2) = if falling { (a0, c2) } else { (a2, c0) };
-    let (v1, v2) = if upright { (a1, c1) } else { (d1, d2) };
-    if level { (b0, b2) } else { (v1, v2) }
+fn block<T>(row: &[T], x: usize) -> &[T; BLOCK] {
+    &row[x..x + BLOCK].as_chunks().0[0]
+}
+
+/// All bits set, or none.
+#[inline(always)]
+fn mask(condition: bool) -> i32 {
+    -i32::from(condition)
 }
 
 /// Whether a direction with these absolute components lies within 22.5 degrees of the axis of `along`.
@@ -284,19 +288,12 @@ pub(super) fn is_shallow(across: i32, along: i32) -> bool {
 }
 
 #[inline(always)]
-fn neighbours([a, b, c]: [&GradientRow; 3], x: usize) -> (i32, i32) {
-    let three = |row: &GradientRow| [row.square[x - 1], row.square[x], row.square[x + 1]];
-    across_edge(b.x[x], b.y[x], [three(a), three(b), three(c)])
-}
-
-#[inline(always)]
-fn candidate(rows: [&GradientRow; 3], x: usize, y: usize) -> Candidate {
-    let (before, behind) = neighbours(rows, x);
+fn candidate((x, y): (usize, usize), (gx, gy): (i16, i16), squares: [i32; 3]) -> Candidate {
     Candidate {
         pixel: EdgePixel {
             x: x as u32,
             y: y as u32,
         },
-        gradient: EdgeGradient::new(rows[1].x[x], rows[1].y[x], [before, rows[1].square[x], behind]),
+        gradient: EdgeGradient::new(gx, gy, squares),
     }
 }
