@@ -10,8 +10,9 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Canny, CannyConfig, CircleDetector, EdgeDetector, FrameError, FrameSource, Heuristic, HeuristicConfig,
-    ImageFiles, ImageprocCanny,
+    Acceptance, Canny, CannyConfig, CircleDetector, EdgeDetector, FrameError, FrameSource, Heuristic,
+    HeuristicConfig, ImageFiles, ImageprocCanny, RandomizedHough, RandomizedHoughConfig, Sampling,
+    StandardHough, StandardHoughConfig,
 };
 
 /// Measures a circle detector, or an edge detector alone, on image files.
@@ -43,21 +44,49 @@ enum Kind {
     Canny,
     ImageprocCanny,
     Heuristic,
+    /// The paper's own sampling, from the whole frame.
+    HeuristicAnywhere,
+    Rht,
+    RhtAnywhere,
+    Sht,
+    ShtGradient,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse();
-    let config = HeuristicConfig {
+    let canny = Canny::new(CannyConfig::default())?;
+    let accept = Acceptance {
         min_radius: options.min_radius,
         max_radius: options.max_radius,
         max_circles: 32,
+        ..Acceptance::default()
+    };
+    let heuristic = |sampling| HeuristicConfig {
+        min_radius: accept.min_radius,
+        max_radius: accept.max_radius,
+        max_circles: accept.max_circles,
+        sampling,
         ..HeuristicConfig::default()
     };
-    let canny = Canny::new(CannyConfig::default())?;
+    let rht = |sampling| RandomizedHoughConfig {
+        accept,
+        sampling,
+        ..RandomizedHoughConfig::default()
+    };
+    let sht = |gradient| StandardHoughConfig {
+        accept,
+        gradient,
+        ..StandardHoughConfig::default()
+    };
     match options.detector {
         Kind::Canny => edges(&options, canny),
         Kind::ImageprocCanny => edges(&options, ImageprocCanny::new(30.0, 70.0)?),
-        Kind::Heuristic => circles(&options, Heuristic::new(config, canny)?),
+        Kind::Heuristic => circles(&options, Heuristic::new(heuristic(Sampling::Near), canny)?),
+        Kind::HeuristicAnywhere => circles(&options, Heuristic::new(heuristic(Sampling::Anywhere), canny)?),
+        Kind::Rht => circles(&options, RandomizedHough::new(rht(Sampling::Near), canny)?),
+        Kind::RhtAnywhere => circles(&options, RandomizedHough::new(rht(Sampling::Anywhere), canny)?),
+        Kind::Sht => circles(&options, StandardHough::new(sht(false), canny)?),
+        Kind::ShtGradient => circles(&options, StandardHough::new(sht(true), canny)?),
     }
 }
 

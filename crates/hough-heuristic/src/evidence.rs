@@ -1,6 +1,6 @@
 //! What every detector does with a candidate: count its edge pixels, fit it to them, and take them out.
 
-use crate::belonging::{MAX_TOLERANCE, NearEdges};
+use crate::belonging::{MAX_TOLERANCE, NearEdges, Probes};
 use crate::error::{require, require_radii};
 use crate::fit::fit_circle;
 use crate::structure::Structure;
@@ -102,6 +102,8 @@ pub(crate) struct Evidence {
     pub(crate) acceptance: Acceptance,
     pub(crate) structure: Structure,
     pub(crate) near: NearEdges,
+    /// For circles that are still off by more than the tolerance here and there.
+    rough: Probes,
     /// Scratch: the edge points around a circle.
     around: Vec<(f64, f64)>,
 }
@@ -115,6 +117,7 @@ impl Evidence {
             acceptance,
             structure: Structure::default(),
             near: NearEdges::new(acceptance.tolerance),
+            rough: Probes::new(0.6 * acceptance.theta),
             around: Vec::new(),
         })
     }
@@ -130,7 +133,13 @@ impl Evidence {
         Some(Detection { circle, score })
     }
 
-    /// The circle fitted to the edge points around it, at first to those within `reach` pixels; none if the fit fails.
+    /// A look at a few pixels of a circle that a fit may yet improve: false if it is most likely none.
+    pub(crate) fn might_be(&self, circle: &Circle) -> bool {
+        self.near.promising(circle, &self.rough)
+    }
+
+    /// The circle fitted to the edge points around it, at first to those within `reach` pixels; none if the fit fails or
+    /// leads nowhere.
     pub(crate) fn fitted(&mut self, edges: &EdgeMap, circle: Circle, reach: f64) -> Option<Circle> {
         let band = self.acceptance.tolerance + 0.5;
         let Acceptance {
@@ -141,6 +150,9 @@ impl Evidence {
         self.gather(edges, &circle, 2.0 * reach);
         let fixed = self.acceptance.known_radius().is_some();
         let rough = fit_circle(&self.around, circle, reach, fixed)?;
+        if !self.might_be(&rough) {
+            return None;
+        }
         self.gather(edges, &rough, 2.0 * band);
         let fitted = fit_circle(&self.around, rough, band, fixed)?;
         if (min_radius..=max_radius).contains(&fitted.radius) {

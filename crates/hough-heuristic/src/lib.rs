@@ -43,7 +43,9 @@ mod files;
 mod fit;
 mod frame;
 mod heuristic;
+mod randomized_hough;
 mod region;
+mod standard_hough;
 mod structure;
 
 pub use circle::{Circle, Features};
@@ -57,7 +59,9 @@ pub use files::ImageFiles;
 pub use frame::{FrameError, FrameSource};
 pub use heuristic::{Heuristic, HeuristicConfig, Sampling, StageTimes, detect_circles};
 pub use image;
+pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;
+pub use standard_hough::{StandardHough, StandardHoughConfig};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
