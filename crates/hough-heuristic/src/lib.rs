@@ -45,6 +45,8 @@ mod frame;
 mod heuristic;
 mod randomized_hough;
 mod region;
+#[cfg(feature = "files")]
+mod stages;
 mod standard_hough;
 mod structure;
 
@@ -56,11 +58,13 @@ pub use error::ConfigError;
 pub use evidence::Acceptance;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
-pub use frame::{FrameError, FrameSource};
+pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
 pub use heuristic::{Heuristic, HeuristicConfig, Sampling, StageTimes, detect_circles};
 pub use image;
 pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;
+#[cfg(feature = "files")]
+pub use stages::{StageError, write_stages};
 pub use standard_hough::{StandardHough, StandardHoughConfig};
 
 #[cfg(doctest)]
