@@ -3,4 +3,8 @@
 #[path = "../../scenes/scenes.rs"]
 mod scenes;
 
+mod curves;
+mod detectors;
 mod heuristic;
+#[cfg(feature = "files")]
+mod stages;
