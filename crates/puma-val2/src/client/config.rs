@@ -4,51 +4,51 @@ use std::time::Duration;
 
 use crate::PumaParams;
 
-/// Settings of a [`Val2Client`](super::Val2Client). Defaults, in brackets, suit a real controller behind a USB serial adapter.
+/// Settings of a [`Val2Client`](super::Val2Client). The defaults suit a real controller behind a USB serial adapter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClientConfig {
-    /// Silence after which a prompt counts as one [30 ms]. A USB adapter delivers in bursts up to 16 ms apart: below that a `.` in mid-reply can
+    /// Silence after which a prompt counts as one (default: 30 ms). A USB adapter delivers in bursts up to 16 ms apart: below that a `.` in mid-reply can
     /// be taken for the prompt; every exchange waits this long, so an emulator is talked to faster with 1 to 2 ms.
     pub quiet: Duration,
-    /// Silence after which a reply counts as missing [1 s]. The line is then asked for its prompt; too small a value asks while the controller
+    /// Silence after which a reply counts as missing (default: 1 s). The line is then asked for its prompt; too small a value asks while the controller
     /// still thinks, which is harmless but slow.
     pub reply_timeout: Duration,
-    /// Longest time for a motion, a calibration or anything else that moves the arm [60 s]. When it is over the arm is stopped.
+    /// Longest time for a motion, a calibration or anything else that moves the arm (default: 60 s). When it is over the arm is stopped.
     pub motion_timeout: Duration,
-    /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect) [10 s]; loading from a floppy takes longer.
+    /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect) (default: 10 s); loading from a floppy takes longer.
     pub connect_timeout: Duration,
-    /// Monitor speed set by `connect`, percent [50], above 0 to 327; `None` leaves it as it is.
+    /// Monitor speed set by `connect`, percent (default: 50), above 0 to 327; `None` leaves it as it is.
     pub speed_percent: Option<f64>,
-    /// How far a joint may stand from where it was sent, radians [0.05 degrees]. A PUMA 560 stands at encoder counts up to 0.009 degrees apart; less
+    /// How far a joint may stand from where it was sent, radians (default: 0.05 degrees). A PUMA 560 stands at encoder counts up to 0.009 degrees apart; less
     /// than 0.01 degrees makes good moves fail.
     pub tolerance: f64,
-    /// How often something is tried again when the line has failed it [3]. 0 reports the first fault.
+    /// How often something is tried again when the line has failed it (default: 3). 0 reports the first fault.
     pub retries: usize,
-    /// Whether what is typed is compared with its echo before the line is ended, if the controller echoes at all [yes]. Costs one round trip;
+    /// Whether what is typed is compared with its echo before the line is ended, if the controller echoes at all (default: yes). Costs one round trip;
     /// without it a character lost on the line can change a command.
     pub check_echo: bool,
-    /// How a coordinated motion is commanded [automatic].
+    /// How a coordinated motion is commanded (default: automatic).
     pub way: MoveWay,
-    /// Answer to a start-up question that speaks of loading [yes].
+    /// Answer to a start-up question that speaks of loading (default: yes).
     pub load_from_floppy: bool,
-    /// Answer to a start-up question that speaks of initializing, which erases programs and locations [no].
+    /// Answer to a start-up question that speaks of initializing, which erases programs and locations (default: no).
     pub initialize: bool,
-    /// Whether a program found running is aborted by `connect` [yes]; otherwise that is an error.
+    /// Whether a program found running is aborted by `connect` (default: yes); otherwise that is an error.
     pub abort_running_program: bool,
-    /// How often `calibrate` tries again while arm power is off [0].
+    /// How often `calibrate` tries again while arm power is off (default: 0).
     pub power_retries: usize,
-    /// Pause between these tries [2 s].
+    /// Pause between these tries (default: 2 s).
     pub power_retry_delay: Duration,
-    /// Name of the precision point that the client uses for its moves [`PGOAL`], letters and digits, at most six.
+    /// Name of the precision point that the client uses for its moves (default: `PGOAL`), letters and digits, at most six.
     pub point_name: String,
-    /// Longest reply that is kept, bytes [16384]; a longer one is an error.
+    /// Longest reply that is kept, bytes (default: 16384); a longer one is an error.
     pub reply_limit: usize,
-    /// Prompt of the idle monitor [`.`].
+    /// Prompt of the idle monitor (default: `.`).
     pub idle_prompt: char,
-    /// Prompt of the monitor while a program runs [`*`].
+    /// Prompt of the monitor while a program runs (default: `*`).
     pub run_prompt: char,
     /// Geometry and limits: moves out of the ranges are refused before anything is sent, and `WHERE` is checked against its own two halves
-    /// [[`PumaParams::unimation`]].
+    /// (default: [`PumaParams::unimation`]).
     pub params: PumaParams,
 }
 

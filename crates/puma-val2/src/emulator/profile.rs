@@ -39,93 +39,93 @@ pub enum StartPower {
 /// What of an emulated controller may differ from one machine, release or source to another.
 ///
 /// The wire protocol of VAL II is documented in fragments only. What two independent sources agree on is built in; everything else is here,
-/// so that a client can be tried against controllers that answer otherwise. Defaults in brackets are those of [`Profile::val2`].
+/// so that a client can be tried against controllers that answer otherwise. Defaults are those of [`Profile::val2`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// Name for messages and for choosing it on a command line.
     pub name: &'static str,
-    /// Questions at start-up, in order [load from floppy, initialize].
+    /// Questions at start-up, in order (default: load from floppy, initialize).
     pub boot: Vec<BootQuestion>,
-    /// Line printed after them [`PUMA 560  VAL-II`]; empty for none.
+    /// Line printed after them (default: `PUMA 560  VAL-II`); empty for none.
     pub banner: String,
-    /// Whether what is typed comes back [yes].
+    /// Whether what is typed comes back (default: yes).
     pub echo: bool,
-    /// End of a line to the terminal [CR LF].
+    /// End of a line to the terminal (default: CR LF).
     pub eol: &'static str,
-    /// Blank lines before every reply [0].
+    /// Blank lines before every reply (default: 0).
     pub blank_lines: usize,
-    /// Prompt when no program runs [`.`].
+    /// Prompt when no program runs (default: `.`).
     pub idle_prompt: char,
-    /// Prompt while a program runs [`*`].
+    /// Prompt while a program runs (default: `*`).
     pub run_prompt: char,
-    /// Order of the two blocks of `WHERE` [Cartesian first].
+    /// Order of the two blocks of `WHERE` (default: Cartesian first).
     pub where_layout: WhereLayout,
-    /// Width of a number column [9 in `WHERE`; `HERE` and `POINT` add one].
+    /// Width of a number column (default: 9 in `WHERE`; `HERE` and `POINT` add one).
     pub width: usize,
-    /// Decimals of millimetres [2].
+    /// Decimals of millimetres (default: 2).
     pub length_decimals: usize,
-    /// Decimals of degrees [3].
+    /// Decimals of degrees (default: 3).
     pub angle_decimals: usize,
-    /// Words that head the joint columns of `WHERE` before their digit [`JT`].
+    /// Words that head the joint columns of `WHERE` before their digit (default: `JT`).
     pub joint_heading: &'static str,
-    /// Whether `WHERE` shows a hand column at the end of the Cartesian line [no].
+    /// Whether `WHERE` shows a hand column at the end of the Cartesian line (default: no).
     pub hand_column: bool,
-    /// What `HERE` and `POINT` ask [`Change?`]; a line end follows.
+    /// What `HERE` and `POINT` ask (default: `Change?`); a line end follows.
     pub change_text: String,
-    /// Whether the prompt after `DO` waits for the end of the motion [yes].
+    /// Whether the prompt after `DO` waits for the end of the motion (default: yes).
     pub do_blocks: bool,
-    /// Whether `PANIC` and `ABORT` are heard while `DO` blocks [yes].
+    /// Whether `PANIC` and `ABORT` are heard while `DO` blocks (default: yes).
     pub stop_while_busy: bool,
-    /// Whether `#PPOINT(...)` is known [yes].
+    /// Whether `#PPOINT(...)` is known (default: yes).
     pub ppoint: bool,
-    /// Whether `DO REACTI` watches a signal without a program running [yes].
+    /// Whether `DO REACTI` watches a signal without a program running (default: yes).
     pub react_at_monitor: bool,
-    /// Largest value of the monitor's `SPEED`, percent [200]; larger ones are cut to it.
+    /// Largest value of the monitor's `SPEED`, percent (default: 200); larger ones are cut to it.
     pub speed_max: f64,
     /// Words that differ from [`Message::default_text`].
     pub messages: BTreeMap<Message, String>,
-    /// Longest name of a program, location or variable [15].
+    /// Longest name of a program, location or variable (default: 15).
     pub max_name: usize,
-    /// Longest line that can be typed [128]; further characters are refused with a bell.
+    /// Longest line that can be typed (default: 128); further characters are refused with a bell.
     pub max_line: usize,
-    /// Most entries of each kind (programs, locations, variables) and most steps of a program [1000].
+    /// Most entries of each kind (programs, locations, variables) and most steps of a program (default: 1000).
     pub max_entries: usize,
-    /// Time one character takes on the line in either direction [none]; 9600 baud: 10/9600 s.
+    /// Time one character takes on the line in either direction (default: none); 9600 baud: 10/9600 s.
     pub char_time: Option<Duration>,
-    /// Time the monitor takes to digest a line [0]. Characters that arrive meanwhile wait in `input_buffer`.
+    /// Time the monitor takes to digest a line (default: 0). Characters that arrive meanwhile wait in `input_buffer`.
     pub line_time: Duration,
-    /// Characters that can wait while the monitor is busy [256]; further ones are lost.
+    /// Characters that can wait while the monitor is busy (default: 256); further ones are lost.
     pub input_buffer: usize,
-    /// Time one program step takes [2 ms], at least 0.1 ms.
+    /// Time one program step takes (default: 2 ms), at least 0.1 ms.
     pub step_time: Duration,
     /// Whether Ctrl-C cancels a line or the running command, Ctrl-U deletes the line, DEL and BS a character, Ctrl-S and Ctrl-Q hold and release
-    /// the output, Ctrl-O drops it [yes].
+    /// the output, Ctrl-O drops it (default: yes).
     pub control_characters: bool,
-    /// Arm power at start [on at calibration].
+    /// Arm power at start (default: on at calibration).
     pub start_power: StartPower,
-    /// Whether the arm already knows its joint angles at start [no].
+    /// Whether the arm already knows its joint angles at start (default: no).
     pub start_calibrated: bool,
-    /// Joint angles at start [READY].
+    /// Joint angles at start (default: READY).
     pub start: Joints,
     /// Where `NEST` goes. The real pose is not known; this is an assumption: the arm folded above the shoulder.
     pub nest: Joints,
-    /// Time in which a joint reaches its full speed [0.25 s].
+    /// Time in which a joint reaches its full speed (default: 0.25 s).
     pub acceleration_time: Duration,
-    /// Time in which a motion that is broken off comes to a stand [60 ms].
+    /// Time in which a motion that is broken off comes to a stand (default: 60 ms).
     pub stop_time: Duration,
-    /// Speed of straight-line motion at 100 %, metres per second [0.5].
+    /// Speed of straight-line motion at 100 %, metres per second (default: 0.5).
     pub line_speed: f64,
-    /// Turning speed of straight-line motion at 100 %, radians per second [pi/2].
+    /// Turning speed of straight-line motion at 100 %, radians per second (default: pi/2).
     pub line_turn: f64,
-    /// Time of a full opening or closing of the hand [0.3 s].
+    /// Time of a full opening or closing of the hand (default: 0.3 s).
     pub hand_time: Duration,
-    /// Period at which sensors and armed reactions are looked at during a motion [28 ms, VAL's trajectory period].
+    /// Period at which sensors and armed reactions are looked at during a motion (default: 28 ms, VAL's trajectory period).
     pub tick: Duration,
-    /// Whether the arm stands, and is shown, at whole encoder counts only [no].
+    /// Whether the arm stands, and is shown, at whole encoder counts only (default: no).
     pub encoder_counts: bool,
-    /// Whether a straight line is checked over its whole length before it starts [no: the arm stops where the line leaves its reach].
+    /// Whether a straight line is checked over its whole length before it starts (default: no: the arm stops where the line leaves its reach).
     pub check_line_ahead: bool,
-    /// Whether `DRIVE` ends a little short, by this many degrees [0]; a fault for trying out clients.
+    /// Whether `DRIVE` ends a little short, by this many degrees (default: 0); a fault for trying out clients.
     pub drive_error_degrees: f64,
 }
 
