@@ -17,8 +17,8 @@ pub use emulator::{
 pub use error::ArmError;
 pub use joints::{Joint, JointDelta, Joints};
 pub use kinematics::{
-    ArmSide, Configuration, DriveTrain, Elbow, JointRange, PumaParams, Solution, Solutions, Unreachable,
-    Wrist, Xyzoat,
+    ArmDynamics, ArmSide, Configuration, DriveTrain, Elbow, Frames, JointRange, LinkDynamics, PumaParams,
+    Singularity, Solution, Solutions, Unreachable, Wrist, Xyzoat,
 };
 pub use manipulator::{Gripper, Manipulator, ProximitySensor};
 pub use nalgebra;

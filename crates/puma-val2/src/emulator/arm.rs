@@ -8,7 +8,7 @@ use super::instruction::{Posture, SpeedUnit};
 use super::motion::{Motion, Pace};
 use super::place::Place;
 use super::{Fault, Message, Profile};
-use crate::{Configuration, DriveTrain, Gripper, Joint, Joints, PumaParams, Unreachable};
+use crate::{Configuration, DriveTrain, Frames, Gripper, Joint, Joints, PumaParams, Unreachable};
 
 #[derive(Clone, Debug)]
 pub(super) struct Arm {
@@ -18,8 +18,7 @@ pub(super) struct Arm {
     motion: Option<Motion>,
     pub(super) power: bool,
     pub(super) calibrated: bool,
-    pub(super) tool: Isometry3<f64>,
-    pub(super) base: Isometry3<f64>,
+    pub(super) frames: Frames,
     pub(super) gripper: Gripper,
     gripper_next: Option<Gripper>,
     postures_next: Vec<Posture>,
@@ -79,8 +78,7 @@ impl Arm {
             motion: None,
             power: profile.start_power == super::StartPower::On,
             calibrated: profile.start_calibrated,
-            tool: Isometry3::identity(),
-            base: Isometry3::identity(),
+            frames: Frames::default(),
             gripper: Gripper::Open,
             gripper_next: None,
             postures_next: Vec::new(),
@@ -114,7 +112,7 @@ impl Arm {
 
     /// The hand in the world frame.
     pub(super) fn hand(&self, joints: &Joints) -> Isometry3<f64> {
-        self.base * self.params.forward(joints) * self.tool
+        self.frames.hand(&self.params, joints)
     }
 
     pub(super) fn moving(&self) -> bool {
@@ -242,7 +240,7 @@ impl Arm {
     }
 
     fn reach(&self, hand: &Isometry3<f64>, near: &Joints, posture: Configuration) -> Result<Joints, Fault> {
-        let flange = self.base.inverse() * hand * self.tool.inverse();
+        let flange = self.frames.flange(hand);
         self.params
             .inverse_near(&flange, near, Some(posture))
             .map_err(|why| match why {

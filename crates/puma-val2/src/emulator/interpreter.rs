@@ -609,7 +609,7 @@ impl Emulator {
             }
             Instruction::Tool(to) => {
                 let tool = to.as_ref().map(|t| t.transformation(&scope)).transpose()?;
-                self.arm.tool = tool.unwrap_or_default();
+                self.arm.frames.tool = tool.unwrap_or_default();
             }
             Instruction::Base(shift) => {
                 let shift = values(shift, &scope)?;
@@ -803,7 +803,7 @@ impl Emulator {
     pub(super) fn set_base(&mut self, [dx, dy, dz, turn]: [f64; 4]) {
         let shift = nalgebra::Vector3::new(dx, dy, dz) / 1000.0;
         let turn = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), turn.to_radians());
-        self.arm.base = nalgebra::Isometry3::from_parts(shift.into(), turn);
+        self.arm.frames.base = nalgebra::Isometry3::from_parts(shift.into(), turn);
     }
 
     pub(super) fn command_signal(&mut self, value: f64) -> Result<(), Fault> {

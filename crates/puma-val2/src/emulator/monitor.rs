@@ -185,7 +185,7 @@ impl Emulator {
                 self.need_standing_arm()?;
                 let scope = self.scope();
                 let tool = tool.map(|t| t.transformation(&scope)).transpose()?;
-                self.arm.tool = tool.unwrap_or_default();
+                self.arm.frames.tool = tool.unwrap_or_default();
             }
             Command::Signal => {
                 let scope = self.scope();
