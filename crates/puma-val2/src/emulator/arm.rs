@@ -22,6 +22,7 @@ pub(super) struct Arm {
     pub(super) gripper: Gripper,
     gripper_next: Option<Gripper>,
     postures_next: Vec<Posture>,
+    keeps_posture: bool,
     /// Percent.
     pub(super) monitor_speed: f64,
     pub(super) program_speed: Speed,
@@ -82,6 +83,7 @@ impl Arm {
             gripper: Gripper::Open,
             gripper_next: None,
             postures_next: Vec::new(),
+            keeps_posture: profile.keeps_posture,
             monitor_speed: 100.0,
             program_speed: Speed::FULL,
             next_speed: None,
@@ -228,21 +230,53 @@ impl Arm {
             Place::PrecisionPoint(joints) => return Ok(*joints),
             Place::Transformation(pose) => pose,
         };
-        let mut posture = self.params.configuration(&self.joints);
-        for wanted in &self.postures_next {
-            match *wanted {
-                Posture::Side(side) => posture.side = side,
-                Posture::Elbow(elbow) => posture.elbow = elbow,
-                Posture::Wrist(wrist) => posture.wrist = wrist,
+        let words = &self.postures_next;
+        let asked = |c: Configuration| {
+            words
+                .iter()
+                .rev()
+                .fold([None; 3], |[side, elbow, wrist], word| match *word {
+                    Posture::Side(s) => [side.or(Some(s == c.side)), elbow, wrist],
+                    Posture::Elbow(e) => [side, elbow.or(Some(e == c.elbow)), wrist],
+                    Posture::Wrist(w) => [side, elbow, wrist.or(Some(w == c.wrist))],
+                })
+        };
+        let now = self.params.configuration(&self.joints);
+        let [side_open, wrist_open] = self.between_postures();
+        let keeps = |c: Configuration| {
+            let [side, elbow, wrist] = asked(c);
+            side.unwrap_or(side_open || c.side == now.side)
+                && elbow.unwrap_or(side_open || c.elbow == now.elbow)
+                && wrist.unwrap_or(wrist_open || c.wrist == now.wrist)
+        };
+        let obeys = |c: Configuration| asked(c).iter().all(|fits| fits.unwrap_or(true));
+        self.reach(pose, &self.joints, keeps).or_else(|fault| {
+            if self.keeps_posture {
+                Err(fault)
+            } else {
+                self.reach(pose, &self.joints, obeys).map_err(|_| fault)
             }
-        }
-        self.reach(pose, &self.joints, posture)
+        })
     }
 
-    fn reach(&self, hand: &Isometry3<f64>, near: &Joints, posture: Configuration) -> Result<Joints, Fault> {
+    /// Whether the arm stands so near to the border between two postures that it is in neither: the upright arm between left and right, the
+    /// straight wrist between flip and no flip.
+    fn between_postures(&self) -> [bool; 2] {
+        let [_, t2, t3, _, t5, _] = self.joints.0;
+        let p = &self.params;
+        let ahead = p.d4 * (t2 + t3).sin() + p.a3 * (t2 + t3).cos() + p.a2 * t2.cos();
+        [ahead.abs() < 0.03, t5.abs() < 0.1_f64.to_radians()]
+    }
+
+    fn reach(
+        &self,
+        hand: &Isometry3<f64>,
+        near: &Joints,
+        allowed: impl Fn(Configuration) -> bool,
+    ) -> Result<Joints, Fault> {
         let flange = self.frames.flange(hand);
         self.params
-            .inverse_near(&flange, near, Some(posture))
+            .inverse_among(&flange, near, allowed)
             .map_err(|why| match why {
                 Unreachable::TooClose { .. } => Message::TooClose.into(),
                 Unreachable::Limit { joint, .. } => Fault::at(Message::OutOfRange, joint),
@@ -259,7 +293,7 @@ impl Arm {
         };
         let from = self.hand(&self.joints);
         let posture = self.params.configuration(&self.joints);
-        self.reach(&to, &self.joints, posture)?;
+        self.reach(&to, &self.joints, |c| c == posture)?;
         let length = (to.translation.vector - from.translation.vector).norm();
         let turn = from.rotation.angle_to(&to.rotation);
         // A knot every 5 mm or 2 degrees keeps the joint-interpolated chord within some micrometres of the line.
@@ -277,7 +311,7 @@ impl Arm {
                 .try_slerp(&to.rotation, part, 1e-9)
                 .unwrap_or(to.rotation);
             let hand = Isometry3::from_parts(Translation3::from(position), rotation);
-            match self.reach(&hand, &knots[i - 1], posture) {
+            match self.reach(&hand, &knots[i - 1], |c| c == posture) {
                 Ok(joints) => knots.push(joints),
                 Err(fault) if profile.check_line_ahead || i == 1 => return Err(fault),
                 Err(fault) => {

@@ -24,6 +24,13 @@ pub(super) fn plain(value: f64) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
+/// A word over the middle of a column of numbers.
+fn above(word: &str, width: usize) -> String {
+    let before = (width.saturating_sub(word.len()) + 2) / 2;
+    let text = format!(" {:>1$}{word}", "", before.saturating_sub(1));
+    format!("{text:<width$}")
+}
+
 /// The two blocks of `WHERE`, each a heading and a line of values.
 pub(super) fn whereabouts(
     joints: &Joints,
@@ -32,7 +39,7 @@ pub(super) fn whereabouts(
     profile: &Profile,
 ) -> Vec<String> {
     let width = profile.width;
-    let heading = |words: [String; 6]| words.map(|w| format!("{w:>width$}")).concat();
+    let heading = |words: [String; 6]| words.map(|w| above(&w, width)).concat();
     let mut cartesian_heading = heading(["X", "Y", "Z", "O", "A", "T"].map(String::from));
     let values = hand.val();
     let mut cartesian: String = (0..6)
@@ -46,7 +53,7 @@ pub(super) fn whereabouts(
         })
         .collect();
     if profile.hand_column {
-        cartesian_heading.push_str(&format!("{:>width$}", "HAND"));
+        cartesian_heading.push_str(&above("HAND", width));
         let opening = if gripper == Gripper::Open { 50.0 } else { 0.0 };
         cartesian.push_str(&number(opening, width, profile.length_decimals));
     }
@@ -57,6 +64,8 @@ pub(super) fn whereabouts(
         .degrees()
         .map(|v| number(v, width, profile.angle_decimals))
         .concat();
+    let [cartesian_heading, joint_heading] =
+        [cartesian_heading, joint_heading].map(|h| h.trim_end().to_owned());
     match profile.where_layout {
         WhereLayout::CartesianFirst => vec![cartesian_heading, cartesian, joint_heading, joint_line],
         WhereLayout::JointsFirst => vec![joint_heading, joint_line, cartesian_heading, cartesian],

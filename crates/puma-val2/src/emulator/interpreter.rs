@@ -470,7 +470,7 @@ impl Emulator {
         let scope = self.scope();
         let number = |e: &Expr| e.value(&scope);
         match instruction {
-            Instruction::Remark | Instruction::Settling | Instruction::Break | Instruction::Any => {}
+            Instruction::Remark | Instruction::Settling | Instruction::Break => {}
             Instruction::Move { straight, to, hand } => {
                 let place = to.place(&scope)?;
                 let opening = hand.as_ref().map(number).transpose()?;
@@ -675,7 +675,7 @@ impl Emulator {
                 let of = of.value(&scope)?;
                 Flow::Jump(self.branch(&program, at, of)?)
             }
-            Instruction::Value(_) => Flow::Jump(program.end_of(at)? + 1),
+            Instruction::Value(_) | Instruction::Any => Flow::Jump(program.end_of(at)? + 1),
             Instruction::For {
                 variable,
                 from,

@@ -125,6 +125,9 @@ pub struct Profile {
     pub encoder_counts: bool,
     /// Whether a straight line is checked over its whole length before it starts (default: no: the arm stops where the line leaves its reach).
     pub check_line_ahead: bool,
+    /// Whether a joint-interpolated move to a transformation is refused when the present posture cannot reach it, though another could
+    /// (default: no). From a pose between two postures, READY for instance, the nearer one is taken in either case.
+    pub keeps_posture: bool,
     /// Whether `DRIVE` ends a little short, by this many degrees (default: 0); a fault for trying out clients.
     pub drive_error_degrees: f64,
 }
@@ -183,6 +186,7 @@ impl Profile {
             tick: Duration::from_millis(28),
             encoder_counts: false,
             check_line_ahead: false,
+            keeps_posture: false,
             drive_error_degrees: 0.0,
         }
     }

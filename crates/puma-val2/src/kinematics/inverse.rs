@@ -99,6 +99,9 @@ pub enum Unreachable {
     /// A coordinate of the pose is NaN or infinite.
     #[error("the pose holds a number that is not finite")]
     NotFinite,
+    /// No posture was allowed.
+    #[error("no posture is allowed")]
+    NotAllowed,
     /// The wrist centre would lie nearer to the waist axis than the arm's lateral offset allows.
     #[error("the wrist would have to stand {by:.4} m further from the waist axis")]
     TooClose {
@@ -245,10 +248,23 @@ impl PumaParams {
         near: &Joints,
         configuration: Option<Configuration>,
     ) -> Result<Joints, Unreachable> {
+        self.inverse_among(flange, near, |c| configuration.is_none_or(|wanted| wanted == c))
+    }
+
+    /// As [`PumaParams::inverse_near`], in any of the postures that `allowed` accepts.
+    ///
+    /// # Errors
+    /// As for [`PumaParams::inverse_near`]; [`Unreachable::NotAllowed`] if no posture is accepted.
+    pub fn inverse_among(
+        &self,
+        flange: &Isometry3<f64>,
+        near: &Joints,
+        allowed: impl Fn(Configuration) -> bool,
+    ) -> Result<Joints, Unreachable> {
         let mut best: Option<(f64, Joints)> = None;
         let mut least: Option<(f64, Unreachable)> = None;
         for solution in self.inverse(flange)?.iter() {
-            if configuration.is_some_and(|c| c != solution.configuration) {
+            if !allowed(solution.configuration) {
                 continue;
             }
             match self.place_in_ranges(&solution.joints, near) {
@@ -270,7 +286,7 @@ impl PumaParams {
         match (best, least) {
             (Some((_, joints)), _) => Ok(joints),
             (None, Some((_, why))) => Err(why),
-            (None, None) => Err(Unreachable::NotFinite),
+            (None, None) => Err(Unreachable::NotAllowed),
         }
     }
 
