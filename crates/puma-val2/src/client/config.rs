@@ -41,6 +41,8 @@ pub struct ClientConfig {
     pub power_retry_delay: Duration,
     /// Name of the precision point that the client uses for its moves (default: `PGOAL`), letters and digits, at most six.
     pub point_name: String,
+    /// The input that the pair of proximity sensors is wired to (default: 1001).
+    pub proximity_signal: u16,
     /// Longest reply that is kept, bytes (default: 16384); a longer one is an error.
     pub reply_limit: usize,
     /// Prompt of the idle monitor (default: `.`).
@@ -70,6 +72,7 @@ impl Default for ClientConfig {
             power_retries: 0,
             power_retry_delay: Duration::from_secs(2),
             point_name: "PGOAL".into(),
+            proximity_signal: 1001,
             reply_limit: 16 * 1024,
             idle_prompt: '.',
             run_prompt: '*',

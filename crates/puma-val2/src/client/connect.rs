@@ -1,6 +1,6 @@
 //! Getting hold of the monitor, and calibrating the arm.
 
-use super::wire::{is_boot_question, is_doubt, last_line, refusal, shortened};
+use super::wire::{SPOIL, is_boot_question, is_doubt, last_line, refusal, shortened};
 use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
 use crate::{ArmError, Transport};
 
@@ -21,6 +21,7 @@ impl<T: Transport> Val2Client<T> {
             config,
             last_known: None,
             lacks_ppoint: false,
+            guard: None,
         };
         client.reach_monitor()?;
         if client.config.speed_percent.is_some() || client.wire.echo.is_none() {
@@ -39,6 +40,7 @@ impl<T: Transport> Val2Client<T> {
     pub fn reconnect(&mut self) -> Result<(), ArmError> {
         self.wire.echo = None;
         self.last_known = None;
+        self.guard = None;
         self.reach_monitor()?;
         self.find_echo()?;
         match self.config.speed_percent {
@@ -51,7 +53,7 @@ impl<T: Transport> Val2Client<T> {
         let begun = self.wire.line.clock();
         let until = begun.saturating_add(self.config.connect_timeout);
         // Something that is no command and no answer: a half-typed line is spoilt by it, a question asked again.
-        self.wire.send(b"\x15!?\r", "connecting")?;
+        self.wire.send(SPOIL, "connecting")?;
         let mut questions = 0;
         loop {
             let left = until.saturating_sub(self.wire.line.clock());

@@ -3,6 +3,7 @@
 mod config;
 mod connect;
 mod motion;
+mod proximity;
 mod reader;
 mod whereabouts;
 mod wire;
@@ -30,6 +31,7 @@ pub struct Val2Client<T: Transport> {
     last_known: Option<Joints>,
     /// Whether the controller has turned out not to know `#PPOINT`.
     lacks_ppoint: bool,
+    guard: Option<proximity::Guard>,
 }
 
 impl<T: Transport> Val2Client<T> {

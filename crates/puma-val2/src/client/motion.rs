@@ -9,6 +9,10 @@ use crate::{ArmError, Joint, JointDelta, Joints, Location, Transport, Xyzoat};
 /// Less than VAL's smallest step of a joint, half a thousandth of a degree.
 const STILL: f64 = 0.0005 * std::f64::consts::PI / 180.0;
 
+/// An arm that shows its goal to within an encoder count and a display digit stands there. One that is a little further off may be about to
+/// arrive and is looked at again.
+const AS_SENT: f64 = 0.012 * std::f64::consts::PI / 180.0;
+
 /// What is commanded to get from where the arm stands to a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Means {
@@ -16,6 +20,8 @@ enum Means {
     Drive(f64),
     Ppoint,
     Point,
+    /// `POINT`, then the stored program that watches a signal while it moves.
+    Guarded,
     Ready,
 }
 
@@ -43,6 +49,7 @@ impl<T: Transport> Val2Client<T> {
     pub(super) fn move_joints_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
         let moving = delta.0.iter().filter(|d| d.abs() >= STILL).count();
         let means = match self.config.way {
+            _ if self.guard.is_some() => self.coordinated(),
             MoveWay::Drive => Means::Drive(100.0),
             MoveWay::Automatic if moving == 1 && self.echoes() => Means::Drive(100.0),
             _ => self.coordinated(),
@@ -52,7 +59,7 @@ impl<T: Transport> Val2Client<T> {
 
     pub(super) fn move_joints_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
         let means = match self.config.way {
-            MoveWay::Drive => Means::Drive(100.0),
+            MoveWay::Drive if self.guard.is_none() => Means::Drive(100.0),
             _ => self.coordinated(),
         };
         self.absolute(target, means)
@@ -60,6 +67,7 @@ impl<T: Transport> Val2Client<T> {
 
     fn coordinated(&self) -> Means {
         match self.config.way {
+            _ if self.guard.is_some_and(|guard| guard.by_program) => Means::Guarded,
             MoveWay::Ppoint => Means::Ppoint,
             MoveWay::Automatic if self.echoes() && !self.lacks_ppoint => Means::Ppoint,
             _ => Means::Point,
@@ -129,6 +137,9 @@ impl<T: Transport> Val2Client<T> {
             if off <= self.config.tolerance {
                 return Ok(stands);
             }
+            if let Err(stopped) = self.stopped_by_guard(stands) {
+                return Err(stopped);
+            }
             match doubt {
                 Some(_) if tries < self.config.retries => {
                     tries += 1;
@@ -170,6 +181,10 @@ impl<T: Transport> Val2Client<T> {
                 self.define_point(&target)?;
                 let line = format!("DO MOVE #{}", self.config.point_name);
                 self.command_once(&line, patience).map(drop)
+            }
+            Means::Guarded => {
+                self.define_point(&target)?;
+                self.run_guarded()
             }
             Means::Ready => self.command_once("DO READY", patience).map(drop),
         }
@@ -219,7 +234,7 @@ impl<T: Transport> Val2Client<T> {
                     shown
                         .iter()
                         .zip(target.degrees())
-                        .all(|(s, t)| (s - t).abs() < 0.011)
+                        .all(|((s, rounding), t)| (s - t).abs() < 0.000_6 + rounding)
                 });
                 if !fits {
                     let error = self.wire.garbled(typed, "the same values displayed", &reply.text);
@@ -238,7 +253,7 @@ impl<T: Transport> Val2Client<T> {
         let mut before = self.where_()?.joints;
         let mut equal = 0;
         loop {
-            if furthest(&before, &target).1 <= self.config.tolerance {
+            if furthest(&before, &target).1 <= self.config.tolerance.min(AS_SENT) {
                 return Ok(before);
             }
             if self.wire.line.clock() >= until {
@@ -366,11 +381,19 @@ fn furthest(a: &Joints, b: &Joints) -> (Joint, f64) {
         )
 }
 
-/// The numbers of a line that holds exactly six.
-fn shown_values(line: &str) -> Option<[f64; 6]> {
-    let numbers: Vec<f64> = line
+/// The numbers of a line that holds exactly six, each with what rounding to its decimals can have changed.
+fn shown_values(line: &str) -> Option<[(f64, f64); 6]> {
+    let numbers: Vec<(f64, f64)> = line
         .split_whitespace()
-        .map(|word| word.parse().ok())
+        .map(|word| {
+            let decimals = word.split_once('.').map_or(0, |(_, d)| d.len());
+            let rounding = if decimals >= 3 {
+                0.0
+            } else {
+                0.5 / 10_f64.powi(decimals as i32)
+            };
+            Some((word.parse().ok()?, rounding))
+        })
         .collect::<Option<_>>()?;
     numbers.try_into().ok()
 }

@@ -41,8 +41,12 @@ pub(super) fn is_doubt(error: &ArmError) -> bool {
     matches!(error, ArmError::Silence { .. } | ArmError::Garbled { .. })
 }
 
-/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried out.
-const SPOIL: &[u8] = b"\x15!?\r";
+/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried out. Ctrl-Q comes before it: a single flipped
+/// bit makes an `S` a Ctrl-S, which holds all output.
+pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
+
+/// Asks for the prompt.
+const NUDGE: &[u8] = b"\x11\r";
 
 #[derive(Debug)]
 pub(super) struct Wire<T> {
@@ -213,7 +217,27 @@ impl<T: Transport> Wire<T> {
                 let expected = format!("the prompt `{}`", config.idle_prompt);
                 return Err(self.silence(sent, &expected, &shortened(reader.text()), timeout));
             }
-            self.send(b"\r", sent)?;
+            self.send(NUDGE, sent)?;
+        }
+    }
+
+    /// Reads until the idle prompt, over as many run prompts as come before.
+    pub(super) fn read_idle(
+        &mut self,
+        sent: &str,
+        timeout: Duration,
+        config: &ClientConfig,
+    ) -> Result<Reply, ArmError> {
+        let until = self.line.clock().saturating_add(timeout);
+        let mut text = String::new();
+        loop {
+            let left = until.saturating_sub(self.line.clock());
+            let reply = self.read_reply(sent, left, config)?;
+            text.push_str(&reply.text);
+            if reply.ending != Ending::Running || text.len() > config.reply_limit {
+                let ending = reply.ending;
+                return Ok(Reply { text, ending });
+            }
         }
     }
 
