@@ -83,6 +83,15 @@ impl Shape {
         matches!(self, Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. })
     }
 
+    /// Height above the table, metres; 0 for what lies flat.
+    pub fn height(&self) -> f64 {
+        match *self {
+            Self::Box { height, .. } | Self::Cylinder { height, .. } => height,
+            Self::Ball { radius } => 2.0 * radius,
+            Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. } => 0.0,
+        }
+    }
+
     /// Radius of the smallest circle on the table, about the thing's middle, that holds the shape.
     pub fn footprint(&self) -> f64 {
         match *self {

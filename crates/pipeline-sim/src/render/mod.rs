@@ -2,6 +2,7 @@
 
 mod bodies;
 mod canvas;
+mod light_grid;
 mod sensor;
 mod shadow;
 mod texture;
@@ -16,6 +17,7 @@ use rand::{RngExt, SeedableRng};
 use crate::{Cell, Look, Scene};
 use bodies::{Studio, plane_row};
 use canvas::Canvas;
+use light_grid::LightGrid;
 use sensor::Exposure;
 use shadow::{BallShadow, cast_things, table_light};
 use texture::{CoarseMap, Texture};
@@ -53,6 +55,7 @@ pub struct Renderer {
     /// Brightness of the panels on the walls.
     walls: Vec<f32>,
     exposure: Exposure,
+    light: LightGrid,
     canvas: Canvas,
     image: GrayImage,
 }
@@ -63,7 +66,7 @@ impl Renderer {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let wood = Texture::wood(0.60, &mut rng);
         let stains = 0.8 * scene.table.texture.clamp(0.0, 1.0) as f32;
-        let mut table = CoarseMap::stains(961, (-0.6, -1.2), 2.4, stains, &mut rng);
+        let mut table = CoarseMap::stains(601, (-0.6, -1.2), 2.4, stains, &mut rng);
         cast_things(&mut table, scene);
         let walls = (0..48).map(|_| rng.random_range(0.12_f32..0.55)).collect();
         let exposure = Exposure::new(scene.sensor, &mut rng);
@@ -75,6 +78,7 @@ impl Renderer {
             table,
             walls,
             exposure,
+            light: LightGrid::default(),
             canvas: Canvas::new(0, 0),
             image: GrayImage::new(0, 0),
         }
@@ -141,9 +145,12 @@ impl Renderer {
             let light = (self.scene.table.albedo * total) as f32;
             let ball = BallShadow::new(&self.scene, &cell.ball, cell.holder, cell.table);
             let strength = self.scene.table.texture as f32;
+            self.light.lay(view, &plane, |u, v| {
+                light * self.table.at(u, v) * ball.factor(u, v)
+            });
             canvas.fill(&polygon, |y, x0, row| {
-                plane_row(&plane, &self.wood, strength, (y, x0), row, |(u, v)| {
-                    light * self.table.at(u, v) * ball.factor(u, v)
+                plane_row(&plane, &self.wood, strength, (y, x0), row, |x| {
+                    self.light.at(x, y)
                 });
             });
         }
