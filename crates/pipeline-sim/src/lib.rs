@@ -33,8 +33,10 @@ mod reach_model;
 mod render;
 mod samples;
 mod scene;
+mod scene_kind;
 mod source;
 mod workspace;
+mod y4m;
 
 pub use ball::{Ball, Holder};
 pub use camera::{Camera, Distortion};
@@ -51,11 +53,13 @@ pub use mount::Mount;
 pub use open_loop::OpenLoopError;
 pub use optimum::GoalBox;
 pub use reach_model::{ReachForm, ReachModel};
-pub use render::Renderer;
+pub use render::{Renderer, Round, Shot, Sighting};
 pub use samples::{CentreSample, MoveLists, ReachSample, exploring_start, sample_moves, with_noise};
-pub use scene::{Light, Look, Scene, Sensor, Shape, Thing};
+pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
+pub use scene_kind::{SceneKind, Snapshot};
 pub use source::{CellCamera, FeatureCamera, SharedCell, SimulatedArm};
 pub use workspace::{Coverage, Workspace};
+pub use y4m::Y4mWriter;
 
 pub use hough_heuristic::image;
 pub use nalgebra;

@@ -6,7 +6,7 @@ use crate::render::canvas::Canvas;
 use crate::render::shadow::toward;
 use crate::render::texture::Texture;
 use crate::render::view::View;
-use crate::{Look, Scene, Shape, Thing};
+use crate::{Look, Occluder, Scene, Shape, Thing};
 
 /// Everything a body's shading depends on.
 pub(super) struct Studio<'a> {
@@ -340,6 +340,28 @@ impl Studio<'_> {
                     self.print(canvas, thing, (length, width), lines);
                 }
             }
+        }
+    }
+
+    /// Draws a strip right before the lens: too near to be sharp, so its edges are soft.
+    pub(super) fn occluder(&self, canvas: &mut Canvas, strip: &Occluder) {
+        let unit = self.view.width as f64 / hough_heuristic::Features::WIDTH;
+        let pixel = |p: Point2<f64>| p.coords * unit - nalgebra::Vector2::new(0.5, 0.5);
+        let (from, to) = (pixel(strip.from), pixel(strip.to));
+        let Some(along) = (to - from).try_normalize(1e-9) else {
+            return;
+        };
+        let across = nalgebra::Vector2::new(-along.y, along.x);
+        let light = strip.albedo * self.irradiance(&Vector3::z());
+        // Several ever narrower layers make a soft edge: each adds its share of what is still missing.
+        const LAYERS: usize = 6;
+        let soft = strip.softness.max(0.0) * unit;
+        for k in 0..LAYERS {
+            let half = across
+                * (0.5 * strip.width * unit + soft * (0.5 - (k as f64 + 0.5) / LAYERS as f64)).max(0.0);
+            let corners = [from - half, to - half, to + half, from + half].map(Point2::from);
+            let share = 1.0 / (LAYERS - k) as f32;
+            canvas.blend(&corners, light as f32, share);
         }
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 
 /// Light per pixel, 1 = just white.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -29,6 +29,13 @@ impl Canvas {
         }
     }
 
+    /// Gives the canvas another size, if it is another.
+    pub(super) fn resize(&mut self, width: usize, height: usize) {
+        if (self.width, self.height) != (width, height) {
+            *self = Self::new(width, height);
+        }
+    }
+
     /// Fills a convex polygon. `shade(y, x0, row)` writes the light of the pixels x0.. of row y into `row`.
     pub(super) fn fill(&mut self, polygon: &[Point2<f64>], mut shade: impl FnMut(usize, usize, &mut [f32])) {
         let Some(rows) = self.rows_of(polygon) else { return };
@@ -45,6 +52,21 @@ impl Canvas {
             shade(y, start, shades);
             for ((light, shade), share) in row.iter_mut().zip(&*shades).zip(&self.coverage[start..end]) {
                 *light += (shade - *light) * share;
+            }
+        }
+    }
+
+    /// Lays an even layer of light over a convex polygon that replaces `share` of what is below.
+    pub(super) fn blend(&mut self, polygon: &[Point2<f64>], light: f32, share: f32) {
+        let Some(rows) = self.rows_of(polygon) else { return };
+        for y in rows {
+            let Some((start, end, solid)) = self.cover_row(polygon, y) else {
+                continue;
+            };
+            let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
+            for (value, coverage) in row.iter_mut().zip(&self.coverage[start..end]) {
+                let coverage = if solid { 1.0 } else { *coverage };
+                *value += (light - *value) * coverage * share;
             }
         }
     }

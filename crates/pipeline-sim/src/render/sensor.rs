@@ -4,9 +4,8 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::Sensor;
 use crate::render::canvas::Canvas;
-use crate::render::view::View;
+use crate::{Camera, Sensor};
 
 const NOISES: usize = 1 << 16;
 const LEVELS: usize = 4096;
@@ -41,13 +40,14 @@ impl Exposure {
     }
 
     /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and with it the noise.
-    pub(super) fn expose(&mut self, canvas: &Canvas, view: &View, seed: u64, frame: u64, out: &mut [u8]) {
+    pub(super) fn expose(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, frame: u64, out: &mut [u8]) {
         let (width, height) = (canvas.width, canvas.height);
         if width == 0 || height == 0 {
             return;
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let s = self.sensor;
+        let (principal, focal) = (camera.principal_point(), camera.focal_px());
         let (side, middle) = kernel(s.blur);
         let (read, shot) = ((s.read_noise / 255.0) as f32, (s.shot_noise / 255.0) as f32);
         let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
@@ -56,7 +56,7 @@ impl Exposure {
         // Squared tangent of the angle to the axis, column by column.
         self.columns.clear();
         self.columns
-            .extend((0..width).map(|x| (((x as f64 - view.principal.x) / view.focal) as f32).powi(2)));
+            .extend((0..width).map(|x| (((x as f64 - principal.x) / focal) as f32).powi(2)));
         // A frame wider than the table of noise repeats it along the row.
         let run = width.min(NOISES / 2);
         for y in 0..height {
@@ -67,7 +67,7 @@ impl Exposure {
             }
             self.mixed[0] = self.mixed[1];
             self.mixed[width + 1] = self.mixed[width];
-            let fall = 1.0 + (((y as f64 - view.principal.y) / view.focal) as f32).powi(2);
+            let fall = 1.0 + (((y as f64 - principal.y) / focal) as f32).powi(2);
             let (left, centre, right) = (&self.mixed[..width], &self.mixed[1..=width], &self.mixed[2..]);
             for ((((value, l), c), r), tan2) in self
                 .row
