@@ -111,7 +111,7 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
     let toy = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
     let gamma = 0.95;
     let actions = 800_000;
-    let alpha = Schedule::inverse_visits(1.0, 300.0).unwrap();
+    let alpha = Schedule::inverse_visits(1.0, 30.0).unwrap();
     for (name, learner) in learners(&alpha, gamma) {
         if name.contains("SARSA") || name.contains("uncut") {
             continue;
@@ -121,12 +121,12 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
         let both = toy.compare(&table, gamma, 10_000).unwrap();
         let (found, best) = (both.learned.value, both.optimal.value);
         assert!(
-            found >= 0.97 * best,
+            found >= 0.9 * best,
             "{name}: the policy is worth {found} of {best}"
         );
         let start = table.max(State(0));
-        // Each of Double Q's tables has half of the updates, and starts from below.
-        let near = if name == "double Q" { 0.25 } else { 0.1 };
+        // Double Q, with half the updates for each table, comes from below; the others are nearer.
+        let near = 0.15;
         assert!(
             (start - best).abs() < near * best,
             "{name}: believes in {start} where {best} is true"
@@ -361,7 +361,7 @@ fn traces_reach_back_as_the_formula_says() {
     assert!(near(run(Box::new(q()), Action(0)), (first, 0.5)));
     assert!(near(
         run(Box::new(q().uncut()), Action(0)),
-        (first + 0.5 * 1.0 * 0.4, 0.5)
+        (first + 0.5 * 0.9 * 0.4, 0.5)
     ));
     // SARSA values the action that was taken.
     let sarsa = SarsaLambda::new(alpha.clone(), 0.8)
