@@ -43,6 +43,7 @@
 //! # Ok::<(), qtable::Error>(())
 //! ```
 
+mod check_env;
 mod course;
 mod curve;
 mod discretise;
@@ -58,7 +59,11 @@ mod model;
 mod persist;
 mod policy;
 mod schedule;
+mod scratch;
+mod seeds;
 mod table;
+mod text;
+mod time_limit;
 pub mod toys;
 mod train;
 mod training;
@@ -66,6 +71,7 @@ mod validated;
 
 pub use rand;
 
+pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
 pub use curve::Record;
 pub use discretise::{DiscretiseError, Intervals, Product};
 pub use environment::{Environment, Status, Step};
@@ -82,6 +88,9 @@ pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, 
 pub use persist::{PersistError, Problem, decode, encode, load, save};
 pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
 pub use schedule::{Schedule, ScheduleError};
+pub use seeds::{Estimate, over_seeds};
 pub use table::{QTable, Value};
+pub use text::CsvError;
+pub use time_limit::TimeLimit;
 pub use train::{Progress, TrainConfig, TrainReport, train};
 pub use training::{Training, Until};

@@ -293,6 +293,11 @@ impl<V: Value> QTable<V> {
         *count = count.saturating_add(1);
     }
 
+    /// Sets the count of a checked pair.
+    pub(crate) fn set_visits(&mut self, state: State, action: Action, visits: u32) {
+        self.visits[state.0 * self.actions + action.0] = visits;
+    }
+
     /// The value as it would be stored, or an error if that is not finite.
     #[inline]
     pub(crate) fn check_value(&self, state: State, action: Action, value: f64) -> Result<V, Error> {

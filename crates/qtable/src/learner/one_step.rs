@@ -5,6 +5,7 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::{Experience, Learner, Rates, check, next_value};
+use crate::scratch::Scratch;
 use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Step, Value};
 
 /// One-step Q-learning (Watkins and Dayan 1992; the paper's Eq. 3):
@@ -146,7 +147,7 @@ impl<V: Value> Learner<V> for Sarsa {
 pub struct ExpectedSarsa {
     rates: Rates,
     #[cfg_attr(feature = "serde", serde(skip))]
-    probabilities: Vec<f64>,
+    probabilities: Scratch,
 }
 
 impl ExpectedSarsa {
@@ -157,7 +158,7 @@ impl ExpectedSarsa {
     pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
         Ok(Self {
             rates: Rates::new(alpha, gamma)?,
-            probabilities: Vec::new(),
+            probabilities: Scratch::default(),
         })
     }
 
@@ -167,14 +168,13 @@ impl ExpectedSarsa {
         state: State,
         policy: &dyn Policy<V>,
     ) -> Result<f64, Error> {
-        self.probabilities.resize(table.actions(), 0.0);
-        if !policy.probabilities(table, state, &mut self.probabilities) {
+        let probabilities = self.probabilities.of_length(table.actions());
+        if !policy.probabilities(table, state, probabilities) {
             return Err(Error::NoProbabilities);
         }
         let row = table.row(state);
         // Forbidden actions have probability 0 and, being finite, no part in the sum.
-        Ok(self
-            .probabilities
+        Ok(probabilities
             .iter()
             .zip(row)
             .map(|(p, value)| p * value.to_f64())

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Policy;
 use crate::elementary::exp;
+use crate::scratch::Scratch;
 use crate::validated::validated;
 use crate::{Action, Error, QTable, Schedule, State, Value};
 
@@ -20,7 +21,7 @@ pub struct Boltzmann {
     temperature: Schedule,
     choices: u64,
     #[cfg_attr(feature = "serde", serde(skip))]
-    weights: Vec<f64>,
+    weights: Scratch,
 }
 
 impl Boltzmann {
@@ -37,7 +38,7 @@ impl Boltzmann {
         Self {
             temperature,
             choices: 0,
-            weights: Vec::new(),
+            weights: Scratch::default(),
         }
         .restore()
     }
@@ -64,10 +65,10 @@ impl<V: Value> Policy<V> for Boltzmann {
     fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action {
         let temperature = self.temperature();
         self.choices += 1;
-        self.weights.resize(table.actions(), 0.0);
-        let sum = boltzmann_weights(table, state, temperature, &mut self.weights);
+        let weights = self.weights.of_length(table.actions());
+        let sum = boltzmann_weights(table, state, temperature, weights);
         let mut rest = rng.random::<f64>() * sum;
-        for (action, &weight) in self.weights.iter().enumerate() {
+        for (action, &weight) in weights.iter().enumerate() {
             rest -= weight;
             if rest < 0.0 {
                 return Action(action);
