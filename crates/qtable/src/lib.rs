@@ -43,6 +43,7 @@
 //! # Ok::<(), qtable::Error>(())
 //! ```
 
+mod cached;
 mod check_env;
 mod course;
 mod curve;
@@ -71,6 +72,7 @@ mod validated;
 
 pub use rand;
 
+pub use cached::CachedBoltzmann;
 pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
 pub use curve::Record;
 pub use discretise::{DiscretiseError, Intervals, Product};
@@ -92,5 +94,5 @@ pub use seeds::{Estimate, over_seeds};
 pub use table::{QTable, Value};
 pub use text::CsvError;
 pub use time_limit::TimeLimit;
-pub use train::{Progress, TrainConfig, TrainReport, train};
+pub use train::{Progress, TrainConfig, TrainReport, train, train_in_blocks};
 pub use training::{Training, Until};

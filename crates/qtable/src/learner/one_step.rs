@@ -37,7 +37,7 @@ impl QLearning {
     /// # Errors
     /// A state or action out of range or forbidden, a reward that is not finite, or a value that would not be.
     /// The table is unchanged then.
-    #[inline]
+    #[inline(always)]
     pub fn update<V: Value>(
         &mut self,
         table: &mut QTable<V>,
@@ -45,9 +45,17 @@ impl QLearning {
         action: Action,
         step: &Step,
     ) -> Result<f64, Error> {
-        check(table, state, action, step)?;
+        table.check_state(step.observation)?;
         let target = self.rates.target(step, || table.max(step.observation).to_f64());
-        self.rates.learn(table, state, action, target)
+        // A reward that is not finite makes a value that is not, which is refused; only its name is to be found.
+        match self.rates.learn(table, state, action, target) {
+            Err(Error::ValueNotFinite { .. }) if !step.reward.is_finite() => Err(Error::RewardNotFinite {
+                state,
+                action,
+                reward: step.reward,
+            }),
+            learned => learned,
+        }
     }
 
     /// Learns from a step that did not really happen: no visit is counted, and the clock stands still.

@@ -97,7 +97,7 @@ fn learn_along<V: Value>(
     traces.spread(table, alpha * (target - expected))?;
     table.store(state, action, old + alpha * error)?;
     traces.recent.push((state, action, 1.0));
-    table.count(state, action);
+    table.visit(state, action)?;
     rates.updates += 1;
     match step.status {
         Status::Continuing => traces.decay(rates.gamma),

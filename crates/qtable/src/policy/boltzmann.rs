@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::Policy;
-use crate::elementary::exp;
+use crate::elementary::exp_within;
 use crate::scratch::Scratch;
 use crate::validated::validated;
 use crate::{Action, Error, QTable, Schedule, State, Value};
@@ -87,7 +87,7 @@ impl<V: Value> Policy<V> for Boltzmann {
     }
 }
 
-/// Writes `exp((Q - max Q) / T)` for each action, 0 for forbidden ones, and returns the sum.
+/// Writes `exp((Q - max Q) / T)` for each action (0 below `exp(-700)`), 0 for forbidden ones, and returns the sum.
 fn boltzmann_weights<V: Value>(
     table: &QTable<V>,
     state: State,
@@ -96,7 +96,13 @@ fn boltzmann_weights<V: Value>(
 ) -> f64 {
     let highest = table.max(state).to_f64();
     for (weight, value) in weights.iter_mut().zip(table.row(state)) {
-        *weight = exp((value.to_f64() - highest) / temperature);
+        let exponent = (value.to_f64() - highest) / temperature;
+        // Below this an ordinary number cannot hold it; not a branch, but a choice of two values.
+        *weight = if exponent < -700.0 {
+            0.0
+        } else {
+            exp_within(exponent)
+        };
     }
     if let Some(mask) = table.mask() {
         for (weight, &allowed) in weights.iter_mut().zip(mask.row(state)) {
