@@ -38,8 +38,10 @@ pub struct CachedBoltzmann {
     groups: Vec<Group>,
 }
 
-/// What there is once for each state.
+/// What there is once for each state. Here and below the alignment is that of a cache line, so that no vector lies
+/// across two of them.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct Head {
     /// The offset c.
     offset: f64,
@@ -53,6 +55,7 @@ struct Head {
 
 /// What there is for each action, 16 of them.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct Group {
     /// Values; negative infinity for the padding of a row and for forbidden actions.
     values: [f32; GROUP],
@@ -223,7 +226,7 @@ impl CachedBoltzmann {
     #[inline(always)]
     pub fn choose<R: Rng + ?Sized>(&self, state: State, rng: &mut R) -> Action {
         // As many random bits as an f32 holds; all that is drawn is below the total.
-        let uniform = (rng.next_u64() >> 40) as f32 * (1.0 / (1u32 << 24) as f32);
+        let uniform = (rng.next_u64() >> 40) as u32 as i32 as f32 * (1.0 / (1u32 << 24) as f32);
         let head = &self.heads[state.0];
         let drawn = uniform * head.ends[BLOCKS - 1];
         let block = count_up_to(&head.ends, drawn);
@@ -233,19 +236,19 @@ impl CachedBoltzmann {
             } else {
                 head.ends[(block - 1) % BLOCKS]
             };
-        let first = block << self.block_shift;
-        let last = (first + (1 << self.block_shift)).min(self.groups_per_row);
+        let (first, last) = self.groups_of(block);
         let start = state.0 * self.groups_per_row;
         let mut action = first * GROUP;
-        for group in self.groups.get(start + first..start + last).unwrap_or_default() {
-            action += count_up_to(&group.running, rest);
+        if self.block_shift == 0 {
+            // The usual case in a straight line: it is the latency of this that limits the speed.
+            action += count_up_to(&self.groups[start + first].running, rest);
+        } else {
+            for group in &self.groups[start + first..start + last] {
+                action += count_up_to(&group.running, rest);
+            }
         }
         // Rounding may lead past the last weight.
-        if action < last * GROUP {
-            Action(action)
-        } else {
-            self.best(state)
-        }
+        if action < last * GROUP { Action(action) } else { self.best(state) }
     }
 
     /// Writes the probability of each action into `probabilities`, one entry for each.
@@ -316,6 +319,13 @@ impl CachedBoltzmann {
         }
     }
 
+    /// The first group of a block, and the one after its last; the row's last group for a block beyond the row.
+    #[inline(always)]
+    fn groups_of(&self, block: usize) -> (usize, usize) {
+        let first = (block << self.block_shift).min(self.groups_per_row - 1);
+        (first, (first + (1 << self.block_shift)).min(self.groups_per_row))
+    }
+
     fn row(&self, state: State) -> &[Group] {
         &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row]
     }
@@ -359,8 +369,7 @@ impl CachedBoltzmann {
     /// Sums a block anew, and the ends of all blocks of the row. Nothing is added to an old sum, so no error builds up.
     #[inline(always)]
     fn sum_block(&mut self, state: State, block: usize) {
-        let first = block << self.block_shift;
-        let last = (first + (1 << self.block_shift)).min(self.groups_per_row);
+        let (first, last) = self.groups_of(block);
         let start = state.0 * self.groups_per_row;
         let mut sum = 0.0;
         for group in &mut self.groups[start + first..start + last] {
