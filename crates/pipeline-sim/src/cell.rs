@@ -2,7 +2,7 @@
 
 use hough_heuristic::{Circle, Features};
 use nalgebra::{Isometry3, Point3, Vector3};
-use puma_val2::{Joint, Joints, PumaParams};
+use puma_val2::{Gripper, Joint, Joints, PumaParams};
 
 use crate::{Ball, Camera, Ellipse, Hand, Holder, Mount};
 
@@ -100,6 +100,10 @@ pub struct Cell {
     pub holder: Option<Holder>,
     /// Height of the table's surface, metres.
     pub table: f64,
+    /// State of the jaws.
+    pub jaws: Gripper,
+    /// Where the ball is in the hand frame while the jaws hold it.
+    pub held: Option<Point3<f64>>,
     /// When the ball counts as seen.
     pub sight: SightRule,
     /// Joint angles that the task keeps to.
@@ -127,13 +131,16 @@ impl Cell {
             ball,
             holder: Some(Holder::under(&ball)),
             table: -0.300,
+            jaws: Gripper::Open,
+            held: None,
             sight: SightRule::default(),
             limits: WorkingLimits::paper(),
         }
     }
 
-    /// Puts the ball, with a holder under it, at another place.
+    /// Puts the ball, with a holder under it, at another place, out of the jaws if they held it.
     pub fn place_ball(&mut self, centre: Point3<f64>) {
+        self.held = None;
         self.ball.centre = centre;
         self.holder = Some(Holder::under(&self.ball));
     }
@@ -254,7 +261,7 @@ impl Cell {
     /// Whether fingers, palm or camera are about to touch table, holder or ball.
     ///
     /// The ball may be between the open fingers, that is what they are for: it counts when a finger, the palm or the camera comes
-    /// nearer to its surface than the sensors' range, which a ball gripped after a correct reach never does.
+    /// nearer to its surface than the sensors' range, which does not happen in a correct reach and grip. A held ball does not count.
     pub fn proximity(&self, joints: &Joints) -> bool {
         let range = self.hand.sensor_range;
         let holder = self.holder.map(|h| crate::Capsule {
@@ -264,15 +271,20 @@ impl Cell {
         });
         self.hand_bodies(joints).iter().any(|body| {
             body.gap_to_plane(self.table) < range
-                || body.gap_to_sphere(&self.ball.centre, self.ball.radius) < range
+                || (self.held.is_none() && body.gap_to_sphere(&self.ball.centre, self.ball.radius) < range)
                 || holder.is_some_and(|h| body.gap_to(&h) < range)
         })
     }
 
-    /// Fingers (open), palm and camera, in the world frame.
+    /// Fingers, palm and camera, in the world frame. Closed fingers stand as far apart as the ball is wide if they hold it.
     pub fn hand_bodies(&self, joints: &Joints) -> [crate::Capsule; 4] {
         let wrist = self.params.wrist(joints);
-        let [left, right] = self.hand.fingers(self.params.d6, self.hand.half_opening);
+        let apart = match self.jaws {
+            Gripper::Open => self.hand.half_opening,
+            Gripper::Closed if self.held.is_some() => self.ball.radius + self.hand.finger_radius,
+            Gripper::Closed => self.hand.finger_radius,
+        };
+        let [left, right] = self.hand.fingers(self.params.d6, apart);
         [
             left.moved(&wrist),
             right.moved(&wrist),

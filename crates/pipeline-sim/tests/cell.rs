@@ -95,9 +95,9 @@ fn a_correct_reach_and_grip_leaves_the_proximity_sensors_quiet() {
         for i in 0..=20 {
             let t = f64::from(i) / 20.0;
             let pose = Joints(std::array::from_fn(|j| start.0[j] + t * (goal.0[j] - start.0[j])));
-            assert!(!cell.proximity(&pose), "{} at {pose} of {cell:?}", t);
+            assert!(!cell.proximity(&pose), "{t} at {pose} of {cell:?}");
             let swing = goal + JointDelta::of(Joint::J5, -18.01_f64.to_radians() * t);
-            assert!(!cell.proximity(&swing), "swing {} at {swing}", t);
+            assert!(!cell.proximity(&swing), "swing {t} at {swing}");
         }
     }
 }
