@@ -2,6 +2,11 @@
 //! machine is doing. Where valgrind is not installed it says so and succeeds.
 
 #![allow(missing_docs)]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "its counts are for reading"
+)]
 
 #[path = "../scenes/contest.rs"]
 mod contest;
@@ -77,7 +82,8 @@ fn count(scene: &str, case: &str) -> Result<u64, String> {
 
 /// One frame to fill the buffers, and a second one that counts.
 fn run(scene: &str, case: &str) {
-    let Some((_, scene)) = contest::scenes().into_iter().find(|(name, _)| *name == scene) else {
+    let Some(contest::Round { scene, .. }) = contest::rounds().into_iter().find(|round| round.name == scene)
+    else {
         return;
     };
     let (frame, _) = scene.render();

@@ -2,6 +2,8 @@
 //!
 //! cargo run --release -p hough-heuristic --example compare -- --seeds 20 --csv scenes.csv --svg scenes.svg
 
+#![allow(clippy::print_stdout, reason = "what an example is for")]
+
 #[path = "../scenes/contest.rs"]
 mod contest;
 #[path = "../scenes/scenes.rs"]
@@ -11,7 +13,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Parser;
-use hough_heuristic::{Canny, EdgeDetector};
+use hough_heuristic::EdgeDetector;
 use plotters::prelude::*;
 use scenes::same;
 
@@ -54,27 +56,37 @@ recall,precision,centre_error_px_median,memory_bytes";
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse();
     let mut rows = Vec::new();
-    for (name, scene) in contest::scenes() {
+    for round in contest::rounds() {
         for detector in contest::DETECTORS {
             let seeds = if detector == "SHT" {
                 options.slow_seeds
             } else {
                 options.seeds
             };
-            let row = measure(name, scene, detector, seeds)?;
+            let row = measure(&round, detector, seeds)?;
             println!("{}", row.to_csv());
             rows.push(row);
         }
-        let mut canny = Canny::default();
+        let mut canny = round.canny();
         let mut times: Vec<f64> = (0..options.seeds)
             .map(|seed| {
-                let (frame, _) = scenes::Scene { seed, ..scene }.render();
+                let (frame, _) = scenes::Scene {
+                    seed: 100 + seed,
+                    ..round.scene
+                }
+                .render();
                 least_millis(5, || {
                     canny.detect_edges(&frame);
                 })
             })
             .collect();
-        println!("# {name}: edges take {:.3} ms", median(&mut times));
+        let edges_row = Row {
+            detector: "edges",
+            median: median(&mut times),
+            ..Row::new(&round, "edges", options.seeds)
+        };
+        println!("{}", edges_row.to_csv());
+        rows.push(edges_row);
     }
     if let Some(path) = &options.csv {
         let lines: Vec<String> = rows.iter().map(Row::to_csv).collect();
@@ -86,33 +98,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn measure(
-    name: &'static str,
-    scene: scenes::Scene,
-    detector_name: &'static str,
-    seeds: u64,
-) -> Result<Row, Box<dyn Error>> {
+fn measure(round: &contest::Round, detector_name: &'static str, seeds: u64) -> Result<Row, Box<dyn Error>> {
     let (mut times, mut errors) = (Vec::new(), Vec::new());
-    let mut row = Row {
-        scene: name,
-        detector: detector_name,
-        frames: seeds,
-        edges: 0,
-        median: 0.0,
-        most: 0.0,
-        truths: 0,
-        found: 0,
-        matched: 0,
-        centre: f64::NAN,
-        memory: 0,
-    };
+    let mut row = Row::new(round, detector_name, seeds);
     for seed in 0..seeds {
         let scene = scenes::Scene {
             seed: 100 + seed,
-            ..scene
+            ..round.scene
         };
         let (frame, balls) = scene.render();
-        let edges = Canny::default().detect_edges(&frame).clone();
+        let edges = round.canny().detect_edges(&frame).clone();
         row.edges += edges.pixels().len();
         let mut detector = contest::detector(detector_name, &scene, edges)?;
         let mut found = Vec::new();
@@ -138,6 +133,22 @@ fn measure(
 }
 
 impl Row {
+    fn new(round: &contest::Round, detector: &'static str, frames: u64) -> Self {
+        Self {
+            scene: round.name,
+            detector,
+            frames,
+            edges: 0,
+            median: 0.0,
+            most: 0.0,
+            truths: 0,
+            found: 0,
+            matched: 0,
+            centre: f64::NAN,
+            memory: 0,
+        }
+    }
+
     fn to_csv(&self) -> String {
         let share = |of: usize| self.matched as f64 / of as f64;
         format!(
@@ -181,7 +192,7 @@ fn least_millis(reps: u32, mut work: impl FnMut()) -> f64 {
 
 /// The median time of each detector (a colour) on each scene (a column), on a logarithmic scale.
 fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
-    let names: Vec<&str> = contest::scenes().into_iter().map(|(name, _)| name).collect();
+    let names: Vec<&str> = contest::rounds().into_iter().map(|round| round.name).collect();
     let area = SVGBackend::new(path, (1000, 560)).into_drawing_area();
     area.fill(&WHITE)?;
     let columns = names.len() as f64;

@@ -4,14 +4,38 @@
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Acceptance, CircleDetector, ConfigError, EdgeDetector, EdgeMap, Heuristic, HeuristicConfig,
-    RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
+    Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, EdgeDetector, EdgeMap, Heuristic,
+    HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
 };
 
 use crate::scenes::Scene;
 
+/// A scene of the comparison.
+#[derive(Clone, Copy)]
+pub struct Round {
+    pub name: &'static str,
+    pub scene: Scene,
+    /// Whether the edge thresholds stay as they are in noise.
+    pub fixed_thresholds: bool,
+}
+
+impl Round {
+    pub fn canny(&self) -> Canny {
+        let noise_factor = if self.fixed_thresholds {
+            0.0
+        } else {
+            CannyConfig::default().noise_factor
+        };
+        Canny::new(CannyConfig {
+            noise_factor,
+            ..CannyConfig::default()
+        })
+        .expect("usable settings")
+    }
+}
+
 /// From the paper's simple case to hard ones.
-pub fn scenes() -> Vec<(&'static str, Scene)> {
+pub fn rounds() -> Vec<Round> {
     let one = Scene {
         noise: 2.0,
         radius: (20.0, 140.0),
@@ -28,37 +52,49 @@ pub fn scenes() -> Vec<(&'static str, Scene)> {
         radius: (10.0, 35.0),
         ..one
     };
+    let round = |name, scene| Round {
+        name,
+        scene,
+        fixed_thresholds: false,
+    };
+    let fixed = |name, scene| Round {
+        name,
+        scene,
+        fixed_thresholds: true,
+    };
     vec![
-        ("1 ball", one),
-        (
+        round("1 ball", one),
+        round(
             "+5 distractors",
             Scene {
                 distractors: 5,
                 ..one
             },
         ),
-        (
+        round(
             "+20 distractors",
             Scene {
                 distractors: 20,
                 ..one
             },
         ),
-        ("noise 5", Scene { noise: 5.0, ..one }),
-        ("noise 15", Scene { noise: 15.0, ..one }),
-        ("noise 30", Scene { noise: 30.0, ..one }),
-        ("5 balls", many(5)),
-        ("20 balls", many(20)),
-        (
-            "20 distractors, no ball",
+        round("noise 5", Scene { noise: 5.0, ..one }),
+        round("noise 15", Scene { noise: 15.0, ..one }),
+        round("noise 30", Scene { noise: 30.0, ..one }),
+        fixed("noise 20, fixed", Scene { noise: 20.0, ..one }),
+        fixed("noise 30, fixed", Scene { noise: 30.0, ..one }),
+        round("5 balls", many(5)),
+        round("20 balls", many(20)),
+        round(
+            "no ball, 20 distr.",
             Scene {
                 distractors: 20,
                 balls: 0,
                 ..one
             },
         ),
-        ("192x144, 1 ball", small),
-        (
+        round("192x144, 1 ball", small),
+        round(
             "192x144, +5",
             Scene {
                 distractors: 5,

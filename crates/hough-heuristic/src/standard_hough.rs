@@ -18,7 +18,8 @@ pub struct StandardHoughConfig {
     /// Vote only along the gradient, where the edge detector knows it (default false). A pixel then votes for an arc of
     /// `direction_error` to either side of the two directions instead of the full circle.
     pub gradient: bool,
-    /// How far the gradient's direction may be off, radians (default 0.06; 0..=1).
+    /// How far the gradient's direction may be off, radians (default 0.15; 0..=1). Noise turns a gradient by
+    /// the ratio of its own deviation to the edge's strength.
     pub direction_error: f64,
     /// The share of the outline's cells that must have voted before a peak is verified (default 0.4; 0..1).
     pub min_votes: f64,
@@ -30,7 +31,7 @@ impl Default for StandardHoughConfig {
             accept: Acceptance::default(),
             cell: 2.0,
             gradient: false,
-            direction_error: 0.06,
+            direction_error: 0.15,
             min_votes: 0.4,
         }
     }

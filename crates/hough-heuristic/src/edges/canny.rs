@@ -11,6 +11,9 @@ use crate::error::require;
 /// The largest threshold: no gradient is steeper.
 pub(super) const MAX_THRESHOLD: f32 = 1141.0;
 
+/// What noise raises the low threshold to, in parts of what it raises the high one to.
+const LOW_FLOOR: f32 = 0.6;
+
 /// The settings of [`Canny`].
 ///
 /// Thresholds are in grey levels of the Sobel gradient's length, `sqrt(gx^2 + gy^2)` with the 3x3 kernels that sum to 8
@@ -27,9 +30,9 @@ pub struct CannyConfig {
     /// Deviation of the Gaussian that smooths the frame, pixels (default 1.2; 0..=2, and 0 does not smooth). Larger: less
     /// noise, and corners and small circles rounded off. The kernel is cut off after 2 px up to 1.25, 3 px up to 1.6, else 4 px.
     pub sigma: f32,
-    /// Raises both thresholds in noisy frames, by the same factor, until `high` is this many times the deviation that the
-    /// frame's noise gives to each part of the gradient (default 5; 0..=20, and 0 leaves the thresholds as they are). At 5
-    /// noise alone starts about one edge per frame of 768x576, at 4 a hundred.
+    /// Raises the thresholds in noisy frames: `high` to at least this many times the deviation that the frame's noise gives
+    /// to each part of the gradient, `low` to at least 0.6 of that (default 5; 0..=20, and 0 leaves the thresholds as they
+    /// are). At 5 noise alone starts about one edge per frame of 768x576, at 4 a hundred.
     pub noise_factor: f32,
 }
 
@@ -108,9 +111,11 @@ impl Canny {
             noise_factor,
             ..
         } = self.config;
-        let raise = (noise_factor * noise * self.noise_gain / high).max(1.0);
+        let floor = noise_factor * noise * self.noise_gain;
+        let high = high.max(floor).min(MAX_THRESHOLD);
+        let low = low.max(LOW_FLOOR * floor).min(high);
         let square = |threshold: f32| {
-            let threshold = (threshold * raise).min(MAX_THRESHOLD) * UNITS;
+            let threshold = threshold * UNITS;
             (threshold * threshold) as i32
         };
         self.passes.low = square(low);

@@ -1,5 +1,10 @@
 //! Integration tests, one module a theme.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may fail that way, also in a function that several tests share"
+)]
+
 #[path = "../../scenes/scenes.rs"]
 mod scenes;
 

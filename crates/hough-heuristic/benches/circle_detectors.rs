@@ -12,19 +12,19 @@ mod scenes;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use hough_heuristic::{Canny, EdgeDetector};
+use hough_heuristic::EdgeDetector;
 
 fn detectors(criterion: &mut Criterion) {
-    for (scene_name, scene) in contest::scenes() {
-        let (frame, _) = scene.render();
-        let edges = Canny::default().detect_edges(&frame).clone();
-        let mut group = criterion.benchmark_group(scene_name);
+    for round in contest::rounds() {
+        let (frame, _) = round.scene.render();
+        let edges = round.canny().detect_edges(&frame).clone();
+        let mut group = criterion.benchmark_group(round.name);
         group
             .sample_size(10)
             .warm_up_time(Duration::from_millis(300))
             .measurement_time(Duration::from_secs(1));
         for name in contest::DETECTORS {
-            let mut detector = contest::detector(name, &scene, edges.clone()).expect("usable settings");
+            let mut detector = contest::detector(name, &round.scene, edges.clone()).expect("usable settings");
             let mut found = Vec::new();
             group.bench_function(name, |bencher| {
                 bencher.iter(|| {
