@@ -118,6 +118,7 @@ impl Renderer {
     /// Joints or places that are not finite give a frame of noise without content.
     pub fn render(&mut self, cell: &Cell, joints: &Joints) -> &GrayImage {
         self.illuminate(cell, joints);
+        self.exposure.blurred = false;
         self.develop(cell)
     }
 
