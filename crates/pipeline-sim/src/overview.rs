@@ -12,11 +12,13 @@ const SCALE: f64 = 340.0;
 /// Width of each of the two views, and their height, pixels.
 const VIEW: (f64, f64) = (560.0, 470.0);
 
+/// World to page.
+type Placement = Box<dyn Fn(&Point3<f64>) -> (f64, f64)>;
+
 /// One of the two views: a projection of the world onto the page.
 struct Page<'a> {
     text: &'a mut String,
-    /// World to page.
-    place: Box<dyn Fn(&Point3<f64>) -> (f64, f64)>,
+    place: Placement,
 }
 
 impl Page<'_> {
@@ -77,7 +79,7 @@ rect{{fill:#fff}} text{{font:13px sans-serif;fill:#333}} polyline{{fill:none;str
         };
         // From above: x up, y to the left.
         let above = |p: &Point3<f64>| (VIEW.0 + 280.0 - p.y * SCALE, 390.0 - p.x * SCALE);
-        let views: [(&str, Box<dyn Fn(&Point3<f64>) -> (f64, f64)>); 2] = [
+        let views: [(&str, Placement); 2] = [
             ("from the side, in the plane of the arm", Box::new(side)),
             ("from above", Box::new(above)),
         ];
