@@ -8,9 +8,10 @@
 //! top-left pixel. Truth holds every outline that is round to 5 % (axis ratio), at least 60 % visible and at least 5 px in radius:
 //! the ball (`Target`) and whatever else is round, since a detector that finds the rim of a disc seen from above is right.
 
+#![allow(clippy::print_stdout)] // What it measured is what it prints.
+
 use std::error::Error;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
@@ -115,12 +116,10 @@ fn counts(sighting: &Sighting, visible: f64) -> bool {
 }
 
 /// Writes a file as a whole or not at all.
-fn save(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
+fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let unfinished = path.with_extension("part");
+    std::fs::write(&unfinished, bytes)?;
+    std::fs::rename(unfinished, path)
 }
 
 /// CPU time of this process.

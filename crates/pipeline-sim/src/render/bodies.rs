@@ -47,24 +47,45 @@ pub(super) fn plane_row(
     };
     let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
     let level = texture.level(footprint);
-    // Places are exact at multiples of the stride, so that what lies between is the same in all rows.
+    // A plane that does not recede along the row (the camera's x axis lies in it, as it does while the hand is not rolled) is walked in one
+    // go; otherwise places are exact at multiples of the stride, so that what lies between is the same in all rows.
     let length = row.len();
+    let even = (step.z * length as f64).abs() < 1e-7 * base.z.abs();
+    if even {
+        let (from, to) = (place(0), place(length));
+        let share = 1.0 / length as f64;
+        texture.walk(
+            level,
+            from,
+            ((to.0 - from.0) * share, (to.1 - from.1) * share),
+            strength,
+            row,
+        );
+    }
     let mut k = 0;
     let mut from = place(0);
     let mut from_light = light(x0);
     while k < length {
         let end = ((x0 + k + STRIDE) / STRIDE * STRIDE - x0).min(length);
-        let to = place(end);
-        let to_light = light(x0 + end);
         let chunk = &mut row[k..end];
-        let share = 1.0 / (end - k) as f64;
-        let step = ((to.0 - from.0) * share, (to.1 - from.1) * share);
-        texture.walk(level, from, step, strength, chunk);
-        let slope = (to_light - from_light) * share as f32;
+        if !even {
+            let to = place(end);
+            let share = 1.0 / (end - k) as f64;
+            texture.walk(
+                level,
+                from,
+                ((to.0 - from.0) * share, (to.1 - from.1) * share),
+                strength,
+                chunk,
+            );
+            from = to;
+        }
+        let to_light = light(x0 + end);
+        let slope = (to_light - from_light) / (end - k) as f32;
         for (i, value) in (0_i32..).zip(chunk) {
             *value *= from_light + slope * i as f32;
         }
-        (from, from_light, k) = (to, to_light, end);
+        (from_light, k) = (to_light, end);
     }
 }
 
