@@ -39,7 +39,11 @@ fn pyserial_holds_the_example_session_and_reopens_the_line() {
     assert!(output.status.success(), "{screen}\n{complaints}");
     println!("{screen}");
     if std::env::var_os("REGENERATE").is_some() {
-        std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/pyserial.txt"), &screen).unwrap();
+        std::fs::write(
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/pyserial.txt"),
+            &screen,
+        )
+        .unwrap();
         return;
     }
     let expected = include_str!("golden/pyserial.txt").replace("\r\n", "\n");
