@@ -9,7 +9,7 @@ mod manipulator;
 mod serve;
 mod transport;
 
-pub use client::{ClientConfig, Ending, Location, MoveWay, ReplyReader, Val2Client};
+pub use client::{ClientConfig, Ending, Location, MoveWay, ReplyReader, Resident, Val2Client};
 pub use emulator::{
     BootQuestion, Emulator, Event, Fault, Message, Place, Profile, StartPower, TextError, WhereLayout,
     char_time,

@@ -89,6 +89,7 @@ impl<T: Transport> Val2Client<T> {
                     };
                     if yes { b"Y\r" } else { b"N\r" }
                 }
+                Ending::Question if questions % 2 == 0 && !last_line(&reply.text).contains("Y/N") => b"\r",
                 Ending::Question => refusal(&reply.text),
             };
             questions += 1;
