@@ -14,7 +14,9 @@ use std::time::Duration;
 use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic, HeuristicConfig, ImageFiles,
+    Acceptance, Canny, Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic,
+    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
+    StandardHoughConfig,
 };
 
 use files::{writable_folder, write_png, write_whole};
@@ -74,6 +76,14 @@ struct Options {
 enum DetectorName {
     /// Three random edge pixels, belonging against a threshold (the paper's)
     Heuristic,
+    /// The same, all three pixels from the whole image, as the paper samples
+    HeuristicAnywhere,
+    /// Randomized Hough transform
+    Rht,
+    /// Standard Hough transform; takes seconds on large images
+    Sht,
+    /// Standard Hough transform that votes along the gradient
+    ShtGradient,
 }
 
 fn main() -> ExitCode {
@@ -191,17 +201,43 @@ impl Results {
 }
 
 fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
+    let accept = Acceptance {
+        min_radius: options.min_radius,
+        max_radius: options.max_radius,
+        max_circles: options.max_circles,
+        ..Acceptance::default()
+    };
+    let heuristic = |sampling| {
+        Heuristic::with_canny(HeuristicConfig {
+            min_radius: accept.min_radius,
+            max_radius: accept.max_radius,
+            max_circles: accept.max_circles,
+            seed: options.seed,
+            sampling,
+            ..HeuristicConfig::default()
+        })
+    };
+    let standard = |gradient| {
+        let config = StandardHoughConfig {
+            accept,
+            gradient,
+            ..StandardHoughConfig::default()
+        };
+        StandardHough::new(config, Canny::default())
+    };
     Ok(match options.detector {
-        DetectorName::Heuristic => {
-            let config = HeuristicConfig {
-                min_radius: options.min_radius,
-                max_radius: options.max_radius,
-                max_circles: options.max_circles,
+        DetectorName::Heuristic => Box::new(heuristic(Sampling::Near)?),
+        DetectorName::HeuristicAnywhere => Box::new(heuristic(Sampling::Anywhere)?),
+        DetectorName::Rht => {
+            let config = RandomizedHoughConfig {
+                accept,
                 seed: options.seed,
-                ..HeuristicConfig::default()
+                ..RandomizedHoughConfig::default()
             };
-            Box::new(Heuristic::with_canny(config)?)
+            Box::new(RandomizedHough::new(config, Canny::default())?)
         }
+        DetectorName::Sht => Box::new(standard(false)?),
+        DetectorName::ShtGradient => Box::new(standard(true)?),
     })
 }
 

@@ -11,8 +11,8 @@
 //! | [`grasp_agent`] | circles into joint moves: learned behaviours, search, recovery, grip |
 //!
 //! They are re-exported here under their own names. What this package adds is the wiring between the two that do not know each other,
-//! the simulated cell and the controller: a [`Simulator`] is fitted to samples of the cell, and [`learn`] teaches a behaviour in
-//! it.
+//! the simulated cell and the controller: a [`Simulator`] is fitted to samples of the cell, [`learn`] teaches a behaviour in it,
+//! and a [`Rig`] is an arm behind a VAL II controller with the cell around it, in which an agent goes for a ball.
 //!
 //! ```
 //! use puma_grasp::grasp_agent::BehaviourSpec;
@@ -34,6 +34,7 @@
 //! `cargo run --release --example grasp`.
 
 mod plane;
+mod rig;
 mod training;
 mod trial;
 
@@ -44,6 +45,7 @@ pub use puma_val2;
 pub use qtable;
 
 pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_starts};
+pub use rig::{Rig, RigError};
 pub use training::{LearnError, Lesson, Simulator, learn};
 pub use trial::{FeatureEye, TrialCell, TrialResult};
 

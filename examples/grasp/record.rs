@@ -37,7 +37,13 @@ pub(crate) struct Picture {
 
 impl RunRecord {
     pub(crate) fn new(ball_mm: [f64; 3]) -> Self {
-        Self { ball_mm, rows: Vec::new(), outcome: None, grasped: false, miss_mm: None }
+        Self {
+            ball_mm,
+            rows: Vec::new(),
+            outcome: None,
+            grasped: false,
+            miss_mm: None,
+        }
     }
 
     /// Takes down an event; returns the picture of its frame, if it has one.
@@ -48,13 +54,22 @@ impl RunRecord {
             _ => (None, None),
         };
         let number = self.rows.len();
-        self.rows.push(Row { step: event.cycle, event: event.kind.word(), features, joints: event.joints, action });
+        self.rows.push(Row {
+            step: event.cycle,
+            event: event.kind.word(),
+            features,
+            joints: event.joints,
+            action,
+        });
 
         let mut overlay = Overlay::new(event.frame?);
         if let EventKind::Seen(sighting) = event.kind {
             overlay.circle(&sighting.detection.circle);
             let f = sighting.features;
-            overlay.caption(&format!("run {run} step {}   x {:.1} y {:.1} r {:.1}", event.cycle, f.x, f.y, f.r));
+            overlay.caption(&format!(
+                "run {run} step {}   x {:.1} y {:.1} r {:.1}",
+                event.cycle, f.x, f.y, f.r
+            ));
         } else {
             overlay.caption(&format!("run {run} step {}   no ball", event.cycle));
         }

@@ -17,6 +17,12 @@ impl Overlay {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
     }
 
+    /// Draws on a picture that is in colour already.
+    #[allow(dead_code, reason = "not every example that draws begins with such a picture")]
+    pub(crate) fn over(picture: RgbImage) -> Self {
+        Self(picture)
+    }
+
     /// A found circle: its outline and its centre. Parts outside the frame are cut off.
     pub(crate) fn circle(&mut self, circle: &Circle) {
         let green = Rgb888::new(60, 255, 60);

@@ -1,6 +1,7 @@
-//! The checking procedure: how many pixels of an estimated circle are edges.
+//! The checking procedure: how many pixels of an estimated curve are edges.
 
-use crate::{Circle, EdgePixel};
+use crate::curve::{longest_outline, round};
+use crate::{Circle, Curve, EdgePixel};
 
 /// Answers for every pixel of a frame whether an edge pixel lies within the tolerance of it.
 ///
@@ -64,20 +65,35 @@ impl NearEdges {
         index(x, y, self.width, self.height).is_some_and(|index| self.counts[index] != 0)
     }
 
-    /// The belonging parameter β of the circle, if it is above `theta`.
+    /// The belonging parameter β of a curve; 0 for a curve without pixels.
+    pub(crate) fn belonging<C: Curve>(&self, curve: &C) -> f64 {
+        let (mut pixels, mut matched) = (0u32, 0u32);
+        curve.outline(self.width as u32, self.height as u32, |x, y| {
+            pixels += 1;
+            matched += u32::from(self.matches(x, y));
+            true
+        });
+        f64::from(matched) / f64::from(pixels.max(1))
+    }
+
+    /// The β of a circle, if it is above `theta`.
     ///
     /// Stops counting as soon as the misses rule that out, which changes no answer.
     pub(crate) fn belonging_above(&self, circle: &Circle, theta: f64) -> Option<f64> {
-        // The outline has at most this many pixels, so that more misses than this make β <= theta.
-        let spare = (1.0 - theta) * (4.0 * std::f64::consts::SQRT_2 * circle.radius + 8.0);
+        let spare = (1.0 - theta) * longest_outline(circle.radius);
         let (mut pixels, mut misses) = (0u32, 0u32);
-        let complete = outline(circle, |x, y| {
+        let complete = circle.outline(self.width as u32, self.height as u32, |x, y| {
             pixels += 1;
             misses += u32::from(!self.matches(x, y));
             f64::from(misses) <= spare
         });
         let beta = f64::from(pixels - misses) / f64::from(pixels.max(1));
         (complete && beta > theta).then_some(beta)
+    }
+
+    /// The memory it holds, bytes.
+    pub(crate) fn memory(&self) -> usize {
+        self.counts.capacity()
     }
 
     /// A first look at a few pixels of the outline: false if too few of them match for a circle with β above `theta`.
@@ -132,45 +148,6 @@ impl Probes {
     }
 }
 
-/// Visits the pixels of the estimated circle, until `visit` says false; true if it never did.
-///
-/// The rule is that of the midpoint circle, for a centre and radius that need not be whole numbers: in the two arcs above
-/// and below the centre, out to 45 degrees, the pixel of each column that lies nearest to the curve; in the arcs left and
-/// right of it the nearest pixel of each row. No pixel comes twice, and the pixels form a closed line. Pixels outside the
-/// frame are visited like the others.
-pub(crate) fn outline(circle: &Circle, mut visit: impl FnMut(i32, i32) -> bool) -> bool {
-    let &Circle { x: cx, y: cy, radius } = circle;
-    // Half a pixel beyond 45 degrees, so that the arcs meet.
-    let diagonal = radius * std::f64::consts::FRAC_1_SQRT_2 + 0.5;
-    // Half the chord of the column or row at this distance from the centre.
-    let half_chord = |distance: f64| (radius * radius - distance * distance).max(0.0).sqrt();
-    let (first, last) = ((cx - diagonal).ceil() as i32, (cx + diagonal).floor() as i32);
-    let column = |x: i32| {
-        let rise = half_chord(f64::from(x) - cx);
-        (round(cy - rise), round(cy + rise))
-    };
-    for x in first..=last {
-        let (above, below) = column(x);
-        if !visit(x, above) || (below != above && !visit(x, below)) {
-            return false;
-        }
-    }
-    // Where the arcs meet, a column may already have the pixel of the row.
-    let seen = |x: i32, y: i32| (first..=last).contains(&x) && (column(x).0 == y || column(x).1 == y);
-    for y in (cy - diagonal).ceil() as i32..=(cy + diagonal).floor() as i32 {
-        let run = half_chord(f64::from(y) - cy);
-        let (left, right) = (round(cx - run), round(cx + run));
-        if !seen(left, y) && !visit(left, y) || left != right && !seen(right, y) && !visit(right, y) {
-            return false;
-        }
-    }
-    true
-}
-
-fn round(value: f64) -> i32 {
-    (value + 0.5).floor() as i32
-}
-
 #[inline]
 fn index(x: i32, y: i32, width: i32, height: i32) -> Option<usize> {
     ((x as u32) < width as u32 && (y as u32) < height as u32)
@@ -180,42 +157,14 @@ fn index(x: i32, y: i32, width: i32, height: i32) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::HashSet;
 
     fn outline_of(circle: Circle) -> Vec<(i32, i32)> {
         let mut pixels = Vec::new();
-        outline(&circle, |x, y| {
+        circle.outline(40, 40, |x, y| {
             pixels.push((x, y));
             true
         });
         pixels
-    }
-
-    #[test]
-    fn the_outline_is_thin_closed_and_without_repeats() {
-        for step in 0..400 {
-            let circle = Circle {
-                x: 0.37 * f64::from(step % 17),
-                y: -0.29 * f64::from(step % 13),
-                radius: 1.0 + 0.37 * f64::from(step),
-            };
-            let pixels = outline_of(circle);
-            let set: HashSet<_> = pixels.iter().copied().collect();
-            assert_eq!(set.len(), pixels.len(), "{circle:?}");
-            assert!(
-                pixels.len() as f64 <= 4.0 * std::f64::consts::SQRT_2 * circle.radius + 4.0,
-                "{circle:?}"
-            );
-            for &(x, y) in &pixels {
-                let off = (f64::from(x) - circle.x).hypot(f64::from(y) - circle.y) - circle.radius;
-                assert!(off.abs() <= 0.5 + 1e-9, "{circle:?} {x} {y} {off}");
-                let neighbours = (-1..=1)
-                    .flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)))
-                    .filter(|&(dx, dy)| (dx, dy) != (0, 0) && set.contains(&(x + dx, y + dy)))
-                    .count();
-                assert!(neighbours >= 2, "{circle:?} breaks at {x} {y}");
-            }
-        }
     }
 
     #[test]
@@ -240,6 +189,7 @@ mod tests {
         let expected = inside.len() as f64 / outline.len() as f64;
         assert!((beta - expected).abs() < 1e-12, "{beta} {expected}");
         assert!(expected < 0.6);
+        assert_eq!(near.belonging(&circle).to_bits(), beta.to_bits());
         assert_eq!(near.belonging_above(&circle, expected), None);
     }
 

@@ -1,9 +1,22 @@
 //! The first stage: from a frame to its edge pixels, the paper's structure `D`.
 
+mod canny;
+mod dispatch;
+mod gradient;
+mod imageproc_canny;
+mod noise;
+#[cfg(test)]
+mod plain;
+mod rows;
+
 use image::GrayImage;
 
+pub use canny::{Canny, CannyConfig};
+pub use gradient::EdgeGradient;
+pub use imageproc_canny::ImageprocCanny;
+
 /// The coordinates of one edge pixel: a record of the paper's structure `D`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct EdgePixel {
     /// Column, 0 at the left.
     pub x: u32,
@@ -18,6 +31,8 @@ pub struct EdgePixel {
 pub struct EdgeMap {
     image: GrayImage,
     pixels: Vec<EdgePixel>,
+    /// One for each pixel, or none at all.
+    gradients: Vec<EdgeGradient>,
 }
 
 impl EdgeMap {
@@ -50,6 +65,23 @@ impl EdgeMap {
         &self.pixels
     }
 
+    /// The grey-level gradient at each pixel of [`pixels`](EdgeMap::pixels), in the same order; empty if the detector knows
+    /// none.
+    pub fn gradients(&self) -> &[EdgeGradient] {
+        &self.gradients
+    }
+
+    /// Where the edge runs at the pixel of this index in [`pixels`](EdgeMap::pixels), to a fraction of a pixel where the
+    /// detector knows it, else the centre of the pixel.
+    ///
+    /// # Panics
+    /// If there are not so many pixels.
+    pub fn position(&self, index: usize) -> (f64, f64) {
+        let pixel = self.pixels[index];
+        let (dx, dy) = self.gradients.get(index).map_or((0.0, 0.0), EdgeGradient::offset);
+        (f64::from(pixel.x) + dx, f64::from(pixel.y) + dy)
+    }
+
     /// Columns of the frame.
     pub fn width(&self) -> u32 {
         self.image.width()
@@ -62,10 +94,22 @@ impl EdgeMap {
 
     /// Makes this the map of a frame without edges, keeping the memory.
     pub(crate) fn clear(&mut self, width: u32, height: u32) {
+        self.repaint(width, height, |bytes, _, _| bytes.fill(0));
+    }
+
+    /// Gives the map the size of a frame and lets `paint` set the image, whose old content is of no meaning, and the lists,
+    /// which come empty.
+    pub(crate) fn repaint(
+        &mut self,
+        width: u32,
+        height: u32,
+        paint: impl FnOnce(&mut [u8], &mut Vec<EdgePixel>, &mut Vec<EdgeGradient>),
+    ) {
         self.pixels.clear();
+        self.gradients.clear();
         let mut bytes = std::mem::take(&mut self.image).into_raw();
-        bytes.clear();
         bytes.resize(width as usize * height as usize, 0);
+        paint(&mut bytes, &mut self.pixels, &mut self.gradients);
         self.image = GrayImage::from_raw(width, height, bytes).unwrap_or_default();
     }
 

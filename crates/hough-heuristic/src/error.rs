@@ -32,6 +32,22 @@ pub enum ConfigError {
         /// The upper threshold.
         high: f64,
     },
+    /// The rows of a frame in memory overlap.
+    #[error("the stride of {stride} bytes is below the frame's width of {width} px")]
+    Stride {
+        /// Bytes from one row to the next.
+        stride: usize,
+        /// Pixels in a row.
+        width: u32,
+    },
+    /// A frame in memory is cut short.
+    #[error("the buffer of {given} bytes is too short: the frame needs {needed}")]
+    Buffer {
+        /// Its length, bytes.
+        given: usize,
+        /// The bytes up to the last pixel.
+        needed: usize,
+    },
     /// A region of interest is empty or sticks out of its frame.
     #[error(
         "the region of {width}x{height} px at ({left}, {top}) is empty or sticks out of the {frame_width}x{frame_height} px frame"

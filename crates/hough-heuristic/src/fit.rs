@@ -13,7 +13,7 @@ pub(crate) fn fit_circle(
     fixed_radius: bool,
 ) -> Option<Circle> {
     let mut circle = start;
-    for _ in 0..12 {
+    for _ in 0..8 {
         // Normal equations of the residuals |p - c| - r; the unit vector u points from the centre to the point.
         let (mut n, mut ux, mut uy, mut uxx, mut uxy, mut uyy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         let (mut d, mut dx, mut dy) = (0.0, 0.0, 0.0);
@@ -64,7 +64,7 @@ pub(crate) fn fit_circle(
         if !moved.is_finite() || runaway {
             return None;
         }
-        if step_x.abs() + step_y.abs() + step_r.abs() < 1e-4 {
+        if step_x.abs() + step_y.abs() + step_r.abs() < 1e-3 {
             break;
         }
     }

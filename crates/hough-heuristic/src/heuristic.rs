@@ -1,24 +1,27 @@
 //! The paper's detector: sample three edge pixels, look at the edge image itself, keep no accumulator.
 
+use std::time::{Duration, Instant};
+
 use image::GrayImage;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-use crate::belonging::{MAX_TOLERANCE, NearEdges, Probes};
-use crate::error::{require, require_radii};
-use crate::fit::fit_circle;
-use crate::structure::{Structure, circle_through};
+use crate::belonging::Probes;
+use crate::curve::circles_of_radius;
+use crate::error::require;
+use crate::evidence::{Evidence, rank};
+use crate::structure::Structure;
 use crate::{
-    Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, EdgePixel, Region,
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Curve, Detection, EdgeDetector, EdgeMap, Region,
 };
 
-/// Where the three pixels of a draw come from.
+/// Where the pixels of a draw come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Sampling {
-    /// All three from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all edge pixels, one
-    /// draw in `p^-3` hits it.
+    /// All from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all edge pixels, one draw of
+    /// three in `p^-3` hits it.
     Anywhere,
     /// The first from the whole of `D`; the others from a window around it that is as wide as a circle of some radius
     /// between the smallest and the largest can reach, the radius drawn anew each time (small ones more often: its
@@ -33,48 +36,60 @@ pub enum Sampling {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HeuristicConfig {
-    /// The offset θ that β must exceed (default 0.65; 0..1). Lower: balls more hidden are found, and more circles that are none.
+    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more hidden are found, and more
+    /// circles that are none.
     pub theta: f64,
-    /// How many triples are drawn at most per frame (default 60000; at least 1). Bounds the time; more finds fainter and smaller
-    /// balls amid more clutter.
+    /// How many triples are drawn at most per frame (default 60000; at least 1). Bounds the time; more finds fainter and
+    /// smaller balls amid more clutter.
     pub iterations: u32,
-    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1,
-    /// corners and texture begin to pass for circles..
+    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1, corners and
+    /// texture begin to pass for circles.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 300; at least min_radius).
+    /// The largest radius, pixels (default 300; at least min_radius). If it equals `min_radius` the radius is known: draws
+    /// are of two pixels, and only the centre is fitted.
     pub max_radius: f64,
-    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than round
-    /// is forgiven, and texture matches more by chance.
+    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than
+    /// round is forgiven, and texture matches more by chance.
     pub tolerance: f64,
-    /// How many circles to look for (default 1; at least 1). The search ends with the last one found; if there are fewer in the
-    /// frame it uses all of `iterations`.
+    /// How many circles to look for (default 1; at least 1). The search ends with the last one found; if there are fewer
+    /// in the frame it uses all of `iterations`.
     pub max_circles: usize,
     /// The least distance between the centres of two circles found, pixels (default 8; at least 0). 0 allows concentric ones.
     pub min_distance: f64,
     /// Where the centre may lie (default None: anywhere, even outside the frame).
     pub region: Option<Region>,
-    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). Beyond the paper: three whole pixels
-    /// give the centre to about a pixel, the fit to a tenth or two.
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). Beyond the paper: three whole
+    /// pixels give the centre to about a pixel, the fit to a twentieth.
     pub refine: bool,
     /// Where draws come from (default [`Sampling::Near`]).
     pub sampling: Sampling,
-    /// The seed of the draws (default 1). They begin anew with every frame, so that what is found depends on the configuration and
-    /// the frame alone.
+    /// The seed of the draws (default 1). They begin anew with every frame, so that what is found depends on the
+    /// configuration and the frame alone.
     pub seed: u64,
 }
 
 impl Default for HeuristicConfig {
     fn default() -> Self {
+        let Acceptance {
+            theta,
+            tolerance,
+            min_radius,
+            max_radius,
+            max_circles,
+            min_distance,
+            region,
+            refine,
+        } = Acceptance::default();
         Self {
-            theta: 0.65,
+            theta,
             iterations: 60_000,
-            min_radius: 15.0,
-            max_radius: 300.0,
-            tolerance: 1.0,
-            max_circles: 1,
-            min_distance: 8.0,
-            region: None,
-            refine: true,
+            min_radius,
+            max_radius,
+            tolerance,
+            max_circles,
+            min_distance,
+            region,
+            refine,
             sampling: Sampling::default(),
             seed: 1,
         }
@@ -82,42 +97,29 @@ impl Default for HeuristicConfig {
 }
 
 impl HeuristicConfig {
-    /// # Errors
-    /// The first parameter outside its range.
-    fn check(&self) -> Result<(), ConfigError> {
-        require(
-            "theta",
-            self.theta,
-            "between 0 and 1, both excluded",
-            self.theta > 0.0 && self.theta < 1.0,
-        )?;
-        require(
-            "iterations",
-            self.iterations.into(),
-            "at least 1",
-            self.iterations > 0,
-        )?;
-        require_radii(self.min_radius, self.max_radius)?;
-        require(
-            "tolerance",
-            self.tolerance,
-            "0..=8 px",
-            (0.0..=MAX_TOLERANCE).contains(&self.tolerance),
-        )?;
-        require(
-            "max_circles",
-            self.max_circles as f64,
-            "at least 1",
-            self.max_circles > 0,
-        )?;
-        let distance = self.min_distance;
-        require(
-            "min_distance",
-            distance,
-            "finite and at least 0 px",
-            distance.is_finite() && distance >= 0.0,
-        )
+    fn acceptance(&self) -> Acceptance {
+        Acceptance {
+            theta: self.theta,
+            tolerance: self.tolerance,
+            min_radius: self.min_radius,
+            max_radius: self.max_radius,
+            max_circles: self.max_circles,
+            min_distance: self.min_distance,
+            region: self.region,
+            refine: self.refine,
+        }
     }
+}
+
+/// How long the stages of the last frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageTimes {
+    /// Finding the edges.
+    pub edges: Duration,
+    /// Arranging the edge pixels as the structure `D`, and marking what lies near them.
+    pub structure: Duration,
+    /// Drawing, checking, fitting.
+    pub search: Duration,
 }
 
 /// The heuristic of section 2.1 of the paper, for circles.
@@ -142,10 +144,9 @@ pub struct Heuristic<E = Canny> {
     probes: Probes,
     /// The reaches of [`Sampling::Near`], pixels.
     reaches: Vec<f64>,
-    structure: Structure,
-    near: NearEdges,
-    /// Scratch: the edge pixels around a circle.
-    around: Vec<(f64, f64)>,
+    evidence: Evidence,
+    candidates: Option<Vec<Circle>>,
+    times: StageTimes,
 }
 
 impl Heuristic<Canny> {
@@ -164,16 +165,26 @@ impl<E: EdgeDetector> Heuristic<E> {
     /// # Errors
     /// The first parameter outside its range.
     pub fn new(config: HeuristicConfig, edge_detector: E) -> Result<Self, ConfigError> {
-        config.check()?;
+        require(
+            "iterations",
+            config.iterations.into(),
+            "at least 1",
+            config.iterations > 0,
+        )?;
         Ok(Self {
+            evidence: Evidence::new(config.acceptance())?,
             edge_detector,
             probes: Probes::new(config.theta),
             reaches: reaches(config.min_radius, config.max_radius),
-            structure: Structure::default(),
-            near: NearEdges::new(config.tolerance),
-            around: Vec::new(),
+            candidates: None,
+            times: StageTimes::default(),
             config,
         })
+    }
+
+    /// Whether to remember the candidates of each frame from now on, for [`candidates`](Heuristic::candidates).
+    pub fn keep_candidates(&mut self, keep: bool) {
+        self.candidates = keep.then(Vec::new);
     }
 
     /// The edges of the last frame; empty before the first.
@@ -181,104 +192,114 @@ impl<E: EdgeDetector> Heuristic<E> {
         self.edge_detector.edges()
     }
 
+    /// The circles of the last frame that passed the first look, if they are [kept](Heuristic::keep_candidates).
+    pub fn candidates(&self) -> &[Circle] {
+        self.candidates.as_deref().unwrap_or_default()
+    }
+
+    /// How long the stages of the last frame took.
+    pub fn times(&self) -> StageTimes {
+        self.times
+    }
+
     /// The settings the detector was built with.
     pub fn config(&self) -> &HeuristicConfig {
         &self.config
     }
 
-    fn draw(&self, rng: &mut Xoshiro256PlusPlus) -> Option<[EdgePixel; 3]> {
-        match self.config.sampling {
-            Sampling::Anywhere => self.structure.draw_anywhere(rng),
-            Sampling::Near => {
-                let reach = self.reaches[rng.next_u32() as usize % self.reaches.len()];
-                self.structure.draw_near(reach, rng)
-            }
+    /// The memory that the circle search holds, bytes, edges not included.
+    pub fn memory(&self) -> usize {
+        self.evidence.memory()
+    }
+}
+
+/// A draw that ended the search, or the circle it determines, if it determines one.
+enum Draw {
+    Exhausted,
+    Nothing,
+    Circle(Circle),
+}
+
+/// Draws pixels and solves for the circle: the paper's steps 3a and 3b.
+struct Sampler<'a> {
+    sampling: Sampling,
+    known_radius: Option<f64>,
+    reaches: &'a [f64],
+    rng: Xoshiro256PlusPlus,
+}
+
+impl Sampler<'_> {
+    fn draw(&mut self, structure: &Structure) -> Draw {
+        let circle = match self.known_radius {
+            Some(radius) => self.pixels::<2>(structure).map(|pair| {
+                let side = self.rng.next_u32() as usize % 2;
+                circles_of_radius(pair, radius).map(|both| both[side])
+            }),
+            None => self.pixels::<3>(structure).map(|triple| Circle::through(&triple)),
+        };
+        match circle {
+            None => Draw::Exhausted,
+            Some(None) => Draw::Nothing,
+            Some(Some(circle)) => Draw::Circle(circle),
         }
     }
 
-    /// Whether the configuration admits this circle beside those found.
-    fn admits(&self, circle: &Circle, found: &[Detection]) -> bool {
-        let config = &self.config;
-        (config.min_radius..=config.max_radius).contains(&circle.radius)
-            && config.region.is_none_or(|region| region.holds(circle))
-            && found.iter().all(|other| {
-                let (dx, dy) = (circle.x - other.circle.x, circle.y - other.circle.y);
-                dx * dx + dy * dy >= config.min_distance * config.min_distance
-            })
-    }
-
-    /// The accepted circle fitted to its edge pixels, where that is a circle the configuration admits.
-    fn refined(&mut self, drawn: Detection, found: &[Detection]) -> Detection {
-        let fitted = |circle: Circle, band: f64, points: &mut Vec<(f64, f64)>| {
-            points.clear();
-            points.extend(self.structure.pixels().iter().filter_map(|pixel| {
-                let point = (f64::from(pixel.x), f64::from(pixel.y));
-                (distance_to(&circle, point) <= 2.0 * band).then_some(point)
-            }));
-            fit_circle(points, circle, band, false)
-        };
-        // First with room for the error of a circle through three whole pixels, then close.
-        let band = self.config.tolerance + 0.5;
-        let mut points = std::mem::take(&mut self.around);
-        let circle =
-            fitted(drawn.circle, 2.0 * band, &mut points).and_then(|rough| fitted(rough, band, &mut points));
-        self.around = points;
-        circle
-            .filter(|circle| self.admits(circle, found))
-            .and_then(|circle| {
-                let score = self.near.belonging_above(&circle, self.config.theta)?;
-                Some(Detection { circle, score })
-            })
-            .unwrap_or(drawn)
-    }
-
-    /// Takes the edge pixels that the circle explains out of `D`.
-    fn explain(&mut self, circle: &Circle) {
-        let band = self.config.tolerance + 1.5 + 0.01 * circle.radius;
-        let near = &mut self.near;
-        self.structure.remove(|pixel| {
-            let explained = distance_to(circle, (f64::from(pixel.x), f64::from(pixel.y))) <= band;
-            if explained {
-                near.forget(pixel);
+    fn pixels<const N: usize>(&mut self, structure: &Structure) -> Option<[crate::EdgePixel; N]> {
+        match self.sampling {
+            Sampling::Anywhere => structure.draw_anywhere(&mut self.rng),
+            Sampling::Near => {
+                let reach = self.reaches[self.rng.next_u32() as usize % self.reaches.len()];
+                structure.draw_near(reach, &mut self.rng)
             }
-            explained
-        });
+        }
     }
 }
 
 impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
         found.clear();
+        let start = Instant::now();
         let edges = self.edge_detector.detect_edges(frame);
-        self.structure.fill(edges.width(), edges.height(), edges.pixels());
-        self.near.fill(edges.width(), edges.height(), edges.pixels());
+        let with_edges = Instant::now();
+        let evidence = &mut self.evidence;
+        evidence.fill(edges);
+        let with_structure = Instant::now();
 
-        let theta = self.config.theta;
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.config.seed);
+        if let Some(candidates) = &mut self.candidates {
+            candidates.clear();
+        }
+        let mut sampler = Sampler {
+            sampling: self.config.sampling,
+            known_radius: evidence.acceptance.known_radius(),
+            reaches: &self.reaches,
+            rng: Xoshiro256PlusPlus::seed_from_u64(self.config.seed),
+        };
         for _ in 0..self.config.iterations {
-            let Some(pixels) = self.draw(&mut rng) else {
-                break;
+            let circle = match sampler.draw(&evidence.structure) {
+                Draw::Exhausted => break,
+                Draw::Nothing => continue,
+                Draw::Circle(circle) => circle,
             };
-            let Some(circle) = circle_through(pixels) else {
-                continue;
-            };
-            if !self.admits(&circle, found) || !self.near.promising(&circle, &self.probes) {
+            if !evidence.acceptance.admits(&circle, found) || !evidence.near.promising(&circle, &self.probes)
+            {
                 continue;
             }
-            let Some(beta) = self.near.belonging_above(&circle, theta) else {
-                continue;
-            };
-            let mut detection = Detection { circle, score: beta };
-            if self.config.refine {
-                detection = self.refined(detection, found);
+            if let Some(candidates) = &mut self.candidates {
+                candidates.push(circle);
             }
-            self.explain(&detection.circle);
-            found.push(detection);
-            if found.len() == self.config.max_circles {
-                break;
+            if let Some(detection) = evidence.check(circle) {
+                evidence.accept(edges, detection, found);
+                if found.len() == self.config.max_circles {
+                    break;
+                }
             }
         }
-        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        rank(found);
+        self.times = StageTimes {
+            edges: with_edges - start,
+            structure: with_structure - with_edges,
+            search: with_structure.elapsed(),
+        };
     }
 }
 
@@ -304,7 +325,7 @@ pub fn detect_circles(
 }
 
 /// How far the windows reach: 64 diameters, each longer than the one before by the same factor.
-fn reaches(min_radius: f64, max_radius: f64) -> Vec<f64> {
+pub(crate) fn reaches(min_radius: f64, max_radius: f64) -> Vec<f64> {
     // The 64th root by square roots, which have the same bits on every platform.
     let factor = (0..6).fold(max_radius / min_radius, |root, _| root.sqrt());
     let mut reach = 2.0 * min_radius;
@@ -314,9 +335,4 @@ fn reaches(min_radius: f64, max_radius: f64) -> Vec<f64> {
             reach.ceil()
         })
         .collect()
-}
-
-fn distance_to(circle: &Circle, (x, y): (f64, f64)) -> f64 {
-    let (dx, dy) = (x - circle.x, y - circle.y);
-    ((dx * dx + dy * dy).sqrt() - circle.radius).abs()
 }

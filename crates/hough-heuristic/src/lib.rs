@@ -32,30 +32,40 @@
 //! [`GrayImage`]: image::GrayImage
 
 mod belonging;
-mod canny;
 mod circle;
+mod curve;
 mod detect;
 mod edges;
 mod error;
+mod evidence;
 #[cfg(feature = "files")]
 mod files;
 mod fit;
 mod frame;
 mod heuristic;
+mod randomized_hough;
 mod region;
+#[cfg(feature = "files")]
+mod stages;
+mod standard_hough;
 mod structure;
 
-pub use canny::{Canny, CannyConfig};
 pub use circle::{Circle, Features};
+pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
 pub use detect::{CircleDetector, Detection};
-pub use edges::{EdgeDetector, EdgeMap, EdgePixel};
+pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
 pub use error::ConfigError;
+pub use evidence::Acceptance;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
-pub use frame::{FrameError, FrameSource};
-pub use heuristic::{Heuristic, HeuristicConfig, Sampling, detect_circles};
+pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
+pub use heuristic::{Heuristic, HeuristicConfig, Sampling, StageTimes, detect_circles};
 pub use image;
+pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;
+#[cfg(feature = "files")]
+pub use stages::{StageError, write_stages};
+pub use standard_hough::{StandardHough, StandardHoughConfig};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

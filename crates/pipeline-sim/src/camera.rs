@@ -117,6 +117,17 @@ impl Camera {
         })
     }
 
+    /// A pinhole given in pixels, for frames that are drawn and then warped or reduced.
+    pub(crate) fn ideal(focal_px: f64, principal: Point2<f64>, width: u32, height: u32) -> Self {
+        Self {
+            focal_px,
+            principal,
+            width,
+            height,
+            distortion: Distortion::default(),
+        }
+    }
+
     /// The same camera with its focal length multiplied by `factor`.
     ///
     /// # Errors

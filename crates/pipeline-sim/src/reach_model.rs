@@ -187,6 +187,79 @@ impl ReachModel {
         Ok(model)
     }
 
+    /// The model fitted anew to samples of another plant, held toward this one: what N real moves teach about an arm that is not
+    /// the one the model was made for.
+    ///
+    /// For each elbow interval and output the coefficients c minimise the mean of w (change - terms · c)² plus `ridge` · |c - c0|², with
+    /// c0 this model's coefficients and w = r before to the power `radius_power`, normalised to mean 1 (the fitted quantities of the
+    /// `Rigid` forms are the noisier the smaller the ball; 2 to 4 is right for them, 0 for `Linear`). An interval without samples stays as it is.
+    ///
+    /// # Errors
+    /// [`FitError::Prior`] for a `ridge` or power that is not a finite number of zero or above; otherwise as for [`ReachModel::fit`] (with
+    /// a ridge above zero neither too few samples nor a lack of rank is an error).
+    pub fn refit(&self, samples: &[ReachSample], ridge: f64, radius_power: f64) -> Result<Self, FitError> {
+        if !(ridge.is_finite() && ridge >= 0.0 && radius_power.is_finite()) {
+            let what = format!(
+                "a refit needs a finite ridge of zero or above and a finite power, not {ridge} and {radius_power}"
+            );
+            return Err(FitError::Prior { what });
+        }
+        let mut groups = vec![Vec::new(); self.pieces.len()];
+        for (index, sample) in samples.iter().enumerate() {
+            check(index, sample)?;
+            groups[self.piece(sample.jt3_degrees)].push(sample);
+        }
+        let mut model = self.clone();
+        let mut buffer = [0.0; 22];
+        for (i, group) in groups.iter().enumerate().filter(|(_, group)| !group.is_empty()) {
+            let count = group.len();
+            if ridge == 0.0 && count < self.form.terms() {
+                return Err(FitError::TooFewSamples {
+                    place: self.place(i),
+                    got: count,
+                    needed: self.form.terms(),
+                });
+            }
+            let weigh = |sample: &ReachSample| sample.before.r.powf(radius_power);
+            let mean = group.iter().map(|s| weigh(s)).sum::<f64>() / count as f64;
+            let mut rows = Rows::default();
+            for sample in group {
+                let (from, to) = (
+                    self.form.outputs(&sample.before),
+                    self.form.outputs(&sample.after),
+                );
+                let terms = self.form.fill(
+                    &sample.before,
+                    sample.jt3_degrees,
+                    sample.d2,
+                    sample.d3,
+                    &mut buffer,
+                );
+                rows.push(
+                    terms,
+                    &[to[0] - from[0], to[1] - from[1]],
+                    (weigh(sample) / mean).sqrt(),
+                );
+            }
+            if ridge > 0.0 {
+                let pull = (ridge * count as f64).sqrt();
+                let mut unit = vec![0.0; self.form.terms()];
+                for (k, (c0, c1)) in self.pieces[i].coefficients[0]
+                    .iter()
+                    .zip(&self.pieces[i].coefficients[1])
+                    .enumerate()
+                {
+                    unit[k] = 1.0;
+                    rows.push(&unit, &[*c0, *c1], pull);
+                    unit[k] = 0.0;
+                }
+            }
+            model.pieces[i] = rows.solve(&self.place(i), count)?;
+        }
+        model.quality = model.quality_on(samples);
+        Ok(model)
+    }
+
     /// The form the model was fitted in.
     pub fn form(&self) -> ReachForm {
         self.form

@@ -1,6 +1,6 @@
 //! What stands on the table, how it is lit, and what the sensor makes of it.
 
-use nalgebra::Vector3;
+use nalgebra::{Point2, Vector3};
 
 /// A far lamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Light {
 pub struct Look {
     /// Mean reflectance, 0 (black) to 1 (white).
     pub albedo: f64,
-    /// Strength of the surface's texture relative to the reflectance, 0 (even) to about 1.
+    /// Strength of the surface's texture relative to the reflectance, 0 (even) to about 1. Flat surfaces only.
     pub texture: f64,
     /// Strength of the highlight, 0 (dull) to about 1. Balls and cylinders only.
     pub gloss: f64,
@@ -83,6 +83,15 @@ impl Shape {
         matches!(self, Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. })
     }
 
+    /// Height above the table, metres; 0 for what lies flat.
+    pub fn height(&self) -> f64 {
+        match *self {
+            Self::Box { height, .. } | Self::Cylinder { height, .. } => height,
+            Self::Ball { radius } => 2.0 * radius,
+            Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. } => 0.0,
+        }
+    }
+
     /// Radius of the smallest circle on the table, about the thing's middle, that holds the shape.
     pub fn footprint(&self) -> f64 {
         match *self {
@@ -110,6 +119,22 @@ pub struct Thing {
     pub look: Look,
 }
 
+/// A strip right before the lens, a cable or the edge of a finger: it hides whatever is behind it. Lengths in feature units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Occluder {
+    /// One end of its middle line, in the image.
+    pub from: Point2<f64>,
+    /// The other end.
+    pub to: Point2<f64>,
+    /// Width.
+    pub width: f64,
+    /// Width of its blurred edges.
+    pub softness: f64,
+    /// Reflectance.
+    pub albedo: f64,
+}
+
 /// What turns light into grey levels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -121,6 +146,8 @@ pub struct Sensor {
     pub shot_noise: f64,
     /// Standard deviation of the blur of lens and video electronics, pixels, 0 to about 1.2.
     pub blur: f64,
+    /// Standard deviation of the blur of a lens out of focus, pixels; 0 for none.
+    pub defocus: f64,
     /// Strength of the fall of light toward the corners, 0 (none) to 1 (the natural cos⁴).
     pub vignetting: f64,
     /// Exponent of the grey levels: value^(1 / gamma). 1 is linear.
@@ -136,6 +163,7 @@ impl Default for Sensor {
             read_noise: 1.6,
             shot_noise: 2.4,
             blur: 0.7,
+            defocus: 0.0,
             vignetting: 1.0,
             gamma: 1.0,
             exposure: 1.0,
@@ -155,8 +183,11 @@ pub struct Scene {
     pub table: Look,
     /// The ball's surface.
     pub ball: Look,
-    /// What else is on the table. No two things may overlap; one that stands where the holder stands is left out.
+    /// What else is on the table. No two standing things may overlap; one that stands where the
+    /// holder or a low ball is, is left out.
     pub things: Vec<Thing>,
+    /// What hangs before the lens.
+    pub occluders: Vec<Occluder>,
     /// The sensor.
     pub sensor: Sensor,
 }
@@ -182,6 +213,7 @@ impl Scene {
                 gloss: 0.25,
             },
             things: Vec::new(),
+            occluders: Vec::new(),
             sensor: Sensor::default(),
         }
     }
@@ -372,6 +404,7 @@ impl Scene {
                     0.10,
                 ),
             ],
+            occluders: Vec::new(),
             sensor: Sensor::default(),
         }
     }

@@ -30,7 +30,7 @@ fn a_ball_at_the_pads_is_held_carried_and_put_down() {
     arm.set_gripper(Gripper::Closed).expect("always");
     assert_eq!(arm.grasp(), Some(Grasp::Held));
     let joints = arm
-        .move_by(JointDelta::from_degrees([0.0, -15.0, 0.0, 0.0, 0.0, 0.0]))
+        .move_by(JointDelta::from_degrees([10.0, -15.0, 0.0, 0.0, 0.0, 0.0]))
         .expect("within limits");
     assert_eq!(arm.contact(), Contact::Carried);
     assert!(shared.get().ball.centre.z > cell.ball.centre.z + 0.05, "lifted");

@@ -111,3 +111,84 @@ fn the_expected_error_of_a_prediction_is_the_one_that_occurs() {
     }
     assert!((0.8..1.25).contains(&y) && (0.7..1.4).contains(&r), "{y} {r}");
 }
+
+#[test]
+fn a_model_believed_for_several_moves_drifts_as_its_form_lets_expect() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let (_, training) = samples(7, 2083, 0.125);
+    let mut last = f64::MAX;
+    for form in [ReachForm::Linear, ReachForm::Rigid8, ReachForm::Rigid22] {
+        let model = ReachModel::fit(&training, form, &ReachModel::PAPER_ELBOW_EDGES).expect("enough samples");
+        let errors = model.open_loop_error(&cell, 5, 400, &mut Xoshiro256PlusPlus::seed_from_u64(8));
+        for e in [errors[0], errors[2], errors[4]] {
+            println!("{form:?}: {e:?}");
+        }
+        assert!(
+            errors[4].y_mean > errors[0].y_mean && errors[4].y_mean < last,
+            "{form:?}"
+        );
+        last = errors[4].y_mean;
+    }
+    assert!(last < 2.0, "{last}");
+}
+
+#[test]
+fn a_refit_learns_a_wrong_arm_from_few_moves() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let (_, nominal) = samples(9, 1500, 0.125);
+    let model = ReachModel::fit(&nominal, ReachForm::Rigid22, &[]).expect("enough samples");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(10);
+    let wrong = pipeline_sim::ErrorLevel::Heavy
+        .draw(&mut rng)
+        .apply(&cell)
+        .expect("sound errors");
+    let (_, few) = sample_moves(&wrong, 200, 0.5, &mut rng);
+    let (_, fresh) = sample_moves(&wrong, 1000, 0.0, &mut rng);
+    let refitted = model.refit(&few, 0.001, 2.0).expect("a prior helps out");
+    let (before, after) = (model.quality_on(&fresh), refitted.quality_on(&fresh));
+    println!("{before:?} {after:?}");
+    assert!(after[0].rmse < 0.5 * before[0].rmse && after[1].rmse < before[1].rmse);
+    // So strong a prior that nothing moves, and none at all with too few samples.
+    let held = model.refit(&few, 1e12, 2.0).expect("a prior helps out");
+    let s = few[0];
+    let (p, q) = (
+        held.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3)
+            .expect("finite"),
+        model
+            .predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3)
+            .expect("finite"),
+    );
+    assert!((p.y - q.y).abs() < 1e-3 && (p.r - q.r).abs() < 1e-3);
+    assert!(model.refit(&few[..5], 0.0, 2.0).is_err() && model.refit(&few[..5], 0.02, 2.0).is_ok());
+    assert!(matches!(
+        model.refit(&few, f64::NAN, 2.0),
+        Err(FitError::Prior { .. })
+    ));
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn models_are_stored_and_only_sound_ones_come_back() {
+    let (centring, reaching) = samples(11, 300, 0.125);
+    let model = ReachModel::fit(&reaching, ReachForm::Rigid8, &[185.0]).expect("enough samples");
+    let text = serde_json::to_string(&model).expect("plain data");
+    assert_eq!(
+        serde_json::from_str::<ReachModel>(&text).expect("its own text"),
+        model
+    );
+    let centre = CentreModel::fit(&centring).expect("enough samples");
+    let centre_text = serde_json::to_string(&centre).expect("plain data");
+    assert_eq!(
+        serde_json::from_str::<CentreModel>(&centre_text).expect("its own text"),
+        centre
+    );
+    // Too few pieces, another form, edges that do not ascend.
+    for broken in [
+        text.replace("\"edges\":[185.0]", "\"edges\":[]"),
+        text.replace("Rigid8", "Rigid22"),
+        text.replace("\"edges\":[185.0]", "\"edges\":[190.0,185.0]"),
+    ] {
+        assert_ne!(broken, text);
+        assert!(serde_json::from_str::<ReachModel>(&broken).is_err());
+    }
+}

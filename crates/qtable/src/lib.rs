@@ -43,6 +43,8 @@
 //! # Ok::<(), qtable::Error>(())
 //! ```
 
+mod cached;
+mod check_env;
 mod course;
 mod curve;
 mod discretise;
@@ -58,7 +60,11 @@ mod model;
 mod persist;
 mod policy;
 mod schedule;
+mod scratch;
+mod seeds;
 mod table;
+mod text;
+mod time_limit;
 pub mod toys;
 mod train;
 mod training;
@@ -66,6 +72,8 @@ mod validated;
 
 pub use rand;
 
+pub use cached::CachedBoltzmann;
+pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
 pub use curve::Record;
 pub use discretise::{DiscretiseError, Intervals, Product};
 pub use environment::{Environment, Status, Step};
@@ -82,6 +90,9 @@ pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, 
 pub use persist::{PersistError, Problem, decode, encode, load, save};
 pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
 pub use schedule::{Schedule, ScheduleError};
+pub use seeds::{Estimate, over_seeds};
 pub use table::{QTable, Value};
-pub use train::{Progress, TrainConfig, TrainReport, train};
+pub use text::CsvError;
+pub use time_limit::TimeLimit;
+pub use train::{Progress, TrainConfig, TrainReport, train, train_in_blocks};
 pub use training::{Training, Until};

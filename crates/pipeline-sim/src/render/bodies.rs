@@ -6,7 +6,7 @@ use crate::render::canvas::Canvas;
 use crate::render::shadow::toward;
 use crate::render::texture::Texture;
 use crate::render::view::View;
-use crate::{Look, Scene, Shape, Thing};
+use crate::{Look, Occluder, Scene, Shape, Thing};
 
 /// Everything a body's shading depends on.
 pub(super) struct Studio<'a> {
@@ -20,17 +20,17 @@ pub(super) struct Studio<'a> {
 }
 
 /// Pixels between two places where a plane's coordinates are worked out exactly.
-const STRIDE: usize = 8;
+pub(super) const STRIDE: usize = 16;
 
 /// Writes a row of a textured plane: `plane` takes pixels to homogeneous plane coordinates in metres, `light` gives the factor at a
-/// place.
+/// column.
 pub(super) fn plane_row(
     plane: &Matrix3<f64>,
     texture: &Texture,
     strength: f32,
     (y, x0): (usize, usize),
     row: &mut [f32],
-    mut light: impl FnMut((f64, f64)) -> f32,
+    light: impl Fn(usize) -> f32,
 ) {
     let base = plane * Vector3::new(x0 as f64, y as f64, 1.0);
     let step = plane.column(0);
@@ -47,23 +47,45 @@ pub(super) fn plane_row(
     };
     let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
     let level = texture.level(footprint);
+    // A plane that does not recede along the row (the camera's x axis lies in it, as it does while the hand is not rolled) is walked in one
+    // go; otherwise places are exact at multiples of the stride, so that what lies between is the same in all rows.
     let length = row.len();
+    let even = (step.z * length as f64).abs() < 1e-7 * base.z.abs();
+    if even {
+        let (from, to) = (place(0), place(length));
+        let share = 1.0 / length as f64;
+        texture.walk(
+            level,
+            from,
+            ((to.0 - from.0) * share, (to.1 - from.1) * share),
+            strength,
+            row,
+        );
+    }
     let mut k = 0;
     let mut from = place(0);
-    let mut from_light = light(from);
+    let mut from_light = light(x0);
     while k < length {
-        let end = (k + STRIDE).min(length);
-        let to = place(end);
-        let to_light = light(to);
+        let end = ((x0 + k + STRIDE) / STRIDE * STRIDE - x0).min(length);
         let chunk = &mut row[k..end];
-        texture.walk(level, from, to, strength, chunk);
-        let slope = (to_light - from_light) / (end - k) as f32;
-        let mut factor = from_light;
-        for value in chunk {
-            *value *= factor;
-            factor += slope;
+        if !even {
+            let to = place(end);
+            let share = 1.0 / (end - k) as f64;
+            texture.walk(
+                level,
+                from,
+                ((to.0 - from.0) * share, (to.1 - from.1) * share),
+                strength,
+                chunk,
+            );
+            from = to;
         }
-        (from, from_light, k) = (to, to_light, end);
+        let to_light = light(x0 + end);
+        let slope = (to_light - from_light) / (end - k) as f32;
+        for (i, value) in (0_i32..).zip(chunk) {
+            *value *= from_light + slope * i as f32;
+        }
+        (from_light, k) = (to_light, end);
     }
 }
 
@@ -206,34 +228,40 @@ impl Studio<'_> {
         let hull = convex_hull(a.iter().chain(&b).copied().collect());
         let axis = Point2::new(foot.x - eye.x, foot.y - eye.y);
         let rotation = self.view.pose.rotation;
-        canvas.fill(&hull, |y, x0, row| {
-            for (i, value) in row.iter_mut().enumerate() {
-                let d = rotation
-                    * Vector3::new(
-                        ((x0 + i) as f64 - self.view.principal.x) / self.view.focal,
-                        (y as f64 - self.view.principal.y) / self.view.focal,
-                        1.0,
-                    );
-                // Where the ray meets the wall, seen from above.
-                let dd = (d.x * d.x + d.y * d.y).max(1e-12);
-                let b = d.x * axis.x + d.y * axis.y;
-                let disc = b * b - dd * (axis.coords.norm_squared() - radius * radius);
-                let t = (b - disc.max(0.0).sqrt()) / dd;
-                let n = Vector3::new(t * d.x - axis.x, t * d.y - axis.y, 0.0)
-                    .try_normalize(1e-12)
-                    .unwrap_or_else(Vector3::x);
-                let mut light = self.irradiance(&n);
-                if look.gloss > 0.0 {
-                    for lamp in &self.scene.lights {
-                        let l = toward(lamp);
-                        let half = (l - d.normalize()).normalize();
-                        let h = (1.0 - half.dot(&n)).max(0.0);
-                        light += lamp.intensity * look.gloss * (-40.0 * h).exp();
-                    }
+        let shade = |x: f64, y: f64| {
+            let d = rotation
+                * Vector3::new(
+                    (x - self.view.principal.x) / self.view.focal,
+                    (y - self.view.principal.y) / self.view.focal,
+                    1.0,
+                );
+            // Where the ray meets the wall, seen from above.
+            let dd = (d.x * d.x + d.y * d.y).max(1e-12);
+            let b = d.x * axis.x + d.y * axis.y;
+            let disc = b * b - dd * (axis.coords.norm_squared() - radius * radius);
+            let t = (b - disc.max(0.0).sqrt()) / dd;
+            let n = Vector3::new(t * d.x - axis.x, t * d.y - axis.y, 0.0).try_normalize(1e-12);
+            let n = n.unwrap_or_else(Vector3::x);
+            let mut light = self.irradiance(&n);
+            if look.gloss > 0.0 {
+                for lamp in &self.scene.lights {
+                    let half = (toward(lamp) - d.normalize()).try_normalize(1e-9).unwrap_or(n);
+                    light += lamp.intensity * look.gloss * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
                 }
-                // Darker toward the table.
-                let depth = ((eye.z + t * d.z - self.table) / 0.03).clamp(0.0, 1.0);
-                *value = (look.albedo * light * (0.75 + 0.25 * depth)) as f32;
+            }
+            // Darker toward the table.
+            let depth = ((eye.z + t * d.z - self.table) / 0.03).clamp(0.0, 1.0);
+            (look.albedo * light * (0.75 + 0.25 * depth)) as f32
+        };
+        canvas.fill(&hull, |y, x0, row| {
+            // Exact at every fourth pixel and straight between.
+            let mut from = shade(x0 as f64, y as f64);
+            for (k, chunk) in row.chunks_mut(4).enumerate() {
+                let to = shade((x0 + 4 * k + 4) as f64, y as f64);
+                for (i, value) in (0_i32..).zip(chunk) {
+                    *value = from + 0.25 * (to - from) * i as f32;
+                }
+                from = to;
             }
         });
         if eye.z > high {
@@ -328,10 +356,45 @@ impl Studio<'_> {
             }
             Shape::Print { length, width, lines } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                self.face(canvas, &corners, &along, &across, look, albedo);
-                self.print(canvas, thing, (length, width), lines);
+                if self.in_frame(canvas, &corners) {
+                    self.face(canvas, &corners, &along, &across, look, albedo);
+                    self.print(canvas, thing, (length, width), lines);
+                }
             }
         }
+    }
+
+    /// Draws a strip right before the lens: too near to be sharp, so its edges are soft.
+    pub(super) fn occluder(&self, canvas: &mut Canvas, strip: &Occluder) {
+        let unit = self.view.width as f64 / hough_heuristic::Features::WIDTH;
+        let pixel = |p: Point2<f64>| p.coords * unit - nalgebra::Vector2::new(0.5, 0.5);
+        let (from, to) = (pixel(strip.from), pixel(strip.to));
+        let Some(along) = (to - from).try_normalize(1e-9) else {
+            return;
+        };
+        let across = nalgebra::Vector2::new(-along.y, along.x);
+        let light = strip.albedo * self.irradiance(&Vector3::z());
+        // Several ever narrower layers make a soft edge: each adds its share of what is still missing.
+        const LAYERS: usize = 6;
+        let soft = strip.softness.max(0.0) * unit;
+        for k in 0..LAYERS {
+            let half = across
+                * (0.5 * strip.width * unit + soft * (0.5 - (k as f64 + 0.5) / LAYERS as f64)).max(0.0);
+            let corners = [from - half, to - half, to + half, from + half].map(Point2::from);
+            let share = 1.0 / (LAYERS - k) as f32;
+            canvas.blend(&corners, light as f32, share);
+        }
+    }
+
+    /// Whether a polygon's surrounding box touches the frame.
+    fn in_frame(&self, canvas: &Canvas, corners: &[Point3<f64>]) -> bool {
+        let mut polygon = Vec::with_capacity(corners.len() + 1);
+        self.view.polygon(corners, &mut polygon);
+        let (w, h) = (canvas.width as f64, canvas.height as f64);
+        polygon.iter().any(|p| p.x > -1.0)
+            && polygon.iter().any(|p| p.x < w)
+            && polygon.iter().any(|p| p.y > -1.0)
+            && polygon.iter().any(|p| p.y < h)
     }
 
     /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters from afar.

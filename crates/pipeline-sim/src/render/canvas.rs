@@ -3,13 +3,15 @@
 use nalgebra::Point2;
 
 /// Light per pixel, 1 = just white.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) light: Vec<f32>,
     coverage: Vec<f32>,
     shade: Vec<f32>,
+    /// Edges of the polygon that cross the present row.
+    edges: Vec<(Point2<f64>, Point2<f64>)>,
 }
 
 /// Scan lines per row of pixels; coverage is exact along x and sampled this finely along y.
@@ -23,6 +25,14 @@ impl Canvas {
             light: vec![0.0; width * height],
             coverage: vec![0.0; width + 2],
             shade: vec![0.0; width + 2],
+            edges: Vec::with_capacity(8),
+        }
+    }
+
+    /// Gives the canvas another size, if it is another.
+    pub(super) fn resize(&mut self, width: usize, height: usize) {
+        if (self.width, self.height) != (width, height) {
+            *self = Self::new(width, height);
         }
     }
 
@@ -46,6 +56,21 @@ impl Canvas {
         }
     }
 
+    /// Lays an even layer of light over a convex polygon that replaces `share` of what is below.
+    pub(super) fn blend(&mut self, polygon: &[Point2<f64>], light: f32, share: f32) {
+        let Some(rows) = self.rows_of(polygon) else { return };
+        for y in rows {
+            let Some((start, end, solid)) = self.cover_row(polygon, y) else {
+                continue;
+            };
+            let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
+            for (value, coverage) in row.iter_mut().zip(&self.coverage[start..end]) {
+                let coverage = if solid { 1.0 } else { *coverage };
+                *value += (light - *value) * coverage * share;
+            }
+        }
+    }
+
     /// Rows that a polygon may touch.
     fn rows_of(&self, polygon: &[Point2<f64>]) -> Option<std::ops::Range<usize>> {
         if polygon.len() < 3 {
@@ -60,20 +85,27 @@ impl Canvas {
 
     /// Coverage of one row: the touched pixels start..end, and whether all of them are covered wholly.
     fn cover_row(&mut self, polygon: &[Point2<f64>], y: usize) -> Option<(usize, usize, bool)> {
+        let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
+        self.edges.clear();
+        let mut p = polygon[polygon.len() - 1];
+        for &q in polygon {
+            if p.y.max(q.y) >= above && p.y.min(q.y) <= below {
+                self.edges.push((p, q));
+            }
+            p = q;
+        }
         let mut spans = [(0.0_f64, -1.0_f64); SUBROWS];
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut inner_left, mut inner_right) = (f64::NEG_INFINITY, f64::INFINITY);
         for (i, span) in spans.iter_mut().enumerate() {
             let line = y as f64 - 0.5 + (i as f64 + 0.5) / SUBROWS as f64;
             let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-            let mut p = polygon[polygon.len() - 1];
-            for &q in polygon {
+            for (p, q) in &self.edges {
                 if (p.y <= line) != (q.y <= line) {
                     let x = p.x + (line - p.y) / (q.y - p.y) * (q.x - p.x);
                     left = left.min(x);
                     right = right.max(x);
                 }
-                p = q;
             }
             // Pixel x covers x - 0.5 .. x + 0.5; here its left border is at x.
             let (left, right) = ((left + 0.5).max(0.0), (right + 0.5).min(self.width as f64));

@@ -2,9 +2,13 @@
 
 mod bodies;
 mod canvas;
+mod lens;
+mod light_grid;
 mod sensor;
 mod shadow;
+mod shot;
 mod texture;
+mod truth;
 mod view;
 
 use hough_heuristic::image::GrayImage;
@@ -13,13 +17,18 @@ use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::{Cell, Look, Scene};
+use crate::{Cell, Look, Scene, Thing};
 use bodies::{Studio, plane_row};
 use canvas::Canvas;
+use lens::{Warp, defocus};
+use light_grid::LightGrid;
 use sensor::Exposure;
 use shadow::{BallShadow, cast_things, table_light};
 use texture::{CoarseMap, Texture};
 use view::View;
+
+pub use shot::Shot;
+pub use truth::{Round, Sighting};
 
 /// Near and far edge of the table along x, and its half width along y, metres.
 const TABLE: (f64, f64, f64) = (-0.45, 1.30, 1.15);
@@ -53,7 +62,15 @@ pub struct Renderer {
     /// Brightness of the panels on the walls.
     walls: Vec<f32>,
     exposure: Exposure,
+    light: LightGrid,
     canvas: Canvas,
+    /// The frame before distortion, and the distortion; unused without.
+    ideal: Canvas,
+    warp: Option<Warp>,
+    spare: Vec<f32>,
+    /// Light of one field, and of both.
+    exposed: Vec<f32>,
+    woven: Vec<f32>,
     image: GrayImage,
 }
 
@@ -63,7 +80,7 @@ impl Renderer {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let wood = Texture::wood(0.60, &mut rng);
         let stains = 0.8 * scene.table.texture.clamp(0.0, 1.0) as f32;
-        let mut table = CoarseMap::stains(961, (-0.6, -1.2), 2.4, stains, &mut rng);
+        let mut table = CoarseMap::stains(601, (-0.6, -1.2), 2.4, stains, &mut rng);
         cast_things(&mut table, scene);
         let walls = (0..48).map(|_| rng.random_range(0.12_f32..0.55)).collect();
         let exposure = Exposure::new(scene.sensor, &mut rng);
@@ -75,7 +92,13 @@ impl Renderer {
             table,
             walls,
             exposure,
-            canvas: Canvas::new(0, 0),
+            light: LightGrid::default(),
+            canvas: Canvas::default(),
+            ideal: Canvas::default(),
+            warp: None,
+            spare: Vec::new(),
+            exposed: Vec::new(),
+            woven: Vec::new(),
             image: GrayImage::new(0, 0),
         }
     }
@@ -94,92 +117,148 @@ impl Renderer {
     ///
     /// Joints or places that are not finite give a frame of noise without content.
     pub fn render(&mut self, cell: &Cell, joints: &Joints) -> &GrayImage {
-        let view = View::new(&cell.camera, cell.camera_pose(joints));
-        if (self.canvas.width, self.canvas.height) != (view.width, view.height) {
-            self.canvas = Canvas::new(view.width, view.height);
-            self.image = GrayImage::new(view.width as u32, view.height as u32);
+        self.illuminate(cell, joints);
+        self.exposure.blurred = false;
+        self.develop(cell)
+    }
+
+    /// The light that reaches the sensor.
+    fn illuminate(&mut self, cell: &Cell, joints: &Joints) {
+        let (width, height) = cell.camera.size();
+        let pose = cell.camera_pose(joints);
+        if self.warp.as_ref().is_none_or(|warp| !warp.is_for(&cell.camera)) {
+            self.warp = Warp::new(&cell.camera);
         }
-        let finite = view
-            .pose
-            .translation
-            .vector
-            .iter()
-            .chain(view.pose.rotation.coords.iter())
-            .all(|v| v.is_finite());
-        if finite {
-            self.draw(cell, &view);
-        } else {
+        self.canvas.resize(width as usize, height as usize);
+        let coordinates = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+        if !coordinates.chain(cell.ball.centre.iter()).all(|v| v.is_finite()) {
             self.canvas.light.fill(0.0);
+            return;
         }
-        self.exposure
-            .expose(&self.canvas, &view, self.seed, self.frames, &mut self.image);
+        match self.warp.take() {
+            None => {
+                let mut canvas = std::mem::take(&mut self.canvas);
+                self.draw(&mut canvas, cell, &View::new(&cell.camera, pose));
+                self.canvas = canvas;
+            }
+            Some(warp) => {
+                let mut ideal = std::mem::take(&mut self.ideal);
+                let (width, height) = warp.ideal.size();
+                ideal.resize(width as usize, height as usize);
+                self.draw(&mut ideal, cell, &View::new(&warp.ideal, pose));
+                warp.apply(&ideal, &mut self.canvas);
+                self.ideal = ideal;
+                self.warp = Some(warp);
+            }
+        }
+        defocus(&mut self.canvas, self.scene.sensor.defocus, &mut self.spare);
+    }
+
+    /// Turns the light into the next frame.
+    fn develop(&mut self, cell: &Cell) -> &GrayImage {
+        let (width, height) = cell.camera.size();
+        if self.image.dimensions() != (width, height) {
+            self.image = GrayImage::new(width, height);
+        }
+        self.exposure.expose(
+            &self.canvas,
+            &cell.camera,
+            self.seed,
+            self.frames,
+            &mut self.image,
+        );
         self.frames += 1;
         &self.image
     }
 
-    fn draw(&mut self, cell: &Cell, view: &View) {
+    fn draw(&mut self, canvas: &mut Canvas, cell: &Cell, view: &View) {
         let (total, _) = table_light(&self.scene);
+        let plane = view.plane(&Point3::new(0.0, 0.0, cell.table), &Vector3::x(), &Vector3::y());
+        let above = view.eye().z > cell.table;
+        if above {
+            let light = (self.scene.table.albedo * total) as f32;
+            let ball = BallShadow::new(&self.scene, &cell.ball, cell.holder, cell.table);
+            self.light.lay(view, &plane, |u, v| {
+                light * self.table.at(u, v) * ball.factor(u, v)
+            });
+        }
+        let bounce = self.scene.table.albedo * total;
         let studio = Studio {
             view,
             scene: &self.scene,
             texture: &self.wood,
             table: cell.table,
-            bounce: self.scene.table.albedo * total,
+            bounce,
         };
-        let canvas = &mut self.canvas;
-        let (near, far, half) = TABLE;
-        let corners = [(near, -half), (far, -half), (far, half), (near, half)]
-            .map(|(x, y)| Point3::new(x, y, cell.table));
-        let plane = view.plane(&Point3::new(0.0, 0.0, cell.table), &Vector3::x(), &Vector3::y());
-        let mut polygon = Vec::with_capacity(8);
-        let above = view.eye().z > cell.table;
         if !(above && fills_frame(view, &plane)) {
             backdrop(canvas, &studio, &self.walls);
         }
         if above {
-            view.polygon(&corners, &mut polygon);
-            let light = (self.scene.table.albedo * total) as f32;
-            let ball = BallShadow::new(&self.scene, &cell.ball, cell.holder, cell.table);
+            let (near, far, half) = TABLE;
+            let corners = [(near, -half), (far, -half), (far, half), (near, half)];
+            let mut polygon = Vec::with_capacity(8);
+            view.polygon(&corners.map(|(x, y)| Point3::new(x, y, cell.table)), &mut polygon);
             let strength = self.scene.table.texture as f32;
             canvas.fill(&polygon, |y, x0, row| {
-                plane_row(&plane, &self.wood, strength, (y, x0), row, |(u, v)| {
-                    light * self.table.at(u, v) * ball.factor(u, v)
+                plane_row(&plane, &self.wood, strength, (y, x0), row, |x| {
+                    self.light.at(x, y)
                 });
             });
         }
-        // What lies flat first; then what stands, far things before near ones. Circles that do not overlap are in the right order
-        // when sorted by power (squared distance less squared radius): their radical axes separate them.
-        let eye = view.eye();
-        let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
-        let stands_clear = |x: f64, y: f64, r: f64| {
-            let (bx, by) = cell
-                .holder
-                .map_or((cell.ball.centre.x, cell.ball.centre.y), |h| (h.foot.x, h.foot.y));
-            (x - bx).hypot(y - by) > r + cell.ball.radius
-        };
-        for thing in self.scene.things.iter().filter(|t| t.shape.is_flat()) {
-            studio.thing(canvas, thing);
-        }
-        let mut order: Vec<(f64, Option<usize>)> = self
-            .scene
-            .things
-            .iter()
-            .enumerate()
-            .filter(|(_, t)| !t.shape.is_flat() && stands_clear(t.x, t.y, t.shape.footprint()))
-            .map(|(i, t)| (power(t.x, t.y, t.shape.footprint()), Some(i)))
-            .collect();
-        order.push((
-            power(cell.ball.centre.x, cell.ball.centre.y, cell.ball.radius),
-            None,
-        ));
-        order.sort_by(|a, b| b.0.total_cmp(&a.0));
-        for (_, which) in order {
-            match which {
-                Some(i) => studio.thing(canvas, &self.scene.things[i]),
-                None => ball_on_holder(canvas, &studio, cell),
-            }
+        for item in self.items(cell, view) {
+            self.draw_item(canvas, &studio, cell, &item);
         }
     }
+
+    /// All that is drawn over the table, in the order of drawing.
+    ///
+    /// What lies flat comes first; then what stands, far things before near ones; occluders, which are before the lens, last. Circles that
+    /// do not overlap are in the right order when sorted by power (squared distance less squared radius): their radical axes
+    /// separate them.
+    fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
+        let eye = view.eye();
+        let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
+        let ball = cell.ball.centre;
+        let foot = cell.holder.map_or(ball.xy(), |h| h.foot);
+        // A thing where the holder stands, or in a ball that lies or is carried low, is left out.
+        let in_the_way = |t: &Thing| {
+            let low = cell.holder.is_some() || ball.z - cell.ball.radius < cell.table + t.shape.height();
+            low && (t.x - foot.x).hypot(t.y - foot.y) <= t.shape.footprint() + cell.ball.radius
+        };
+        let things = || self.scene.things.iter().enumerate();
+        let mut items: Vec<Item> = things()
+            .filter(|(_, t)| t.shape.is_flat())
+            .map(|(i, _)| Item::Thing(i))
+            .collect();
+        let mut standing: Vec<(f64, Item)> = things()
+            .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t))
+            .map(|(i, t)| (power(t.x, t.y, t.shape.footprint()), Item::Thing(i)))
+            .collect();
+        standing.push((power(ball.x, ball.y, cell.ball.radius), Item::Ball));
+        standing.sort_by(|a, b| b.0.total_cmp(&a.0));
+        items.extend(standing.into_iter().map(|(_, item)| item));
+        items.extend((0..self.scene.occluders.len()).map(Item::Occluder));
+        items
+    }
+
+    fn draw_item(&self, canvas: &mut Canvas, studio: &Studio<'_>, cell: &Cell, item: &Item) {
+        match item {
+            Item::Thing(i) => studio.thing(canvas, &self.scene.things[*i]),
+            Item::Ball => ball_on_holder(canvas, studio, cell),
+            Item::Occluder(i) => studio.occluder(canvas, &self.scene.occluders[*i]),
+        }
+    }
+}
+
+/// Something drawn over the table.
+#[derive(Clone, Copy, Debug)]
+enum Item {
+    /// The ball with its holder.
+    Ball,
+    /// A thing of the scene.
+    Thing(usize),
+    /// An occluder of the scene.
+    Occluder(usize),
 }
 
 /// Ball and holder, the farther one first.

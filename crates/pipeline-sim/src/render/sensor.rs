@@ -4,9 +4,9 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::Sensor;
 use crate::render::canvas::Canvas;
-use crate::render::view::View;
+use crate::render::lens::three_taps;
+use crate::{Camera, Sensor};
 
 const NOISES: usize = 1 << 16;
 const LEVELS: usize = 4096;
@@ -15,45 +15,57 @@ const LEVELS: usize = 4096;
 #[derive(Clone, Debug)]
 pub(super) struct Exposure {
     sensor: Sensor,
+    /// Whether the light comes already blurred.
+    pub(super) blurred: bool,
     /// Standard normal numbers; every row of every frame starts at another place.
     noise: Vec<f32>,
     /// Grey level of a linear value, in steps of 1 / 4095.
-    curve: Vec<u8>,
+    curve: Box<[u8; LEVELS]>,
     mixed: Vec<f32>,
     row: Vec<f32>,
+    columns: Vec<f32>,
 }
 
 impl Exposure {
     pub(super) fn new<R: Rng + ?Sized>(sensor: Sensor, rng: &mut R) -> Self {
         let noise = (0..NOISES).map(|_| StandardNormal.sample(rng)).collect();
         let exponent = 1.0 / if sensor.gamma > 0.0 { sensor.gamma } else { 1.0 };
-        let curve = (0..LEVELS)
-            .map(|i| (255.0 * (i as f64 / (LEVELS - 1) as f64).powf(exponent)).round() as u8)
-            .collect();
+        let level = |i: usize| (255.0 * (i as f64 / (LEVELS - 1) as f64).powf(exponent)).round() as u8;
+        let curve = Box::new(std::array::from_fn(level));
         Self {
             sensor,
+            blurred: false,
             noise,
             curve,
             mixed: Vec::new(),
             row: Vec::new(),
+            columns: Vec::new(),
         }
     }
 
     /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and with it the noise.
-    pub(super) fn expose(&mut self, canvas: &Canvas, view: &View, seed: u64, frame: u64, out: &mut [u8]) {
+    pub(super) fn expose(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, frame: u64, out: &mut [u8]) {
         let (width, height) = (canvas.width, canvas.height);
         if width == 0 || height == 0 {
             return;
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let s = self.sensor;
-        let (side, middle) = kernel(s.blur);
-        let (read, shot) = ((s.read_noise / 255.0) as f32, (s.shot_noise / 255.0) as f32);
-        let exposure = s.exposure as f32;
-        let bend = s.vignetting as f32;
-        let inverse_focal = (1.0 / view.focal) as f32;
+        let (principal, focal) = (camera.principal_point(), camera.focal_px());
+        let (side, middle) = three_taps(if self.blurred { 0.0 } else { s.blur });
+        let (read2, shot2) = (
+            ((s.read_noise / 255.0) as f32).powi(2),
+            ((s.shot_noise / 255.0) as f32).powi(2),
+        );
+        let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
         self.mixed.resize(width + 2, 0.0);
         self.row.resize(width, 0.0);
+        // Squared tangent of the angle to the axis, column by column.
+        self.columns.clear();
+        self.columns
+            .extend((0..width).map(|x| (((x as f64 - principal.x) / focal) as f32).powi(2)));
+        // A frame wider than the table of noise repeats it along the row.
+        let run = width.min(NOISES / 2);
         for y in 0..height {
             let line = |k: usize| &canvas.light[k * width..(k + 1) * width];
             let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1)));
@@ -62,38 +74,33 @@ impl Exposure {
             }
             self.mixed[0] = self.mixed[1];
             self.mixed[width + 1] = self.mixed[width];
-            let start = rng.random_range(0..NOISES - width.min(NOISES - 1));
-            let noise = self.noise[start..].iter().chain(std::iter::repeat(&0.0));
-            let yn = (y as f32 - view.principal.y as f32) * inverse_focal;
-            let first = -(view.principal.x as f32) * inverse_focal;
-            let fall = yn * yn;
-            if width < NOISES {
-                let noise = &self.noise[start..start + width];
-                let blurred = self.mixed.windows(3);
-                for (((x, value), w), n) in self.row.iter_mut().enumerate().zip(blurred).zip(noise) {
-                    let light = middle * w[1] + side * (w[0] + w[2]);
-                    let xn = first + x as f32 * inverse_focal;
-                    let cos2 = 1.0 / (1.0 + xn * xn + fall);
-                    let light = light * exposure * (1.0 - bend * (1.0 - cos2 * cos2));
-                    let light = light + (read + shot * light.max(0.0).sqrt()) * n;
-                    *value = (light.clamp(0.0, 1.0)) * (LEVELS - 1) as f32 + 0.5;
-                }
-            } else {
-                for ((value, m), n) in self.row.iter_mut().zip(&self.mixed[1..=width]).zip(noise) {
-                    let light = m * exposure + read * n;
-                    *value = (light.clamp(0.0, 1.0)) * (LEVELS - 1) as f32 + 0.5;
+            let fall = 1.0 + (((y as f64 - principal.y) / focal) as f32).powi(2);
+            let (left, centre, right) = (&self.mixed[..width], &self.mixed[1..=width], &self.mixed[2..]);
+            for ((((value, l), c), r), tan2) in self
+                .row
+                .iter_mut()
+                .zip(left)
+                .zip(centre)
+                .zip(right)
+                .zip(&self.columns)
+            {
+                let cos2 = 1.0 / (fall + tan2);
+                let light = middle * c + side * (l + r);
+                *value = light * (exposure * (1.0 - bend * (1.0 - cos2 * cos2)));
+            }
+            let start = rng.random_range(0..NOISES - run);
+            let noise = &self.noise[start..start + run];
+            for part in self.row.chunks_mut(run) {
+                for (value, n) in part.iter_mut().zip(noise) {
+                    let light = *value + (read2 + shot2 * value.max(0.0)).sqrt() * n;
+                    // The sum with 2^23 rounds to a whole number and leaves it in the low bits.
+                    *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + 8_388_608.0;
                 }
             }
-            let curve = &self.curve[..LEVELS];
+            let curve = &self.curve;
             for (grey, value) in out[y * width..(y + 1) * width].iter_mut().zip(&self.row) {
-                *grey = curve[(*value as i32 as usize).min(LEVELS - 1)];
+                *grey = curve[value.to_bits() as usize & (LEVELS - 1)];
             }
         }
     }
-}
-
-/// Side and middle weight of the three-tap kernel whose variance is sigma², up to the widest that three taps give.
-fn kernel(sigma: f64) -> (f32, f32) {
-    let side = (0.5 * sigma * sigma).clamp(0.0, 0.333) as f32;
-    (side, 1.0 - 2.0 * side)
 }

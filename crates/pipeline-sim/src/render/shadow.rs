@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::render::texture::CoarseMap;
-use crate::{Ball, Holder, Light, Scene, Shape, Thing};
+use crate::{Ball, Holder, Light, Scene, Shape};
 
 /// Directions toward points of a lamp's disc.
 const LAMP_POINTS: usize = 24;
@@ -28,30 +28,50 @@ pub(super) fn toward(light: &Light) -> Vector3<f64> {
 /// Darkens `map` where things keep the lamps' light off the table, and a little around their feet.
 pub(super) fn cast_things(map: &mut CoarseMap, scene: &Scene) {
     let (_, shares) = table_light(scene);
-    let things = || scene.things.iter().filter(|t| !t.shape.is_flat());
-    for j in 0..map.side {
-        for i in 0..map.side {
-            let (x, y) = map.place(i, j);
-            let mut factor = 1.0;
-            for thing in things() {
-                let distance = (x - thing.x).hypot(y - thing.y);
-                if distance > thing.shape.footprint() + 0.35 {
+    for thing in scene.things.iter().filter(|t| !t.shape.is_flat()) {
+        let (foot, height) = (thing.shape.footprint(), thing.shape.height());
+        let lamps: Vec<(f64, Vec<Vector3<f64>>)> = scene
+            .lights
+            .iter()
+            .zip(&shares)
+            .map(|(light, share)| (*share, lamp_points(light, thing.turn)))
+            .collect();
+        // The longest shadow that any point of a lamp throws.
+        let slope = |d: &Vector3<f64>| d.x.hypot(d.y) / d.z.max(1e-3);
+        let longest = lamps
+            .iter()
+            .flat_map(|(_, points)| points)
+            .map(slope)
+            .fold(0.0, f64::max);
+        let reach = foot + (height * longest).max(0.05);
+        let (columns, rows) = map.range(thing.x, thing.y, reach.min(map.size));
+        for j in rows {
+            for i in columns.clone() {
+                let (x, y) = map.place(i, j);
+                let (dx, dy) = (x - thing.x, y - thing.y);
+                let distance = dx.hypot(dy);
+                if distance > reach {
                     continue;
                 }
                 // Things also hide part of the sky from the table near their feet.
-                let gap = (distance - thing.shape.footprint()).max(0.0);
-                factor *= 1.0 - 0.35 * (-gap / 0.012).exp();
-                for (light, share) in scene.lights.iter().zip(&shares) {
-                    factor -= share * blocked_share(thing, light, x, y);
+                let mut factor = 1.0 - 0.35 * (-(distance - foot).max(0.0) / 0.012).exp();
+                let (sin, cos) = thing.turn.sin_cos();
+                let from = Point3::new(dx * cos + dy * sin, dy * cos - dx * sin, 0.0);
+                for (share, points) in &lamps {
+                    let blocked = points
+                        .iter()
+                        .filter(|d| d.z > 1e-3 && meets(&thing.shape, &from, d))
+                        .count();
+                    factor -= share * blocked as f64 / LAMP_POINTS as f64;
                 }
+                map.values[j * map.side + i] *= factor.max(0.02) as f32;
             }
-            map.values[j * map.side + i] *= factor.max(0.02) as f32;
         }
     }
 }
 
-/// Share of a lamp's disc that `thing` hides from a point of the table.
-fn blocked_share(thing: &Thing, light: &Light, x: f64, y: f64) -> f64 {
+/// Directions toward points spread evenly over a lamp's disc, in the frame of a thing turned by `turn`.
+fn lamp_points(light: &Light, turn: f64) -> Vec<Vector3<f64>> {
     let axis = toward(light);
     let side = if axis.x.abs() < 0.9 {
         Vector3::x()
@@ -60,23 +80,19 @@ fn blocked_share(thing: &Thing, light: &Light, x: f64, y: f64) -> f64 {
     };
     let u = axis.cross(&side).normalize();
     let v = axis.cross(&u);
-    // Point of the table in the thing's own frame.
-    let (sin, cos) = thing.turn.sin_cos();
-    let (dx, dy) = (x - thing.x, y - thing.y);
-    let from = Point3::new(dx * cos + dy * sin, dy * cos - dx * sin, 0.0);
     let reach = light.half_angle.clamp(0.0, 0.7).tan();
-    let mut blocked = 0;
-    for k in 0..LAMP_POINTS {
-        // Vogel's spiral: even over the disc.
-        let (radius, angle) = (
-            ((k as f64 + 0.5) / LAMP_POINTS as f64).sqrt() * reach,
-            k as f64 * 2.399_963,
-        );
-        let d = axis + u * (radius * angle.cos()) + v * (radius * angle.sin());
-        let d = Vector3::new(d.x * cos + d.y * sin, d.y * cos - d.x * sin, d.z);
-        blocked += usize::from(d.z > 1e-3 && meets(&thing.shape, &from, &d));
-    }
-    blocked as f64 / LAMP_POINTS as f64
+    let (sin, cos) = turn.sin_cos();
+    (0..LAMP_POINTS)
+        .map(|k| {
+            // Vogel's spiral.
+            let (radius, angle) = (
+                ((k as f64 + 0.5) / LAMP_POINTS as f64).sqrt() * reach,
+                k as f64 * 2.399_963,
+            );
+            let d = axis + u * (radius * angle.cos()) + v * (radius * angle.sin());
+            Vector3::new(d.x * cos + d.y * sin, d.y * cos - d.x * sin, d.z)
+        })
+        .collect()
 }
 
 /// Whether the ray from a point of the table upward along `d` meets the shape, which stands at the origin.
@@ -127,6 +143,8 @@ pub(super) struct BallShadow {
     ball: Ball,
     holder: Option<Holder>,
     table: f64,
+    /// Box on the table outside which nothing is darkened: least and greatest x, least and greatest y.
+    bounds: [f64; 4],
 }
 
 #[derive(Clone, Debug)]
@@ -141,7 +159,7 @@ struct Lamp {
 impl BallShadow {
     pub(super) fn new(scene: &Scene, ball: &Ball, holder: Option<Holder>, table: f64) -> Self {
         let (_, shares) = table_light(scene);
-        let lamps = scene
+        let lamps: Vec<Lamp> = scene
             .lights
             .iter()
             .zip(shares)
@@ -166,16 +184,25 @@ impl BallShadow {
                 }
             })
             .collect();
+        let foot = holder.map_or(ball.centre.xy(), |h| h.foot);
+        let near = [foot.x - 0.1, foot.x + 0.1, foot.y - 0.1, foot.y + 0.1];
+        let bounds = lamps.iter().map(|l: &Lamp| l.bounds).fold(near, |a, b| {
+            [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
+        });
         Self {
             lamps,
             ball: *ball,
             holder,
             table,
+            bounds,
         }
     }
 
     /// Factor on the table's light at (x, y).
     pub(super) fn factor(&self, x: f64, y: f64) -> f32 {
+        if x < self.bounds[0] || x > self.bounds[1] || y < self.bounds[2] || y > self.bounds[3] {
+            return 1.0;
+        }
         let mut factor = 1.0;
         for lamp in &self.lamps {
             let [x0, x1, y0, y1] = lamp.bounds;
@@ -185,8 +212,11 @@ impl BallShadow {
             }
         }
         if let Some(h) = self.holder {
-            let gap = ((x - h.foot.x).hypot(y - h.foot.y) - h.radius).max(0.0);
-            factor *= 1.0 - 0.35 * (-gap / 0.012).exp();
+            let (dx, dy) = (x - h.foot.x, y - h.foot.y);
+            let distance2 = dx * dx + dy * dy;
+            if distance2 < 0.01 {
+                factor *= 1.0 - 0.35 * (-(distance2.sqrt() - h.radius).max(0.0) / 0.012).exp();
+            }
         }
         factor.max(0.02) as f32
     }
@@ -213,7 +243,7 @@ impl BallShadow {
         } else {
             0.0
         };
-        let across = (px + z * dx).hypot(py + z * dy);
+        let across = ((px + z * dx).powi(2) + (py + z * dy).powi(2)).sqrt();
         overlap(h.radius, z * lamp.reach, across)
     }
 }

@@ -4,7 +4,7 @@ use rand::{Rng, RngExt};
 
 /// A square repeating texture with coarser copies of itself, values 0..=255 with mean 128.
 ///
-/// Each entry holds four neighbouring values in one word, so that one read serves a bilinear interpolation.
+/// One byte a texel: what counts is how much memory a frame has to touch.
 #[derive(Clone, Debug)]
 pub(super) struct Texture {
     /// Texels per metre of the finest level.
@@ -14,8 +14,10 @@ pub(super) struct Texture {
 
 #[derive(Clone, Debug)]
 struct Level {
+    /// Logarithm of the side.
     bits: u32,
-    words: Vec<u32>,
+    /// Row after row; each row, and the whole, goes on with a copy of its beginning, so that neighbours need no wrap.
+    texels: Vec<u8>,
 }
 
 const FINEST_BITS: u32 = 10;
@@ -67,14 +69,12 @@ impl Texture {
         let mut levels = Vec::new();
         for bits in (3..=FINEST_BITS).rev() {
             let n = 1_usize << bits;
-            let at = |u: usize, v: usize| u32::from(values[(v % n) * n + u % n].round() as u8);
-            let words = (0..n * n)
-                .map(|i| {
-                    let (u, v) = (i % n, i / n);
-                    at(u, v) | at(u + 1, v) << 8 | at(u, v + 1) << 16 | at(u + 1, v + 1) << 24
-                })
+            let at = |u: usize, v: usize| values[(v % n) * n + u % n].round() as u8;
+            let texels = (0..=n)
+                .flat_map(|v| (0..=n).map(move |u| (u, v)))
+                .map(|(u, v)| at(u, v))
                 .collect();
-            levels.push(Level { bits, words });
+            levels.push(Level { bits, texels });
             let half = n / 2;
             values = (0..half * half)
                 .map(|i| {
@@ -101,35 +101,53 @@ impl Texture {
         }
     }
 
-    /// Samples between (u0, v0) and (u1, v1) metres, one for each entry of `row` from the start on, scaled so that the mean is 1 and
-    /// one standard deviation about `strength` / 3.2.
+    /// Samples from `from` on in steps of `step` (metres per entry), one for each entry of `row`, scaled so that the mean is 1 and one
+    /// standard deviation about `strength` / 3.2.
+    ///
+    /// Every second entry is the mean of its neighbours: with the level chosen for the pixels' size nothing visible is lost.
     pub(super) fn walk(
         &self,
         index: usize,
         from: (f64, f64),
-        to: (f64, f64),
+        step: (f64, f64),
         strength: f32,
         row: &mut [f32],
     ) {
-        let steps = row.len().max(1) as f64;
-        let (du, dv) = ((to.0 - from.0) / steps, (to.1 - from.1) / steps);
         let level = &self.levels[index];
         let scale = self.per_metre / (1_u64 << index) as f64 * 65536.0;
         // 16.16 fixed point; the texture repeats, so the wrap of the integers does no harm.
-        let (mut u, mut v) = ((from.0 * scale) as i64 as u32, (from.1 * scale) as i64 as u32);
-        let (du, dv) = ((du * scale) as i64 as u32, (dv * scale) as i64 as u32);
+        let fixed = |metres: f64| (metres * scale) as i64 as u32;
+        let (mut u, mut v) = (fixed(from.0), fixed(from.1));
+        let (du, dv) = (fixed(2.0 * step.0), fixed(2.0 * step.1));
         let (mask, bits) = ((1_u32 << level.bits) - 1, level.bits);
         let (gain, base) = (strength / (128.0 * 256.0), 1.0 - strength);
-        let words = &level.words[..1_usize << (2 * bits)];
-        for value in row {
-            let word = words[((((v >> 16) & mask) << bits) | ((u >> 16) & mask)) as usize];
+        let (texels, line) = (level.texels.as_slice(), (1_usize << bits) + 1);
+        let pair = |at: usize| {
+            texels
+                .get(at..at + 2)
+                .map_or(0, |p| u32::from(p[0]) | u32::from(p[1]) << 8)
+        };
+        let mut sample = || {
+            let at = ((v >> 16) & mask) as usize * line + ((u >> 16) & mask) as usize;
+            let word = pair(at) | pair(at + line) << 16;
             let (fu, fv) = ((u >> 8) & 255, (v >> 8) & 255);
             let across =
-                ((word & 0x00ff_00ff) * (256 - fu) + ((word >> 8) & 0x00ff_00ff) * fu) >> 8 & 0x00ff_00ff;
-            let sample = (across & 255) * (256 - fv) + (across >> 16) * fv;
-            *value = base + gain * sample as f32;
+                (((word & 0x00ff_00ff) * (256 - fu) + ((word >> 8) & 0x00ff_00ff) * fu) >> 8) & 0x00ff_00ff;
+            let value = (across & 255) * (256 - fv) + (across >> 16) * fv;
             u = u.wrapping_add(du);
             v = v.wrapping_add(dv);
+            base + gain * value as i32 as f32
+        };
+        let mut here = sample();
+        let mut pairs = row.chunks_exact_mut(2);
+        for pair in &mut pairs {
+            let next = sample();
+            pair[0] = here;
+            pair[1] = 0.5 * (here + next);
+            here = next;
+        }
+        if let [last] = pairs.into_remainder() {
+            *last = here;
         }
     }
 }
@@ -196,6 +214,22 @@ impl CoarseMap {
     pub(super) fn place(&self, i: usize, j: usize) -> (f64, f64) {
         let step = self.size / (self.side - 1) as f64;
         (self.corner.0 + i as f64 * step, self.corner.1 + j as f64 * step)
+    }
+
+    /// Columns and rows of the entries within `reach` of (x, y) along each axis.
+    pub(super) fn range(
+        &self,
+        x: f64,
+        y: f64,
+        reach: f64,
+    ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+        let scale = (self.side - 1) as f64 / self.size;
+        let range = |middle: f64, corner: f64| {
+            let low = ((middle - reach - corner) * scale).ceil().max(0.0) as usize;
+            let high = ((middle + reach - corner) * scale).floor().max(-1.0) + 1.0;
+            low..(high as usize).min(self.side)
+        };
+        (range(x, self.corner.0), range(y, self.corner.1))
     }
 
     /// Bilinear value; outside the map that of its border.

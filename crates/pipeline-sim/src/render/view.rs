@@ -30,6 +30,17 @@ impl View {
         }
     }
 
+    /// The same view in a frame that is smaller by `factor`.
+    pub(super) fn reduced(&self, factor: f64) -> Self {
+        Self {
+            pose: self.pose,
+            focal: self.focal / factor,
+            principal: self.principal.map(|v| (v + 0.5) / factor - 0.5),
+            width: (self.width as f64 / factor).ceil() as usize,
+            height: (self.height as f64 / factor).ceil() as usize,
+        }
+    }
+
     /// A world point in the camera frame.
     pub(super) fn seen(&self, point: &Point3<f64>) -> Point3<f64> {
         self.pose.inverse_transform_point(point)

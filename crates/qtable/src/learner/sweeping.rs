@@ -112,7 +112,7 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
         };
         table.check_shape("the model", model.states(), model.actions())?;
         model.observe(state, action, &step)?;
-        table.count(state, action);
+        table.visit(state, action)?;
 
         let change = |table: &QTable<V>, state, action| {
             model
