@@ -46,7 +46,7 @@ pub use qtable;
 
 pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_starts};
 pub use rig::{Rig, RigError};
-pub use training::{LearnError, Lesson, Simulator, learn};
+pub use training::{LearnError, Lesson, Simulator, learn, schedule};
 pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]

@@ -13,7 +13,7 @@ use qtable::{Action, Progress, QTable, TrainConfig, train};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
-use crate::{LearnError, Lesson};
+use crate::{LearnError, Lesson, schedule};
 
 /// A simulator of approaching that makes no errors, and the starts to learn from.
 #[derive(Clone, Debug)]
@@ -87,7 +87,7 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
-        self.learn_with(spec, &TrainConfig::paper(actions), rng, on_progress)
+        self.learn_with(spec, &schedule(actions)?, rng, on_progress)
     }
 
     /// Learns `spec` here.
@@ -126,7 +126,11 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
         joints.0[0] = goal.0[0];
         cell.features(&joints)?;
         let optimum = optimum(&cell, &joints, &spec)?;
-        Some(PlaneStart { cell, joints, optimum })
+        Some(PlaneStart {
+            cell,
+            joints,
+            optimum,
+        })
     });
     starts.flatten().take(count).collect()
 }
@@ -201,7 +205,8 @@ pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usi
     while let Some(((i, j), steps)) = queue.pop_front() {
         for (di, dj) in &moves {
             let next = (i + di, j + dj);
-            let inside = (-below2..size2 - below2).contains(&next.0) && (-below3..size3 - below3).contains(&next.1);
+            let inside =
+                (-below2..size2 - below2).contains(&next.0) && (-below3..size3 - below3).contains(&next.1);
             if !inside || places[index(next)] != Place::Unknown {
                 continue;
             }

@@ -15,7 +15,8 @@ pub struct AgentConfig {
     /// From the goal pose to the grip [`J5` by -18.01 degrees]: the paper's "the fifth joint is activated".
     pub grip: JointDelta,
     /// Where the ball is looked for when it is lost, relative to the pose of the last sighting
-    /// [four moves: `J1` +10, -10, `J2` +8, -8 degrees]; tried in order, after that pose itself.
+    /// [four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
+    /// +12]; tried in order, after that pose itself.
     pub recovery: Vec<JointDelta>,
     /// The range that each joint is kept in [[`JointLimits::paper`]].
     pub limits: JointLimits,
@@ -69,12 +70,9 @@ impl AgentConfig {
                 interval(Input::R, 32.0, 34.0),
             ],
             grip: turn(Joint::J5, -18.01),
-            recovery: vec![
-                turn(Joint::J1, 10.0),
-                turn(Joint::J1, -10.0),
-                turn(Joint::J2, 8.0),
-                turn(Joint::J2, -8.0),
-            ],
+            recovery: [(0.0, -20.0), (15.0, -20.0), (-15.0, -20.0), (0.0, 12.0)]
+                .map(|(j1, j2)| JointDelta::from_degrees([j1, j2, 0.0, 0.0, 0.0, 0.0]))
+                .into(),
             limits: JointLimits::paper(),
             max_cycles: 60,
             looks: 2,

@@ -90,9 +90,9 @@ impl BehaviourSpec {
             name: "approaching".into(),
             inputs: vec![Input::Y, Input::R, Input::Theta3],
             space: product([
-                (&[50.0, 74.0, 82.0, 108.0], 2),
-                (&R_EDGES, 3),
-                (&[5.0, 20.0], NO_GOAL),
+                (&[43.0, 74.0, 82.0, 98.0], 2),
+                (&[15.0, 27.0, 32.0, 34.0, 50.0], 3),
+                (&[6.0, 27.0], NO_GOAL),
             ]),
             moves: vec![
                 JointSteps {

@@ -144,18 +144,6 @@ impl Belief {
         let values = self.information.iter().copied().chain(std::iter::repeat(0.0));
         Information::from_iterator(values.take(LEARNED * LEARNED))
     }
-
-    /// Whether it has the right number of numbers, all of them finite.
-    #[cfg(feature = "serde")]
-    pub(crate) fn is_sound(&self) -> bool {
-        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
-        self.mean.len() == LEARNED
-            && self.information.len() == LEARNED * LEARNED
-            && finite(&self.mean)
-            && finite(&self.information)
-            && self.noise.is_finite()
-            && self.noise > 0.0
-    }
 }
 
 /// `nominal` with the camera and the ball as `numbers` say; the play of the joints is not part of a model.

@@ -68,6 +68,10 @@ pub struct Hybrid {
     boldness: f64,
     /// Losses since the last move that kept the ball in view.
     losses: usize,
+    /// Whether the last sighting cannot have been the ball where it was; it is looked for once more before that is believed.
+    doubt: bool,
+    /// Sightings for which a ball that has just moved is taken to be still moving.
+    moving: usize,
 }
 
 /// The ball and the camera as they are taken to be at the moment.
@@ -81,6 +85,8 @@ struct Estimate {
 
 /// A sighting so many standard deviations off, and at least so many units, means that the ball has moved.
 const MOVED: (f64, f64) = (5.0, 3.0);
+/// For so many sightings after it has moved, a ball that has moved again is believed at once.
+const STILL_MOVING: usize = 3;
 /// Room to the border of the frame, feature units, and the range of radii that a move may lead to.
 const MARGIN: f64 = 4.0;
 const RADII: (f64, f64) = (5.5, 55.0);
@@ -106,6 +112,8 @@ impl Hybrid {
             learning: true,
             boldness: 1.0,
             losses: 0,
+            doubt: false,
+            moving: 0,
         }
     }
 
@@ -227,6 +235,8 @@ impl Controller for Hybrid {
         self.estimate = None;
         self.boldness = 1.0;
         self.losses = 0;
+        self.doubt = false;
+        self.moving = 0;
     }
 
     fn arm_at(&mut self, joints: &Joints) {
@@ -234,9 +244,22 @@ impl Controller for Hybrid {
     }
 
     fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        let odd = self.has_moved(&now.features);
+        if odd && !self.doubt && self.moving == 0 {
+            // A circle that is not the ball, perhaps: the arm stays, and looks again.
+            self.doubt = true;
+            return Ok(JointDelta::default());
+        }
+        self.doubt = false;
+        self.moving = if odd {
+            STILL_MOVING
+        } else {
+            self.moving.saturating_sub(1)
+        };
         // A ball that was lost twice, though it should have stayed in view for certain, is not where it was taken to be.
-        if self.has_moved(&now.features) || self.losses >= 2 {
-            if self.losses < 2 {
+        let mistaken = self.losses >= 2;
+        if odd || mistaken {
+            if !mistaken {
                 self.remember();
             }
             self.current.forget_sightings();
