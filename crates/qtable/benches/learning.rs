@@ -115,11 +115,11 @@ fn files(c: &mut Criterion) {
         b.iter(|| qtable::load::<QTable>(&path, "table/1").unwrap());
     });
     c.bench_function("encode 540x81", |b| {
-        b.iter(|| qtable::encode("table/1", &table).unwrap())
+        b.iter(|| qtable::encode("table/1", &table).unwrap());
     });
     let bytes = qtable::encode("table/1", &table).unwrap();
     c.bench_function("decode 540x81", |b| {
-        b.iter(|| qtable::decode::<QTable>("table/1", &bytes).unwrap())
+        b.iter(|| qtable::decode::<QTable>("table/1", &bytes).unwrap());
     });
 }
 
