@@ -1,0 +1,52 @@
+//! The ball, and what it stands on.
+
+use nalgebra::{Point2, Point3};
+
+/// A sphere at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Ball {
+    /// Centre, metres, in VAL's world frame (origin at the shoulder, z up).
+    pub centre: Point3<f64>,
+    /// Radius, metres.
+    pub radius: f64,
+}
+
+impl Ball {
+    /// Radius of the ball used throughout, metres: 20 mm.
+    pub const RADIUS: f64 = 0.020;
+
+    /// A ball of [`Ball::RADIUS`] with its centre at (x, y, z) metres.
+    pub fn at(x: f64, y: f64, z: f64) -> Self {
+        Self {
+            centre: Point3::new(x, y, z),
+            radius: Self::RADIUS,
+        }
+    }
+}
+
+/// An upright rod on the table that carries the ball, so that the fingers find room below the ball's centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Holder {
+    /// Where it stands: x and y of its axis, metres.
+    pub foot: Point2<f64>,
+    /// Height of its upper end, metres.
+    pub top: f64,
+    /// Radius of the rod, metres.
+    pub radius: f64,
+}
+
+impl Holder {
+    /// The holder that carries `ball`: a rod of 8 mm radius that ends where the ball rests.
+    pub fn under(ball: &Ball) -> Self {
+        let radius = 0.008_f64.min(0.8 * ball.radius);
+        // The ball sinks a little into the open end of the rod.
+        let top = ball.centre.z - (ball.radius * ball.radius - radius * radius).max(0.0).sqrt();
+        Self {
+            foot: ball.centre.xy(),
+            top,
+            radius,
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! The camera: optics, lens distortion, and the exact outline of a sphere.
+
+use hough_heuristic::Circle;
+use nalgebra::{Point2, Point3, Vector3};
+
+use crate::{CameraError, Ellipse, ProjectionError};
+
+/// Lens distortion after Brown and Conrady, in coordinates on the plane at unit depth.
+///
+/// A point (x, y) at squared distance s from the axis moves to
+/// x (1 + `k1` s + `k2` s² + `k3` s³) + 2 `p1` x y + `p2` (s + 2 x²), and likewise in y with `p1`, `p2` exchanged: the
+/// convention of OpenCV's five coefficients. All zero is the ideal pinhole.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Distortion {
+    /// Radial, of second order. Below zero: barrel.
+    pub k1: f64,
+    /// Radial, of fourth order.
+    pub k2: f64,
+    /// Radial, of sixth order.
+    pub k3: f64,
+    /// Tangential, along y.
+    pub p1: f64,
+    /// Tangential, along x.
+    pub p2: f64,
+}
+
+impl Distortion {
+    /// Whether this is the ideal pinhole.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Where the lens shows what a pinhole would show at `p`.
+    pub fn distort(&self, p: Point2<f64>) -> Point2<f64> {
+        let (x, y) = (p.x, p.y);
+        let s = x * x + y * y;
+        let radial = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
+        Point2::new(
+            x * radial + 2.0 * self.p1 * x * y + self.p2 * (s + 2.0 * x * x),
+            y * radial + 2.0 * self.p2 * x * y + self.p1 * (s + 2.0 * y * y),
+        )
+    }
+
+    /// The inverse of [`Distortion::distort`], by fixed-point iteration; exact to about 1e-12 where the lens does not fold.
+    pub fn undistort(&self, p: Point2<f64>) -> Point2<f64> {
+        if self.is_none() {
+            return p;
+        }
+        let mut q = p;
+        for _ in 0..50 {
+            let error = self.distort(q) - p;
+            q -= error;
+            if error.norm_squared() < 1e-28 {
+                break;
+            }
+        }
+        q
+    }
+}
+
+/// A monochrome camera: a pinhole with square pixels, and the distortion of its lens.
+///
+/// Camera frame: origin at the centre of projection, z along the optical axis, x to the right of the image, y downward.
+/// Valid by construction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    focal_px: f64,
+    principal: Point2<f64>,
+    width: u32,
+    height: u32,
+    distortion: Distortion,
+}
+
+impl Camera {
+    /// The paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3" CCD, whose image is
+    /// 8.8 mm wide; principal point in the middle of the frame, no distortion.
+    ///
+    /// ```
+    /// let camera = pipeline_sim::Camera::paper();
+    /// assert_eq!(camera.size(), (768, 576));
+    /// assert!((camera.focal_px() / 4.0 - 250.9).abs() < 0.01); // in feature units
+    /// ```
+    pub fn paper() -> Self {
+        Self {
+            focal_px: 11.5 / 8.8 * 768.0,
+            principal: Point2::new(383.5, 287.5),
+            width: 768,
+            height: 576,
+            distortion: Distortion::default(),
+        }
+    }
+
+    /// A pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width` metres wide and a frame of
+    /// `width` x `height` pixels, principal point in the middle of the frame.
+    ///
+    /// # Errors
+    /// [`CameraError::NotPositive`] names the quantity that is not above zero.
+    pub fn pinhole(
+        focal_length: f64,
+        sensor_width: f64,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, CameraError> {
+        positive("focal length (m)", focal_length)?;
+        positive("sensor width (m)", sensor_width)?;
+        positive("frame width (px)", f64::from(width))?;
+        positive("frame height (px)", f64::from(height))?;
+        let focal_px = focal_length / sensor_width * f64::from(width);
+        positive("focal length (px)", focal_px)?;
+        Ok(Self {
+            focal_px,
+            principal: Point2::new((f64::from(width) - 1.0) / 2.0, (f64::from(height) - 1.0) / 2.0),
+            width,
+            height,
+            distortion: Distortion::default(),
+        })
+    }
+
+    /// A pinhole given in pixels, for frames that are drawn and then warped or reduced.
+    pub(crate) fn ideal(focal_px: f64, principal: Point2<f64>, width: u32, height: u32) -> Self {
+        Self {
+            focal_px,
+            principal,
+            width,
+            height,
+            distortion: Distortion::default(),
+        }
+    }
+
+    /// The same camera with its focal length multiplied by `factor`.
+    ///
+    /// # Errors
+    /// [`CameraError::NotPositive`] if the factor is not above zero; [`CameraError::Folds`] if a distorted image would fold.
+    pub fn with_focal_factor(self, factor: f64) -> Result<Self, CameraError> {
+        positive("focal factor", factor)?;
+        let focal_px = self.focal_px * factor;
+        positive("focal length (px)", focal_px)?;
+        Self { focal_px, ..self }.unfolded()
+    }
+
+    /// The same camera with its principal point at `principal`, pixels.
+    ///
+    /// # Errors
+    /// [`CameraError::NotFinite`]; [`CameraError::Folds`] if a distorted image would fold.
+    pub fn with_principal_point(self, principal: Point2<f64>) -> Result<Self, CameraError> {
+        finite("principal point x (px)", principal.x)?;
+        finite("principal point y (px)", principal.y)?;
+        Self { principal, ..self }.unfolded()
+    }
+
+    /// The same camera with this lens distortion.
+    ///
+    /// # Errors
+    /// [`CameraError::NotFinite`]; [`CameraError::Folds`] if the image folds over within the frame.
+    pub fn with_distortion(self, distortion: Distortion) -> Result<Self, CameraError> {
+        let Distortion { k1, k2, k3, p1, p2 } = distortion;
+        for (name, value) in [("k1", k1), ("k2", k2), ("k3", k3), ("p1", p1), ("p2", p2)] {
+            finite(name, value)?;
+        }
+        Self { distortion, ..self }.unfolded()
+    }
+
+    /// Width and height of the frame, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// Focal length in pixels.
+    pub fn focal_px(&self) -> f64 {
+        self.focal_px
+    }
+
+    /// Where the optical axis meets the image, pixels.
+    pub fn principal_point(&self) -> Point2<f64> {
+        self.principal
+    }
+
+    /// The lens distortion.
+    pub fn distortion(&self) -> &Distortion {
+        &self.distortion
+    }
+
+    /// The pixel that shows a point given in the camera frame; `None` for a point that is not in front of the camera.
+    pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
+        (point.z > 0.0).then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
+    }
+
+    /// The direction, in the camera frame and with z = 1, that is seen at a pixel.
+    pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
+        let p = self
+            .distortion
+            .undistort((pixel - self.principal.coords) / self.focal_px);
+        Vector3::new(p.x, p.y, 1.0)
+    }
+
+    /// The outline of a sphere whose centre is given in the camera frame.
+    ///
+    /// Without distortion the outline *is* an ellipse, and this one is exact: the section of the image plane with the cone
+    /// of half-angle asin(radius / distance) about the direction of the centre. With distortion it is the ellipse with the
+    /// area and the second moments of the distorted outline.
+    ///
+    /// # Errors
+    /// [`ProjectionError`]: a radius that is not above zero, a camera inside the sphere, a sphere not wholly in front of the
+    /// camera.
+    pub fn project_sphere(&self, centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
+        let outline = unit_outline(centre, radius)?;
+        if self.distortion.is_none() {
+            return Ok(Ellipse {
+                centre: self.to_pixel(outline.centre),
+                major: outline.major * self.focal_px,
+                minor: outline.minor * self.focal_px,
+                angle: outline.angle,
+            });
+        }
+        Ok(Ellipse::of_outline(|t| self.to_pixel(outline.point(t))))
+    }
+
+    /// The circle of equal mean radius for a sphere: the centre of [`Camera::project_sphere`]'s ellipse and the mean of its
+    /// semi-axes, in pixels of this camera's frame.
+    ///
+    /// # Errors
+    /// As for [`Camera::project_sphere`].
+    pub fn project_sphere_to_circle(
+        &self,
+        centre: &Point3<f64>,
+        radius: f64,
+    ) -> Result<Circle, ProjectionError> {
+        Ok(self.project_sphere(centre, radius)?.circle())
+    }
+
+    /// The centre of the sphere of `radius` metres whose outline has the circle `circle`, in the camera frame: the inverse of
+    /// [`Camera::project_sphere_to_circle`] for a camera without distortion, and close to it (the distortion at the circle's
+    /// centre is undone) for others.
+    ///
+    /// `None` if `circle` or `radius` is not finite or not above zero.
+    pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
+        let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
+            && [circle.radius, radius].iter().all(|v| v.is_finite() && *v > 0.0);
+        if !usable {
+            return None;
+        }
+        let ray = self.ray(Point2::new(circle.x, circle.y));
+        let (m, r) = (ray.xy().norm(), circle.radius / self.focal_px);
+        // Unknown: tan(eta) of the centre's direction, and sin²(alpha). From the formulas of `unit_outline`, with
+        // k = cos²(alpha) - sin²(eta): m = sin(eta) cos(eta) / k and r = (sin(alpha) cos(alpha) / k + sin(alpha) / sqrt(k)) / 2.
+        let (mut tan, mut sin) = (m, r / (1.0 + r * r).sqrt());
+        for _ in 0..60 {
+            let cos2_eta = 1.0 / (1.0 + tan * tan);
+            let k = (cos2_eta - sin * sin).max(1e-9);
+            let r_now = 0.5 * (sin * (1.0 - sin * sin).sqrt() / k + sin / k.sqrt());
+            let step = (r / r_now).clamp(0.5, 2.0);
+            let tan_now = m * k / cos2_eta;
+            let settled = (step - 1.0).abs() < 1e-15 && (tan_now - tan).abs() < 1e-15;
+            sin = (sin * step).min(0.999);
+            tan = tan_now;
+            if settled {
+                break;
+            }
+        }
+        let sideways = if m > 0.0 { ray.xy() * (tan / m) } else { ray.xy() };
+        let direction = Vector3::new(sideways.x, sideways.y, 1.0).normalize();
+        Some(Point3::from(direction * (radius / sin)))
+    }
+
+    fn to_pixel(self, p: Point2<f64>) -> Point2<f64> {
+        let p = if self.distortion.is_none() {
+            p
+        } else {
+            self.distortion.distort(p)
+        };
+        self.principal + p.coords * self.focal_px
+    }
+
+    /// Refuses a radial distortion that turns back before the farthest corner of the frame.
+    fn unfolded(self) -> Result<Self, CameraError> {
+        if self.distortion.is_none() {
+            return Ok(self);
+        }
+        let (w, h) = (f64::from(self.width) - 0.5, f64::from(self.height) - 0.5);
+        let reach = [(-0.5, -0.5), (w, -0.5), (-0.5, h), (w, h)]
+            .into_iter()
+            .map(|(x, y)| (Point2::new(x, y) - self.principal).norm())
+            .fold(0.0, f64::max);
+        // March outward until the image of the ray leaves the frame; the image must grow all the way, in every direction.
+        for direction in 0..32 {
+            let (sin, cos) = (f64::from(direction) * std::f64::consts::TAU / 32.0).sin_cos();
+            let (mut last, mut u) = (0.0, 0.0);
+            let step = reach / self.focal_px / 200.0;
+            while last < reach {
+                u += step;
+                let image = self.distortion.distort(Point2::new(u * cos, u * sin));
+                let out = (image.x * cos + image.y * sin) * self.focal_px;
+                if out.is_nan() || out <= last {
+                    return Err(CameraError::Folds { radius_px: last });
+                }
+                last = out;
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// The outline of a sphere on the plane at unit depth.
+fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
+    if !(radius.is_finite() && radius > 0.0) {
+        return Err(ProjectionError::Radius { radius });
+    }
+    let distance2 = centre.coords.norm_squared();
+    if !distance2.is_finite() {
+        return Err(ProjectionError::CentreNotFinite);
+    }
+    if distance2 <= radius * radius {
+        return Err(ProjectionError::Inside {
+            distance: distance2.sqrt(),
+            radius,
+        });
+    }
+    if centre.z <= radius {
+        return Err(ProjectionError::Behind {
+            depth: centre.z,
+            radius,
+        });
+    }
+    let sideways2 = centre.x * centre.x + centre.y * centre.y;
+    let sin2_alpha = radius * radius / distance2;
+    let cos2_eta = centre.z * centre.z / distance2;
+    // cos²(alpha) - sin²(eta), above zero because the whole sphere is in front of the camera.
+    let k = cos2_eta - sin2_alpha;
+    let scale = centre.z / distance2 / k;
+    Ok(Ellipse {
+        centre: Point2::new(centre.x * scale, centre.y * scale),
+        major: (sin2_alpha * (1.0 - sin2_alpha)).sqrt() / k,
+        minor: (sin2_alpha / k).sqrt(),
+        angle: if sideways2 > 0.0 {
+            centre.y.atan2(centre.x)
+        } else {
+            0.0
+        },
+    })
+}
+
+fn positive(quantity: &'static str, value: f64) -> Result<(), CameraError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(CameraError::NotPositive { quantity, value })
+    }
+}
+
+fn finite(quantity: &'static str, value: f64) -> Result<(), CameraError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(CameraError::NotFinite { quantity, value })
+    }
+}

@@ -1,0 +1,232 @@
+//! How wrong a cell can be: the arm and the camera that one believes to have, and those one has.
+
+use std::fmt;
+use std::str::FromStr;
+
+use puma_val2::Joints;
+use rand::{Rng, RngExt};
+
+use crate::{CameraError, Cell, Mount};
+
+/// The ways in which a real cell differs from the nominal one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Errors {
+    /// True focal length over the nominal one.
+    pub focal_factor: f64,
+    /// Turn of the camera about its optical axis, radians.
+    pub roll: f64,
+    /// Turn of the camera about the image's x axis, radians.
+    pub pitch: f64,
+    /// Turn of the camera about the image's y axis, radians.
+    pub yaw: f64,
+    /// Displacement of the camera along its own axes, metres.
+    pub camera_shift: [f64; 3],
+    /// Displacement of the principal point, feature units.
+    pub centre_shift: [f64; 2],
+    /// True radius of the ball over the nominal one.
+    pub radius_factor: f64,
+    /// Play between motor and link in every joint, whole width, radians.
+    pub backlash: f64,
+    /// Angle of one encoder count, `JT1` first, radians; 0 for a joint that stands anywhere.
+    pub encoder_step: [f64; 6],
+    /// Standard deviation of the noise on each image feature, units.
+    pub feature_noise: f64,
+}
+
+impl Errors {
+    /// Angles of one count of the PUMA 560's encoders, degrees.
+    pub const PUMA_ENCODER_DEGREES: [f64; 6] = [0.00575, 0.00417, 0.00670, 0.00474, 0.00501, 0.00939];
+
+    /// A cell as it is believed to be.
+    pub fn none() -> Self {
+        Self {
+            focal_factor: 1.0,
+            roll: 0.0,
+            pitch: 0.0,
+            yaw: 0.0,
+            camera_shift: [0.0; 3],
+            centre_shift: [0.0; 2],
+            radius_factor: 1.0,
+            backlash: 0.0,
+            encoder_step: [0.0; 6],
+            feature_noise: 0.0,
+        }
+    }
+
+    /// The true cell where `nominal` is the believed one. Backlash, encoder steps and noise belong to the arm and the observation
+    /// ([`crate::SimulatedArm::with_errors`], [`crate::FeatureCamera`]).
+    ///
+    /// # Errors
+    /// [`CameraError`] for factors that are not above zero and shifts that are not finite.
+    pub fn apply(&self, nominal: &Cell) -> Result<Cell, CameraError> {
+        let angles = [self.roll, self.pitch, self.yaw];
+        for value in angles.into_iter().chain(self.camera_shift) {
+            if !value.is_finite() {
+                return Err(CameraError::NotFinite {
+                    quantity: "error of the camera's mount",
+                    value,
+                });
+            }
+        }
+        let radius = nominal.ball.radius * self.radius_factor;
+        if !(radius.is_finite() && radius > 0.0) {
+            return Err(CameraError::NotPositive {
+                quantity: "radius of the ball (m)",
+                value: radius,
+            });
+        }
+        let unit = f64::from(nominal.camera.size().0) / hough_heuristic::Features::WIDTH;
+        let principal = nominal.camera.principal_point()
+            + nalgebra::Vector2::new(self.centre_shift[0] * unit, self.centre_shift[1] * unit);
+        let mut cell = *nominal;
+        cell.camera = nominal
+            .camera
+            .with_focal_factor(self.focal_factor)?
+            .with_principal_point(principal)?;
+        cell.mount = Mount::displaced(&nominal.mount, self.camera_shift, self.roll, self.pitch, self.yaw);
+        cell.ball.radius = radius;
+        Ok(cell)
+    }
+}
+
+impl Default for Errors {
+    fn default() -> Self {
+        Self::none()
+    }
+}
+
+/// How wrong a cell is, in four measures.
+///
+/// | level | focal length | roll, pitch, yaw | backlash | noise | ball | camera | principal point |
+/// |---|---|---|---|---|---|---|---|
+/// | none | | | | | | | |
+/// | moderate | 10 % | 3 deg | 0.2 deg | 0.5 units | | | |
+/// | heavy | 25 % | 8 deg | 0.6 deg | 1 unit | 10 % | 20 mm each axis | 5 units |
+/// | extreme | 40 % | 15 deg | 1 deg | 1.5 units | 20 % | 20 mm each axis | 5 units |
+///
+/// Each quantity is off by the full amount, with a sign drawn at random. All levels but `none` have the encoder steps of a PUMA 560.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum ErrorLevel {
+    /// As believed.
+    None,
+    /// A cell set up with care, without calibration.
+    Moderate,
+    /// A cell set up by eye.
+    Heavy,
+    /// A cell with the wrong lens, a bent bracket and another ball.
+    Extreme,
+}
+
+impl ErrorLevel {
+    /// All levels, mildest first.
+    pub const ALL: [Self; 4] = [Self::None, Self::Moderate, Self::Heavy, Self::Extreme];
+
+    /// Draws the errors of one cell.
+    pub fn draw<R: Rng + ?Sized>(self, rng: &mut R) -> Errors {
+        let (focal, degrees, backlash, noise, ball, shift, centre) = match self {
+            Self::None => return Errors::none(),
+            Self::Moderate => (0.10, 3.0, 0.2, 0.5, 0.0, 0.0, 0.0),
+            Self::Heavy => (0.25, 8.0, 0.6, 1.0, 0.10, 0.020, 5.0),
+            Self::Extreme => (0.40, 15.0, 1.0, 1.5, 0.20, 0.020, 5.0),
+        };
+        let mut signed = |amount: f64| if rng.random() { amount } else { -amount };
+        let angle = f64::to_radians(degrees);
+        Errors {
+            focal_factor: 1.0 + signed(focal),
+            roll: signed(angle),
+            pitch: signed(angle),
+            yaw: signed(angle),
+            camera_shift: [signed(shift), signed(shift), signed(shift)],
+            centre_shift: [signed(centre), signed(centre)],
+            radius_factor: 1.0 + signed(ball),
+            backlash: f64::to_radians(backlash),
+            encoder_step: Errors::PUMA_ENCODER_DEGREES.map(f64::to_radians),
+            feature_noise: noise,
+        }
+    }
+}
+
+impl fmt::Display for ErrorLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::Moderate => "moderate",
+            Self::Heavy => "heavy",
+            Self::Extreme => "extreme",
+        })
+    }
+}
+
+impl FromStr for ErrorLevel {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|level| level.to_string() == name)
+            .ok_or_else(|| UnknownName {
+                name: name.to_owned(),
+                known: "none, moderate, heavy, extreme",
+            })
+    }
+}
+
+/// A name that stands for nothing.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown name {name:?}; known are {known}")]
+pub struct UnknownName {
+    /// What was given.
+    pub name: String,
+    /// What would have been known.
+    pub known: &'static str,
+}
+
+/// Motors and gears: where the arm reports to be, and where its links are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Drive {
+    backlash: f64,
+    encoder_step: [f64; 6],
+    reported: Joints,
+    links: Joints,
+}
+
+impl Drive {
+    pub(crate) fn new(joints: Joints, errors: &Errors) -> Self {
+        let (backlash, encoder_step) = (errors.backlash.max(0.0), errors.encoder_step);
+        let mut drive = Self {
+            backlash,
+            encoder_step,
+            reported: joints,
+            links: joints,
+        };
+        drive.send(joints);
+        drive
+    }
+
+    /// What the encoders say.
+    pub(crate) fn reported(&self) -> Joints {
+        self.reported
+    }
+
+    /// Where the links are, within the play of the gears.
+    pub(crate) fn links(&self) -> Joints {
+        self.links
+    }
+
+    /// Turns the motors to the counts nearest to `target`; the links follow as soon as the play is used up.
+    pub(crate) fn send(&mut self, target: Joints) {
+        let half = 0.5 * self.backlash;
+        for i in 0..6 {
+            let step = self.encoder_step[i];
+            let motor = if step > 0.0 {
+                (target.0[i] / step).round() * step
+            } else {
+                target.0[i]
+            };
+            self.reported.0[i] = motor;
+            self.links.0[i] = self.links.0[i].clamp(motor - half, motor + half);
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Touching the ball: gripping it, carrying it, pushing it.
+
+use hough_heuristic::Features;
+use nalgebra::{Point3, Vector3};
+use puma_val2::{Gripper, Joints};
+
+use crate::{Cell, Holder};
+
+/// What closing the jaws came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Grasp {
+    /// The ball is between the pads and goes where the hand goes.
+    Held,
+    /// The pads caught the ball beside its middle and squeezed it out; it moved by this much.
+    Pushed {
+        /// Metres.
+        by: f64,
+    },
+    /// There was no ball between the jaws.
+    Missed,
+}
+
+/// What a move of the hand did to the ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Contact {
+    /// Nothing.
+    Free,
+    /// The ball is in the jaws and came along.
+    Carried,
+    /// Finger, palm or camera pushed the ball aside.
+    Pushed {
+        /// Metres.
+        by: f64,
+    },
+}
+
+impl Cell {
+    /// Closes the jaws with the arm at `joints`.
+    ///
+    /// The jaws open along the hand's y axis. Held: the ball's middle lies between the jaws and within [`crate::Hand::pad_tolerance`] of the
+    /// pads' middle across them; the jaws then pull it to the middle. Pushed: it lies between the jaws but farther out than that, so
+    /// that the pads slide off and press it away until they miss it. Missed: otherwise; the ball stays.
+    pub fn close_gripper(&mut self, joints: &Joints) -> Grasp {
+        let wrist = self.params.wrist(joints);
+        self.jaws = Gripper::Closed;
+        let ball = wrist.inverse_transform_point(&self.ball.centre);
+        let pads = self.params.d6 + self.hand.tool;
+        let across = Vector3::new(ball.x, 0.0, ball.z - pads);
+        let miss = across.norm();
+        let gap = self.hand.half_opening - self.hand.finger_radius;
+        let reach = self.ball.radius + self.hand.finger_radius;
+        if self.held.is_some() {
+            return Grasp::Held;
+        }
+        if ball.y.abs() > gap || miss > reach {
+            return Grasp::Missed;
+        }
+        if miss <= self.hand.pad_tolerance {
+            let place = Point3::new(ball.x, 0.0, ball.z);
+            self.held = Some(place);
+            self.ball.centre = wrist * place;
+            return Grasp::Held;
+        }
+        let by = reach - miss;
+        let out = wrist * (across * (by / miss));
+        self.slide_ball(
+            Vector3::new(out.x, out.y, 0.0)
+                .try_normalize(1e-9)
+                .unwrap_or_else(Vector3::x)
+                * by,
+        );
+        Grasp::Pushed { by }
+    }
+
+    /// Opens the jaws. A ball that they held falls straight down, onto its holder if that is below, else onto the table.
+    pub fn open_gripper(&mut self) {
+        self.jaws = Gripper::Open;
+        if self.held.take().is_none() {
+            return;
+        }
+        let ball = &mut self.ball;
+        match self.holder {
+            Some(h) if (ball.centre.xy() - h.foot).norm() <= h.radius => {
+                let sunk = (ball.radius * ball.radius - h.radius * h.radius).max(0.0).sqrt();
+                ball.centre = Point3::new(h.foot.x, h.foot.y, h.top + sunk);
+            }
+            _ => ball.centre.z = self.table + ball.radius,
+        }
+    }
+
+    /// Lets the ball follow the hand, now at `joints`: a held ball comes along; one that finger, palm or camera overlap is pushed aside,
+    /// holder and all, until they only touch.
+    ///
+    /// Call it after every move (and along the way for long moves); [`crate::SimulatedArm`] does.
+    pub fn follow(&mut self, joints: &Joints) -> Contact {
+        if let Some(place) = self.held {
+            self.ball.centre = self.params.wrist(joints) * place;
+            return Contact::Carried;
+        }
+        let start = self.ball.centre;
+        let bodies = self.hand_bodies(joints);
+        // Pushing it off one body may push it into another; a few rounds settle that.
+        for _ in 0..8 {
+            let centre = self.ball.centre;
+            let deepest = bodies
+                .iter()
+                .map(|body| {
+                    (
+                        body.gap_to_sphere(&centre, self.ball.radius),
+                        body.nearest_axis_point(&centre),
+                    )
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((gap, from)) = deepest.filter(|(gap, _)| *gap < -1e-9) else {
+                break;
+            };
+            let away = centre - from;
+            let aside = Vector3::new(away.x, away.y, 0.0)
+                .try_normalize(1e-9)
+                .unwrap_or_else(Vector3::x);
+            // Sideways along the table, far enough to clear a gap that opens obliquely.
+            let slant = aside.dot(&away.try_normalize(1e-9).unwrap_or(aside)).max(0.25);
+            self.slide_ball(aside * (-gap / slant));
+        }
+        let by = (self.ball.centre - start).norm();
+        if by > 0.0 {
+            Contact::Pushed { by }
+        } else {
+            Contact::Free
+        }
+    }
+
+    /// Moves the ball, with the holder if it stands on it.
+    fn slide_ball(&mut self, by: Vector3<f64>) {
+        self.ball.centre += by;
+        if let Some(Holder { foot, .. }) = &mut self.holder {
+            *foot += by.xy();
+        }
+    }
+
+    /// Pushes the ball along the camera's line of sight until it shows with radius `r` units: nearer for a greater r. The holder comes
+    /// along. Returns whether such a place exists above the table.
+    pub fn push_to_radius(&mut self, joints: &Joints, r: f64) -> bool {
+        let Some(outline) = self.outline(joints) else {
+            return false;
+        };
+        let now = Features::from_circle(&outline.circle(), self.camera.size().0);
+        match self.ball_showing(joints, &Features { r, ..now }) {
+            Some(place) if place.z > self.table + self.ball.radius => {
+                self.place_ball(place);
+                true
+            }
+            _ => false,
+        }
+    }
+}

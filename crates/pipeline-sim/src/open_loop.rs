@@ -1,0 +1,95 @@
+//! How far a model drifts from the plant when it is believed for several moves.
+
+use puma_val2::{Joint, JointDelta};
+use rand::{Rng, RngExt};
+
+use crate::{Cell, MoveLists, ReachModel, exploring_start};
+
+/// Errors of a model after some moves in a row without a look at the plant, feature units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct OpenLoopError {
+    /// Moves in a row.
+    pub moves: usize,
+    /// Runs that were counted.
+    pub runs: usize,
+    /// Mean absolute error of y.
+    pub y_mean: f64,
+    /// Mean absolute error of r.
+    pub r_mean: f64,
+    /// Median absolute error of y.
+    pub y_median: f64,
+    /// Median absolute error of r.
+    pub r_median: f64,
+}
+
+impl ReachModel {
+    /// Compares model and plant over runs of up to `moves` random moves from the paper's lists, starting from [`exploring_start`]s; entry
+    /// k holds the errors after k + 1 moves.
+    ///
+    /// A run goes on while the plant keeps the ball in sight and the arm within its limits (moves that do not are not taken); the
+    /// model gets its own last prediction as its next input.
+    pub fn open_loop_error<R: Rng + ?Sized>(
+        &self,
+        cell: &Cell,
+        moves: usize,
+        runs: usize,
+        rng: &mut R,
+    ) -> Vec<OpenLoopError> {
+        let lists = MoveLists::paper();
+        let mut errors: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); moves];
+        for _ in 0..runs {
+            let Some((start, mut joints)) = exploring_start(cell, rng) else {
+                break;
+            };
+            let Some(mut believed) = start.features(&joints) else {
+                continue;
+            };
+            for (y, r) in &mut errors {
+                let Some((d2, d3, there)) = (0..100).find_map(|_| {
+                    let (d2, d3) = (
+                        lists.jt2[rng.random_range(0..9)],
+                        lists.jt3[rng.random_range(0..9)],
+                    );
+                    let after = joints + JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]);
+                    let seen = start
+                        .within_limits(&after)
+                        .then(|| start.features(&after))
+                        .flatten()?;
+                    Some((d2, d3, (after, seen)))
+                }) else {
+                    break;
+                };
+                let Some(after) = self.predict_unbounded(&believed, joints[Joint::J3].to_degrees(), d2, d3)
+                else {
+                    break;
+                };
+                believed = after;
+                joints = there.0;
+                y.push((believed.y - there.1.y).abs());
+                r.push((believed.r - there.1.r).abs());
+            }
+        }
+        let summed = |values: &mut Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            let median = values.get(values.len() / 2).copied().unwrap_or(f64::NAN);
+            (values.iter().sum::<f64>() / values.len() as f64, median)
+        };
+        errors
+            .iter_mut()
+            .enumerate()
+            .map(|(k, (y, r))| {
+                let runs = y.len();
+                let ((y_mean, y_median), (r_mean, r_median)) = (summed(y), summed(r));
+                OpenLoopError {
+                    moves: k + 1,
+                    runs,
+                    y_mean,
+                    r_mean,
+                    y_median,
+                    r_median,
+                }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,477 @@
+//! The shaded bodies: balls, cylinders, boxes, and what lies flat.
+
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+
+use crate::render::canvas::Canvas;
+use crate::render::shadow::toward;
+use crate::render::texture::Texture;
+use crate::render::view::View;
+use crate::{Look, Occluder, Scene, Shape, Thing};
+
+/// Everything a body's shading depends on.
+pub(super) struct Studio<'a> {
+    pub(super) view: &'a View,
+    pub(super) scene: &'a Scene,
+    pub(super) texture: &'a Texture,
+    /// Height of the table.
+    pub(super) table: f64,
+    /// Light that the table throws back.
+    pub(super) bounce: f64,
+}
+
+/// Pixels between two places where a plane's coordinates are worked out exactly.
+pub(super) const STRIDE: usize = 16;
+
+/// Writes a row of a textured plane: `plane` takes pixels to homogeneous plane coordinates in metres, `light` gives the factor at a
+/// column.
+pub(super) fn plane_row(
+    plane: &Matrix3<f64>,
+    texture: &Texture,
+    strength: f32,
+    (y, x0): (usize, usize),
+    row: &mut [f32],
+    light: impl Fn(usize) -> f32,
+) {
+    let base = plane * Vector3::new(x0 as f64, y as f64, 1.0);
+    let step = plane.column(0);
+    let place = |k: usize| {
+        let k = k as f64;
+        let w = 1.0 / (base.z + k * step.z);
+        ((base.x + k * step.x) * w, (base.y + k * step.y) * w)
+    };
+    let middle = row.len() / 2;
+    let (a, b) = (place(middle), place(middle + 1));
+    let down = {
+        let p = plane * Vector3::new((x0 + middle) as f64, y as f64 + 1.0, 1.0);
+        (p.x / p.z, p.y / p.z)
+    };
+    let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
+    let level = texture.level(footprint);
+    // A plane that does not recede along the row (the camera's x axis lies in it, as it does while the hand is not rolled) is walked in one
+    // go; otherwise places are exact at multiples of the stride, so that what lies between is the same in all rows.
+    let length = row.len();
+    let even = (step.z * length as f64).abs() < 1e-7 * base.z.abs();
+    if even {
+        let (from, to) = (place(0), place(length));
+        let share = 1.0 / length as f64;
+        texture.walk(
+            level,
+            from,
+            ((to.0 - from.0) * share, (to.1 - from.1) * share),
+            strength,
+            row,
+        );
+    }
+    let mut k = 0;
+    let mut from = place(0);
+    let mut from_light = light(x0);
+    while k < length {
+        let end = ((x0 + k + STRIDE) / STRIDE * STRIDE - x0).min(length);
+        let chunk = &mut row[k..end];
+        if !even {
+            let to = place(end);
+            let share = 1.0 / (end - k) as f64;
+            texture.walk(
+                level,
+                from,
+                ((to.0 - from.0) * share, (to.1 - from.1) * share),
+                strength,
+                chunk,
+            );
+            from = to;
+        }
+        let to_light = light(x0 + end);
+        let slope = (to_light - from_light) / (end - k) as f32;
+        for (i, value) in (0_i32..).zip(chunk) {
+            *value *= from_light + slope * i as f32;
+        }
+        (from_light, k) = (to_light, end);
+    }
+}
+
+impl Studio<'_> {
+    /// Light that a surface with this normal receives, world frame.
+    pub(super) fn irradiance(&self, normal: &Vector3<f64>) -> f64 {
+        let up = 0.5 + 0.5 * normal.z;
+        let lamps: f64 = self
+            .scene
+            .lights
+            .iter()
+            .map(|l| l.intensity.max(0.0) * toward(l).dot(normal).max(0.0))
+            .sum();
+        self.scene.ambient.max(0.0) * up + self.bounce * (1.0 - up) + lamps
+    }
+
+    /// Draws a sphere.
+    pub(super) fn sphere(&self, canvas: &mut Canvas, centre: &Point3<f64>, radius: f64, look: &Look) {
+        // In units of the radius, camera frame.
+        let c = self.view.seen(centre).coords / radius;
+        if c.z <= 1.05 || c.norm_squared() <= 1.0 {
+            return;
+        }
+        let Some((rows, columns)) = self.sphere_bounds(canvas, &c) else {
+            return;
+        };
+        let k = c.norm_squared() - 1.0;
+        let (cx, cy, cz, k) = (c.x as f32, c.y as f32, c.z as f32, k as f32);
+        let step = (1.0 / self.view.focal) as f32;
+        let up = self.view.turned(&Vector3::z()).cast::<f32>();
+        let (sky, ground) = (
+            (0.5 * self.scene.ambient.max(0.0)) as f32,
+            (0.5 * self.bounce) as f32,
+        );
+        let albedo = look.albedo as f32;
+        let gloss = look.gloss as f32;
+        let lamps: Vec<(Vector3<f32>, Vector3<f32>, f32)> = self
+            .scene
+            .lights
+            .iter()
+            .map(|l| {
+                let axis = self.view.turned(&toward(l));
+                let half = (axis - c.normalize()).try_normalize(1e-9).unwrap_or(axis);
+                (axis.cast(), half.cast(), l.intensity.max(0.0) as f32)
+            })
+            .collect();
+        let origin = columns.start;
+        let width = columns.len();
+        let mut shade = vec![0.0_f32; width];
+        let mut normals = vec![[0.0_f32; 3]; width];
+        for y in rows {
+            let yn = ((y as f64 - self.view.principal.y) / self.view.focal) as f32;
+            let first = ((origin as f64 - self.view.principal.x) / self.view.focal) as f32;
+            let row = &mut canvas.light[y * canvas.width + origin..y * canvas.width + origin + width];
+            for (i, (value, n)) in shade.iter_mut().zip(&mut normals).enumerate() {
+                let xn = first + i as f32 * step;
+                let dd = 1.0 + xn * xn + yn * yn;
+                let b = xn * cx + yn * cy + cz;
+                let disc = b * b - dd * k;
+                let t = (b - disc.max(0.0).sqrt()) / dd;
+                *n = [t * xn - cx, t * yn - cy, t - cz];
+                *value = ground + sky + (sky - ground) * (n[0] * up.x + n[1] * up.y + n[2] * up.z);
+            }
+            for (axis, half, intensity) in &lamps {
+                for (value, n) in shade.iter_mut().zip(&normals) {
+                    let lit = (n[0] * axis.x + n[1] * axis.y + n[2] * axis.z).max(0.0);
+                    *value += intensity * lit;
+                }
+                if gloss > 0.0 {
+                    for (value, n) in shade.iter_mut().zip(&normals) {
+                        let h = (n[0] * half.x + n[1] * half.y + n[2] * half.z).max(0.0);
+                        let (h2, h4) = (h * h, h * h * h * h);
+                        let h16 = h4 * h4 * h4 * h4;
+                        let h64 = h16 * h16 * h16 * h16;
+                        // Added on top of the reflectance, hence divided by it here.
+                        *value += intensity * gloss / albedo.max(0.05) * (1.6 * h64 + 0.12 * h4 * h2);
+                    }
+                }
+            }
+            for (i, (light, value)) in row.iter_mut().zip(&shade).enumerate() {
+                let xn = first + i as f32 * step;
+                let dd = 1.0 + xn * xn + yn * yn;
+                let b = xn * cx + yn * cy + cz;
+                let disc = b * b - dd * k;
+                // Distance to the outline in pixels: the discriminant over its gradient.
+                let (gx, gy) = (2.0 * (b * cx - xn * k) * step, 2.0 * (b * cy - yn * k) * step);
+                let share = (0.5 + disc / (gx * gx + gy * gy).max(1e-20).sqrt()).clamp(0.0, 1.0);
+                *light += (albedo * value - *light) * share;
+            }
+        }
+    }
+
+    /// Rows and columns that a sphere of radius 1 may touch.
+    fn sphere_bounds(
+        &self,
+        canvas: &Canvas,
+        c: &Vector3<f64>,
+    ) -> Option<(std::ops::Range<usize>, std::ops::Range<usize>)> {
+        let k = c.z * c.z - 1.0;
+        let range = |across: f64, principal: f64, limit: usize| {
+            let half = (across * across + k).max(0.0).sqrt() / k;
+            let middle = across * c.z / k;
+            let (least, most) = (
+                principal + (middle - half) * self.view.focal - 1.0,
+                principal + (middle + half) * self.view.focal + 2.0,
+            );
+            (most > 0.0 && least < limit as f64)
+                .then(|| least.max(0.0) as usize..(most.min(limit as f64).max(0.0)) as usize)
+                .filter(|r| !r.is_empty())
+        };
+        Some((
+            range(c.y, self.view.principal.y, canvas.height)?,
+            range(c.x, self.view.principal.x, canvas.width)?,
+        ))
+    }
+
+    /// Draws an upright rod or cylinder from `low` to `high`, hollow-looking tops left out.
+    pub(super) fn cylinder(
+        &self,
+        canvas: &mut Canvas,
+        foot: Point2<f64>,
+        radius: f64,
+        low: f64,
+        high: f64,
+        look: &Look,
+    ) {
+        const SIDES: usize = 40;
+        let ring = |z: f64| -> [Point3<f64>; SIDES] {
+            std::array::from_fn(|i| {
+                let (sin, cos) = (i as f64 * std::f64::consts::TAU / SIDES as f64).sin_cos();
+                Point3::new(foot.x + radius * cos, foot.y + radius * sin, z)
+            })
+        };
+        let eye = self.view.eye();
+        let (top, bottom) = (ring(high), ring(low));
+        // Silhouette of the side: the hull of both rings, made of the half of each that faces away from the other in the image.
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        self.view.polygon(&top, &mut a);
+        self.view.polygon(&bottom, &mut b);
+        let hull = convex_hull(a.iter().chain(&b).copied().collect());
+        let axis = Point2::new(foot.x - eye.x, foot.y - eye.y);
+        let rotation = self.view.pose.rotation;
+        let shade = |x: f64, y: f64| {
+            let d = rotation
+                * Vector3::new(
+                    (x - self.view.principal.x) / self.view.focal,
+                    (y - self.view.principal.y) / self.view.focal,
+                    1.0,
+                );
+            // Where the ray meets the wall, seen from above.
+            let dd = (d.x * d.x + d.y * d.y).max(1e-12);
+            let b = d.x * axis.x + d.y * axis.y;
+            let disc = b * b - dd * (axis.coords.norm_squared() - radius * radius);
+            let t = (b - disc.max(0.0).sqrt()) / dd;
+            let n = Vector3::new(t * d.x - axis.x, t * d.y - axis.y, 0.0).try_normalize(1e-12);
+            let n = n.unwrap_or_else(Vector3::x);
+            let mut light = self.irradiance(&n);
+            if look.gloss > 0.0 {
+                for lamp in &self.scene.lights {
+                    let half = (toward(lamp) - d.normalize()).try_normalize(1e-9).unwrap_or(n);
+                    light += lamp.intensity * look.gloss * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
+                }
+            }
+            // Darker toward the table.
+            let depth = ((eye.z + t * d.z - self.table) / 0.03).clamp(0.0, 1.0);
+            (look.albedo * light * (0.75 + 0.25 * depth)) as f32
+        };
+        canvas.fill(&hull, |y, x0, row| {
+            // Exact at every fourth pixel and straight between.
+            let mut from = shade(x0 as f64, y as f64);
+            for (k, chunk) in row.chunks_mut(4).enumerate() {
+                let to = shade((x0 + 4 * k + 4) as f64, y as f64);
+                for (i, value) in (0_i32..).zip(chunk) {
+                    *value = from + 0.25 * (to - from) * i as f32;
+                }
+                from = to;
+            }
+        });
+        if eye.z > high {
+            self.face(canvas, &top, &Vector3::x(), &Vector3::y(), look, look.albedo);
+        }
+    }
+
+    /// Draws a flat convex face with the texture running along u and v.
+    pub(super) fn face(
+        &self,
+        canvas: &mut Canvas,
+        corners: &[Point3<f64>],
+        u: &Vector3<f64>,
+        v: &Vector3<f64>,
+        look: &Look,
+        albedo: f64,
+    ) {
+        let mut polygon = Vec::with_capacity(corners.len() + 1);
+        self.view.polygon(corners, &mut polygon);
+        let light = (albedo * self.irradiance(&u.cross(v))) as f32;
+        if look.texture <= 0.0 {
+            canvas.fill(&polygon, |_, _, row| row.fill(light));
+            return;
+        }
+        let plane = self.view.plane(&corners[0], u, v);
+        let strength = look.texture as f32;
+        canvas.fill(&polygon, |y, x0, row| {
+            plane_row(&plane, self.texture, strength, (y, x0), row, |_| light);
+        });
+    }
+
+    /// Draws a thing.
+    pub(super) fn thing(&self, canvas: &mut Canvas, thing: &Thing) {
+        let (sin, cos) = thing.turn.sin_cos();
+        let along = Vector3::new(cos, sin, 0.0);
+        let across = Vector3::new(-sin, cos, 0.0);
+        let middle = Point3::new(thing.x, thing.y, self.table);
+        let (look, albedo) = (&thing.look, thing.look.albedo);
+        let quad = |at: Point3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
+            [at - u - v, at + u - v, at + u + v, at - u + v]
+        };
+        match thing.shape {
+            Shape::Box {
+                length,
+                width,
+                height,
+            } => {
+                let (l, w, h) = (
+                    along * (0.5 * length),
+                    across * (0.5 * width),
+                    Vector3::z() * (0.5 * height),
+                );
+                let centre = middle + h;
+                let eye = self.view.eye();
+                for (out, u, v) in [(l, w, h), (-l, -w, h), (w, -l, h), (-w, l, h), (h, l, w)] {
+                    if (eye - (centre + out)).dot(&out) > 0.0 {
+                        let corners = quad(centre + out, u, v);
+                        self.face(canvas, &corners, &u.normalize(), &v.normalize(), look, albedo);
+                    }
+                }
+            }
+            Shape::Cylinder { radius, height } => {
+                self.cylinder(canvas, middle.xy(), radius, self.table, self.table + height, look);
+            }
+            Shape::Ball { radius } => {
+                self.sphere(canvas, &(middle + Vector3::z() * radius), radius, look);
+            }
+            Shape::Disc { radius, inner } => {
+                for (r, a) in [
+                    (radius, albedo),
+                    (
+                        inner,
+                        if albedo > 0.5 {
+                            0.4 * albedo
+                        } else {
+                            0.5 + 0.5 * albedo
+                        },
+                    ),
+                ] {
+                    if r > 0.0 {
+                        let ring: [Point3<f64>; 64] = std::array::from_fn(|i| {
+                            let (s, c) = (i as f64 * std::f64::consts::TAU / 64.0).sin_cos();
+                            middle + along * (r * c) + across * (r * s)
+                        });
+                        self.face(canvas, &ring, &along, &across, look, a);
+                    }
+                }
+            }
+            Shape::Tape { length, width } => {
+                let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
+                self.face(canvas, &corners, &along, &across, look, albedo);
+            }
+            Shape::Print { length, width, lines } => {
+                let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
+                if self.in_frame(canvas, &corners) {
+                    self.face(canvas, &corners, &along, &across, look, albedo);
+                    self.print(canvas, thing, (length, width), lines);
+                }
+            }
+        }
+    }
+
+    /// Draws a strip right before the lens: too near to be sharp, so its edges are soft.
+    pub(super) fn occluder(&self, canvas: &mut Canvas, strip: &Occluder) {
+        let unit = self.view.width as f64 / hough_heuristic::Features::WIDTH;
+        let pixel = |p: Point2<f64>| p.coords * unit - nalgebra::Vector2::new(0.5, 0.5);
+        let (from, to) = (pixel(strip.from), pixel(strip.to));
+        let Some(along) = (to - from).try_normalize(1e-9) else {
+            return;
+        };
+        let across = nalgebra::Vector2::new(-along.y, along.x);
+        let light = strip.albedo * self.irradiance(&Vector3::z());
+        // Several ever narrower layers make a soft edge: each adds its share of what is still missing.
+        const LAYERS: usize = 6;
+        let soft = strip.softness.max(0.0) * unit;
+        for k in 0..LAYERS {
+            let half = across
+                * (0.5 * strip.width * unit + soft * (0.5 - (k as f64 + 0.5) / LAYERS as f64)).max(0.0);
+            let corners = [from - half, to - half, to + half, from + half].map(Point2::from);
+            let share = 1.0 / (LAYERS - k) as f32;
+            canvas.blend(&corners, light as f32, share);
+        }
+    }
+
+    /// Whether a polygon's surrounding box touches the frame.
+    fn in_frame(&self, canvas: &Canvas, corners: &[Point3<f64>]) -> bool {
+        let mut polygon = Vec::with_capacity(corners.len() + 1);
+        self.view.polygon(corners, &mut polygon);
+        let (w, h) = (canvas.width as f64, canvas.height as f64);
+        polygon.iter().any(|p| p.x > -1.0)
+            && polygon.iter().any(|p| p.x < w)
+            && polygon.iter().any(|p| p.y > -1.0)
+            && polygon.iter().any(|p| p.y < h)
+    }
+
+    /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters from afar.
+    fn print(&self, canvas: &mut Canvas, thing: &Thing, (length, width): (f64, f64), lines: u32) {
+        let (sin, cos) = thing.turn.sin_cos();
+        let (along, across) = (Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0));
+        let middle = Point3::new(thing.x, thing.y, self.table);
+        let ink = Look {
+            albedo: 0.1,
+            texture: 0.0,
+            gloss: 0.0,
+        };
+        let pitch = 0.86 * width / f64::from(lines.max(1));
+        let size = 0.55 * pitch;
+        // A fixed, scrambled sequence decides the letters: print looks the same in every frame.
+        let mut state = (thing.x.to_bits() ^ thing.y.to_bits()).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1;
+        let mut next = |n: u64| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 33) % n
+        };
+        for line in 0..lines {
+            let y = 0.43 * width - (f64::from(line) + 0.5) * pitch;
+            let mut x = -0.43 * length;
+            let end = if line + 1 == lines {
+                0.1 * length
+            } else {
+                0.43 * length
+            };
+            while x < end {
+                for _ in 0..2 + next(7) {
+                    let kind = next(5);
+                    let mut stroke = |x0: f64, y0: f64, w: f64, h: f64| {
+                        let at = middle + along * (x + x0) + across * (y + y0);
+                        let (u, v) = (along * (0.5 * w), across * (0.5 * h));
+                        let corners = [at - u - v, at + u - v, at + u + v, at - u + v];
+                        self.face(canvas, &corners, &along, &across, &ink, ink.albedo);
+                    };
+                    let thick = 0.16 * size;
+                    stroke(0.0, 0.0, thick, size);
+                    if kind & 1 == 1 {
+                        stroke(0.4 * size, 0.0, thick, 0.8 * size);
+                    }
+                    if kind > 1 {
+                        stroke(0.2 * size, 0.3 * size * (kind as f64 - 3.0), 0.5 * size, thick);
+                    }
+                    x += 0.75 * size;
+                    if x > end {
+                        break;
+                    }
+                }
+                x += 0.5 * size;
+            }
+        }
+    }
+}
+
+/// The convex hull of points in the plane, in order.
+fn convex_hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+    points.sort_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)));
+    let mut hull: Vec<Point2<f64>> = Vec::with_capacity(points.len() + 1);
+    let mut half = |points: &mut dyn Iterator<Item = Point2<f64>>| {
+        let start = hull.len();
+        for p in points {
+            while hull.len() >= start + 2 {
+                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+                if (b - a).perp(&(p - a)) > 0.0 {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.pop();
+    };
+    half(&mut points.iter().copied());
+    half(&mut points.iter().rev().copied());
+    hull
+}

@@ -1,0 +1,106 @@
+//! From light to grey levels: blur, vignetting, noise, gamma, eight bits.
+
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::render::canvas::Canvas;
+use crate::render::lens::three_taps;
+use crate::{Camera, Sensor};
+
+const NOISES: usize = 1 << 16;
+const LEVELS: usize = 4096;
+
+/// The sensor with its tables and row buffers.
+#[derive(Clone, Debug)]
+pub(super) struct Exposure {
+    sensor: Sensor,
+    /// Whether the light comes already blurred.
+    pub(super) blurred: bool,
+    /// Standard normal numbers; every row of every frame starts at another place.
+    noise: Vec<f32>,
+    /// Grey level of a linear value, in steps of 1 / 4095.
+    curve: Box<[u8; LEVELS]>,
+    mixed: Vec<f32>,
+    row: Vec<f32>,
+    columns: Vec<f32>,
+}
+
+impl Exposure {
+    pub(super) fn new<R: Rng + ?Sized>(sensor: Sensor, rng: &mut R) -> Self {
+        let noise = (0..NOISES).map(|_| StandardNormal.sample(rng)).collect();
+        let exponent = 1.0 / if sensor.gamma > 0.0 { sensor.gamma } else { 1.0 };
+        let level = |i: usize| (255.0 * (i as f64 / (LEVELS - 1) as f64).powf(exponent)).round() as u8;
+        let curve = Box::new(std::array::from_fn(level));
+        Self {
+            sensor,
+            blurred: false,
+            noise,
+            curve,
+            mixed: Vec::new(),
+            row: Vec::new(),
+            columns: Vec::new(),
+        }
+    }
+
+    /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and with it the noise.
+    pub(super) fn expose(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, frame: u64, out: &mut [u8]) {
+        let (width, height) = (canvas.width, canvas.height);
+        if width == 0 || height == 0 {
+            return;
+        }
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let s = self.sensor;
+        let (principal, focal) = (camera.principal_point(), camera.focal_px());
+        let (side, middle) = three_taps(if self.blurred { 0.0 } else { s.blur });
+        let (read2, shot2) = (
+            ((s.read_noise / 255.0) as f32).powi(2),
+            ((s.shot_noise / 255.0) as f32).powi(2),
+        );
+        let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
+        self.mixed.resize(width + 2, 0.0);
+        self.row.resize(width, 0.0);
+        // Squared tangent of the angle to the axis, column by column.
+        self.columns.clear();
+        self.columns
+            .extend((0..width).map(|x| (((x as f64 - principal.x) / focal) as f32).powi(2)));
+        // A frame wider than the table of noise repeats it along the row.
+        let run = width.min(NOISES / 2);
+        for y in 0..height {
+            let line = |k: usize| &canvas.light[k * width..(k + 1) * width];
+            let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1)));
+            for (((m, a), h), b) in self.mixed[1..=width].iter_mut().zip(above).zip(here).zip(below) {
+                *m = middle * h + side * (a + b);
+            }
+            self.mixed[0] = self.mixed[1];
+            self.mixed[width + 1] = self.mixed[width];
+            let fall = 1.0 + (((y as f64 - principal.y) / focal) as f32).powi(2);
+            let (left, centre, right) = (&self.mixed[..width], &self.mixed[1..=width], &self.mixed[2..]);
+            for ((((value, l), c), r), tan2) in self
+                .row
+                .iter_mut()
+                .zip(left)
+                .zip(centre)
+                .zip(right)
+                .zip(&self.columns)
+            {
+                let cos2 = 1.0 / (fall + tan2);
+                let light = middle * c + side * (l + r);
+                *value = light * (exposure * (1.0 - bend * (1.0 - cos2 * cos2)));
+            }
+            let start = rng.random_range(0..NOISES - run);
+            let noise = &self.noise[start..start + run];
+            for part in self.row.chunks_mut(run) {
+                for (value, n) in part.iter_mut().zip(noise) {
+                    let light = *value + (read2 + shot2 * value.max(0.0)).sqrt() * n;
+                    // The sum with 2^23 rounds to a whole number and leaves it in the low bits.
+                    *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + 8_388_608.0;
+                }
+            }
+            let curve = &self.curve;
+            for (grey, value) in out[y * width..(y + 1) * width].iter_mut().zip(&self.row) {
+                *grey = curve[value.to_bits() as usize & (LEVELS - 1)];
+            }
+        }
+    }
+}

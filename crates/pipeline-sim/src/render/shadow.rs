@@ -1,0 +1,257 @@
+//! Shadows on the table: those of the things, worked out once, and those of ball and holder, worked out for every frame.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::render::texture::CoarseMap;
+use crate::{Ball, Holder, Light, Scene, Shape};
+
+/// Directions toward points of a lamp's disc.
+const LAMP_POINTS: usize = 24;
+
+/// Light on a horizontal surface: everything, and each lamp's share of it.
+pub(super) fn table_light(scene: &Scene) -> (f64, Vec<f64>) {
+    let lamps: Vec<f64> = scene
+        .lights
+        .iter()
+        .map(|l| l.intensity.max(0.0) * toward(l).z.max(0.0))
+        .collect();
+    let total = scene.ambient.max(0.0) + lamps.iter().sum::<f64>();
+    let shares = lamps.iter().map(|l| l / total.max(1e-9)).collect();
+    (total, shares)
+}
+
+/// Unit vector toward a lamp.
+pub(super) fn toward(light: &Light) -> Vector3<f64> {
+    light.toward.try_normalize(1e-12).unwrap_or_else(Vector3::z)
+}
+
+/// Darkens `map` where things keep the lamps' light off the table, and a little around their feet.
+pub(super) fn cast_things(map: &mut CoarseMap, scene: &Scene) {
+    let (_, shares) = table_light(scene);
+    for thing in scene.things.iter().filter(|t| !t.shape.is_flat()) {
+        let (foot, height) = (thing.shape.footprint(), thing.shape.height());
+        let lamps: Vec<(f64, Vec<Vector3<f64>>)> = scene
+            .lights
+            .iter()
+            .zip(&shares)
+            .map(|(light, share)| (*share, lamp_points(light, thing.turn)))
+            .collect();
+        // The longest shadow that any point of a lamp throws.
+        let slope = |d: &Vector3<f64>| d.x.hypot(d.y) / d.z.max(1e-3);
+        let longest = lamps
+            .iter()
+            .flat_map(|(_, points)| points)
+            .map(slope)
+            .fold(0.0, f64::max);
+        let reach = foot + (height * longest).max(0.05);
+        let (columns, rows) = map.range(thing.x, thing.y, reach.min(map.size));
+        for j in rows {
+            for i in columns.clone() {
+                let (x, y) = map.place(i, j);
+                let (dx, dy) = (x - thing.x, y - thing.y);
+                let distance = dx.hypot(dy);
+                if distance > reach {
+                    continue;
+                }
+                // Things also hide part of the sky from the table near their feet.
+                let mut factor = 1.0 - 0.35 * (-(distance - foot).max(0.0) / 0.012).exp();
+                let (sin, cos) = thing.turn.sin_cos();
+                let from = Point3::new(dx * cos + dy * sin, dy * cos - dx * sin, 0.0);
+                for (share, points) in &lamps {
+                    let blocked = points
+                        .iter()
+                        .filter(|d| d.z > 1e-3 && meets(&thing.shape, &from, d))
+                        .count();
+                    factor -= share * blocked as f64 / LAMP_POINTS as f64;
+                }
+                map.values[j * map.side + i] *= factor.max(0.02) as f32;
+            }
+        }
+    }
+}
+
+/// Directions toward points spread evenly over a lamp's disc, in the frame of a thing turned by `turn`.
+fn lamp_points(light: &Light, turn: f64) -> Vec<Vector3<f64>> {
+    let axis = toward(light);
+    let side = if axis.x.abs() < 0.9 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let u = axis.cross(&side).normalize();
+    let v = axis.cross(&u);
+    let reach = light.half_angle.clamp(0.0, 0.7).tan();
+    let (sin, cos) = turn.sin_cos();
+    (0..LAMP_POINTS)
+        .map(|k| {
+            // Vogel's spiral.
+            let (radius, angle) = (
+                ((k as f64 + 0.5) / LAMP_POINTS as f64).sqrt() * reach,
+                k as f64 * 2.399_963,
+            );
+            let d = axis + u * (radius * angle.cos()) + v * (radius * angle.sin());
+            Vector3::new(d.x * cos + d.y * sin, d.y * cos - d.x * sin, d.z)
+        })
+        .collect()
+}
+
+/// Whether the ray from a point of the table upward along `d` meets the shape, which stands at the origin.
+fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
+    match *shape {
+        Shape::Box {
+            length,
+            width,
+            height,
+        } => {
+            let mut interval = (0.0_f64, height / d.z);
+            for (p, v, half) in [(from.x, d.x, 0.5 * length), (from.y, d.y, 0.5 * width)] {
+                if v.abs() < 1e-12 {
+                    if p.abs() > half {
+                        return false;
+                    }
+                    continue;
+                }
+                let (a, b) = ((-half - p) / v, (half - p) / v);
+                interval = (interval.0.max(a.min(b)), interval.1.min(a.max(b)));
+            }
+            interval.0 < interval.1
+        }
+        Shape::Cylinder { radius, height } => {
+            // Nearest horizontal approach to the axis while the ray is below the top.
+            let (dx, dy, top) = (d.x / d.z, d.y / d.z, height);
+            let speed2 = dx * dx + dy * dy;
+            let z = if speed2 > 0.0 {
+                (-(from.x * dx + from.y * dy) / speed2).clamp(0.0, top)
+            } else {
+                0.0
+            };
+            (from.x + z * dx).hypot(from.y + z * dy) < radius
+        }
+        Shape::Ball { radius } => {
+            let to = Point3::new(0.0, 0.0, radius) - from;
+            let along = to.dot(d) / d.norm();
+            along > 0.0 && to.norm_squared() - along * along < radius * radius
+        }
+        _ => false,
+    }
+}
+
+/// The soft shadows of ball and holder on the table.
+#[derive(Clone, Debug)]
+pub(super) struct BallShadow {
+    lamps: Vec<Lamp>,
+    ball: Ball,
+    holder: Option<Holder>,
+    table: f64,
+    /// Box on the table outside which nothing is darkened: least and greatest x, least and greatest y.
+    bounds: [f64; 4],
+}
+
+#[derive(Clone, Debug)]
+struct Lamp {
+    axis: Vector3<f64>,
+    reach: f64,
+    share: f64,
+    /// Box on the table that holds both shadows: least and greatest x, least and greatest y.
+    bounds: [f64; 4],
+}
+
+impl BallShadow {
+    pub(super) fn new(scene: &Scene, ball: &Ball, holder: Option<Holder>, table: f64) -> Self {
+        let (_, shares) = table_light(scene);
+        let lamps: Vec<Lamp> = scene
+            .lights
+            .iter()
+            .zip(shares)
+            .map(|(light, share)| {
+                let axis = toward(light);
+                let reach = light.half_angle.clamp(0.0, 0.7).tan();
+                let drop = (ball.centre.z - table).max(0.0) / axis.z.max(0.05);
+                let margin = ball.radius / axis.z.max(0.05) + drop * reach * 1.5 / axis.z.max(0.05) + 0.03;
+                let tip = ball.centre - axis * drop;
+                let foot = holder.map_or(tip.xy(), |h| h.foot);
+                let bounds = [
+                    tip.x.min(foot.x) - margin,
+                    tip.x.max(foot.x) + margin,
+                    tip.y.min(foot.y) - margin,
+                    tip.y.max(foot.y) + margin,
+                ];
+                Lamp {
+                    axis,
+                    reach,
+                    share,
+                    bounds,
+                }
+            })
+            .collect();
+        let foot = holder.map_or(ball.centre.xy(), |h| h.foot);
+        let near = [foot.x - 0.1, foot.x + 0.1, foot.y - 0.1, foot.y + 0.1];
+        let bounds = lamps.iter().map(|l: &Lamp| l.bounds).fold(near, |a, b| {
+            [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
+        });
+        Self {
+            lamps,
+            ball: *ball,
+            holder,
+            table,
+            bounds,
+        }
+    }
+
+    /// Factor on the table's light at (x, y).
+    pub(super) fn factor(&self, x: f64, y: f64) -> f32 {
+        if x < self.bounds[0] || x > self.bounds[1] || y < self.bounds[2] || y > self.bounds[3] {
+            return 1.0;
+        }
+        let mut factor = 1.0;
+        for lamp in &self.lamps {
+            let [x0, x1, y0, y1] = lamp.bounds;
+            if x > x0 && x < x1 && y > y0 && y < y1 {
+                let point = Point3::new(x, y, self.table);
+                factor -= lamp.share * self.ball_share(lamp, &point).max(self.holder_share(lamp, &point));
+            }
+        }
+        if let Some(h) = self.holder {
+            let (dx, dy) = (x - h.foot.x, y - h.foot.y);
+            let distance2 = dx * dx + dy * dy;
+            if distance2 < 0.01 {
+                factor *= 1.0 - 0.35 * (-(distance2.sqrt() - h.radius).max(0.0) / 0.012).exp();
+            }
+        }
+        factor.max(0.02) as f32
+    }
+
+    fn ball_share(&self, lamp: &Lamp, point: &Point3<f64>) -> f64 {
+        let to = self.ball.centre - point;
+        let along = to.dot(&lamp.axis);
+        let across = (to.norm_squared() - along * along).max(0.0).sqrt();
+        overlap(self.ball.radius, along * lamp.reach, across)
+    }
+
+    fn holder_share(&self, lamp: &Lamp, point: &Point3<f64>) -> f64 {
+        let Some(h) = self.holder else { return 0.0 };
+        // Height at which the ray to the lamp passes the rod's axis most closely.
+        let (dx, dy) = (
+            lamp.axis.x / lamp.axis.z.max(0.05),
+            lamp.axis.y / lamp.axis.z.max(0.05),
+        );
+        let (px, py) = (point.x - h.foot.x, point.y - h.foot.y);
+        let slope2 = dx * dx + dy * dy;
+        let top = (h.top - self.table).max(0.0);
+        let z = if slope2 > 1e-9 {
+            (-(px * dx + py * dy) / slope2).clamp(0.0, top)
+        } else {
+            0.0
+        };
+        let across = ((px + z * dx).powi(2) + (py + z * dy).powi(2)).sqrt();
+        overlap(h.radius, z * lamp.reach, across)
+    }
+}
+
+/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body` at distance `across` between their middles.
+fn overlap(body: f64, lamp: f64, across: f64) -> f64 {
+    let lamp = lamp.max(1e-4);
+    let t = ((body + lamp - across) / (2.0 * lamp.min(body))).clamp(0.0, 1.0);
+    let depth = (body / lamp).min(1.0);
+    t * t * (3.0 - 2.0 * t) * depth * depth.sqrt()
+}

@@ -1,0 +1,102 @@
+//! Frames that take time: motion during the exposure, and the two fields of an interlaced frame.
+
+use hough_heuristic::image::GrayImage;
+use puma_val2::Joints;
+
+use crate::render::lens::soften;
+use crate::{Cell, Renderer};
+
+/// How a frame is taken while things move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Shot {
+    /// Time the shutter is open, seconds. 0 freezes all motion.
+    pub exposure: f64,
+    /// Moments, spread evenly over the exposure, that are drawn and averaged; 1 freezes all motion. Their number times the cost of one
+    /// frame is the cost of this one; one for every two pixels of motion is enough.
+    pub moments: usize,
+    /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones.
+    pub interlace: Option<f64>,
+}
+
+impl Shot {
+    /// All at once.
+    pub fn still() -> Self {
+        Self {
+            exposure: 0.0,
+            moments: 1,
+            interlace: None,
+        }
+    }
+
+    /// The two fields of PAL, 20 ms apart (the paper's grabber delivers 768x576 pixels at 50 Hz, which are fields), each
+    /// exposed for `exposure` seconds.
+    pub fn pal(exposure: f64, moments: usize) -> Self {
+        Self {
+            exposure,
+            moments,
+            interlace: Some(0.020),
+        }
+    }
+}
+
+impl Default for Shot {
+    fn default() -> Self {
+        Self::still()
+    }
+}
+
+impl Renderer {
+    /// Takes a frame while cell and joints change: `moment(t)` tells what they are t seconds after the shutter opened.
+    ///
+    /// The truth of such a frame is that of the middle of its exposure.
+    pub fn take(&mut self, shot: &Shot, mut moment: impl FnMut(f64) -> (Cell, Joints)) -> &GrayImage {
+        let count = shot.moments.clamp(1, 64);
+        let fields: &[f64] = match shot.interlace {
+            Some(later) => &[0.0, later],
+            None => &[0.0],
+        };
+        let mut total = std::mem::take(&mut self.exposed);
+        let mut woven = std::mem::take(&mut self.woven);
+        for (field, opened) in fields.iter().enumerate() {
+            for k in 0..count {
+                let t = opened + shot.exposure * (k as f64 + 0.5) / count as f64;
+                let (cell, joints) = moment(t);
+                self.illuminate(&cell, &joints);
+                if k == 0 {
+                    total.clear();
+                    total.extend_from_slice(&self.canvas.light);
+                } else if total.len() == self.canvas.light.len() {
+                    total
+                        .iter_mut()
+                        .zip(&self.canvas.light)
+                        .for_each(|(sum, light)| *sum += light);
+                }
+            }
+            let share = 1.0 / count as f32;
+            total.iter_mut().for_each(|sum| *sum *= share);
+            if shot.interlace.is_some() && total.len() == self.canvas.light.len() {
+                // Lens and sensor blur what they see of each field; only then are the rows woven.
+                std::mem::swap(&mut self.canvas.light, &mut total);
+                soften(&mut self.canvas, self.scene.sensor.blur, &mut self.spare);
+                std::mem::swap(&mut self.canvas.light, &mut total);
+            }
+            if field == 0 {
+                std::mem::swap(&mut woven, &mut total);
+            } else {
+                let width = self.canvas.width.max(1);
+                let rows = woven.chunks_exact_mut(width).zip(total.chunks_exact(width));
+                rows.skip(1)
+                    .step_by(2)
+                    .for_each(|(row, later)| row.copy_from_slice(later));
+            }
+        }
+        if woven.len() == self.canvas.light.len() {
+            self.canvas.light.copy_from_slice(&woven);
+        }
+        (self.exposed, self.woven) = (total, woven);
+        let (cell, _) = moment(shot.interlace.unwrap_or(0.0));
+        self.exposure.blurred = shot.interlace.is_some();
+        self.develop(&cell)
+    }
+}

@@ -1,0 +1,98 @@
+//! From the world to pixels and back, for an ideal pinhole, in the renderer's single precision.
+
+use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
+
+use crate::Camera;
+
+/// A camera at a place.
+#[derive(Clone, Debug)]
+pub(super) struct View {
+    /// Camera frame to world.
+    pub(super) pose: Isometry3<f64>,
+    pub(super) focal: f64,
+    pub(super) principal: Point2<f64>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// Nothing nearer than this to the camera's plane is drawn, metres.
+const NEAR: f64 = 0.004;
+
+impl View {
+    pub(super) fn new(camera: &Camera, pose: Isometry3<f64>) -> Self {
+        let (width, height) = camera.size();
+        Self {
+            pose,
+            focal: camera.focal_px(),
+            principal: camera.principal_point(),
+            width: width as usize,
+            height: height as usize,
+        }
+    }
+
+    /// The same view in a frame that is smaller by `factor`.
+    pub(super) fn reduced(&self, factor: f64) -> Self {
+        Self {
+            pose: self.pose,
+            focal: self.focal / factor,
+            principal: self.principal.map(|v| (v + 0.5) / factor - 0.5),
+            width: (self.width as f64 / factor).ceil() as usize,
+            height: (self.height as f64 / factor).ceil() as usize,
+        }
+    }
+
+    /// A world point in the camera frame.
+    pub(super) fn seen(&self, point: &Point3<f64>) -> Point3<f64> {
+        self.pose.inverse_transform_point(point)
+    }
+
+    /// A world direction in the camera frame.
+    pub(super) fn turned(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.inverse_transform_vector(direction)
+    }
+
+    /// Where the camera is.
+    pub(super) fn eye(&self) -> Point3<f64> {
+        Point3::from(self.pose.translation.vector)
+    }
+
+    /// Projects a convex polygon given in the world, cut at the near plane. Empty if nothing is left.
+    pub(super) fn polygon(&self, corners: &[Point3<f64>], out: &mut Vec<Point2<f64>>) {
+        out.clear();
+        let n = corners.len();
+        for i in 0..n {
+            let (p, q) = (self.seen(&corners[i]), self.seen(&corners[(i + 1) % n]));
+            if p.z >= NEAR {
+                out.push(self.pixel(&p));
+            }
+            if (p.z >= NEAR) != (q.z >= NEAR) {
+                let t = (NEAR - p.z) / (q.z - p.z);
+                out.push(self.pixel(&(p + (q - p) * t)));
+            }
+        }
+    }
+
+    fn pixel(&self, p: &Point3<f64>) -> Point2<f64> {
+        self.principal + nalgebra::Vector2::new(p.x, p.y) * (self.focal / p.z)
+    }
+
+    /// The matrix that takes a pixel (x, y, 1) to homogeneous coordinates on the plane through `origin` spanned by `u` and `v`
+    /// (world frame): the third divides the first two.
+    pub(super) fn plane(&self, origin: &Point3<f64>, u: &Vector3<f64>, v: &Vector3<f64>) -> Matrix3<f64> {
+        let (o, u, v) = (self.seen(origin).coords, self.turned(u), self.turned(v));
+        // A plane point with coordinates (a, b) lies at a u + b v + o in the camera frame: columns of the matrix to invert.
+        let to_camera = Matrix3::from_columns(&[u, v, o]);
+        let ray = Matrix3::new(
+            1.0 / self.focal,
+            0.0,
+            -self.principal.x / self.focal,
+            0.0,
+            1.0 / self.focal,
+            -self.principal.y / self.focal,
+            0.0,
+            0.0,
+            1.0,
+        );
+        to_camera.try_inverse().unwrap_or_else(Matrix3::zeros) * ray
+    }
+}

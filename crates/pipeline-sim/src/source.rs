@@ -1,0 +1,282 @@
+//! The doors of the cell: a camera that delivers frames, an arm that moves, sensors that warn.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{Features, FrameError, FrameSource};
+use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
+
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::errors::Drive;
+use crate::{Cell, Contact, Errors, Grasp, Renderer, with_noise};
+
+/// A cell that camera, arm and whoever pushes the ball have in common.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use pipeline_sim::{Ball, Cell, SharedCell};
+///
+/// let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.1, -0.1)));
+/// let same = cell.clone();
+/// same.with(|cell| cell.place_ball(Point3::new(0.65, 0.1, -0.1)));
+/// assert_eq!(cell.get().ball.centre.x, 0.65);
+/// ```
+#[derive(Clone, Debug)]
+pub struct SharedCell(Arc<Mutex<Cell>>);
+
+impl SharedCell {
+    /// Shares a cell.
+    pub fn new(cell: Cell) -> Self {
+        Self(Arc::new(Mutex::new(cell)))
+    }
+
+    /// A copy of the cell as it is now.
+    pub fn get(&self) -> Cell {
+        *locked(&self.0)
+    }
+
+    /// Does something to the cell, or asks it something.
+    pub fn with<T>(&self, act: impl FnOnce(&mut Cell) -> T) -> T {
+        act(&mut locked(&self.0))
+    }
+}
+
+/// A cell is plain data: whatever a panicking thread left in it is still a cell.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The camera on the hand as a [`FrameSource`]: every grab renders the cell as it is, with the joints where they are.
+///
+/// The joints come from a closure, so that any arm will do: [`SimulatedArm::pose`], or an emulated controller asked where it stands.
+pub struct CellCamera<P> {
+    cell: SharedCell,
+    renderer: Renderer,
+    pose: P,
+}
+
+impl<P: FnMut() -> Joints> CellCamera<P> {
+    /// A camera in `cell` that looks from wherever `pose` says the joints are.
+    pub fn new(cell: SharedCell, renderer: Renderer, pose: P) -> Self {
+        Self { cell, renderer, pose }
+    }
+
+    /// Renders the next frame into the renderer's own buffer, without a copy.
+    ///
+    /// # Errors
+    /// [`FrameError::Failed`] if the joints are not finite.
+    pub fn look(&mut self) -> Result<&GrayImage, FrameError> {
+        let joints = (self.pose)();
+        if let Some(joint) = joints.non_finite() {
+            return Err(FrameError::Failed {
+                origin: "simulated camera".to_owned(),
+                reason: format!("the angle of {joint} is not a finite number"),
+            });
+        }
+        Ok(self.renderer.render(&self.cell.get(), &joints))
+    }
+}
+
+impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
+    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+        self.look().cloned()
+    }
+}
+
+impl<P> std::fmt::Debug for CellCamera<P> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CellCamera")
+            .field("cell", &self.cell)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The camera and the detector in one: the ball's features straight from the geometry, with noise, without a frame.
+pub struct FeatureCamera<P> {
+    cell: SharedCell,
+    pose: P,
+    noise: f64,
+    rng: Xoshiro256PlusPlus,
+}
+
+impl<P: FnMut() -> Joints> FeatureCamera<P> {
+    /// A camera in `cell` that looks from wherever `pose` says the joints are; its features carry normal noise of standard deviation
+    /// `noise` units, drawn from `seed`.
+    pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Self {
+        Self {
+            cell,
+            pose,
+            noise,
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+        }
+    }
+
+    /// What a detector would find; `None` if the ball counts as lost.
+    pub fn look(&mut self) -> Option<Features> {
+        let joints = (self.pose)();
+        let features = self.cell.with(|cell| cell.features(&joints))?;
+        Some(with_noise(features, self.noise, &mut self.rng))
+    }
+}
+
+impl<P> std::fmt::Debug for FeatureCamera<P> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FeatureCamera")
+            .field("cell", &self.cell)
+            .field("noise", &self.noise)
+            .finish_non_exhaustive()
+    }
+}
+
+/// An arm that moves at once, without a controller in between: a [`Manipulator`] and a [`ProximitySensor`].
+///
+/// On its way it pushes the ball if it runs into it, and carries it if it holds it. With [`Errors`] its gears have play and its encoders
+/// count in steps: what it reports is where the motors are, and [`SimulatedArm::pose`] tells where the links are.
+#[derive(Clone, Debug)]
+pub struct SimulatedArm {
+    cell: SharedCell,
+    drive: Arc<Mutex<Drive>>,
+    grasp: Option<Grasp>,
+    contact: Contact,
+    stops: usize,
+}
+
+/// Greatest joint step between two looks for contact on the way, radians.
+const SWEEP: f64 = 0.02;
+
+impl SimulatedArm {
+    /// A perfect arm in `cell`, standing at `joints`.
+    ///
+    /// # Errors
+    /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] if it cannot stand there.
+    pub fn new(cell: SharedCell, joints: Joints) -> Result<Self, ArmError> {
+        Self::with_errors(cell, joints, &Errors::none())
+    }
+
+    /// An arm with the backlash and the encoder steps of `errors`, sent to `joints` to begin with. (The other errors are the cell's:
+    /// [`Errors::apply`].)
+    ///
+    /// # Errors
+    /// As for [`SimulatedArm::new`].
+    pub fn with_errors(cell: SharedCell, joints: Joints, errors: &Errors) -> Result<Self, ArmError> {
+        cell.with(|cell| cell.params.check(&joints))?;
+        let drive = Arc::new(Mutex::new(Drive::new(joints, errors)));
+        Ok(Self {
+            cell,
+            drive,
+            grasp: None,
+            contact: Contact::Free,
+            stops: 0,
+        })
+    }
+
+    /// A closure that tells where the links are, now and later: what [`CellCamera::new`] and [`FeatureCamera::new`] want.
+    pub fn pose(&self) -> impl FnMut() -> Joints + Send + use<> {
+        let drive = Arc::clone(&self.drive);
+        move || locked(&drive).links()
+    }
+
+    /// The cell the arm stands in.
+    pub fn cell(&self) -> &SharedCell {
+        &self.cell
+    }
+
+    /// The state of the jaws.
+    pub fn gripper(&self) -> Gripper {
+        self.cell.with(|cell| cell.jaws)
+    }
+
+    /// What closing the jaws came to the last time; `None` before the first.
+    pub fn grasp(&self) -> Option<Grasp> {
+        self.grasp
+    }
+
+    /// What the last move did to the ball.
+    pub fn contact(&self) -> Contact {
+        self.contact
+    }
+
+    /// How often the arm was told to stop.
+    pub fn stops(&self) -> usize {
+        self.stops
+    }
+}
+
+impl Manipulator for SimulatedArm {
+    fn joints(&mut self) -> Result<Joints, ArmError> {
+        Ok(locked(&self.drive).reported())
+    }
+
+    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        let target = locked(&self.drive).reported() + delta;
+        self.move_to(target)
+    }
+
+    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
+        let mut drive = locked(&self.drive);
+        let contact = self.cell.with(|cell| {
+            cell.params.check(&target)?;
+            let from = drive.links();
+            drive.send(target);
+            Ok(sweep(cell, &from, &drive.links()))
+        })?;
+        self.contact = contact;
+        Ok(drive.reported())
+    }
+
+    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+        let joints = locked(&self.drive).links();
+        self.cell.with(|cell| match gripper {
+            Gripper::Open => cell.open_gripper(),
+            Gripper::Closed => self.grasp = Some(cell.close_gripper(&joints)),
+        });
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), ArmError> {
+        self.stops += 1;
+        Ok(())
+    }
+}
+
+/// Takes the hand from one pose to another in joint space, and the ball with it where they meet.
+fn sweep(cell: &mut Cell, from: &Joints, to: &Joints) -> Contact {
+    if cell.held.is_some() {
+        return cell.follow(to);
+    }
+    // Too far away to meet: the hand reaches 0.25 m from the wrist, and no point of the wrist's way is farther from its ends than the way
+    // is long.
+    let (start, end) = (
+        cell.params.wrist(from).translation.vector,
+        cell.params.wrist(to).translation.vector,
+    );
+    let turned = (0..6).map(|i| (to.0[i] - from.0[i]).abs()).fold(0.0, f64::max);
+    let way: f64 = (0..3).map(|i| (to.0[i] - from.0[i]).abs()).sum();
+    let ball = cell.ball.centre.coords;
+    if (ball - start).norm().min((ball - end).norm()) > 0.25 + 0.5 * way {
+        return Contact::Free;
+    }
+    let steps = (turned / SWEEP).ceil().clamp(1.0, 1000.0) as usize;
+    let (before, mut pushed) = (cell.ball.centre, false);
+    for i in 1..=steps {
+        let t = i as f64 / steps as f64;
+        let pose = Joints(std::array::from_fn(|j| from.0[j] + t * (to.0[j] - from.0[j])));
+        pushed |= matches!(cell.follow(&pose), Contact::Pushed { .. });
+    }
+    if pushed {
+        Contact::Pushed {
+            by: (cell.ball.centre - before).norm(),
+        }
+    } else {
+        Contact::Free
+    }
+}
+
+impl ProximitySensor for SimulatedArm {
+    fn object_near(&mut self) -> Result<bool, ArmError> {
+        let joints = locked(&self.drive).links();
+        Ok(self.cell.with(|cell| cell.proximity(&joints)))
+    }
+}

@@ -1,0 +1,124 @@
+//! Where balls lie, and the poses from which the arm looks for them.
+
+use puma_val2::Joints;
+use rand::{Rng, RngExt};
+
+use crate::{Ball, Cell};
+
+/// The part of the world in which balls lie: a sector of a ring around the waist axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Workspace {
+    /// Least and greatest horizontal distance from the waist axis, metres.
+    pub rho: (f64, f64),
+    /// Least and greatest azimuth from +x toward +y, radians.
+    pub azimuth: (f64, f64),
+    /// Least and greatest height above the shoulder, metres.
+    pub height: (f64, f64),
+    /// `JT1` of the search poses, radians.
+    pub search_pans: [f64; 6],
+    /// `JT2` and `JT3` of the search poses, radians.
+    pub search_elbow: (f64, f64),
+}
+
+impl Workspace {
+    /// The workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70 degrees, 200 mm below to 50 mm above the
+    /// shoulder; search poses (p, -110, 210, 0, 45, 0) with p from -75 to 50 in steps of 25 degrees.
+    pub fn paper() -> Self {
+        Self {
+            rho: (0.500, 0.800),
+            azimuth: (-70_f64.to_radians(), 70_f64.to_radians()),
+            height: (-0.200, 0.050),
+            search_pans: [-75.0_f64, -50.0, -25.0, 0.0, 25.0, 50.0].map(f64::to_radians),
+            search_elbow: (-110_f64.to_radians(), 210_f64.to_radians()),
+        }
+    }
+
+    /// The six starting poses of the target search (section 2.2 of the paper).
+    pub fn search_poses(&self) -> [Joints; 6] {
+        let jt5 = Cell::REACHING_JT5_DEGREES.to_radians();
+        self.search_pans
+            .map(|pan| Joints([pan, self.search_elbow.0, self.search_elbow.1, 0.0, jt5, 0.0]))
+    }
+
+    /// A ball somewhere in the workspace, uniform in volume.
+    pub fn sample_ball<R: Rng + ?Sized>(&self, rng: &mut R) -> Ball {
+        let rho = rng.random_range(self.rho.0.powi(2)..=self.rho.1.powi(2)).sqrt();
+        let azimuth = rng.random_range(self.azimuth.0..=self.azimuth.1);
+        let z = rng.random_range(self.height.0..=self.height.1);
+        Ball::at(rho * azimuth.cos(), rho * azimuth.sin(), z)
+    }
+
+    /// A ball that at least one of the search poses sees in `cell` (93 % of all balls are), and the first such pose.
+    ///
+    /// `None` if 10 000 balls in a row cannot be seen: a camera that does not see the workspace.
+    pub fn sample_seen_ball<R: Rng + ?Sized>(&self, cell: &Cell, rng: &mut R) -> Option<(Ball, Joints)> {
+        let poses = self.search_poses();
+        (0..10_000).find_map(|_| {
+            let ball = self.sample_ball(rng);
+            let cell = Cell { ball, ..*cell };
+            let pose = poses.iter().find(|pose| cell.circle(pose).is_some())?;
+            Some((ball, *pose))
+        })
+    }
+
+    /// Which share of the workspace the search poses see, and which share of that can be reached, from `samples` random balls.
+    pub fn coverage<R: Rng + ?Sized>(&self, cell: &Cell, samples: usize, rng: &mut R) -> Coverage {
+        let poses = self.search_poses();
+        let mut coverage = Coverage {
+            samples,
+            seen: 0,
+            seen_and_reachable: 0,
+            reachable: 0,
+            by_pose: [0; 6],
+        };
+        for _ in 0..samples {
+            let cell = Cell {
+                ball: self.sample_ball(rng),
+                ..*cell
+            };
+            let sights = poses.map(|pose| cell.circle(&pose).is_some());
+            let (seen, reachable) = (sights.contains(&true), cell.reachable());
+            coverage.seen += usize::from(seen);
+            coverage.reachable += usize::from(reachable);
+            coverage.seen_and_reachable += usize::from(seen && reachable);
+            for (count, sight) in coverage.by_pose.iter_mut().zip(sights) {
+                *count += usize::from(sight);
+            }
+        }
+        coverage
+    }
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::paper()
+    }
+}
+
+/// Counts of balls, from [`Workspace::coverage`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coverage {
+    /// Balls tried.
+    pub samples: usize,
+    /// Seen from at least one search pose.
+    pub seen: usize,
+    /// Within reach of the goal pose.
+    pub reachable: usize,
+    /// Both.
+    pub seen_and_reachable: usize,
+    /// Seen from each pose.
+    pub by_pose: [usize; 6],
+}
+
+impl Coverage {
+    /// Share of the workspace that the search poses see; NaN without samples.
+    pub fn seen_share(&self) -> f64 {
+        self.seen as f64 / self.samples as f64
+    }
+
+    /// Share of the seen balls that can be reached; NaN if none is seen.
+    pub fn reachable_share(&self) -> f64 {
+        self.seen_and_reachable as f64 / self.seen as f64
+    }
+}

@@ -1,0 +1,76 @@
+//! Runs as video: YUV4MPEG2, which every player and encoder reads.
+
+use std::io::{self, Write};
+
+use hough_heuristic::image::GrayImage;
+
+/// Writes monochrome frames as a YUV4MPEG2 stream (`Cmono`: eight bits of luma, nothing else).
+///
+/// ```
+/// use hough_heuristic::image::GrayImage;
+///
+/// let mut video = pipeline_sim::Y4mWriter::new(Vec::new(), 25, 1)?;
+/// video.write(&GrayImage::new(4, 2))?;
+/// let bytes = video.finish()?;
+/// assert_eq!(&bytes[..], b"YUV4MPEG2 W4 H2 F25:1 Ip A1:1 Cmono\nFRAME\n\0\0\0\0\0\0\0\0");
+/// # Ok::<(), std::io::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Y4mWriter<W: Write> {
+    out: W,
+    rate: (u32, u32),
+    size: Option<(u32, u32)>,
+}
+
+impl<W: Write> Y4mWriter<W> {
+    /// A stream of `frames` frames every `seconds` seconds: (25, 1) is PAL.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::InvalidInput`] for a rate with a zero in it.
+    pub fn new(out: W, frames: u32, seconds: u32) -> io::Result<Self> {
+        if frames == 0 || seconds == 0 {
+            let what = format!("a frame rate of {frames} per {seconds} s is none");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+        }
+        Ok(Self {
+            out,
+            rate: (frames, seconds),
+            size: None,
+        })
+    }
+
+    /// Appends a frame. The first one decides the size.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::InvalidInput`] for a frame of another size, or an empty one; whatever the output says.
+    pub fn write(&mut self, frame: &GrayImage) -> io::Result<()> {
+        let size = frame.dimensions();
+        match self.size {
+            None if size.0 > 0 && size.1 > 0 => {
+                let (frames, seconds) = self.rate;
+                writeln!(
+                    self.out,
+                    "YUV4MPEG2 W{} H{} F{frames}:{seconds} Ip A1:1 Cmono",
+                    size.0, size.1
+                )?;
+                self.size = Some(size);
+            }
+            Some(first) if first == size => {}
+            first => {
+                let what = format!("a frame of {}x{} pixels in a stream of {first:?}", size.0, size.1);
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+            }
+        }
+        self.out.write_all(b"FRAME\n")?;
+        self.out.write_all(frame.as_raw())
+    }
+
+    /// Flushes and gives the output back.
+    ///
+    /// # Errors
+    /// Whatever the output says.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.out.flush()?;
+        Ok(self.out)
+    }
+}

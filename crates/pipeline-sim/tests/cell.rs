@@ -1,0 +1,165 @@
+//! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
+
+use hough_heuristic::Features;
+use pipeline_sim::{Ball, Cell, Workspace};
+use puma_val2::{Joint, JointDelta, Joints};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+/// Cells with a ball that a search pose sees and the arm reaches, each with its goal pose.
+fn goals(count: usize) -> Vec<(Cell, Joints)> {
+    let mut rng = rng(1);
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    (0..count)
+        .map(|_| {
+            let (ball, _) = Workspace::paper()
+                .sample_seen_ball(&cell, &mut rng)
+                .expect("most balls are seen");
+            let cell = Cell::paper(ball);
+            let goal = cell
+                .goal_pose(Cell::REACHING_JT5_DEGREES)
+                .expect("every seen ball is within reach");
+            (cell, goal)
+        })
+        .collect()
+}
+
+#[test]
+fn the_camera_of_the_first_search_pose_stands_where_it_should() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let pose = Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
+    let camera = cell.camera_pose(&pose).translation.vector * 1000.0;
+    assert!(
+        (camera - nalgebra::Vector3::new(343.0, 154.0, 369.0)).amax() < 1.0,
+        "{camera}"
+    );
+    let tool = cell.tool_point(&pose).coords * 1000.0;
+    // 10 mm past the tool point is the finger tip.
+    assert!(
+        (tool - nalgebra::Vector3::new(387.0, 149.0, 201.0)).norm() < 12.0,
+        "{tool}"
+    );
+    let direction = cell.viewing_direction(&pose);
+    assert!(
+        (direction.z.asin().to_degrees() + 55.0).abs() < 1e-9,
+        "looks 55 degrees down"
+    );
+}
+
+#[test]
+fn goal_poses_show_the_goal_and_agree_with_known_ones() {
+    for (cell, goal) in goals(300) {
+        let Features { x, y, r } = cell.features(&goal).expect("the goal is in sight");
+        assert!(
+            (x - 103.5).abs() < 0.2,
+            "the arm's plane is 7.5 units right of the axis: {x}"
+        );
+        assert!((y - 78.0).abs() < 1e-3 && (r - 33.0).abs() < 1e-3, "{y} {r}");
+    }
+    // Planar balls (u, w) in millimetres and their goal poses.
+    for (u, w, jt2, jt3) in [
+        (481.0, 45.0, -86.9, 211.0),
+        (651.0, -108.0, -53.0, 186.2),
+        (769.0, -194.0, -34.1, 164.7),
+    ] {
+        let cell = Cell::paper(Ball::at(u / 1000.0, 0.14909, w / 1000.0));
+        let goal = cell.goal_pose(45.0).expect("within reach").degrees();
+        assert!(
+            goal[0].abs() < 1e-9 && (goal[1] - jt2).abs() < 0.3 && (goal[2] - jt3).abs() < 0.3,
+            "{goal:?}"
+        );
+    }
+}
+
+#[test]
+fn turning_jt5_alone_brings_the_gripper_to_the_ball() {
+    let (mut worst, mut angles) = (0.0_f64, Vec::new());
+    for (cell, goal) in goals(300) {
+        angles.push(cell.grip_angle(&goal).to_degrees());
+        let grip = goal + JointDelta::of(Joint::J5, (26.99_f64 - 45.0).to_radians());
+        worst = worst.max(cell.grip_miss(&grip));
+    }
+    assert!(worst < 0.0002, "{worst}");
+    assert!(angles.iter().all(|a| (a - 26.99).abs() < 0.03), "{angles:?}");
+}
+
+#[test]
+fn a_correct_reach_and_grip_leaves_the_proximity_sensors_quiet() {
+    for (cell, goal) in goals(300) {
+        // Straight in joint space from the pose that sees the ball, turned to it, to the goal; then the swing of JT5.
+        let start = Joints::from_degrees([goal.degrees()[0], -110.0, 210.0, 0.0, 45.0, 0.0]);
+        for i in 0..=20 {
+            let t = f64::from(i) / 20.0;
+            let pose = Joints(std::array::from_fn(|j| start.0[j] + t * (goal.0[j] - start.0[j])));
+            assert!(!cell.proximity(&pose), "{t} at {pose} of {cell:?}");
+            let swing = goal + JointDelta::of(Joint::J5, -18.01_f64.to_radians() * t);
+            assert!(!cell.proximity(&swing), "swing {t} at {swing}");
+        }
+    }
+}
+
+#[test]
+fn the_proximity_sensors_warn_of_table_ball_and_holder() {
+    for (cell, goal) in goals(50) {
+        // Past the goal, onto the ball: the elbow opens further and further.
+        let onto =
+            (0..60).map(|i| goal + JointDelta::from_degrees([0.0, 0.5 * f64::from(i), 0.0, 0.0, 0.0, 0.0]));
+        assert!(onto.into_iter().any(|pose| cell.proximity(&pose)));
+        let aside = goal + JointDelta::from_degrees([2.5, 0.0, 0.0, 0.0, -18.01, 0.0]);
+        assert!(cell.proximity(&aside), "a finger on the ball");
+    }
+}
+
+#[test]
+fn six_search_poses_see_93_percent_and_all_of_it_can_be_reached() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let coverage = Workspace::paper().coverage(&cell, 20_000, &mut rng(2));
+    println!(
+        "{coverage:?} {} {}",
+        coverage.seen_share(),
+        coverage.reachable_share()
+    );
+    assert!(
+        (coverage.seen_share() - 0.931).abs() < 0.02,
+        "{}",
+        coverage.seen_share()
+    );
+    assert!(
+        coverage.reachable_share() > 0.999,
+        "{}",
+        coverage.reachable_share()
+    );
+}
+
+#[test]
+fn features_and_places_invert_each_other() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let pose = Joints::from_degrees([10.0, -60.0, 190.0, 0.0, 45.0, 0.0]);
+    for (x, y, r) in [
+        (96.0, 72.0, 33.0),
+        (20.0, 130.0, 10.0),
+        (150.0, 30.0, 30.0),
+        (103.5, 78.0, 33.0),
+    ] {
+        let wanted = Features { x, y, r };
+        let ball = cell.ball_showing(&pose, &wanted).expect("some place shows it");
+        let shown = Cell {
+            ball: Ball {
+                centre: ball,
+                ..cell.ball
+            },
+            ..cell
+        }
+        .features(&pose)
+        .expect("seen");
+        let error = (shown.x - x)
+            .abs()
+            .max((shown.y - y).abs())
+            .max((shown.r - r).abs());
+        assert!(error < 1e-9, "{wanted:?} {shown:?}");
+    }
+}

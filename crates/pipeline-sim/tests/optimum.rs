@@ -1,0 +1,52 @@
+//! The fewest moves from where the search finds the ball to the goal.
+
+use pipeline_sim::{Ball, Cell, GoalBox, MoveLists, Workspace};
+use puma_val2::Joints;
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+#[test]
+fn from_the_search_poses_the_goal_is_four_to_five_moves_away() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let (moves, goal) = (MoveLists::paper(), GoalBox::paper());
+    let (mut histogram, mut total) = ([0; 12], 0);
+    let starts = 100;
+    for _ in 0..starts {
+        let (ball, pose) = Workspace::paper()
+            .sample_seen_ball(&nominal, &mut rng)
+            .expect("most balls are seen");
+        let cell = Cell::paper(ball);
+        let steps = cell
+            .fewest_reaching_moves(&pose, &moves, &goal, 11)
+            .expect("every seen ball can be reached");
+        histogram[steps as usize] += 1;
+        total += steps;
+    }
+    let mean = f64::from(total) / f64::from(starts);
+    println!("{mean} {histogram:?}");
+    assert!((4.1..4.8).contains(&mean), "{mean} {histogram:?}");
+}
+
+#[test]
+fn at_the_goal_nothing_is_left_to_do_and_nowhere_there_is_no_way() {
+    let cell = Cell::paper(Ball::at(0.62, 0.2, -0.1));
+    let (moves, goal) = (MoveLists::paper(), GoalBox::paper());
+    let there = cell.goal_pose(45.0).expect("within reach");
+    assert_eq!(cell.fewest_reaching_moves(&there, &moves, &goal, 5), Some(0));
+    assert_eq!(cell.fewest_centring_moves(&there, &moves, &goal, 5), Some(0));
+    // At a radius of 33 a degree of JT1 moves the ball by twenty units: 2.4 degrees off are two or three moves.
+    let mut aside = there;
+    aside.0[0] += 2.4_f64.to_radians();
+    let steps = cell
+        .fewest_centring_moves(&aside, &moves, &goal, 5)
+        .expect("in sight");
+    assert!((2..=3).contains(&steps), "{steps}");
+    for nowhere in [
+        Joints([f64::NAN; 6]),
+        Joints::from_degrees([0.0, -110.0, 210.0, 0.0, -45.0, 0.0]),
+        Joints::from_degrees([0.0, 20.0, 210.0, 0.0, 45.0, 0.0]),
+    ] {
+        assert_eq!(cell.fewest_reaching_moves(&nowhere, &moves, &goal, 5), None);
+    }
+}

@@ -1,0 +1,253 @@
+//! The cell as a plant: errors, play, grasps, pushes and moving balls.
+
+use hough_heuristic::Features;
+use nalgebra::{Point3, Vector3};
+use pipeline_sim::{
+    Ball, BallPath, Cell, Contact, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell, SimulatedArm,
+    Workspace,
+};
+use puma_val2::{Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+fn at_goal() -> (Cell, Joints) {
+    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+    let goal = cell.goal_pose(45.0).expect("within reach");
+    (cell, goal)
+}
+
+fn swing() -> JointDelta {
+    JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.01, 0.0])
+}
+
+#[test]
+fn a_ball_at_the_pads_is_held_carried_and_put_down() {
+    let (cell, goal) = at_goal();
+    let shared = SharedCell::new(cell);
+    let mut arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
+    arm.move_by(swing()).expect("within limits");
+    assert_eq!(arm.contact(), Contact::Free, "the open jaws straddle the ball");
+    arm.set_gripper(Gripper::Closed).expect("always");
+    assert_eq!(arm.grasp(), Some(Grasp::Held));
+    let joints = arm
+        .move_by(JointDelta::from_degrees([10.0, -15.0, 0.0, 0.0, 0.0, 0.0]))
+        .expect("within limits");
+    assert_eq!(arm.contact(), Contact::Carried);
+    assert!(shared.get().ball.centre.z > cell.ball.centre.z + 0.05, "lifted");
+    assert!(shared.get().grip_miss(&joints) < 0.001);
+    assert!(
+        !arm.object_near().expect("always"),
+        "what the hand holds is not in its way"
+    );
+    arm.set_gripper(Gripper::Open).expect("always");
+    let z = shared.get().ball.centre.z;
+    assert!(
+        (z - (cell.table + 0.020)).abs() < 1e-12,
+        "it fell onto the table: {z}"
+    );
+}
+
+#[test]
+fn released_over_the_holder_it_stands_there_again() {
+    let (mut cell, goal) = at_goal();
+    let start = cell.ball.centre;
+    let grip = goal + swing();
+    assert_eq!(cell.close_gripper(&grip), Grasp::Held);
+    cell.open_gripper();
+    assert!((cell.ball.centre - start).norm() < 1e-4);
+    assert_eq!(cell.jaws, Gripper::Open);
+}
+
+#[test]
+fn a_grasp_beside_the_ball_pushes_it_or_misses() {
+    let (cell, goal) = at_goal();
+    let grip = goal + swing();
+    let mut outcomes = [0; 3];
+    for mm in 0..=40 {
+        // The hand stands short of the ball or beyond it, along the tool axis: by construction the ball is between the jaws.
+        let mut off = cell;
+        let axis = off.params.wrist(&grip) * Vector3::z();
+        off.ball.centre += axis * (f64::from(mm) / 1000.0);
+        let before = off.ball.centre;
+        let moved = |cell: &Cell| (cell.ball.centre - before).norm();
+        match off.close_gripper(&grip) {
+            Grasp::Held => {
+                assert!(mm <= 10);
+                outcomes[0] += 1;
+            }
+            Grasp::Pushed { by } => {
+                assert!(mm >= 10 && (moved(&off) - by).abs() < 1e-9 && by > 0.0);
+                outcomes[1] += 1;
+            }
+            Grasp::Missed => {
+                assert!(mm >= 25 && moved(&off) == 0.0);
+                outcomes[2] += 1;
+            }
+        }
+    }
+    assert!(outcomes.iter().all(|n| *n > 5), "{outcomes:?}");
+}
+
+#[test]
+fn running_into_the_ball_pushes_it_out_of_the_way() {
+    let (cell, goal) = at_goal();
+    let shared = SharedCell::new(cell);
+    let mut arm = SimulatedArm::new(
+        shared.clone(),
+        goal + JointDelta::from_degrees([8.0, 0.0, 0.0, 0.0, -18.01, 0.0]),
+    )
+    .expect("within limits");
+    arm.move_by(JointDelta::from_degrees([-16.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        .expect("within limits");
+    assert!(
+        matches!(arm.contact(), Contact::Pushed { by } if by > 0.02),
+        "{:?}",
+        arm.contact()
+    );
+    let now = shared.get();
+    let joints = arm.joints().expect("always");
+    let gaps = now
+        .hand_bodies(&joints)
+        .map(|b| b.gap_to_sphere(&now.ball.centre, now.ball.radius));
+    assert!(gaps.iter().all(|g| *g > -1e-6), "{gaps:?}");
+    assert_eq!(
+        now.holder.expect("still there").foot,
+        now.ball.centre.xy(),
+        "the holder went along"
+    );
+}
+
+#[test]
+fn play_and_counts_lie_between_what_is_reported_and_what_is() {
+    let errors = Errors {
+        backlash: 0.2_f64.to_radians(),
+        ..ErrorLevel::Moderate.draw(&mut rng(1))
+    };
+    let start = Workspace::paper().search_poses()[2];
+    let mut arm =
+        SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors).expect("within limits");
+    let mut pose = arm.pose();
+    let step = |arm: &mut SimulatedArm, degrees: f64| {
+        let delta = JointDelta::from_degrees([0.0, degrees, 0.0, 0.0, 0.0, 0.0]);
+        arm.move_by(delta).expect("within limits").degrees()[1]
+    };
+    let up = step(&mut arm, 2.0);
+    let behind = up - pose().degrees()[1];
+    assert!(
+        (behind - 0.1).abs() < 0.005,
+        "the links hang back by half the play: {behind}"
+    );
+    let back = step(&mut arm, -0.15);
+    assert!(
+        (pose().degrees()[1] - (up - behind)).abs() < 1e-9,
+        "inside the play nothing moves"
+    );
+    let counts = back / Errors::PUMA_ENCODER_DEGREES[1];
+    assert!((counts - counts.round()).abs() < 1e-6, "whole counts: {counts}");
+}
+
+fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+#[test]
+fn error_levels_are_drawn_from_a_seed_and_make_the_cell_wrong() {
+    let (cell, goal) = at_goal();
+    for level in ErrorLevel::ALL {
+        assert_eq!(level.draw(&mut rng(3)), level.draw(&mut rng(3)));
+        assert_eq!(level.to_string().parse::<ErrorLevel>(), Ok(level));
+        let mut worst: f64 = 0.0;
+        for seed in 0..20 {
+            let wrong = level.draw(&mut rng(seed)).apply(&cell).expect("sound errors");
+            if let Some(f) = wrong.features(&goal) {
+                worst = worst.max((f.x - 103.5).hypot(f.y - 78.0)).max((f.r - 33.0).abs());
+            }
+        }
+        match level {
+            ErrorLevel::None => assert!(worst < 0.2),
+            _ => assert!(worst > 5.0, "{level}: {worst}"),
+        }
+    }
+    assert!("severe".parse::<ErrorLevel>().is_err());
+    assert!(
+        Errors {
+            focal_factor: 0.0,
+            ..Errors::none()
+        }
+        .apply(&cell)
+        .is_err()
+    );
+    assert!(
+        Errors {
+            radius_factor: -1.0,
+            ..Errors::none()
+        }
+        .apply(&cell)
+        .is_err()
+    );
+    assert!(
+        Errors {
+            yaw: f64::NAN,
+            ..Errors::none()
+        }
+        .apply(&cell)
+        .is_err()
+    );
+}
+
+#[test]
+fn balls_are_pushed_jump_and_drift() {
+    let (mut cell, goal) = at_goal();
+    assert!(cell.push_to_radius(&goal, 60.0));
+    let Features { x, y, r } = cell.features(&goal).expect("in sight");
+    assert!(
+        (r - 60.0).abs() < 1e-6 && (y - 78.0).abs() < 0.01 && (x - 103.5).abs() < 0.2,
+        "{x} {y} {r}"
+    );
+    assert!(!cell.push_to_radius(&goal, f64::NAN));
+
+    let workspace = Workspace::paper();
+    let from = cell.ball.centre;
+    let to = workspace
+        .sample_jump(&Point3::new(0.65, 0.1, -0.1), 0.15, &mut rng(5))
+        .expect("there is room");
+    assert!(workspace.contains(&to) && ((to - Point3::new(0.65, 0.1, -0.1)).norm() - 0.15).abs() < 1e-9);
+    let drift = workspace.sample_drift(&from, 0.02, &mut rng(6));
+    assert!((drift.at(3.0).expect("always") - from).norm() - 0.06 < 1e-12);
+    let jumps = BallPath::Jumps(vec![(0.0, from), (2.0, to)]);
+    assert_eq!(
+        (jumps.at(-1.0), jumps.at(1.9), jumps.at(2.0)),
+        (Some(from), Some(from), Some(to))
+    );
+    assert_eq!(BallPath::Jumps(vec![]).at(0.0), None);
+    let circle = BallPath::Circle {
+        middle: from,
+        radius: 0.05,
+        period: 4.0,
+    };
+    assert!((circle.at(1.0).expect("a period") - (from + Vector3::new(0.0, 0.05, 0.0))).norm() < 1e-12);
+    assert_eq!(
+        BallPath::Circle {
+            middle: from,
+            radius: 0.05,
+            period: 0.0
+        }
+        .at(0.0),
+        None
+    );
+}
+
+#[test]
+fn the_feature_camera_sees_what_the_cell_shows_with_noise() {
+    let (cell, goal) = at_goal();
+    let shared = SharedCell::new(cell);
+    let arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
+    let mut exact = FeatureCamera::new(shared.clone(), arm.pose(), 0.0, 1);
+    assert_eq!(exact.look(), cell.features(&goal));
+    let mut noisy = FeatureCamera::new(shared, arm.pose(), 0.5, 1);
+    let spread = (0..2000)
+        .map(|_| (noisy.look().expect("in sight").r - 33.0).powi(2))
+        .sum::<f64>()
+        / 2000.0;
+    assert!((spread.sqrt() - 0.5).abs() < 0.05, "{spread}");
+}

@@ -1,0 +1,104 @@
+//! Joint angles to hand pose.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::{Joints, PumaParams};
+
+impl PumaParams {
+    /// The pose of the flange in the world frame (metres) for the given joint angles.
+    ///
+    /// ```
+    /// use puma_val2::{Joints, PumaParams};
+    ///
+    /// let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    /// let hand = PumaParams::unimation().forward(&ready);
+    /// assert!((hand.translation.z - 0.92112).abs() < 1e-12);
+    /// ```
+    pub fn forward(&self, joints: &Joints) -> Isometry3<f64> {
+        self.wrist(joints) * Translation3::new(0.0, 0.0, self.d6)
+    }
+
+    /// The pose of the hand frame at the wrist centre: the intersection of the axes of `JT4`, `JT5` and `JT6`, z along the
+    /// tool axis. [`PumaParams::forward`] lies `d6` further along z.
+    pub fn wrist(&self, joints: &Joints) -> Isometry3<f64> {
+        let (s, c) = (joints.0.map(f64::sin), joints.0.map(f64::cos));
+        // Rz(theta) Tz(d) Tx(a) Rx(alpha) for each joint, with alpha a multiple of a quarter turn.
+        let links: [(f64, f64, f64); 6] = [
+            (-1.0, 0.0, 0.0),
+            (0.0, self.a2, self.d2),
+            (1.0, self.a3, 0.0),
+            (-1.0, 0.0, self.d4),
+            (1.0, 0.0, 0.0),
+            (0.0, 0.0, 0.0),
+        ];
+        let mut rotation = Matrix3::identity();
+        let mut position = Vector3::zeros();
+        for (i, &(sin_alpha, a, d)) in links.iter().enumerate() {
+            let cos_alpha = 1.0 - sin_alpha * sin_alpha;
+            position += rotation * Vector3::new(a * c[i], a * s[i], d);
+            rotation *= Matrix3::new(
+                c[i],
+                -s[i] * cos_alpha,
+                s[i] * sin_alpha,
+                s[i],
+                c[i] * cos_alpha,
+                -c[i] * sin_alpha,
+                0.0,
+                sin_alpha,
+                cos_alpha,
+            );
+        }
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Isometry3::from_parts(position.into(), rotation)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Named poses of the arm: joint degrees, position in millimetres, and the tool axis.
+    #[test]
+    fn named_poses_stand_where_the_literature_says() {
+        let poses = [
+            (
+                [0.0, -90.0, 90.0, 0.0, 0.0, 0.0],
+                [-20.32, 149.09, 921.12],
+                [0.0, 0.0, 1.0],
+            ),
+            (
+                [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                [411.48, 149.09, 489.32],
+                [0.0, 0.0, 1.0],
+            ),
+            (
+                [90.0, 0.0, 90.0, 0.0, 0.0, 0.0],
+                [-149.09, 921.12, 20.32],
+                [0.0, 1.0, 0.0],
+            ),
+            (
+                [0.0, 0.0, 90.0, 0.0, 0.0, 0.0],
+                [921.12, 149.09, 20.32],
+                [1.0, 0.0, 0.0],
+            ),
+            (
+                [0.0, -45.0, 180.0, 0.0, 45.0, 0.0],
+                [625.92, 149.09, -42.78],
+                [0.0, 0.0, -1.0],
+            ),
+        ];
+        let arm = PumaParams::unimation();
+        for (degrees, millimetres, axis) in poses {
+            let hand = arm.forward(&Joints::from_degrees(degrees));
+            let position = hand.translation.vector * 1000.0;
+            assert!(
+                (position - Vector3::from(millimetres)).amax() < 0.005,
+                "{degrees:?}: {position}"
+            );
+            assert!(
+                (hand * Vector3::z() - Vector3::from(axis)).amax() < 1e-12,
+                "{degrees:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The arm as data: link lengths, joint ranges, joint speeds.
+
+use crate::{ArmError, Joint, Joints};
+
+/// Where one joint may go and how fast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct JointRange {
+    /// Lower limit, radians.
+    pub min: f64,
+    /// Upper limit, radians.
+    pub max: f64,
+    /// Greatest speed, radians per second.
+    pub speed: f64,
+}
+
+/// Geometry and limits of a PUMA 560, in VAL's joint angles.
+///
+/// Standard Denavit–Hartenberg rows (alpha, a, d) of VAL's description (Fu, Gonzalez, Lee, *Robotics*, 1987):
+/// (-90, 0, 0), (0, `a2`, `d2`), (+90, `a3`, 0), (-90, 0, `d4`), (+90, 0, 0), (0, 0, `d6`). The base frame is VAL's
+/// world frame: its origin is the intersection of the axes of `JT1` and `JT2`, z points up, and at `JT1` = 0 the arm reaches
+/// along +x with the upper arm displaced by `d2` to +y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PumaParams {
+    /// Upper arm, metres.
+    pub a2: f64,
+    /// Elbow offset, metres.
+    pub a3: f64,
+    /// Lateral offset of the arm's plane from the waist axis, metres.
+    pub d2: f64,
+    /// Forearm, metres.
+    pub d4: f64,
+    /// Wrist centre to flange, metres.
+    pub d6: f64,
+    /// Range and speed of each joint.
+    pub ranges: [JointRange; 6],
+}
+
+impl PumaParams {
+    /// The lengths used with VAL itself (431.8, -20.32, 149.09, 433.07, 56.25 mm).
+    ///
+    /// Joint ranges are the classical ones of Fu, Gonzalez, Lee (-160..160, -225..45, -45..225, -110..170, -100..100,
+    /// -266..266 degrees); sources disagree about joints 2 to 4. The speeds (82, 74, 122, 228, 241, 228 degrees per second) are the
+    /// commonly quoted ones and are not confirmed by a primary source.
+    pub fn unimation() -> Self {
+        Self {
+            a2: 0.4318,
+            a3: -0.02032,
+            d2: 0.14909,
+            d4: 0.43307,
+            d6: 0.05625,
+            ranges: classical_ranges(),
+        }
+    }
+
+    /// The lengths of Corke and Armstrong-Hélouvry (431.8, -20.3, 150.05, 431.8 mm, no flange), as used by the Robotics Toolbox.
+    pub fn corke() -> Self {
+        Self {
+            a2: 0.4318,
+            a3: -0.0203,
+            d2: 0.15005,
+            d4: 0.4318,
+            d6: 0.0,
+            ranges: classical_ranges(),
+        }
+    }
+
+    /// Checks that every angle is finite and within its range.
+    ///
+    /// # Errors
+    /// [`ArmError::NotFinite`] or [`ArmError::JointLimit`], naming the first joint that fails.
+    pub fn check(&self, joints: &Joints) -> Result<(), ArmError> {
+        if let Some(joint) = joints.non_finite() {
+            return Err(ArmError::NotFinite { joint });
+        }
+        // VAL prints thousandths of a degree: an arm at its stop may report that much beyond it.
+        let slack = 0.0005_f64.to_radians();
+        for joint in Joint::ALL {
+            let range = self.ranges[joint.index()];
+            if joints[joint] < range.min - slack || joints[joint] > range.max + slack {
+                return Err(ArmError::JointLimit {
+                    joint,
+                    wanted_degrees: joints[joint].to_degrees(),
+                    min_degrees: range.min.to_degrees(),
+                    max_degrees: range.max.to_degrees(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn classical_ranges() -> [JointRange; 6] {
+    [
+        (-160.0_f64, 160.0_f64, 82.0_f64),
+        (-225.0, 45.0, 74.0),
+        (-45.0, 225.0, 122.0),
+        (-110.0, 170.0, 228.0),
+        (-100.0, 100.0, 241.0),
+        (-266.0, 266.0, 228.0),
+    ]
+    .map(|(min, max, speed)| JointRange {
+        min: min.to_radians(),
+        max: max.to_radians(),
+        speed: speed.to_radians(),
+    })
+}
