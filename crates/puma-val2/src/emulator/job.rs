@@ -25,6 +25,8 @@ pub(super) struct Job {
     pub(super) cycles_left: Option<u32>,
     /// How it ends as soon as the arm stands.
     pub(super) ending: Option<Message>,
+    /// What `DO` carries out as soon as the motion before it has ended.
+    pub(super) pending: Option<Instruction>,
     /// Stop after one step, for `NEXT`.
     pub(super) single: bool,
 }
@@ -92,6 +94,7 @@ impl Job {
             next_step: now,
             cycles_left: Some(0),
             ending: None,
+            pending: None,
             single: false,
         }
     }
@@ -207,7 +210,10 @@ impl Emulator {
         }
         let mut job = Job::new(JobKind::Do, self.now);
         match self.carry_out(instruction, &mut job)? {
-            Flow::WhenStanding => return Err(Message::Busy.into()),
+            Flow::WhenStanding => {
+                job.pending = Some(instruction.clone());
+                job.wait = Wait::Motion;
+            }
             Flow::Wait(wait) => job.wait = wait,
             _ => {}
         }
@@ -301,6 +307,14 @@ impl Emulator {
             return self.end_job(job, Message::Aborted);
         }
         job.wait = Wait::Nothing;
+        if let Some(instruction) = job.pending.take() {
+            self.mode = Mode::Monitor;
+            if let Err(fault) = self.do_instruction(&instruction) {
+                self.refuse(fault);
+                self.prompt();
+            }
+            return;
+        }
         if job.kind != JobKind::Program {
             return self.end_job(job, Message::Completed);
         }
