@@ -23,7 +23,7 @@ use puma_val2::{Emulator, Event, Profile, PumaParams, ServeConfig, TcpServer, ch
 
 /// An emulated VAL II controller with a PUMA 560.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Arguments {
     /// Serve on this address (127.0.0.1:5600, or port 0 for any free one) instead of a pseudo-terminal.
     #[arg(long, value_name = "ADDR", conflicts_with = "pty")]
