@@ -1,1 +1,83 @@
-//! grasp-agent
+//! The controller of the paper: circles into joint moves.
+//!
+//! A ball of known size lies somewhere in reach of a PUMA 560 with a camera on its hand. Two behaviours, learned
+//! separately by Q-learning, bring the hand to it: **centering** turns the first joint by what it sees of the ball's x and
+//! radius, **approaching** turns the second and third by y, radius and the elbow angle. Around them stand a search from fixed
+//! poses, a recovery for when the ball leaves the image, the activation of the gripper, and a stop when something comes too near.
+//!
+//! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. The paper's two are presets.
+//! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which [`qtable`] learns it.
+//! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked what to do.
+//! * An [`Agent`] runs both on an [`Eye`] ([`CameraEye`]: camera and circle detector) and a [`Manipulator`](puma_val2::Manipulator), and tells
+//!   every [`Event`] as it happens.
+//!
+//! The crate knows no simulator, no renderer and no particular detector, arm or camera: they meet it through the traits of
+//! `hough-heuristic` and `puma-val2` and through plain closures.
+//!
+//! # Learning a behaviour
+//!
+//! Here the "simulator" is one line: a degree of the first joint moves the ball by four units.
+//!
+//! ```
+//! use grasp_agent::{Behaviour, BehaviourSpec, BehaviourTask, Percept};
+//! use hough_heuristic::Features;
+//! use puma_val2::Joint;
+//! use qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+//! use qtable::{QTable, Schedule, TrainConfig, train};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let spec = BehaviourSpec::centering();
+//! let simulate = |percept: &Percept, delta: &puma_val2::JointDelta| {
+//!     let mut next = *percept;
+//!     next.features.x += 4.0 * delta[Joint::J1].to_degrees();
+//!     (0.0..192.0).contains(&next.features.x).then_some(next)
+//! };
+//! let gamma = 0.9;
+//! let start = |rng: &mut dyn Rng| Percept {
+//!     features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
+//!     theta3: 0.0,
+//! };
+//! let mut task = BehaviourTask::new(&spec, gamma, simulate, start);
+//! let mut table = QTable::new(spec.states(), spec.actions())?;
+//! let config = TrainConfig {
+//!     gamma,
+//!     alpha: Schedule::exponential(0.6, 0.02, 20_000)?,
+//!     temperature: Schedule::exponential(1000.0, 0.1, 20_000)?,
+//!     actions: 20_000,
+//!     episode_limit: 60,
+//!     record_every: 1_000,
+//! };
+//! let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+//! let report = train(&mut task, &mut table, &config, &mut rng, &mut |_progress| {})?;
+//! assert!(report.curve.last().is_some_and(|record| record.success_share > Some(0.9)));
+//! let centering = Behaviour::new(spec, table)?;
+//! # let _ = centering;
+//! # Ok(())
+//! # }
+//! ```
+
+mod agent;
+mod behaviour;
+mod config;
+mod error;
+mod event;
+mod eye;
+mod percept;
+mod reward;
+mod spec;
+mod task;
+
+pub use agent::{Agent, Outcome};
+pub use behaviour::{Behaviour, Episode};
+pub use config::AgentConfig;
+pub use error::{AgentError, BehaviourError};
+pub use event::{Event, EventKind, GaveUp};
+pub use eye::{CameraEye, Eye, Look, Sighting};
+pub use percept::{Input, Percept, theta3};
+pub use reward::{Reward, RewardTerm};
+pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
+pub use task::BehaviourTask;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,5 +1,11 @@
 //! Where frames come from.
 
+mod stream;
+mod view;
+
+pub use stream::{RawFrames, Y4mFrames};
+pub use view::GrayView;
+
 use image::GrayImage;
 
 /// A source of monochrome frames: a camera, a folder of files, a stream, a rendered scene.

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use crate::Joint;
+use crate::{Joint, Joints};
 
 /// Why an arm did not do what it was asked to.
 ///
@@ -96,5 +96,43 @@ pub enum ArmError {
     NotFinite {
         /// The joint.
         joint: Joint,
+    },
+    /// The controller has been started again in mid-session: it asks its start-up questions. It must be connected to and calibrated anew.
+    #[error("{port}: the controller has been restarted: it says {heard:?}; connect and calibrate again")]
+    Restarted {
+        /// The line.
+        port: String,
+        /// What it said.
+        heard: String,
+    },
+    /// A motion was commanded and it can no longer be found out where the arm is. The words that stop it have been sent if the line took them.
+    #[error("{port}: the outcome of a motion is not known: {cause}")]
+    Unconfirmed {
+        /// The line.
+        port: String,
+        /// The joint angles that the arm last reported.
+        last_known: Option<Joints>,
+        /// What kept the arm from reporting.
+        cause: Box<ArmError>,
+    },
+    /// The proximity signal stopped the arm on its way.
+    #[error("{port}: stopped by signal {signal} at {joints}")]
+    ProximityStop {
+        /// The line.
+        port: String,
+        /// The input that came on.
+        signal: u16,
+        /// Where the arm stands.
+        joints: Joints,
+    },
+    /// A setting that cannot be: a speed of zero, an empty name. Nothing was sent.
+    #[error("{what} cannot be {value}: {allowed}")]
+    Setting {
+        /// What was to be set.
+        what: &'static str,
+        /// The value.
+        value: String,
+        /// What would do.
+        allowed: &'static str,
     },
 }

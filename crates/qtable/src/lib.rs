@@ -1,1 +1,98 @@
-//! qtable
+//! Tabular reinforcement learning for problems with finitely many states and actions.
+//!
+//! An [`Environment`] is the problem, in Gymnasium's words. A [`QTable`] holds what is known of it, one number for
+//! each [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, a learner such as [`QLearning`]
+//! improves the table from each [`Step`], and [`train`] runs them against each other.
+//!
+//! ```
+//! use qtable::{Action, Environment, QTable, State, Status, Step, TrainConfig, train};
+//! use rand::rngs::Xoshiro256PlusPlus;
+//! use rand::{Rng, SeedableRng};
+//!
+//! /// Five cells in a row; reach the right end.
+//! struct Row(usize);
+//!
+//! impl Environment for Row {
+//!     fn states(&self) -> usize {
+//!         5
+//!     }
+//!     fn actions(&self) -> usize {
+//!         2
+//!     }
+//!     fn reset(&mut self, _rng: &mut dyn Rng) -> State {
+//!         self.0 = 0;
+//!         State(self.0)
+//!     }
+//!     fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
+//!         self.0 = if action == Action(1) { self.0 + 1 } else { self.0.saturating_sub(1) };
+//!         let done = self.0 == 4;
+//!         Step {
+//!             observation: State(self.0),
+//!             reward: if done { 1.0 } else { 0.0 },
+//!             status: if done { Status::Terminated } else { Status::Continuing },
+//!         }
+//!     }
+//! }
+//!
+//! let mut table = QTable::new(5, 2)?;
+//! let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+//! let report = train(&mut Row(0), &mut table, &TrainConfig::paper(5_000), &mut rng, &mut |_| {})?;
+//! assert_eq!(report.actions, 5_000);
+//! assert_eq!(table.greedy()[..4], [Action(1); 4]);
+//! assert!((table.max(State(0)) - 0.9f64.powi(3)).abs() < 1e-3);
+//! # Ok::<(), qtable::Error>(())
+//! ```
+
+mod cached;
+mod check_env;
+mod course;
+mod curve;
+mod discretise;
+mod elementary;
+mod environment;
+mod error;
+mod evaluate;
+mod index;
+mod learner;
+mod mask;
+mod model;
+#[cfg(feature = "serde")]
+mod persist;
+mod policy;
+mod schedule;
+mod scratch;
+mod seeds;
+mod table;
+mod text;
+mod time_limit;
+pub mod toys;
+mod train;
+mod training;
+mod validated;
+
+pub use rand;
+
+pub use cached::CachedBoltzmann;
+pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
+pub use curve::Record;
+pub use discretise::{DiscretiseError, Intervals, Product};
+pub use environment::{Environment, Status, Step};
+pub use error::Error;
+pub use evaluate::{Evaluation, evaluate};
+pub use index::{Action, State};
+pub use learner::{
+    DoubleQLearning, DynaQ, ExpectedSarsa, Experience, Learner, NStepQ, PrioritizedSweeping, QLambda,
+    QLearning, Sarsa, SarsaLambda,
+};
+pub use mask::ActionMask;
+pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, Outcome, Plan};
+#[cfg(feature = "serde")]
+pub use persist::{PersistError, Problem, decode, encode, load, save};
+pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
+pub use schedule::{Schedule, ScheduleError};
+pub use seeds::{Estimate, over_seeds};
+pub use table::{QTable, Value};
+pub use text::CsvError;
+pub use time_limit::TimeLimit;
+pub use train::{Progress, TrainConfig, TrainReport, train, train_in_blocks};
+pub use training::{Training, Until};

@@ -1,0 +1,213 @@
+//! A learned behaviour, and how it is used at run time.
+
+use qtable::{Action, QTable, State};
+
+use crate::{BehaviourError, BehaviourSpec};
+
+/// A behaviour with what it has learned: the Q-table over its states and actions.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Behaviour {
+    spec: BehaviourSpec,
+    table: QTable,
+}
+
+impl Behaviour {
+    /// Joins a specification and a table learned for it.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Shape`] when the table is not one of `spec.states()` x `spec.actions()`.
+    pub fn new(spec: BehaviourSpec, table: QTable) -> Result<Self, BehaviourError> {
+        let behaviour = Self { spec, table };
+        behaviour.check_shape()?;
+        Ok(behaviour)
+    }
+
+    fn check_shape(&self) -> Result<(), BehaviourError> {
+        let (expected, found) = (
+            (self.spec.states(), self.spec.actions()),
+            (self.table.states(), self.table.actions()),
+        );
+        if expected == found {
+            Ok(())
+        } else {
+            Err(BehaviourError::Shape {
+                name: self.spec.name.clone(),
+                expected,
+                found,
+            })
+        }
+    }
+
+    /// What the behaviour is.
+    pub fn spec(&self) -> &BehaviourSpec {
+        &self.spec
+    }
+
+    /// What it has learned.
+    pub fn table(&self) -> &QTable {
+        &self.table
+    }
+
+    /// The action with the highest Q in `state` after the loop breaker, among those that `allowed` admits.
+    ///
+    /// The loop breaker takes `kappa` off an action's Q for every time that the same action has already been chosen in
+    /// the same state during this episode: a greedy policy on coarse states may otherwise go round in circles for ever. Equal
+    /// values go to the lowest action. `None` when nothing is allowed.
+    pub fn choose(
+        &self,
+        state: State,
+        episode: &Episode,
+        kappa: f64,
+        mut allowed: impl FnMut(Action) -> bool,
+    ) -> Option<Action> {
+        let row = self.table.row(state);
+        let mut best: Option<(Action, f64)> = None;
+        for (index, q) in row.iter().enumerate() {
+            let action = Action(index);
+            let worth = q - kappa * f64::from(episode.weight(state, action));
+            if best.is_none_or(|(_, most)| worth > most) && allowed(action) {
+                best = Some((action, worth));
+            }
+        }
+        best.map(|(action, _)| action)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl Behaviour {
+    /// Writes the behaviour to `path`, whole or not at all.
+    ///
+    /// # Errors
+    /// What kept the file from being written.
+    pub fn save(&self, path: &std::path::Path) -> Result<(), BehaviourError> {
+        Ok(qtable::save(path, FILE_KIND, self)?)
+    }
+
+    /// Reads a behaviour that is exactly `expected`, but for what it has learned.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged or is none of ours; a behaviour with other states, actions, goal or reward.
+    pub fn load(path: &std::path::Path, expected: &BehaviourSpec) -> Result<Self, BehaviourError> {
+        let behaviour: Self = qtable::load(path, FILE_KIND)?;
+        behaviour.check_shape()?;
+        if behaviour.spec != *expected {
+            return Err(BehaviourError::Foreign {
+                path: path.to_owned(),
+                part: behaviour.spec.difference(expected),
+                name: expected.name.clone(),
+            });
+        }
+        Ok(behaviour)
+    }
+}
+
+#[cfg(feature = "serde")]
+const FILE_KIND: &str = "grasp-agent behaviour";
+
+/// What was chosen during one episode, for the loop breaker.
+#[derive(Clone, Debug)]
+pub struct Episode {
+    actions: usize,
+    weights: Vec<u32>,
+}
+
+/// How much choosing an action that lost the ball weighs, in ordinary choices: enough that it is not chosen again.
+const LOST_WEIGHT: u32 = 50;
+
+impl Episode {
+    /// The beginning of an episode of `behaviour`.
+    pub fn new(behaviour: &Behaviour) -> Self {
+        let (states, actions) = (behaviour.table.states(), behaviour.table.actions());
+        Self {
+            actions,
+            weights: vec![0; states * actions],
+        }
+    }
+
+    /// How often `action` has been chosen in `state`.
+    pub fn weight(&self, state: State, action: Action) -> u32 {
+        self.weights[state.0 * self.actions + action.0]
+    }
+
+    /// Notes that `action` was chosen in `state`.
+    pub fn chose(&mut self, state: State, action: Action) {
+        self.add(state, action, 1);
+    }
+
+    /// Notes that `action`, chosen in `state`, lost the ball.
+    pub fn lost_by(&mut self, state: State, action: Action) {
+        self.add(state, action, LOST_WEIGHT);
+    }
+
+    fn add(&mut self, state: State, action: Action, weight: u32) {
+        let slot = &mut self.weights[state.0 * self.actions + action.0];
+        *slot = slot.saturating_add(weight);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn behaviour() -> Behaviour {
+        let spec = BehaviourSpec::centering();
+        let mut table = QTable::new(spec.states(), spec.actions()).unwrap();
+        table.set(State(5), Action(7), 30.0).unwrap();
+        table.set(State(5), Action(2), 15.0).unwrap();
+        Behaviour::new(spec, table).unwrap()
+    }
+
+    #[test]
+    fn repeated_choices_give_way_to_the_next_best() {
+        let behaviour = behaviour();
+        let mut episode = Episode::new(&behaviour);
+        assert_eq!(
+            behaviour.choose(State(5), &episode, 20.0, |_| true),
+            Some(Action(7))
+        );
+        episode.chose(State(5), Action(7));
+        assert_eq!(
+            behaviour.choose(State(5), &episode, 20.0, |_| true),
+            Some(Action(2))
+        );
+        assert_eq!(
+            behaviour.choose(State(5), &episode, 0.0, |_| true),
+            Some(Action(7))
+        );
+        assert_eq!(
+            behaviour.choose(State(5), &episode, 20.0, |a| a != Action(2)),
+            Some(Action(7))
+        );
+        assert_eq!(behaviour.choose(State(5), &episode, 20.0, |_| false), None);
+    }
+
+    #[test]
+    fn a_table_of_another_shape_is_refused() {
+        let refused = Behaviour::new(BehaviourSpec::centering(), QTable::new(42, 81).unwrap());
+        assert!(matches!(
+            refused,
+            Err(BehaviourError::Shape {
+                expected: (42, 9),
+                found: (42, 81),
+                ..
+            })
+        ));
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn a_saved_behaviour_comes_back_equal_and_a_foreign_one_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("centering.policy");
+        let behaviour = behaviour();
+        behaviour.save(&path).unwrap();
+        assert_eq!(Behaviour::load(&path, behaviour.spec()).unwrap(), behaviour);
+
+        let literal = BehaviourSpec::centering().with_reward(crate::Reward::centering_literal());
+        let refused = Behaviour::load(&path, &literal).unwrap_err();
+        assert!(refused.to_string().contains("reward"), "{refused}");
+        let refused = Behaviour::load(&path, &BehaviourSpec::approaching()).unwrap_err();
+        assert!(refused.to_string().contains("approaching"), "{refused}");
+    }
+}

@@ -1,0 +1,52 @@
+//! What can go wrong.
+
+use hough_heuristic::FrameError;
+use puma_val2::ArmError;
+
+/// Why a behaviour could not be made, saved or loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BehaviourError {
+    /// A table that does not fit the specification.
+    #[error(
+        "the table of behaviour `{name}` has {}x{} entries (states x actions) where {}x{} are needed",
+        found.0, found.1, expected.0, expected.1
+    )]
+    Shape {
+        /// The behaviour.
+        name: String,
+        /// States and actions of the specification.
+        expected: (usize, usize),
+        /// States and actions of the table.
+        found: (usize, usize),
+    },
+    /// A file that holds another behaviour than the one asked for.
+    #[error("{}: holds another behaviour than the `{name}` asked for: its {part} differs; train again, or use the specification it was trained for", path.display())]
+    Foreign {
+        /// The file.
+        path: std::path::PathBuf,
+        /// The first part of the specification that differs.
+        part: &'static str,
+        /// The behaviour that was asked for.
+        name: String,
+    },
+    /// A file that cannot be written or read, or is damaged.
+    #[cfg(feature = "serde")]
+    #[error(transparent)]
+    File(#[from] qtable::PersistError),
+}
+
+/// Why a run was broken off. The arm stands.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AgentError {
+    /// The camera delivered no frame.
+    #[error("the camera failed: {0}")]
+    Camera(#[from] FrameError),
+    /// The arm, or the line to it, failed.
+    #[error("the arm failed: {0}")]
+    Arm(#[from] ArmError),
+    /// A configuration that cannot work.
+    #[error("agent configuration: {0}")]
+    Config(String),
+}

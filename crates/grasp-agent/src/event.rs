@@ -1,0 +1,87 @@
+//! The event log: everything that happens in a run, in order.
+
+use hough_heuristic::image::GrayImage;
+use puma_val2::{JointDelta, Joints};
+
+use crate::Sighting;
+
+/// One thing that happened.
+#[derive(Clone, Copy, Debug)]
+pub struct Event<'a> {
+    /// How many moves have been made since the ball was first seen.
+    pub cycle: usize,
+    /// What happened.
+    pub kind: EventKind,
+    /// Where the arm stands, as it reports.
+    pub joints: Joints,
+    /// The frame, for events that come of one.
+    pub frame: Option<&'a GrayImage>,
+}
+
+/// What can happen in a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum EventKind {
+    /// The arm stands at the search pose with this index, and is about to look.
+    AtSearchPose(usize),
+    /// The ball is in the frame.
+    Seen(Sighting),
+    /// No ball is in the frame.
+    NotSeen,
+    /// The behaviours chose this move and the arm has made it.
+    Moved(JointDelta),
+    /// The ball has left the frame during the last move.
+    Lost,
+    /// The arm has gone back to the pose from which the ball was last seen (0), or made the recovery move with this number.
+    Recovering(usize),
+    /// Something came too near to the hand; the arm has gone back by one move.
+    TooNear,
+    /// Centre and radius are at the goal.
+    AtGoal,
+    /// The gripper has been brought to the ball and closed.
+    Gripped,
+    /// The run is over without a grip.
+    GaveUp(GaveUp),
+}
+
+impl EventKind {
+    /// One word for tables and logs.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::AtSearchPose(_) => "search",
+            Self::Seen(_) => "seen",
+            Self::NotSeen => "not-seen",
+            Self::Moved(_) => "moved",
+            Self::Lost => "lost",
+            Self::Recovering(_) => "recover",
+            Self::TooNear => "too-near",
+            Self::AtGoal => "at-goal",
+            Self::Gripped => "gripped",
+            Self::GaveUp(_) => "gave-up",
+        }
+    }
+}
+
+/// Why a run ended without a grip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaveUp {
+    /// The ball is in view from none of the search poses.
+    NotFound,
+    /// The goal was not reached within the allowed number of moves.
+    OutOfCycles,
+    /// Every move that a behaviour could make leads out of the working limits.
+    NoMoveLeft,
+    /// Something was too near to the hand on the way to the ball.
+    Obstructed,
+}
+
+impl std::fmt::Display for GaveUp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::NotFound => "the ball is in view from no search pose",
+            Self::OutOfCycles => "the goal was not reached within the allowed number of moves",
+            Self::NoMoveLeft => "every move leads out of the working limits",
+            Self::Obstructed => "something stood between the gripper and the ball",
+        })
+    }
+}

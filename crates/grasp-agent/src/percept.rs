@@ -1,0 +1,57 @@
+//! What the controller perceives at one moment.
+
+use hough_heuristic::Features;
+use puma_val2::{Joint, Joints};
+
+/// The ball in the image and the elbow: everything a behaviour decides by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Percept {
+    /// Centre and radius of the ball's outline, in feature units (192x144).
+    pub features: Features,
+    /// The paper's third joint angle, degrees: see [`theta3`].
+    pub theta3: f64,
+}
+
+impl Percept {
+    /// The percept of `features`, seen from the pose `joints`.
+    pub fn new(features: Features, joints: &Joints) -> Self {
+        Self {
+            features,
+            theta3: theta3(joints),
+        }
+    }
+}
+
+/// The paper's angle theta 3 "between J2 and J3" in degrees: `JT3` - 170.
+///
+/// The paper gives no zero. With this one the goal poses of a reachable ball fill its interval [0 : 40] (10th to 90th
+/// percentile: -1 to 33).
+pub fn theta3(joints: &Joints) -> f64 {
+    joints[Joint::J3].to_degrees() - 170.0
+}
+
+/// One quantity of a [`Percept`] that a behaviour's state is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Input {
+    /// Horizontal centre, feature units.
+    X,
+    /// Vertical centre, feature units.
+    Y,
+    /// Radius, feature units.
+    R,
+    /// Elbow angle, degrees.
+    Theta3,
+}
+
+impl Input {
+    /// The value of this quantity in `percept`.
+    pub fn of(self, percept: &Percept) -> f64 {
+        match self {
+            Self::X => percept.features.x,
+            Self::Y => percept.features.y,
+            Self::R => percept.features.r,
+            Self::Theta3 => percept.theta3,
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! A behaviour as data: its states, its actions, its goal and its reward, with the paper's values as presets.
+
+use puma_val2::{Joint, JointDelta};
+use qtable::{Action, DiscretiseError, Intervals, Product, State};
+
+use crate::{Input, Percept, Reward};
+
+/// Everything that defines a behaviour, but for what it has learned.
+///
+/// The state is the product of intervals of some inputs; the action is the product of angle steps of some joints. Both
+/// behaviours of the paper, and finer ones, are values of this type.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BehaviourSpec {
+    /// What it is called, in files and messages.
+    pub name: String,
+    /// The inputs, in the order of the intervals of `space`.
+    pub inputs: Vec<Input>,
+    /// The intervals of each input.
+    pub space: Product,
+    /// The joints that it moves, and by which steps.
+    pub moves: Vec<JointSteps>,
+    /// Where it wants to be: every one of these intervals must hold.
+    pub goal: Vec<GoalInterval>,
+    /// What it is taught by.
+    pub reward: Reward,
+}
+
+/// The steps that a behaviour can make with one joint, in degrees.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct JointSteps {
+    /// The joint.
+    pub joint: Joint,
+    /// Its steps, degrees.
+    pub degrees: Vec<f64>,
+}
+
+/// A goal interval of one input, closed at both ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct GoalInterval {
+    /// The input.
+    pub input: Input,
+    /// Lowest value that is still good.
+    pub low: f64,
+    /// Highest value that is still good.
+    pub high: f64,
+}
+
+impl GoalInterval {
+    /// Whether `percept` lies in the interval.
+    pub fn holds(&self, percept: &Percept) -> bool {
+        (self.low..=self.high).contains(&self.input.of(percept))
+    }
+}
+
+/// Edges of the radius, common to both behaviours; the goal is [32, 34].
+const R_EDGES: [f64; 5] = [14.0, 22.0, 32.0, 34.0, 47.0];
+
+impl BehaviourSpec {
+    /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq. 5 with both mends.
+    ///
+    /// The goal interval [99, 108] and the steps of 5 and 1 degrees are the paper's; it does not print the others.
+    pub fn centering() -> Self {
+        Self {
+            name: "centering".into(),
+            inputs: vec![Input::X, Input::R],
+            space: product([(&[50.0, 82.0, 99.0, 108.0, 125.0, 157.0], 3), (&R_EDGES, 3)]),
+            moves: vec![JointSteps {
+                joint: Joint::J1,
+                degrees: vec![-5.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 5.0],
+            }],
+            goal: vec![GoalInterval {
+                input: Input::X,
+                low: 99.0,
+                high: 108.0,
+            }],
+            reward: Reward::centering_literal().mended(),
+        }
+    }
+
+    /// The paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90 states), 9 steps of J2 by 9 of J3
+    /// (81 actions), Eq. 6 with both mends.
+    ///
+    /// The goal (y in [74, 82], r in [32, 34]) and the steps of 20, 6 and 16, 5 degrees are the paper's; it does not print
+    /// the others.
+    pub fn approaching() -> Self {
+        Self {
+            name: "approaching".into(),
+            inputs: vec![Input::Y, Input::R, Input::Theta3],
+            space: product([
+                (&[50.0, 74.0, 82.0, 108.0], 2),
+                (&R_EDGES, 3),
+                (&[5.0, 20.0], NO_GOAL),
+            ]),
+            moves: vec![
+                JointSteps {
+                    joint: Joint::J2,
+                    degrees: vec![-20.0, -6.0, -2.0, -0.6, 0.0, 0.6, 2.0, 6.0, 20.0],
+                },
+                JointSteps {
+                    joint: Joint::J3,
+                    degrees: vec![-16.0, -5.0, -1.6, -0.5, 0.0, 0.5, 1.6, 5.0, 16.0],
+                },
+            ],
+            goal: vec![
+                GoalInterval {
+                    input: Input::Y,
+                    low: 74.0,
+                    high: 82.0,
+                },
+                GoalInterval {
+                    input: Input::R,
+                    low: 32.0,
+                    high: 34.0,
+                },
+            ],
+            reward: Reward::approaching_literal().mended(),
+        }
+    }
+
+    /// The same behaviour taught by another reward.
+    #[must_use]
+    pub fn with_reward(self, reward: Reward) -> Self {
+        Self { reward, ..self }
+    }
+
+    /// How many states it tells apart.
+    pub fn states(&self) -> usize {
+        self.space.len()
+    }
+
+    /// How many actions it chooses from.
+    pub fn actions(&self) -> usize {
+        self.moves.iter().map(|steps| steps.degrees.len()).product()
+    }
+
+    /// The state that `percept` falls into.
+    ///
+    /// # Errors
+    /// An input that is NaN, with its position.
+    pub fn state(&self, percept: &Percept) -> Result<State, DiscretiseError> {
+        let values: Vec<f64> = self.inputs.iter().map(|input| input.of(percept)).collect();
+        self.space.index(&values)
+    }
+
+    /// The joint move that `action` stands for: a mixed-radix number, the last joint's step varying fastest.
+    ///
+    /// An action of [`BehaviourSpec::actions`] or beyond counts from the beginning again.
+    pub fn delta(&self, action: Action) -> JointDelta {
+        let mut degrees = [0.0; 6];
+        let mut rest = action.0;
+        for steps in self.moves.iter().rev().filter(|steps| !steps.degrees.is_empty()) {
+            degrees[steps.joint.index()] = steps.degrees[rest % steps.degrees.len()];
+            rest /= steps.degrees.len();
+        }
+        JointDelta::from_degrees(degrees)
+    }
+
+    /// The first part in which two specifications differ.
+    #[cfg(feature = "serde")]
+    pub(crate) fn difference(&self, other: &Self) -> &'static str {
+        match () {
+            () if self.name != other.name => "name",
+            () if self.inputs != other.inputs || self.space != other.space => "state space",
+            () if self.moves != other.moves => "set of actions",
+            () if self.goal != other.goal => "goal",
+            () => "reward",
+        }
+    }
+
+    /// Whether `percept` is where the behaviour wants to be.
+    pub fn at_goal(&self, percept: &Percept) -> bool {
+        self.goal.iter().all(|interval| interval.holds(percept))
+    }
+}
+
+const NO_GOAL: usize = usize::MAX;
+
+/// The product of intervals with the given edges and goal bins.
+fn product<const N: usize>(axes: [(&[f64], usize); N]) -> Product {
+    let intervals = axes.into_iter().map(|(edges, goal)| {
+        let intervals = Intervals::new(edges)?;
+        if goal == NO_GOAL {
+            Ok(intervals)
+        } else {
+            intervals.with_goal(goal)
+        }
+    });
+    intervals
+        .collect::<Result<Vec<_>, _>>()
+        .and_then(Product::new)
+        .expect("the edges of the presets increase strictly and their goals exist")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hough_heuristic::Features;
+
+    fn percept(x: f64, y: f64, r: f64, theta3: f64) -> Percept {
+        Percept {
+            features: Features { x, y, r },
+            theta3,
+        }
+    }
+
+    #[test]
+    fn the_presets_have_the_papers_sizes() {
+        let (centering, approaching) = (BehaviourSpec::centering(), BehaviourSpec::approaching());
+        assert_eq!((centering.states(), centering.actions()), (42, 9));
+        assert_eq!((approaching.states(), approaching.actions()), (90, 81));
+    }
+
+    #[test]
+    fn goal_intervals_are_closed_in_state_and_test_alike() {
+        let spec = BehaviourSpec::centering();
+        let inside = spec.state(&percept(103.0, 0.0, 33.0, 0.0)).unwrap();
+        for (x, at_goal) in [(99.0, true), (108.0, true), (98.999, false), (108.001, false)] {
+            let p = percept(x, 0.0, 33.0, 0.0);
+            assert_eq!(spec.at_goal(&p), at_goal, "x = {x}");
+            assert_eq!(spec.state(&p).unwrap() == inside, at_goal, "x = {x}");
+        }
+    }
+
+    #[test]
+    fn every_action_is_another_move() {
+        let spec = BehaviourSpec::approaching();
+        let moves: Vec<[f64; 6]> = (0..spec.actions())
+            .map(|a| spec.delta(Action(a)).degrees())
+            .collect();
+        assert!((moves[0][1] + 20.0).abs() < 1e-9 && (moves[0][2] + 16.0).abs() < 1e-9);
+        assert!(moves[40].iter().all(|d| d.abs() < 1e-12));
+        assert!((moves[41][2] - 0.5).abs() < 1e-9 && moves[41][1].abs() < 1e-12);
+        for (i, a) in moves.iter().enumerate() {
+            let same = |b: &[f64; 6]| a.iter().zip(b).all(|(p, q)| (p - q).abs() < 1e-9);
+            assert!(!moves[..i].iter().any(same), "action {i} repeats");
+        }
+    }
+}

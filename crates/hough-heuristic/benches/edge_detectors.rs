@@ -1,0 +1,47 @@
+//! The edge detectors on one frame of 768x576 pixels.
+
+#![allow(missing_docs)]
+
+#[path = "../scenes/scenes.rs"]
+mod scenes;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use hough_heuristic::{Canny, EdgeDetector, ImageprocCanny};
+use scenes::Scene;
+
+fn edges(criterion: &mut Criterion) {
+    let scenes = [
+        ("1 ball", Scene::default()),
+        (
+            "20 distractors",
+            Scene {
+                distractors: 20,
+                ..Scene::default()
+            },
+        ),
+        (
+            "noise 30",
+            Scene {
+                noise: 30.0,
+                ..Scene::default()
+            },
+        ),
+    ];
+    let mut group = criterion.benchmark_group("edges");
+    for (name, scene) in scenes {
+        let (frame, _) = scene.render();
+        let mut canny = Canny::default();
+        group.bench_function(format!("Canny/{name}"), |bencher| {
+            bencher.iter(|| canny.detect_edges(&frame).pixels().len());
+        });
+        let mut imageproc = ImageprocCanny::new(30.0, 70.0).expect("usable thresholds");
+        group.sample_size(10);
+        group.bench_function(format!("imageproc/{name}"), |bencher| {
+            bencher.iter(|| imageproc.detect_edges(&frame).pixels().len());
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, edges);
+criterion_main!(benches);

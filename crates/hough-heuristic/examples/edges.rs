@@ -1,0 +1,128 @@
+//! Writes the edge images of a folder of frames, and the CPU time of every frame as CSV.
+//!
+//! cargo run --release -p hough-heuristic --example edges -- frames/ --edges edges/ --times times.csv
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "what an example is for")]
+
+use std::error::Error;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::{Parser, ValueEnum};
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{
+    Canny, CannyConfig, EdgeDetector, FrameError, FrameSource, ImageFiles, ImageprocCanny,
+};
+
+/// Finds the edges of image files.
+#[derive(Parser)]
+struct Options {
+    /// Folder of images, or one image.
+    frames: PathBuf,
+    #[arg(long, value_enum, default_value = "canny")]
+    operator: Operator,
+    /// Folder, which must exist, to write the edge images to.
+    #[arg(long)]
+    edges: Option<PathBuf>,
+    /// Where to write the CPU times: file,cpu_us, the least of the repetitions.
+    #[arg(long)]
+    times: Option<PathBuf>,
+    #[arg(long, default_value_t = 5)]
+    reps: u32,
+    /// Lower threshold of the gradient.
+    #[arg(long, default_value_t = 30.0)]
+    low: f32,
+    /// Upper threshold of the gradient.
+    #[arg(long, default_value_t = 70.0)]
+    high: f32,
+    /// How far the frame's noise raises the thresholds; 0 keeps them.
+    #[arg(long, default_value_t = 5.0)]
+    noise_factor: f32,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Operator {
+    /// The crate's own.
+    Canny,
+    /// That of the crate imageproc.
+    Imageproc,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::parse();
+    let Options {
+        low,
+        high,
+        noise_factor,
+        ..
+    } = options;
+    let mut detector: Box<dyn EdgeDetector> = match options.operator {
+        Operator::Canny => Box::new(Canny::new(CannyConfig {
+            low,
+            high,
+            noise_factor,
+            ..CannyConfig::default()
+        })?),
+        Operator::Imageproc => Box::new(ImageprocCanny::new(low, high)?),
+    };
+    let mut files = ImageFiles::open(&options.frames)?;
+    let (mut table, mut all) = (String::from("file,cpu_us\n"), Vec::new());
+    loop {
+        let frame = match files.grab() {
+            Ok(frame) => frame,
+            Err(FrameError::End) => break,
+            Err(error) => {
+                eprintln!("skipped: {error}");
+                continue;
+            }
+        };
+        let name = PathBuf::from(
+            files
+                .last_path()
+                .and_then(|path| path.file_name())
+                .unwrap_or_default(),
+        );
+        let micros = least_micros(options.reps, &frame, &mut *detector);
+        all.push(micros);
+        writeln!(table, "{},{micros:.1}", name.display())?;
+        if let Some(folder) = &options.edges {
+            detector
+                .edges()
+                .image()
+                .save(folder.join(name.with_extension("png")))?;
+        }
+    }
+    if let Some(path) = &options.times {
+        std::fs::write(path, table)?;
+    }
+    all.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        all.get((all.len() as f64 * share) as usize)
+            .or(all.last())
+            .copied()
+            .unwrap_or_default()
+    };
+    println!(
+        "{} frames, CPU us: median {:.0}, 95 % {:.0}, most {:.0}",
+        all.len(),
+        at(0.5),
+        at(0.95),
+        at(1.0)
+    );
+    Ok(())
+}
+
+/// CPU time of this process, the least over the repetitions, microseconds.
+fn least_micros(reps: u32, frame: &GrayImage, detector: &mut dyn EdgeDetector) -> f64 {
+    let now = || {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        time.tv_sec as f64 * 1e6 + time.tv_nsec as f64 * 1e-3
+    };
+    (0..reps.max(1))
+        .map(|_| {
+            let start = now();
+            detector.detect_edges(frame);
+            now() - start
+        })
+        .fold(f64::INFINITY, f64::min)
+}

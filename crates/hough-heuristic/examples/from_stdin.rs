@@ -1,0 +1,51 @@
+//! Reads Y4M video from standard input and prints the circles of each frame as one line of JSON.
+//!
+//! ffmpeg -i balls.mp4 -f yuv4mpegpipe -pix_fmt yuv420p - | cargo run --release --features serde --example from_stdin
+
+use std::error::Error;
+use std::io::{BufReader, Write, stdin, stdout};
+
+use clap::Parser;
+use hough_heuristic::{
+    CircleDetector, Detection, FrameError, FrameSource, Heuristic, HeuristicConfig, Y4mFrames,
+};
+use serde_json::json;
+
+/// Finds circles in Y4M video from standard input; prints JSON lines.
+#[derive(Parser)]
+struct Options {
+    /// Smallest radius, pixels.
+    #[arg(long, default_value_t = 15.0)]
+    min_radius: f64,
+    /// Largest radius, pixels.
+    #[arg(long, default_value_t = 300.0)]
+    max_radius: f64,
+    /// The most circles per frame.
+    #[arg(long, default_value_t = 1)]
+    max_circles: usize,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::parse();
+    let mut detector = Heuristic::with_canny(HeuristicConfig {
+        min_radius: options.min_radius,
+        max_radius: options.max_radius,
+        max_circles: options.max_circles,
+        ..HeuristicConfig::default()
+    })?;
+    let mut frames = Y4mFrames::new(BufReader::new(stdin().lock()))?;
+    let mut found: Vec<Detection> = Vec::new();
+    for number in 1u64.. {
+        let frame = match frames.grab() {
+            Ok(frame) => frame,
+            Err(FrameError::End) => break,
+            Err(error) => return Err(error.into()),
+        };
+        detector.detect_into(&frame, &mut found);
+        // A reader that has seen enough closes the pipe.
+        if writeln!(stdout(), "{}", json!({ "frame": number, "circles": found })).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}

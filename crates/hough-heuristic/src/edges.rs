@@ -1,0 +1,159 @@
+//! The first stage: from a frame to its edge pixels, the paper's structure `D`.
+
+mod canny;
+mod dispatch;
+mod gradient;
+mod imageproc_canny;
+mod noise;
+#[cfg(test)]
+mod plain;
+mod rows;
+
+use image::GrayImage;
+
+pub use canny::{Canny, CannyConfig};
+pub use gradient::EdgeGradient;
+pub use imageproc_canny::ImageprocCanny;
+
+/// The coordinates of one edge pixel: a record of the paper's structure `D`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct EdgePixel {
+    /// Column, 0 at the left.
+    pub x: u32,
+    /// Row, 0 at the top.
+    pub y: u32,
+}
+
+/// The edges of one frame: as an image, and as the list of coordinates that the paper calls `D`.
+///
+/// The two always agree: the list holds every lighted pixel once, row by row.
+#[derive(Clone, Debug, Default)]
+pub struct EdgeMap {
+    image: GrayImage,
+    pixels: Vec<EdgePixel>,
+    /// One for each pixel, or none at all.
+    gradients: Vec<EdgeGradient>,
+}
+
+impl EdgeMap {
+    /// The map of an edge image: every pixel that is not 0 is an edge.
+    pub fn from_image(edges: &GrayImage) -> Self {
+        let mut map = Self::default();
+        map.copy_from(edges);
+        map
+    }
+
+    /// Replaces the map by that of an edge image in which every pixel that is not 0 is an edge.
+    ///
+    /// Reuses the memory of the map; this is what an [`EdgeDetector`] of one's own ends with.
+    pub fn copy_from(&mut self, edges: &GrayImage) {
+        self.clear(edges.width(), edges.height());
+        for (x, y, pixel) in edges.enumerate_pixels() {
+            if pixel.0[0] != 0 {
+                self.light(EdgePixel { x, y });
+            }
+        }
+    }
+
+    /// The edge image: 255 on an edge, 0 elsewhere, of the size of the frame.
+    pub fn image(&self) -> &GrayImage {
+        &self.image
+    }
+
+    /// The structure `D`: all edge pixels, row by row.
+    pub fn pixels(&self) -> &[EdgePixel] {
+        &self.pixels
+    }
+
+    /// The grey-level gradient at each pixel of [`pixels`](EdgeMap::pixels), in the same order; empty if the detector knows
+    /// none.
+    pub fn gradients(&self) -> &[EdgeGradient] {
+        &self.gradients
+    }
+
+    /// Where the edge runs at the pixel of this index in [`pixels`](EdgeMap::pixels), to a fraction of a pixel where the
+    /// detector knows it, else the centre of the pixel.
+    ///
+    /// # Panics
+    /// If there are not so many pixels.
+    pub fn position(&self, index: usize) -> (f64, f64) {
+        let pixel = self.pixels[index];
+        let (dx, dy) = self.gradients.get(index).map_or((0.0, 0.0), EdgeGradient::offset);
+        (f64::from(pixel.x) + dx, f64::from(pixel.y) + dy)
+    }
+
+    /// Columns of the frame.
+    pub fn width(&self) -> u32 {
+        self.image.width()
+    }
+
+    /// Rows of the frame.
+    pub fn height(&self) -> u32 {
+        self.image.height()
+    }
+
+    /// Makes this the map of a frame without edges, keeping the memory.
+    pub(crate) fn clear(&mut self, width: u32, height: u32) {
+        self.repaint(width, height, |bytes, _, _| bytes.fill(0));
+    }
+
+    /// Gives the map the size of a frame and lets `paint` set the image, whose old content is of no meaning, and the lists,
+    /// which come empty.
+    pub(crate) fn repaint(
+        &mut self,
+        width: u32,
+        height: u32,
+        paint: impl FnOnce(&mut [u8], &mut Vec<EdgePixel>, &mut Vec<EdgeGradient>),
+    ) {
+        self.pixels.clear();
+        self.gradients.clear();
+        let mut bytes = std::mem::take(&mut self.image).into_raw();
+        bytes.resize(width as usize * height as usize, 0);
+        paint(&mut bytes, &mut self.pixels, &mut self.gradients);
+        self.image = GrayImage::from_raw(width, height, bytes).unwrap_or_default();
+    }
+
+    fn light(&mut self, pixel: EdgePixel) {
+        self.image.put_pixel(pixel.x, pixel.y, image::Luma([255]));
+        self.pixels.push(pixel);
+    }
+}
+
+/// Finds the edge pixels of monochrome frames.
+///
+/// An edge detector owns its buffers, hence `&mut self` and the borrowed result. A frame so small that the operator is
+/// undefined on it (0x0 among them) has no edges; its map still has the size of the frame.
+pub trait EdgeDetector {
+    /// The edges of `frame`.
+    fn detect_edges<'a>(&'a mut self, frame: &GrayImage) -> &'a EdgeMap;
+
+    /// The edges found last; an empty map before the first frame.
+    fn edges(&self) -> &EdgeMap;
+}
+
+impl<E: EdgeDetector + ?Sized> EdgeDetector for Box<E> {
+    fn detect_edges<'a>(&'a mut self, frame: &GrayImage) -> &'a EdgeMap {
+        (**self).detect_edges(frame)
+    }
+
+    fn edges(&self) -> &EdgeMap {
+        (**self).edges()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn image_and_list_agree_after_reuse() {
+        let mut map = EdgeMap::from_image(&GrayImage::from_pixel(9, 7, image::Luma([1])));
+        assert_eq!(map.pixels().len(), 63);
+        let mut small = GrayImage::new(4, 3);
+        small.put_pixel(2, 1, image::Luma([255]));
+        map.copy_from(&small);
+        assert_eq!((map.width(), map.height()), (4, 3));
+        assert_eq!(map.pixels(), [EdgePixel { x: 2, y: 1 }]);
+        assert_eq!(map.image(), &small);
+    }
+}

@@ -1,0 +1,50 @@
+//! Chooses the widest vectors that the machine has.
+//!
+//! The one place of the crate with `unsafe` code: a function compiled for AVX2 may only be called where AVX2 is there, which
+//! the compiler cannot know and the call below makes sure of.
+#![allow(unsafe_code)]
+
+use super::rows::{self, Candidate, Passes, Rows};
+
+/// [`rows::candidates`] by the fastest code for this machine.
+pub(super) fn candidates(
+    passes: &Passes,
+    grey: &[u8],
+    width: usize,
+    rows: &mut Rows,
+    marks: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the function needs nothing but AVX2, which has just been detected.
+        unsafe { candidates_avx2(passes, grey, width, rows, marks, found) };
+        return;
+    }
+    candidates_baseline(passes, grey, width, rows, marks, found);
+}
+
+/// [`rows::candidates`] for the baseline of the target: SSE2, NEON, or no vectors at all.
+pub(super) fn candidates_baseline(
+    passes: &Passes,
+    grey: &[u8],
+    width: usize,
+    rows: &mut Rows,
+    marks: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
+    rows::candidates(passes, grey, width, rows, marks, found);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn candidates_avx2(
+    passes: &Passes,
+    grey: &[u8],
+    width: usize,
+    rows: &mut Rows,
+    marks: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
+    rows::candidates(passes, grey, width, rows, marks, found);
+}

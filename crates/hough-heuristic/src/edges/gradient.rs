@@ -1,0 +1,59 @@
+//! What an edge pixel knows of the grey levels around it.
+
+use super::rows::UNITS;
+
+/// The grey-level gradient at an edge pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EdgeGradient {
+    x: i16,
+    y: i16,
+    /// Squared length at the neighbour before, here, and at the neighbour behind, along the gradient's sector.
+    squares: [i32; 3],
+}
+
+impl EdgeGradient {
+    pub(super) fn new(x: i16, y: i16, squares: [i32; 3]) -> Self {
+        Self { x, y, squares }
+    }
+
+    /// The gradient, from dark to bright, in the units of [`CannyConfig::low`](crate::CannyConfig::low).
+    pub fn vector(&self) -> (f64, f64) {
+        (
+            f64::from(self.x) / f64::from(UNITS),
+            f64::from(self.y) / f64::from(UNITS),
+        )
+    }
+
+    /// The gradient's length, in the same units.
+    pub fn strength(&self) -> f64 {
+        f64::from(self.squares[1]).sqrt() / f64::from(UNITS)
+    }
+
+    /// From the centre of the pixel to where the gradient is steepest, pixels; each part is within half a pixel.
+    ///
+    /// The top of the parabola through the gradient's length here and at the two neighbours across the edge.
+    pub fn offset(&self) -> (f64, f64) {
+        let [before, here, behind] = self.squares.map(|square| f64::from(square).sqrt());
+        let bend = 2.0 * here - before - behind;
+        if bend <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let along = (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
+        let (dx, dy) = self.sector();
+        (along * f64::from(dx), along * f64::from(dy))
+    }
+
+    /// The step from the pixel to the neighbour behind.
+    fn sector(&self) -> (i8, i8) {
+        let (ax, ay) = (i32::from(self.x).abs(), i32::from(self.y).abs());
+        if super::rows::is_shallow(ay, ax) {
+            (1, 0)
+        } else if super::rows::is_shallow(ax, ay) {
+            (0, 1)
+        } else if (self.x ^ self.y) >= 0 {
+            (1, 1)
+        } else {
+            (-1, 1)
+        }
+    }
+}

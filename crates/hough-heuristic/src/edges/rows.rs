@@ -1,0 +1,299 @@
+//! The fused passes of Canny's operator over one row after another.
+//!
+//! Everything is integer arithmetic on short rows that stay in the nearest cache, written as plain loops over slices of one
+//! length, which the compiler turns into vector code. The same source is compiled for the baseline of the target and, in
+//! `dispatch`, for wider vectors; the results are the same by construction, and a test compares both with a plain version.
+
+use super::{EdgeGradient, EdgePixel};
+
+/// Grey levels are carried in sixteenths from the smoothing on.
+pub(super) const UNITS: f32 = 16.0;
+/// The smoothing weights of one direction sum up to this.
+pub(super) const WEIGHT_SUM: u16 = 64;
+/// The largest reach of the smoothing, pixels to either side.
+pub(super) const MAX_REACH: usize = 4;
+/// Pixels that are looked at together when maxima are sought.
+const BLOCK: usize = 32;
+/// `tan(22.5 degrees)` in units of 2^-15: where the sectors of the gradient direction meet.
+const TAN_22: i32 = 13573;
+
+/// What the passes need to know.
+#[derive(Clone, Debug)]
+pub(super) struct Passes {
+    /// Half of the symmetric smoothing kernel: the centre's weight, then outward.
+    pub(super) weights: Vec<u16>,
+    /// Squared thresholds of the gradient, in units.
+    pub(super) low: i32,
+    pub(super) high: i32,
+}
+
+/// The rows in work, reused from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    /// One row smoothed along the columns, in quarters of a grey level, `reach` pixels wider at either end.
+    across: Vec<u16>,
+    /// Three smoothed rows, in units, a pixel wider at either end.
+    smooth: [Vec<i16>; 3],
+    gradient: [GradientRow; 3],
+}
+
+#[derive(Clone, Debug, Default)]
+struct GradientRow {
+    x: Vec<i16>,
+    y: Vec<i16>,
+    /// Squared length.
+    square: Vec<i32>,
+}
+
+/// A pixel that is a maximum across its edge, and above the low threshold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    pub(super) pixel: EdgePixel,
+    pub(super) gradient: EdgeGradient,
+}
+
+/// The marks that [`maxima`] leaves in the edge image.
+pub(super) const WEAK: u8 = 1;
+/// See [`WEAK`].
+pub(super) const STRONG: u8 = 2;
+
+/// Marks the candidates of a frame of at least 3x3 pixels in `marks`, of the frame's size, and lists them row by row.
+#[inline(always)]
+pub(super) fn candidates(
+    passes: &Passes,
+    grey: &[u8],
+    width: usize,
+    rows: &mut Rows,
+    marks: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
+    let height = grey.len() / width;
+    rows.resize(width, passes.weights.len() - 1);
+    let last = height - 1;
+    for y in 0..=height {
+        // Row y is smoothed, then row y - 1 differentiated, then the maxima of row y - 2 found.
+        if y <= last {
+            rows.smooth_row(passes, grey, width, y);
+        }
+        if y >= 1 {
+            let middle = y - 1;
+            let (above, below) = (middle.saturating_sub(1), y.min(last));
+            let [a, b, c] = [above, middle, below].map(|row| &rows.smooth[row % 3]);
+            differentiate(a, b, c, &mut rows.gradient[middle % 3]);
+        }
+        if y >= 3 {
+            let row = y - 2;
+            let [a, b, c] = [row - 1, row, row + 1].map(|row| &rows.gradient[row % 3]);
+            maxima(passes, [a, b, c], row, &mut marks[row * width..][..width], found);
+        }
+    }
+    marks[..width].fill(0);
+    marks[last * width..].fill(0);
+}
+
+impl Rows {
+    /// Makes room for rows of `width` pixels. What an earlier frame left beyond them is never looked at in a way that shows.
+    fn resize(&mut self, width: usize, reach: usize) {
+        let blocks = 1 + (width - 2).next_multiple_of(BLOCK) + 1;
+        self.across.resize(width + 2 * reach, 0);
+        for row in &mut self.smooth {
+            row.resize(width + 2, 0);
+        }
+        for row in &mut self.gradient {
+            row.x.resize(blocks, 0);
+            row.y.resize(blocks, 0);
+            row.square.resize(blocks, 0);
+        }
+    }
+
+    #[inline(always)]
+    fn smooth_row(&mut self, passes: &Passes, grey: &[u8], width: usize, y: usize) {
+        let out = &mut self.smooth[y % 3];
+        // The reach as a constant lets the loops unroll.
+        match passes.weights[..] {
+            [_] => smooth::<0>(passes, grey, width, y, &mut self.across, out),
+            [_, _] => smooth::<1>(passes, grey, width, y, &mut self.across, out),
+            [_, _, _] => smooth::<2>(passes, grey, width, y, &mut self.across, out),
+            [_, _, _, _] => smooth::<3>(passes, grey, width, y, &mut self.across, out),
+            _ => smooth::<MAX_REACH>(passes, grey, width, y, &mut self.across, out),
+        }
+    }
+}
+
+/// Smooths row `y`, down the columns and then along the row; pixels beyond the border repeat the border's.
+#[inline(always)]
+fn smooth<const REACH: usize>(
+    passes: &Passes,
+    grey: &[u8],
+    width: usize,
+    y: usize,
+    across: &mut [u16],
+    out: &mut [i16],
+) {
+    let weights = &passes.weights[..=REACH];
+    let last = grey.len() / width - 1;
+    let row = |y: usize| &grey[y * width..][..width];
+    let centre = row(y);
+    let above: [&[u8]; REACH] = std::array::from_fn(|k| row(y.saturating_sub(k + 1)));
+    let below: [&[u8]; REACH] = std::array::from_fn(|k| row((y + k + 1).min(last)));
+    {
+        let down = &mut across[REACH..][..width];
+        for x in 0..width {
+            let mut sum = u16::from(centre[x]) * weights[0];
+            for k in 0..REACH {
+                sum += (u16::from(above[k][x]) + u16::from(below[k][x])) * weights[k + 1];
+            }
+            // 14 bits to 10: a sum of weights of 64 then just fits again.
+            down[x] = (sum + 8) >> 4;
+        }
+    }
+    let (first, end) = (across[REACH], across[REACH + width - 1]);
+    across[..REACH].fill(first);
+    across[REACH + width..].fill(end);
+    let taps: [&[u16]; MAX_REACH * 2 + 1] = std::array::from_fn(|k| &across[k.min(2 * REACH)..][..width]);
+    let inner = &mut out[1..=width];
+    for x in 0..width {
+        let mut sum = taps[REACH][x] * weights[0];
+        for k in 0..REACH {
+            sum += (taps[REACH - 1 - k][x] + taps[REACH + 1 + k][x]) * weights[k + 1];
+        }
+        inner[x] = ((sum + 8) >> 4) as i16;
+    }
+    out[0] = out[1];
+    out[width + 1] = out[width];
+}
+
+/// Sobel's two derivatives of the middle one of three rows.
+#[inline(always)]
+fn differentiate(a: &[i16], b: &[i16], c: &[i16], out: &mut GradientRow) {
+    let width = a.len() - 2;
+    let [a0, a1, a2] = [&a[..width], &a[1..][..width], &a[2..][..width]];
+    let [b0, b2] = [&b[..width], &b[2..][..width]];
+    let [c0, c1, c2] = [&c[..width], &c[1..][..width], &c[2..][..width]];
+    let (gx, gy, square) = (&mut out.x[..width], &mut out.y[..width], &mut out.square[..width]);
+    for x in 0..width {
+        let dx = (a2[x] - a0[x]) + 2 * (b2[x] - b0[x]) + (c2[x] - c0[x]);
+        let dy = (c0[x] - a0[x]) + 2 * (c1[x] - a1[x]) + (c2[x] - a2[x]);
+        gx[x] = dx;
+        gy[x] = dy;
+        square[x] = i32::from(dx) * i32::from(dx) + i32::from(dy) * i32::from(dy);
+    }
+}
+
+/// Marks the pixels of a row whose gradient is above the low threshold and a maximum across the edge.
+#[inline(always)]
+fn maxima(passes: &Passes, rows: [&GradientRow; 3], y: usize, marks: &mut [u8], found: &mut Vec<Candidate>) {
+    let last = marks.len() - 1;
+    marks[0] = 0;
+    marks[last] = 0;
+    for (index, out) in marks[1..last].chunks_mut(BLOCK).enumerate() {
+        let x = 1 + index * BLOCK;
+        let above = block(&rows[1].square, x)
+            .iter()
+            .fold(0, |most, &square| square.max(most));
+        if above <= passes.low {
+            out.fill(0);
+        } else {
+            block_maxima(passes, rows, (x, y), out, found);
+        }
+    }
+}
+
+/// [`maxima`] for a block of pixels: first all marks without a branch, then the list of the few that are set.
+#[inline(always)]
+fn block_maxima(
+    passes: &Passes,
+    [a, b, c]: [&GradientRow; 3],
+    (x, y): (usize, usize),
+    out: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
+    let (gx, gy) = (block(&b.x, x), block(&b.y, x));
+    let (a0, a1, a2) = (
+        block(&a.square, x - 1),
+        block(&a.square, x),
+        block(&a.square, x + 1),
+    );
+    let (b0, b1, b2) = (
+        block(&b.square, x - 1),
+        block(&b.square, x),
+        block(&b.square, x + 1),
+    );
+    let (c0, c1, c2) = (
+        block(&c.square, x - 1),
+        block(&c.square, x),
+        block(&c.square, x + 1),
+    );
+    let (mut before, mut behind, mut wide) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
+    for i in 0..BLOCK {
+        let (ax, ay) = (i32::from(gx[i]).abs(), i32::from(gy[i]).abs());
+        let level = mask(is_shallow(ay, ax));
+        let upright = mask(is_shallow(ax, ay));
+        let falling = mask((gx[i] ^ gy[i]) >= 0);
+        let choose = |mask: i32, yes: i32, no: i32| no ^ (mask & (yes ^ no));
+        before[i] = choose(
+            level,
+            b0[i],
+            choose(upright, a1[i], choose(falling, a0[i], a2[i])),
+        );
+        behind[i] = choose(
+            level,
+            b2[i],
+            choose(upright, c1[i], choose(falling, c2[i], c0[i])),
+        );
+    }
+    for i in 0..BLOCK {
+        let maximum = (b1[i] > passes.low) & (b1[i] > before[i]) & (b1[i] >= behind[i]);
+        wide[i] = mask(maximum) & (i32::from(WEAK) - mask(b1[i] > passes.high));
+    }
+    let mut marks = [0; BLOCK];
+    for i in 0..BLOCK {
+        marks[i] = wide[i] as u8;
+    }
+    // The last block of a row reaches over its end.
+    marks[out.len()..].fill(0);
+    out.copy_from_slice(&marks[..out.len()]);
+    for (eight, word) in marks.as_chunks::<8>().0.iter().enumerate() {
+        let mut bits = u64::from_le_bytes(*word);
+        while bits != 0 {
+            let offset = bits.trailing_zeros() as usize / 8;
+            bits &= !(0xff << (8 * offset));
+            // Always below BLOCK; the remainder spares the checks.
+            let i = (8 * eight + offset) % BLOCK;
+            found.push(candidate(
+                (x + i, y),
+                (gx[i], gy[i]),
+                [before[i], b1[i], behind[i]],
+            ));
+        }
+    }
+}
+
+/// The block of a row that begins at `x`, as an array: its fixed length is what makes the loops below vector code.
+#[inline(always)]
+fn block<T>(row: &[T], x: usize) -> &[T; BLOCK] {
+    &row[x..x + BLOCK].as_chunks().0[0]
+}
+
+/// All bits set, or none.
+#[inline(always)]
+fn mask(condition: bool) -> i32 {
+    -i32::from(condition)
+}
+
+/// Whether a direction with these absolute components lies within 22.5 degrees of the axis of `along`.
+#[inline(always)]
+pub(super) fn is_shallow(across: i32, along: i32) -> bool {
+    (across << 15) < along * TAN_22
+}
+
+#[inline(always)]
+fn candidate((x, y): (usize, usize), (gx, gy): (i16, i16), squares: [i32; 3]) -> Candidate {
+    Candidate {
+        pixel: EdgePixel {
+            x: x as u32,
+            y: y as u32,
+        },
+        gradient: EdgeGradient::new(gx, gy, squares),
+    }
+}

@@ -1,0 +1,358 @@
+use std::io::{self, Read};
+
+use image::GrayImage;
+
+use super::{FrameError, FrameSource};
+use crate::ConfigError;
+
+/// The longest line of a Y4M header that is read, bytes.
+const MAX_LINE: usize = 1024;
+/// The most pixels of a frame: what a damaged header may not exceed.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// A [`FrameSource`] over a YUV4MPEG2 (Y4M) stream of 8-bit video, of which it takes the luma.
+///
+/// So a live camera comes in through a pipe:
+///
+/// ```text
+/// ffmpeg -i /dev/video0 -f yuv4mpegpipe -pix_fmt yuv420p - | your-program
+/// ```
+///
+/// A stream that ends in the middle of a frame delivers the frames before it, then an error that names the frame, then
+/// [`FrameError::End`]. After an error nothing more is read.
+#[derive(Debug)]
+pub struct Y4mFrames<R> {
+    stream: Stream<R>,
+    /// Bytes of chroma after each luma plane.
+    chroma: u64,
+}
+
+impl<R: Read> Y4mFrames<R> {
+    /// Reads the stream's header. Give a buffered reader, such as `stdin().lock()`.
+    ///
+    /// # Errors
+    /// [`FrameError::Failed`] if there is no Y4M header, or one of a format that is not read, with what it says.
+    pub fn new(mut reader: R) -> Result<Self, FrameError> {
+        let header = match read_line(&mut reader) {
+            Ok(Some(line)) => line,
+            Ok(None) => return Err(failed("the stream is empty".into())),
+            Err(error) => return Err(failed(format!("no header: {error}"))),
+        };
+        let (width, height, chroma) = parse_header(&header).map_err(failed)?;
+        Ok(Self {
+            stream: Stream::new(reader, width, height),
+            chroma,
+        })
+    }
+
+    /// Width and height of the frames, pixels.
+    pub fn dimensions(&self) -> (u32, u32) {
+        (self.stream.width, self.stream.height)
+    }
+}
+
+impl<R: Read> FrameSource for Y4mFrames<R> {
+    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+        let chroma = self.chroma;
+        self.stream.next(|reader, luma| {
+            match read_line(reader)? {
+                None => return Ok(false),
+                Some(line) if line.starts_with(b"FRAME") => {}
+                Some(_) => {
+                    return Err(io::Error::new(
+                        io::ErrorKind::InvalidData,
+                        "it does not begin with FRAME",
+                    ));
+                }
+            }
+            reader.read_exact(luma)?;
+            let skipped = io::copy(&mut reader.by_ref().take(chroma), &mut io::sink())?;
+            if skipped < chroma {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            Ok(true)
+        })
+    }
+}
+
+/// A [`FrameSource`] over raw 8-bit monochrome frames that follow one another without any header.
+///
+/// ```text
+/// ffmpeg -i /dev/video0 -f rawvideo -pix_fmt gray -s 768x576 - | your-program
+/// ```
+///
+/// A stream that ends in the middle of a frame is treated as by [`Y4mFrames`].
+#[derive(Debug)]
+pub struct RawFrames<R> {
+    stream: Stream<R>,
+}
+
+impl<R: Read> RawFrames<R> {
+    /// Frames of `width` x `height` pixels from `reader`.
+    ///
+    /// # Errors
+    /// [`ConfigError::OutOfRange`] if a side is 0 or a frame has more than 2^28 pixels.
+    pub fn new(reader: R, width: u32, height: u32) -> Result<Self, ConfigError> {
+        for (parameter, side) in [("width", width), ("height", height)] {
+            let usable = side > 0 && u64::from(width) * u64::from(height) <= MAX_PIXELS;
+            let expected = "at least 1, with at most 2^28 pixels in all";
+            crate::error::require(parameter, side.into(), expected, usable)?;
+        }
+        Ok(Self {
+            stream: Stream::new(reader, width, height),
+        })
+    }
+}
+
+impl<R: Read> FrameSource for RawFrames<R> {
+    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+        self.stream.next(|reader, luma| {
+            // An end before the first byte is the ordinary one.
+            let Some(first) = read_byte(reader)? else {
+                return Ok(false);
+            };
+            luma[0] = first;
+            reader.read_exact(&mut luma[1..])?;
+            Ok(true)
+        })
+    }
+}
+
+/// What both streams share: counting frames, and stopping at the first that fails.
+#[derive(Debug)]
+struct Stream<R> {
+    reader: R,
+    width: u32,
+    height: u32,
+    delivered: u64,
+    ended: bool,
+}
+
+impl<R: Read> Stream<R> {
+    fn new(reader: R, width: u32, height: u32) -> Self {
+        Self {
+            reader,
+            width,
+            height,
+            delivered: 0,
+            ended: false,
+        }
+    }
+
+    /// The next frame, its luma filled in by `read`, which says false at the ordinary end.
+    fn next(
+        &mut self,
+        read: impl FnOnce(&mut R, &mut [u8]) -> io::Result<bool>,
+    ) -> Result<GrayImage, FrameError> {
+        if self.ended {
+            return Err(FrameError::End);
+        }
+        let mut frame = GrayImage::new(self.width, self.height);
+        match read(&mut self.reader, &mut frame) {
+            Ok(true) => {
+                self.delivered += 1;
+                Ok(frame)
+            }
+            Ok(false) => {
+                self.ended = true;
+                Err(FrameError::End)
+            }
+            Err(error) => {
+                self.ended = true;
+                let number = self.delivered + 1;
+                Err(failed(if error.kind() == io::ErrorKind::UnexpectedEof {
+                    format!("the stream ends in the middle of frame {number}")
+                } else {
+                    format!("frame {number} cannot be read: {error}")
+                }))
+            }
+        }
+    }
+}
+
+fn failed(reason: String) -> FrameError {
+    FrameError::Failed {
+        origin: "frame stream".into(),
+        reason,
+    }
+}
+
+/// Width, height, and bytes of chroma per frame.
+fn parse_header(line: &[u8]) -> Result<(u32, u32, u64), String> {
+    let text = String::from_utf8_lossy(line);
+    let mut fields = text.split_ascii_whitespace();
+    if fields.next() != Some("YUV4MPEG2") {
+        return Err("not a Y4M stream: it does not begin with YUV4MPEG2".into());
+    }
+    let (mut width, mut height, mut colour) = (None, None, "420");
+    for field in fields {
+        match field.split_at_checked(1) {
+            Some(("W", value)) => width = value.parse::<u32>().ok(),
+            Some(("H", value)) => height = value.parse::<u32>().ok(),
+            Some(("C", value)) => colour = value,
+            _ => {}
+        }
+    }
+    let (Some(width @ 1..), Some(height @ 1..)) = (width, height) else {
+        return Err(format!(
+            "the Y4M header gives no usable width and height: {text:?}"
+        ));
+    };
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > MAX_PIXELS {
+        return Err(format!(
+            "frames of {width}x{height} px are more than the 2^28 pixels that are read"
+        ));
+    }
+    let (half_width, half_height) = (u64::from(width.div_ceil(2)), u64::from(height.div_ceil(2)));
+    let chroma = match colour {
+        "mono" => 0,
+        "420" | "420jpeg" | "420mpeg2" | "420paldv" => 2 * half_width * half_height,
+        "411" => 2 * u64::from(width.div_ceil(4)) * u64::from(height),
+        "422" => 2 * half_width * u64::from(height),
+        "444" => 2 * pixels,
+        "444alpha" => 3 * pixels,
+        other => {
+            return Err(format!(
+                "Y4M colour space {other:?} is not read; convert to 8 bits, for example with -pix_fmt yuv420p"
+            ));
+        }
+    };
+    Ok((width, height, chroma))
+}
+
+/// A line without its end; none at the end of the stream.
+fn read_line(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
+    let mut line = Vec::new();
+    loop {
+        match read_byte(reader)? {
+            None if line.is_empty() => return Ok(None),
+            None => return Err(io::ErrorKind::UnexpectedEof.into()),
+            Some(b'\n') => return Ok(Some(line)),
+            Some(_) if line.len() == MAX_LINE => {
+                return Err(io::Error::new(
+                    io::ErrorKind::InvalidData,
+                    "its first line is too long",
+                ));
+            }
+            Some(byte) => line.push(byte),
+        }
+    }
+}
+
+fn read_byte(reader: &mut impl Read) -> io::Result<Option<u8>> {
+    let mut byte = [0];
+    loop {
+        match reader.read(&mut byte) {
+            Ok(0) => return Ok(None),
+            Ok(_) => return Ok(Some(byte[0])),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `count` frames of 5x3 pixels whose luma is their number, in this colour space.
+    fn y4m(colour: &str, chroma: usize, count: u8) -> Vec<u8> {
+        let mut bytes = format!("YUV4MPEG2 W5 H3 F25:1 Ip{colour}\n").into_bytes();
+        for number in 0..count {
+            bytes.extend(b"FRAME\n");
+            bytes.extend([number; 15]);
+            bytes.extend(std::iter::repeat_n(99, chroma));
+        }
+        bytes
+    }
+
+    fn greys(source: &mut impl FrameSource) -> (Vec<u8>, String) {
+        let mut greys = Vec::new();
+        loop {
+            match source.grab() {
+                Ok(frame) => {
+                    assert_eq!(frame.dimensions(), (5, 3));
+                    assert!(frame.iter().all(|&grey| grey == frame.as_raw()[0]));
+                    greys.push(frame.as_raw()[0]);
+                }
+                Err(FrameError::End) => return (greys, String::new()),
+                Err(error) => {
+                    assert!(matches!(source.grab(), Err(FrameError::End)));
+                    return (greys, error.to_string());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_colour_space_gives_its_luma() {
+        for (colour, chroma) in [
+            ("", 12),
+            (" C420jpeg", 12),
+            (" C411", 12),
+            (" C422", 18),
+            (" C444", 30),
+            (" C444alpha", 45),
+            (" Cmono", 0),
+        ] {
+            let bytes = y4m(colour, chroma, 3);
+            let mut frames = Y4mFrames::new(&bytes[..]).unwrap();
+            assert_eq!(greys(&mut frames), (vec![0, 1, 2], String::new()), "{colour}");
+        }
+    }
+
+    #[test]
+    fn a_stream_cut_anywhere_delivers_what_was_whole_and_names_the_frame() {
+        let bytes = y4m(" C420", 12, 3);
+        let frame = (bytes.len() - y4m(" C420", 12, 0).len()) / 3;
+        let header = bytes.len() - 3 * frame;
+        for end in header..bytes.len() {
+            let (greys, error) = greys(&mut Y4mFrames::new(&bytes[..end]).unwrap());
+            let whole = (end - header) / frame;
+            assert_eq!(greys.len(), whole, "{end}");
+            let cut = !(end - header).is_multiple_of(frame);
+            assert_eq!(
+                error.contains(&format!("frame {}", whole + 1)),
+                cut,
+                "{end}: {error}"
+            );
+        }
+        for end in 0..header {
+            assert!(Y4mFrames::new(&bytes[..end]).is_err());
+        }
+    }
+
+    #[test]
+    fn headers_that_cannot_be_read_are_refused() {
+        for header in [
+            "",
+            "RIFF",
+            "YUV4MPEG2\n",
+            "YUV4MPEG2 W5\n",
+            "YUV4MPEG2 W0 H3\n",
+            "YUV4MPEG2 W-5 H3\n",
+            "YUV4MPEG2 W5 H3 C420p10\n",
+            "YUV4MPEG2 W60000 H60000\n",
+            "YUV4MPEG2 W99999999999 H3\n",
+        ] {
+            assert!(Y4mFrames::new(header.as_bytes()).is_err(), "{header:?}");
+        }
+        let endless = io::repeat(b'Y');
+        assert!(Y4mFrames::new(endless).is_err());
+    }
+
+    #[test]
+    fn raw_frames_follow_one_another() {
+        let bytes: Vec<u8> = (0..4u8).flat_map(|number| [number; 15]).collect();
+        assert_eq!(
+            greys(&mut RawFrames::new(&bytes[..], 5, 3).unwrap()),
+            (vec![0, 1, 2, 3], String::new())
+        );
+        let (delivered, error) = greys(&mut RawFrames::new(&bytes[..50], 5, 3).unwrap());
+        assert_eq!(delivered, [0, 1, 2]);
+        assert!(error.contains("frame 4"), "{error}");
+        assert!(RawFrames::new(&bytes[..], 0, 3).is_err());
+        assert!(RawFrames::new(&bytes[..], u32::MAX, u32::MAX).is_err());
+    }
+}

@@ -1,0 +1,338 @@
+//! The paper's detector: sample three edge pixels, look at the edge image itself, keep no accumulator.
+
+use std::time::{Duration, Instant};
+
+use image::GrayImage;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
+
+use crate::belonging::Probes;
+use crate::curve::circles_of_radius;
+use crate::error::require;
+use crate::evidence::{Evidence, rank};
+use crate::structure::Structure;
+use crate::{
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Curve, Detection, EdgeDetector, EdgeMap, Region,
+};
+
+/// Where the pixels of a draw come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Sampling {
+    /// All from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all edge pixels, one draw of
+    /// three in `p^-3` hits it.
+    Anywhere,
+    /// The first from the whole of `D`; the others from a window around it that is as wide as a circle of some radius
+    /// between the smallest and the largest can reach, the radius drawn anew each time (small ones more often: its
+    /// logarithm is uniform). Beyond the paper; in clutter it hits a small ball hundreds of times as often.
+    #[default]
+    Near,
+}
+
+/// The settings of [`Heuristic`].
+///
+/// The defaults suit the paper's frames of 768x576 pixels with one ball of radius 20 to 290 px amid moderate clutter.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct HeuristicConfig {
+    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more hidden are found, and more
+    /// circles that are none.
+    pub theta: f64,
+    /// How many triples are drawn at most per frame (default 60000; at least 1). Bounds the time; more finds fainter and
+    /// smaller balls amid more clutter.
+    pub iterations: u32,
+    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1, corners and
+    /// texture begin to pass for circles.
+    pub min_radius: f64,
+    /// The largest radius, pixels (default 300; at least min_radius). If it equals `min_radius` the radius is known: draws
+    /// are of two pixels, and only the centre is fitted.
+    pub max_radius: f64,
+    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than
+    /// round is forgiven, and texture matches more by chance.
+    pub tolerance: f64,
+    /// How many circles to look for (default 1; at least 1). The search ends with the last one found; if there are fewer
+    /// in the frame it uses all of `iterations`.
+    pub max_circles: usize,
+    /// The least distance between the centres of two circles found, pixels (default 8; at least 0). 0 allows concentric ones.
+    pub min_distance: f64,
+    /// Where the centre may lie (default None: anywhere, even outside the frame).
+    pub region: Option<Region>,
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). Beyond the paper: three whole
+    /// pixels give the centre to about a pixel, the fit to a twentieth.
+    pub refine: bool,
+    /// Where draws come from (default [`Sampling::Near`]).
+    pub sampling: Sampling,
+    /// The seed of the draws (default 1). They begin anew with every frame, so that what is found depends on the
+    /// configuration and the frame alone.
+    pub seed: u64,
+}
+
+impl Default for HeuristicConfig {
+    fn default() -> Self {
+        let Acceptance {
+            theta,
+            tolerance,
+            min_radius,
+            max_radius,
+            max_circles,
+            min_distance,
+            region,
+            refine,
+        } = Acceptance::default();
+        Self {
+            theta,
+            iterations: 60_000,
+            min_radius,
+            max_radius,
+            tolerance,
+            max_circles,
+            min_distance,
+            region,
+            refine,
+            sampling: Sampling::default(),
+            seed: 1,
+        }
+    }
+}
+
+impl HeuristicConfig {
+    fn acceptance(&self) -> Acceptance {
+        Acceptance {
+            theta: self.theta,
+            tolerance: self.tolerance,
+            min_radius: self.min_radius,
+            max_radius: self.max_radius,
+            max_circles: self.max_circles,
+            min_distance: self.min_distance,
+            region: self.region,
+            refine: self.refine,
+        }
+    }
+}
+
+/// How long the stages of the last frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageTimes {
+    /// Finding the edges.
+    pub edges: Duration,
+    /// Arranging the edge pixels as the structure `D`, and marking what lies near them.
+    pub structure: Duration,
+    /// Drawing, checking, fitting.
+    pub search: Duration,
+}
+
+/// The heuristic of section 2.1 of the paper, for circles.
+///
+/// All edge pixels form the structure `D`. Until the budget is spent: draw three of them, solve for the circle through
+/// them, and count how many pixels of that circle are edges. Their share is the *belonging* β; a circle with β above the
+/// offset θ is there. Its edge pixels are then taken out of `D`, and the search goes on for the next.
+///
+/// **How β is counted.** The estimated circle is rasterised by the midpoint rule into a thin outline of about 5.7 pixels
+/// per pixel of radius. A pixel of it matches when an edge pixel lies within `tolerance`. β is the share of the matching
+/// pixels in all pixels of the outline; those that lie outside the frame count as pixels and never match, so a ball cut
+/// in half by the border has a β of at most about one half.
+///
+/// **Beyond the paper.** A hopeless draw is mostly turned away after a look at 8 to 32 pixels of its outline, which can
+/// delay a circle whose β barely exceeds θ but never lets in one that does not; [`Sampling::Near`]; and the final fit.
+///
+/// The score of a [`Detection`] is β of the circle as reported. It means the same at every radius.
+#[derive(Clone, Debug)]
+pub struct Heuristic<E = Canny> {
+    config: HeuristicConfig,
+    edge_detector: E,
+    probes: Probes,
+    /// The reaches of [`Sampling::Near`], pixels.
+    reaches: Vec<f64>,
+    evidence: Evidence,
+    candidates: Option<Vec<Circle>>,
+    times: StageTimes,
+}
+
+impl Heuristic<Canny> {
+    /// A detector on the edges of [`Canny`] with its default thresholds.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn with_canny(config: HeuristicConfig) -> Result<Self, ConfigError> {
+        Self::new(config, Canny::default())
+    }
+}
+
+impl<E: EdgeDetector> Heuristic<E> {
+    /// A detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn new(config: HeuristicConfig, edge_detector: E) -> Result<Self, ConfigError> {
+        require(
+            "iterations",
+            config.iterations.into(),
+            "at least 1",
+            config.iterations > 0,
+        )?;
+        Ok(Self {
+            evidence: Evidence::new(config.acceptance())?,
+            edge_detector,
+            probes: Probes::new(config.theta),
+            reaches: reaches(config.min_radius, config.max_radius),
+            candidates: None,
+            times: StageTimes::default(),
+            config,
+        })
+    }
+
+    /// Whether to remember the candidates of each frame from now on, for [`candidates`](Heuristic::candidates).
+    pub fn keep_candidates(&mut self, keep: bool) {
+        self.candidates = keep.then(Vec::new);
+    }
+
+    /// The edges of the last frame; empty before the first.
+    pub fn edges(&self) -> &EdgeMap {
+        self.edge_detector.edges()
+    }
+
+    /// The circles of the last frame that passed the first look, if they are [kept](Heuristic::keep_candidates).
+    pub fn candidates(&self) -> &[Circle] {
+        self.candidates.as_deref().unwrap_or_default()
+    }
+
+    /// How long the stages of the last frame took.
+    pub fn times(&self) -> StageTimes {
+        self.times
+    }
+
+    /// The settings the detector was built with.
+    pub fn config(&self) -> &HeuristicConfig {
+        &self.config
+    }
+
+    /// The memory that the circle search holds, bytes, edges not included.
+    pub fn memory(&self) -> usize {
+        self.evidence.memory()
+    }
+}
+
+/// A draw that ended the search, or the circle it determines, if it determines one.
+enum Draw {
+    Exhausted,
+    Nothing,
+    Circle(Circle),
+}
+
+/// Draws pixels and solves for the circle: the paper's steps 3a and 3b.
+struct Sampler<'a> {
+    sampling: Sampling,
+    known_radius: Option<f64>,
+    reaches: &'a [f64],
+    rng: Xoshiro256PlusPlus,
+}
+
+impl Sampler<'_> {
+    fn draw(&mut self, structure: &Structure) -> Draw {
+        let circle = match self.known_radius {
+            Some(radius) => self.pixels::<2>(structure).map(|pair| {
+                let side = self.rng.next_u32() as usize % 2;
+                circles_of_radius(pair, radius).map(|both| both[side])
+            }),
+            None => self.pixels::<3>(structure).map(|triple| Circle::through(&triple)),
+        };
+        match circle {
+            None => Draw::Exhausted,
+            Some(None) => Draw::Nothing,
+            Some(Some(circle)) => Draw::Circle(circle),
+        }
+    }
+
+    fn pixels<const N: usize>(&mut self, structure: &Structure) -> Option<[crate::EdgePixel; N]> {
+        match self.sampling {
+            Sampling::Anywhere => structure.draw_anywhere(&mut self.rng),
+            Sampling::Near => {
+                let reach = self.reaches[self.rng.next_u32() as usize % self.reaches.len()];
+                structure.draw_near(reach, &mut self.rng)
+            }
+        }
+    }
+}
+
+impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
+    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
+        found.clear();
+        let start = Instant::now();
+        let edges = self.edge_detector.detect_edges(frame);
+        let with_edges = Instant::now();
+        let evidence = &mut self.evidence;
+        evidence.fill(edges);
+        let with_structure = Instant::now();
+
+        if let Some(candidates) = &mut self.candidates {
+            candidates.clear();
+        }
+        let mut sampler = Sampler {
+            sampling: self.config.sampling,
+            known_radius: evidence.acceptance.known_radius(),
+            reaches: &self.reaches,
+            rng: Xoshiro256PlusPlus::seed_from_u64(self.config.seed),
+        };
+        for _ in 0..self.config.iterations {
+            let circle = match sampler.draw(&evidence.structure) {
+                Draw::Exhausted => break,
+                Draw::Nothing => continue,
+                Draw::Circle(circle) => circle,
+            };
+            if !evidence.acceptance.admits(&circle, found) || !evidence.near.promising(&circle, &self.probes)
+            {
+                continue;
+            }
+            if let Some(candidates) = &mut self.candidates {
+                candidates.push(circle);
+            }
+            if let Some(detection) = evidence.check(circle) {
+                evidence.accept(edges, detection, found);
+                if found.len() == self.config.max_circles {
+                    break;
+                }
+            }
+        }
+        rank(found);
+        self.times = StageTimes {
+            edges: with_edges - start,
+            structure: with_structure - with_edges,
+            search: with_structure.elapsed(),
+        };
+    }
+}
+
+/// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
+///
+/// For one-off use: the [`Heuristic`] on [`Canny`] edges with the default settings, and up to 32 circles. For a stream
+/// of frames build a detector once.
+///
+/// # Errors
+/// [`ConfigError::RadiusRange`] if the range is empty, or its lower end is below 1.
+pub fn detect_circles(
+    frame: &GrayImage,
+    min_radius: f64,
+    max_radius: f64,
+) -> Result<Vec<Detection>, ConfigError> {
+    let config = HeuristicConfig {
+        min_radius,
+        max_radius,
+        max_circles: 32,
+        ..HeuristicConfig::default()
+    };
+    Ok(Heuristic::with_canny(config)?.detect(frame))
+}
+
+/// How far the windows reach: 64 diameters, each longer than the one before by the same factor.
+pub(crate) fn reaches(min_radius: f64, max_radius: f64) -> Vec<f64> {
+    // The 64th root by square roots, which have the same bits on every platform.
+    let factor = (0..6).fold(max_radius / min_radius, |root, _| root.sqrt());
+    let mut reach = 2.0 * min_radius;
+    (0..64)
+        .map(|_| {
+            reach *= factor;
+            reach.ceil()
+        })
+        .collect()
+}

@@ -1,0 +1,278 @@
+//! The randomized Hough transform, the nearer of the paper's two rivals.
+
+use image::GrayImage;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
+
+use crate::error::require;
+use crate::evidence::{Evidence, rank};
+use crate::heuristic::reaches;
+use crate::{
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Curve, Detection, EdgeDetector, EdgeMap, Sampling,
+};
+
+/// The settings of [`RandomizedHough`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RandomizedHoughConfig {
+    /// Which circles are reported.
+    pub accept: Acceptance,
+    /// How many triples are drawn at most per frame (default 60000; at least 1).
+    pub iterations: u32,
+    /// How many triples must agree before their circle is verified (default 2; 2..=255). More: fewer verifications, and
+    /// many more draws.
+    pub votes: u32,
+    /// Side of a cell of the parameter space, pixels, the same for centre and radius (default 4; 0.5..=64). Smaller: cells
+    /// are more exact, and triples of one circle agree more rarely.
+    pub cell: f64,
+    /// Where draws come from (default [`Sampling::Near`]). [`Sampling::Anywhere`] is Xu and Oja's.
+    pub sampling: Sampling,
+    /// The seed of the draws (default 1). They begin anew with every frame.
+    pub seed: u64,
+}
+
+impl Default for RandomizedHoughConfig {
+    fn default() -> Self {
+        Self {
+            accept: Acceptance::default(),
+            iterations: 60_000,
+            votes: 2,
+            cell: 4.0,
+            sampling: Sampling::default(),
+            seed: 1,
+        }
+    }
+}
+
+/// The randomized Hough transform (Xu, Oja and Kultanen, 1990) for circles.
+///
+/// Draws three edge pixels, solves for their circle, and votes for one cell of the parameter space instead of a surface of
+/// it. Only cells that got a vote exist, in a hash table. When enough triples have voted for a cell, their mean circle is
+/// verified in the edge image: looked at in a few places as [`Heuristic`](crate::Heuristic) does, fitted to the
+/// edge pixels around it, and accepted if its β is above θ. Then its pixels are
+/// removed and the accumulator is emptied; a cell that fails is emptied alone.
+///
+/// The score of a [`Detection`] is the β of the circle as reported, counted as [`Heuristic`](crate::Heuristic) counts it.
+#[derive(Clone, Debug)]
+pub struct RandomizedHough<E = Canny> {
+    config: RandomizedHoughConfig,
+    edge_detector: E,
+    reaches: Vec<f64>,
+    evidence: Evidence,
+    cells: Cells,
+}
+
+impl<E: EdgeDetector> RandomizedHough<E> {
+    /// A detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn new(config: RandomizedHoughConfig, edge_detector: E) -> Result<Self, ConfigError> {
+        let RandomizedHoughConfig {
+            accept,
+            iterations,
+            votes,
+            cell,
+            ..
+        } = config;
+        require("iterations", iterations.into(), "at least 1", iterations > 0)?;
+        require("votes", votes.into(), "2..=255", (2..=255).contains(&votes))?;
+        require("cell", cell, "0.5..=64 px", (0.5..=64.0).contains(&cell))?;
+        Ok(Self {
+            evidence: Evidence::new(accept)?,
+            reaches: reaches(accept.min_radius, accept.max_radius),
+            edge_detector,
+            cells: Cells::default(),
+            config,
+        })
+    }
+
+    /// The edges of the last frame; empty before the first.
+    pub fn edges(&self) -> &EdgeMap {
+        self.edge_detector.edges()
+    }
+
+    /// The memory that the circle search holds, bytes, edges not included.
+    pub fn memory(&self) -> usize {
+        self.evidence.memory() + size_of::<Cell>() * self.cells.slots.capacity()
+    }
+}
+
+impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
+    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
+        found.clear();
+        let edges = self.edge_detector.detect_edges(frame);
+        let evidence = &mut self.evidence;
+        evidence.fill(edges);
+        self.cells.clear();
+        let RandomizedHoughConfig {
+            accept, votes, cell, ..
+        } = self.config;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.config.seed);
+        for _ in 0..self.config.iterations {
+            let pixels = match self.config.sampling {
+                Sampling::Anywhere => evidence.structure.draw_anywhere::<3>(&mut rng),
+                Sampling::Near => {
+                    let reach = self.reaches[rng.next_u32() as usize % self.reaches.len()];
+                    evidence.structure.draw_near(reach, &mut rng)
+                }
+            };
+            let Some(pixels) = pixels else { break };
+            let Some(circle) = Circle::through(&pixels) else {
+                continue;
+            };
+            // Triples scatter around a known radius, so votes are taken from a cell beyond the range.
+            let radii = accept.min_radius - cell..=accept.max_radius + cell;
+            if !radii.contains(&circle.radius) || accept.region.is_some_and(|region| !region.holds(&circle)) {
+                continue;
+            }
+            let Some(mean) = self.cells.vote(&circle, cell, votes) else {
+                continue;
+            };
+            let mean = Circle {
+                radius: mean.radius.clamp(accept.min_radius, accept.max_radius),
+                ..mean
+            };
+            if !evidence.might_be(&mean) {
+                continue;
+            }
+            let reach = cell.max(2.0 * accept.tolerance + 1.0);
+            let verified = evidence
+                .fitted(edges, mean, reach)
+                .filter(|circle| accept.admits(circle, found))
+                .and_then(|circle| evidence.check(circle));
+            if let Some(detection) = verified {
+                evidence.accept(edges, detection, found);
+                self.cells.clear();
+                if found.len() == accept.max_circles {
+                    break;
+                }
+            }
+        }
+        rank(found);
+    }
+}
+
+/// A cell of the parameter space and the circles that voted for it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cell {
+    key: u64,
+    /// The cells of earlier frames, and of before a circle was found, have another round.
+    round: u32,
+    votes: u32,
+    x: f64,
+    y: f64,
+    radius: f64,
+}
+
+/// The sparse accumulator: a hash table with open addressing that keeps its memory from frame to frame.
+#[derive(Clone, Debug, Default)]
+struct Cells {
+    slots: Vec<Cell>,
+    used: usize,
+    round: u32,
+}
+
+impl Cells {
+    fn clear(&mut self) {
+        self.used = 0;
+        self.round = self.round.wrapping_add(1);
+        if self.round == 0 {
+            self.slots.fill(Cell::default());
+            self.round = 1;
+        }
+    }
+
+    /// Counts a vote; the mean of the circles in the cell, which is then emptied, if that was the last vote it needed.
+    fn vote(&mut self, circle: &Circle, side: f64, needed: u32) -> Option<Circle> {
+        if 2 * (self.used + 1) > self.slots.len() {
+            self.grow();
+        }
+        let key = key(circle, side);
+        let place = self.place(key);
+        let cell = &mut self.slots[place];
+        if cell.round != self.round {
+            *cell = Cell {
+                key,
+                round: self.round,
+                ..Cell::default()
+            };
+            self.used += 1;
+        }
+        cell.votes += 1;
+        cell.x += circle.x;
+        cell.y += circle.y;
+        cell.radius += circle.radius;
+        if cell.votes < needed {
+            return None;
+        }
+        let votes = f64::from(cell.votes);
+        let mean = Circle {
+            x: cell.x / votes,
+            y: cell.y / votes,
+            radius: cell.radius / votes,
+        };
+        *cell = Cell {
+            key,
+            round: self.round,
+            ..Cell::default()
+        };
+        Some(mean)
+    }
+
+    /// Where the cell of this key is, or would be.
+    fn place(&self, key: u64) -> usize {
+        let mask = self.slots.len() - 1;
+        let mut place = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
+        while self.slots[place].round == self.round && self.slots[place].key != key {
+            place = (place + 1) & mask;
+        }
+        place
+    }
+
+    fn grow(&mut self) {
+        let larger = vec![Cell::default(); (2 * self.slots.len()).max(1024)];
+        let old = std::mem::replace(&mut self.slots, larger);
+        for cell in old {
+            if cell.round == self.round {
+                let place = self.place(cell.key);
+                self.slots[place] = cell;
+            }
+        }
+    }
+}
+
+/// The cell of a circle, 21 bits for each parameter. Radii are bounded, and centres that overflow share a cell at worst.
+fn key(circle: &Circle, side: f64) -> u64 {
+    let part = |value: f64| ((value / side).floor() as i64 & 0x1f_ffff) as u64;
+    part(circle.x) << 42 | part(circle.y) << 21 | part(circle.radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_told_apart_while_the_table_grows_and_forgotten_when_it_is_cleared() {
+        let mut cells = Cells::default();
+        cells.clear();
+        let at = |k: i32| Circle {
+            x: f64::from(k % 71) * 4.0 - 40.0,
+            y: f64::from(k / 71) * 4.0 + 1.0,
+            radius: 20.0,
+        };
+        for k in 0..3000 {
+            assert_eq!(cells.vote(&at(k), 4.0, 2), None);
+        }
+        let moved = |k| Circle {
+            x: at(k).x + 1.0,
+            ..at(k)
+        };
+        for k in 0..1500 {
+            let mean = cells.vote(&moved(k), 4.0, 2).unwrap();
+            assert!((mean.x - at(k).x - 0.5).abs() < 1e-9);
+        }
+        cells.clear();
+        assert_eq!(cells.vote(&moved(2000), 4.0, 2), None);
+    }
+}

@@ -1,0 +1,374 @@
+//! The standard Hough transform for circles, the other of the paper's rivals.
+
+use image::GrayImage;
+
+use crate::error::require;
+use crate::evidence::{Evidence, rank};
+use crate::{Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap};
+
+/// The settings of [`StandardHough`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct StandardHoughConfig {
+    /// Which circles are reported.
+    pub accept: Acceptance,
+    /// Side of an accumulator cell along both axes of the centre and along the radius, pixels (default 2; 1..=16). Memory
+    /// and time fall with its third and second power; cells much larger than the tolerance blur neighbouring circles.
+    pub cell: f64,
+    /// Vote only along the gradient, where the edge detector knows it (default false). A pixel then votes for an arc of
+    /// `direction_error` to either side of the two directions instead of the full circle.
+    pub gradient: bool,
+    /// How far the gradient's direction may be off, radians (default 0.15; 0..=1). Noise turns a gradient by
+    /// the ratio of its own deviation to the edge's strength.
+    pub direction_error: f64,
+    /// The share of the outline's cells that must have voted before a peak is verified (default 0.4; 0..1).
+    pub min_votes: f64,
+}
+
+impl Default for StandardHoughConfig {
+    fn default() -> Self {
+        Self {
+            accept: Acceptance::default(),
+            cell: 2.0,
+            gradient: false,
+            direction_error: 0.15,
+            min_votes: 0.4,
+        }
+    }
+}
+
+/// The standard Hough transform for circles (Duda and Hart, 1972), with a three-dimensional accumulator.
+///
+/// Every edge pixel votes, for every radius, for the centres of the circles through it; with
+/// [`gradient`](StandardHoughConfig::gradient) only for those that its gradient points to. The local peaks, as shares of
+/// the votes that a complete circle of their radius would have, are verified best first: fitted to the edge pixels around,
+/// and accepted if their β is above θ, their pixels then no longer counting for the others.
+///
+/// Centres outside the frame have no cells. The accumulator's memory is `width height radii / cell^3` counts of 16 bits
+/// ([`memory`](StandardHough::memory)): 33 MB for 768x576 pixels, radii of 15 to 300 px and cells of 2 px.
+///
+/// The score of a [`Detection`] is the β of the circle as reported, counted as [`Heuristic`](crate::Heuristic) counts it.
+#[derive(Clone, Debug)]
+pub struct StandardHough<E = Canny> {
+    config: StandardHoughConfig,
+    edge_detector: E,
+    evidence: Evidence,
+    /// For each radius the cells around a pixel that it votes for, by direction.
+    rings: Vec<Ring>,
+    accumulator: Accumulator,
+    peaks: Vec<Peak>,
+    /// The directions of the gradients, in turns.
+    turns: Vec<f64>,
+}
+
+/// The cells at one radius from the origin.
+#[derive(Clone, Debug)]
+struct Ring {
+    radius: f64,
+    /// Around the full circle, each cell once, in the order of their direction.
+    cells: Vec<(i32, i32)>,
+    /// The same, beginning `spread` cells earlier and ending as many later, so that the arc of a direction is in one piece.
+    around: Vec<(i32, i32)>,
+    /// How many of the cells to either side of a direction its error covers.
+    spread: usize,
+    /// The votes a complete circle gets in its cell.
+    complete: f64,
+}
+
+/// Votes by radius, then row, then column.
+#[derive(Clone, Debug, Default)]
+struct Accumulator {
+    columns: usize,
+    rows: usize,
+    votes: Vec<u16>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Peak {
+    share: f64,
+    circle: Circle,
+}
+
+impl<E: EdgeDetector> StandardHough<E> {
+    /// A detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn new(config: StandardHoughConfig, edge_detector: E) -> Result<Self, ConfigError> {
+        let StandardHoughConfig {
+            accept,
+            cell,
+            direction_error,
+            min_votes,
+            ..
+        } = config;
+        require("cell", cell, "1..=16 px", (1.0..=16.0).contains(&cell))?;
+        let usable = (0.0..=1.0).contains(&direction_error);
+        require("direction_error", direction_error, "0..=1 rad", usable)?;
+        require(
+            "min_votes",
+            min_votes,
+            "between 0 and 1, both excluded",
+            min_votes > 0.0 && min_votes < 1.0,
+        )?;
+        let evidence = Evidence::new(accept)?;
+        require(
+            "max_radius",
+            accept.max_radius,
+            "at most 20000 px",
+            accept.max_radius <= 2e4,
+        )?;
+        let layers = ((accept.max_radius - accept.min_radius) / cell).floor() as u32 + 1;
+        Ok(Self {
+            rings: (0..layers)
+                .map(|layer| Ring::new(accept.min_radius + cell * f64::from(layer), cell, direction_error))
+                .collect(),
+            evidence,
+            edge_detector,
+            accumulator: Accumulator::default(),
+            peaks: Vec::new(),
+            turns: Vec::new(),
+            config,
+        })
+    }
+
+    /// The edges of the last frame; empty before the first.
+    pub fn edges(&self) -> &EdgeMap {
+        self.edge_detector.edges()
+    }
+
+    /// The memory that the circle search holds, bytes, edges not included.
+    pub fn memory(&self) -> usize {
+        let rings: usize = self
+            .rings
+            .iter()
+            .map(|ring| size_of::<(i32, i32)>() * (ring.cells.capacity() + ring.around.capacity()))
+            .sum();
+        self.evidence.memory()
+            + rings
+            + size_of::<u16>() * self.accumulator.votes.capacity()
+            + size_of::<Peak>() * self.peaks.capacity()
+    }
+}
+
+impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
+    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
+        found.clear();
+        let edges = self.edge_detector.detect_edges(frame);
+        let StandardHoughConfig {
+            accept,
+            cell,
+            gradient,
+            min_votes,
+            ..
+        } = self.config;
+        self.evidence.fill(edges);
+        self.accumulator
+            .clear(edges.width(), edges.height(), cell, self.rings.len());
+        self.turns.clear();
+        if gradient {
+            self.turns.extend(edges.gradients().iter().map(|gradient| {
+                let (gx, gy) = gradient.vector();
+                gy.atan2(gx) / std::f64::consts::TAU
+            }));
+        }
+        for (layer, ring) in self.rings.iter().enumerate() {
+            for (index, pixel) in edges.pixels().iter().enumerate() {
+                let (x, y) = (
+                    (f64::from(pixel.x) / cell) as i32,
+                    (f64::from(pixel.y) / cell) as i32,
+                );
+                let mut slice = self.accumulator.layer(layer);
+                match self.turns.get(index) {
+                    Some(&turn) => slice.vote(x, y, ring.along(turn)),
+                    None => slice.vote(x, y, ring.cells.iter()),
+                }
+            }
+        }
+        self.accumulator
+            .find_peaks(&self.rings, min_votes, cell, &mut self.peaks);
+
+        let reach = (1.5 * cell).max(2.0 * accept.tolerance + 1.0);
+        for peak in &self.peaks {
+            if found.len() == accept.max_circles {
+                break;
+            }
+            let evidence = &mut self.evidence;
+            let verified = evidence
+                .fitted(edges, peak.circle, reach)
+                .filter(|circle| accept.admits(circle, found))
+                .and_then(|circle| evidence.check(circle));
+            if let Some(detection) = verified {
+                evidence.accept(edges, detection, found);
+            }
+        }
+        rank(found);
+    }
+}
+
+impl Ring {
+    fn new(radius: f64, cell: f64, direction_error: f64) -> Self {
+        let steps = (8.0 * std::f64::consts::TAU * radius / cell).ceil();
+        let mut cells: Vec<(i32, i32)> = Vec::new();
+        for step in 0..steps as u32 {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(step) / steps).sin_cos();
+            let cell = (
+                (radius * cos / cell).round() as i32,
+                (radius * sin / cell).round() as i32,
+            );
+            // On the border between two cells rounding may go back and forth.
+            let recent = &cells[cells.len().saturating_sub(3)..];
+            let closing = step > steps as u32 / 2 && cells.iter().take(3).any(|first| *first == cell);
+            if !closing && !recent.contains(&cell) {
+                cells.push(cell);
+            }
+        }
+        let spread = (cells.len() as f64 * direction_error / std::f64::consts::TAU).round() as usize;
+        let spread = spread.min(cells.len() / 4);
+        let around = cells[cells.len() - spread..]
+            .iter()
+            .chain(&cells)
+            .chain(&cells[..spread])
+            .copied()
+            .collect();
+        Self {
+            around,
+            spread,
+            // The pixels of the outline, about 5.66 per pixel of radius.
+            complete: 4.0 * std::f64::consts::SQRT_2 * radius,
+            radius,
+            cells,
+        }
+    }
+
+    /// The cells in the direction of a gradient, given in turns, and in the opposite one.
+    fn along(&self, turn: f64) -> impl Iterator<Item = &(i32, i32)> {
+        let count = self.around.len() - 2 * self.spread;
+        [turn, turn + 0.5].into_iter().flat_map(move |turn| {
+            let middle = (turn.rem_euclid(1.0) * count as f64) as usize % count;
+            &self.around[middle..=middle + 2 * self.spread]
+        })
+    }
+}
+
+/// The votes for the circles of one radius.
+struct Layer<'a> {
+    columns: i32,
+    rows: i32,
+    votes: &'a mut [u16],
+}
+
+impl Layer<'_> {
+    fn vote<'c>(&mut self, x: i32, y: i32, cells: impl Iterator<Item = &'c (i32, i32)>) {
+        for (dx, dy) in cells {
+            let (column, row) = (x + dx, y + dy);
+            if (column as u32) < self.columns as u32 && (row as u32) < self.rows as u32 {
+                let votes = &mut self.votes[row as usize * self.columns as usize + column as usize];
+                *votes = votes.saturating_add(1);
+            }
+        }
+    }
+}
+
+impl Accumulator {
+    fn clear(&mut self, width: u32, height: u32, cell: f64, layers: usize) {
+        self.columns = (f64::from(width) / cell).ceil() as usize;
+        self.rows = (f64::from(height) / cell).ceil() as usize;
+        self.votes.clear();
+        self.votes.resize(self.columns * self.rows * layers, 0);
+    }
+
+    fn layer(&mut self, layer: usize) -> Layer<'_> {
+        let size = self.columns * self.rows;
+        Layer {
+            columns: self.columns as i32,
+            rows: self.rows as i32,
+            votes: &mut self.votes[layer * size..][..size],
+        }
+    }
+
+    /// The cells that no neighbour exceeds, best first by their share of a complete circle's votes.
+    fn find_peaks(&self, rings: &[Ring], min_votes: f64, cell: f64, peaks: &mut Vec<Peak>) {
+        peaks.clear();
+        let size = self.columns * self.rows;
+        for (layer, ring) in rings.iter().enumerate() {
+            let least = (min_votes * ring.complete).ceil() as u16;
+            let votes = &self.votes[layer * size..][..size];
+            for (index, &count) in votes.iter().enumerate() {
+                if count >= least && self.is_peak(layer, index, rings) {
+                    let (row, column) = (index / self.columns, index % self.columns);
+                    peaks.push(Peak {
+                        share: f64::from(count) / ring.complete,
+                        circle: Circle {
+                            x: (column as f64 + 0.5) * cell - 0.5,
+                            y: (row as f64 + 0.5) * cell - 0.5,
+                            radius: ring.radius,
+                        },
+                    });
+                }
+            }
+        }
+        peaks.sort_unstable_by(|a, b| {
+            let place = |peak: &Peak| (peak.circle.radius, peak.circle.y, peak.circle.x);
+            let tie = || {
+                place(a)
+                    .partial_cmp(&place(b))
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            };
+            b.share.total_cmp(&a.share).then_with(tie)
+        });
+    }
+
+    /// Whether the cell's share is above that of the neighbours before it and not below that of those behind.
+    fn is_peak(&self, layer: usize, index: usize, rings: &[Ring]) -> bool {
+        let size = self.columns * self.rows;
+        let (row, column) = (index / self.columns, index % self.columns);
+        let share =
+            |layer: usize, index: usize| f64::from(self.votes[layer * size + index]) / rings[layer].complete;
+        let here = share(layer, index);
+        let around = |middle: usize, end: usize| middle.saturating_sub(1)..(middle + 2).min(end);
+        around(layer, rings.len()).all(|l| {
+            around(row, self.rows).all(|r| {
+                around(column, self.columns).all(|c| {
+                    let other = share(l, r * self.columns + c);
+                    let before = (l, r, c) < (layer, row, column);
+                    other < here || (other <= here && !before)
+                })
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_is_a_closed_line_of_cells_each_once() {
+        for (radius, cell) in [(31.0, 2.0), (15.0, 1.0), (200.3, 2.0), (33.0, 16.0), (4.0, 2.0)] {
+            let ring = Ring::new(radius, cell, 0.06);
+            for (a, b) in ring.cells.iter().zip(ring.cells.iter().cycle().skip(1)) {
+                assert!(
+                    a != b && (a.0 - b.0).abs() <= 1 && (a.1 - b.1).abs() <= 1,
+                    "{radius} {cell}"
+                );
+            }
+            let mut sorted = ring.cells.clone();
+            sorted.sort_unstable();
+            sorted.dedup();
+            assert_eq!(sorted.len(), ring.cells.len(), "{radius} {cell}");
+        }
+        assert_eq!(Ring::new(1.0, 16.0, 1.0).cells, [(0, 0)]);
+    }
+
+    #[test]
+    fn a_gradient_votes_for_both_sides() {
+        let ring = Ring::new(40.0, 2.0, 0.06);
+        let cells: Vec<_> = ring.along(0.0).collect();
+        assert!(
+            cells.contains(&&(20, 0)) && cells.contains(&&(-20, 0)),
+            "{cells:?}"
+        );
+        assert!(cells.iter().all(|cell| cell.1.abs() <= 3), "{cells:?}");
+    }
+}

@@ -1,0 +1,15 @@
+//! Integration tests, one module a theme.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may fail that way, also in a function that several tests share"
+)]
+
+#[path = "../../scenes/scenes.rs"]
+mod scenes;
+
+mod curves;
+mod detectors;
+mod heuristic;
+#[cfg(feature = "files")]
+mod stages;

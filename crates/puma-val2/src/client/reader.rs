@@ -1,0 +1,131 @@
+//! Replies of the controller: where they end and what they say.
+
+/// How a reply ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// With the idle monitor's prompt.
+    Idle,
+    /// With the prompt of a monitor under which a program runs.
+    Running,
+    /// With a question.
+    Question,
+}
+
+/// Collects bytes until they can be a whole reply. No time passes in here: a caller that sees an [`Ending`] must still wait for silence, for a
+/// `.` at the start of a line may be the beginning of something.
+#[derive(Clone, Debug)]
+pub struct ReplyReader {
+    text: String,
+    limit: usize,
+    idle_prompt: char,
+    run_prompt: char,
+    overflowed: bool,
+}
+
+impl ReplyReader {
+    /// A reader for replies of up to `limit` bytes.
+    pub fn new(limit: usize, idle_prompt: char, run_prompt: char) -> Self {
+        Self {
+            text: String::new(),
+            limit,
+            idle_prompt,
+            run_prompt,
+            overflowed: false,
+        }
+    }
+
+    /// Adds bytes. Of what exceeds the limit the older half is forgotten, so that the end is still found.
+    pub fn push(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            match byte {
+                b'\r' | b'\n' | b'\t' | 0x20..=0x7e => self.text.push(byte as char),
+                0x80.. => self.text.push(char::REPLACEMENT_CHARACTER),
+                _ => {}
+            }
+        }
+        if self.text.len() > self.limit {
+            self.overflowed = true;
+            let mut from = self.text.len() - self.limit / 2;
+            while !self.text.is_char_boundary(from) {
+                from += 1;
+            }
+            self.text.drain(..from);
+        }
+    }
+
+    /// Whether more came than is kept.
+    pub fn overflowed(&self) -> bool {
+        self.overflowed
+    }
+
+    /// What has come so far.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// How the reply ends, if nothing more comes.
+    pub fn ending(&self) -> Option<Ending> {
+        let last_line = self.text.rsplit(['\r', '\n']).next().unwrap_or_default().trim();
+        let mut characters = last_line.chars();
+        match (characters.next(), characters.next()) {
+            (Some(c), None) if c == self.idle_prompt => Some(Ending::Idle),
+            (Some(c), None) if c == self.run_prompt => Some(Ending::Running),
+            _ if self.text.trim_end().ends_with('?') => Some(Ending::Question),
+            _ => None,
+        }
+    }
+}
+
+/// The controller's messages in a reply: the text between asterisks, and what follows it on the line (` Jt 1`).
+pub(super) fn messages(reply: &str) -> Vec<String> {
+    reply
+        .split(['\r', '\n'])
+        .filter_map(|line| {
+            let inner = line.trim().trim_start_matches('.').strip_prefix('*')?;
+            let (message, rest) = inner.trim_start_matches('*').split_once('*')?;
+            let message = format!("{}{}", message.trim(), rest.trim_end());
+            (!message.is_empty()).then_some(message)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ending(text: &str) -> Option<Ending> {
+        let mut reader = ReplyReader::new(1000, '.', '*');
+        reader.push(text.as_bytes());
+        reader.ending()
+    }
+
+    #[test]
+    fn a_prompt_is_one_only_at_the_start_of_a_line() {
+        assert_eq!(ending("SPEED 50\r\n."), Some(Ending::Idle));
+        assert_eq!(ending("."), Some(Ending::Idle));
+        assert_eq!(ending("SPEED 50."), None);
+        assert_eq!(ending("\r\n  10."), None);
+        assert_eq!(ending("\r\n*"), Some(Ending::Running));
+        assert_eq!(ending("\r\n*Arm power off*"), None);
+        assert_eq!(ending("Change?\r\n"), Some(Ending::Question));
+        assert_eq!(ending("Initialize (Y/N)? "), Some(Ending::Question));
+    }
+
+    #[test]
+    fn messages_stand_between_asterisks() {
+        let reply = "DO DRIVE 1,200,100\r\n*Location out of range* Jt 1\r\n.";
+        assert_eq!(messages(reply), ["Location out of range Jt 1"]);
+        assert_eq!(messages("2*3*4\r\n*\r\n."), Vec::<String>::new());
+    }
+
+    #[test]
+    fn a_reply_without_end_stays_within_its_limit() {
+        let mut reader = ReplyReader::new(1000, '.', '*');
+        for _ in 0..100 {
+            reader.push(&[b'7'; 333]);
+        }
+        reader.push(b"\r\n.");
+        assert!(reader.text().len() <= 1000 && reader.overflowed());
+        assert_eq!(reader.ending(), Some(Ending::Idle));
+    }
+}

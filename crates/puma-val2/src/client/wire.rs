@@ -1,0 +1,336 @@
+//! Lines typed to the controller and replies read back.
+
+use std::io;
+use std::time::Duration;
+
+use super::{ClientConfig, Ending, reader};
+use crate::{ArmError, ReplyReader, Transport};
+
+/// A reply that has ended.
+#[derive(Debug)]
+pub(super) struct Reply {
+    pub(super) text: String,
+    pub(super) ending: Ending,
+}
+
+/// An exchange that failed, and whether what was typed may have taken effect.
+#[derive(Debug)]
+pub(super) struct Failed {
+    pub(super) error: ArmError,
+    pub(super) maybe_done: bool,
+}
+
+impl Failed {
+    fn before(error: ArmError) -> Self {
+        Self {
+            error,
+            maybe_done: false,
+        }
+    }
+
+    fn after(error: ArmError) -> Self {
+        Self {
+            error,
+            maybe_done: true,
+        }
+    }
+}
+
+/// What can be tried again: the line garbled something or swallowed it. The rest is for the caller.
+pub(super) fn is_doubt(error: &ArmError) -> bool {
+    matches!(error, ArmError::Silence { .. } | ArmError::Garbled { .. })
+}
+
+/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried out. Ctrl-Q comes before it: a single flipped
+/// bit makes an `S` a Ctrl-S, which holds all output.
+pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
+
+/// Asks for the prompt.
+const NUDGE: &[u8] = b"\x11\r";
+
+#[derive(Debug)]
+pub(super) struct Wire<T> {
+    pub(super) line: T,
+    /// Whether the controller echoes; `None` until found out.
+    pub(super) echo: Option<bool>,
+    /// Messages that came without having been asked for.
+    pub(super) notices: Vec<String>,
+}
+
+impl<T: Transport> Wire<T> {
+    pub(super) fn port(&self) -> String {
+        self.line.name().to_owned()
+    }
+
+    fn broken(&self, doing: &str, source: io::Error) -> ArmError {
+        ArmError::Line {
+            port: self.port(),
+            doing: doing.to_owned(),
+            source,
+        }
+    }
+
+    pub(super) fn send(&mut self, bytes: &[u8], doing: &str) -> Result<(), ArmError> {
+        #[cfg(feature = "tracing")]
+        tracing::trace!(port = self.line.name(), bytes = %bytes.escape_ascii(), "sent");
+        self.line.send(bytes).map_err(|source| self.broken(doing, source))
+    }
+
+    /// What comes within `wait`, at least one byte, or nothing.
+    fn receive(&mut self, wait: Duration, doing: &str) -> Result<Option<Vec<u8>>, ArmError> {
+        let mut buffer = [0; 512];
+        match self.line.receive(&mut buffer, wait) {
+            Ok(Some(count)) => {
+                #[cfg(feature = "tracing")]
+                tracing::trace!(port = self.line.name(), bytes = %buffer[..count].escape_ascii(), "received");
+                Ok(Some(buffer[..count].to_vec()))
+            }
+            Ok(None) => Ok(None),
+            Err(source) => Err(self.broken(doing, source)),
+        }
+    }
+
+    fn reader(config: &ClientConfig) -> ReplyReader {
+        ReplyReader::new(config.reply_limit.max(256), config.idle_prompt, config.run_prompt)
+    }
+
+    /// Types `line` at a prompt or question, ends it and reads the reply, waiting up to `timeout` for it.
+    pub(super) fn exchange(
+        &mut self,
+        line: &str,
+        timeout: Duration,
+        config: &ClientConfig,
+    ) -> Result<Reply, Failed> {
+        self.take_unasked(config).map_err(Failed::before)?;
+        let mut tries = 0;
+        loop {
+            match self.type_text(line, config) {
+                Ok(()) => break,
+                Err(error) if is_doubt(&error) && tries < config.retries => {
+                    tries += 1;
+                    let ending = self.spoil(config).map_err(Failed::before)?;
+                    if ending == Ending::Question {
+                        // The dialogue that the line belongs to has to begin again.
+                        return Err(Failed::before(error));
+                    }
+                }
+                Err(error) => return Err(Failed::before(error)),
+            }
+        }
+        self.send(b"\r", line).map_err(Failed::after)?;
+        let reply = self.read_reply(line, timeout, config).map_err(Failed::after)?;
+        if reply.ending == Ending::Question && is_boot_question(&reply.text) {
+            return Err(Failed::after(ArmError::Restarted {
+                port: self.port(),
+                heard: shortened(&reply.text),
+            }));
+        }
+        Ok(reply)
+    }
+
+    /// Reads away what has come since the last reply, keeping messages.
+    fn take_unasked(&mut self, config: &ClientConfig) -> Result<(), ArmError> {
+        let mut reader = Self::reader(config);
+        // A line that never falls silent is left to the echo check.
+        for _ in 0..64 {
+            match self.receive(Duration::ZERO, "listening")? {
+                Some(bytes) => reader.push(&bytes),
+                None => break,
+            }
+        }
+        if reader.ending() == Some(Ending::Question) && is_boot_question(reader.text()) {
+            return Err(ArmError::Restarted {
+                port: self.port(),
+                heard: shortened(reader.text()),
+            });
+        }
+        self.notice(reader.text());
+        Ok(())
+    }
+
+    pub(super) fn notice(&mut self, text: &str) {
+        self.notices.extend(reader::messages(text));
+        let excess = self.notices.len().saturating_sub(100);
+        self.notices.drain(..excess);
+    }
+
+    /// Sends the text and, where there is an echo, waits until it has come back unchanged. The line is not ended.
+    fn type_text(&mut self, text: &str, config: &ClientConfig) -> Result<(), ArmError> {
+        self.send(text.as_bytes(), text)?;
+        if self.echo != Some(true) || !config.check_echo {
+            return Ok(());
+        }
+        let mut heard = Vec::new();
+        while heard.len() < text.len() {
+            match self.receive(config.reply_timeout, text)? {
+                Some(bytes) => heard.extend(bytes.into_iter().filter(|b| !matches!(b, 0 | 0x07))),
+                None => break,
+            }
+        }
+        if heard.eq_ignore_ascii_case(text.as_bytes()) {
+            return Ok(());
+        }
+        let heard_text = shortened(&String::from_utf8_lossy(&heard));
+        if heard.len() < text.len() {
+            return Err(self.silence(text, "its echo", &heard_text, config.reply_timeout));
+        }
+        Err(self.garbled(text, "its echo", &heard_text))
+    }
+
+    /// Reads until a prompt or question is followed by silence.
+    ///
+    /// When nothing comes for `config.reply_timeout` an empty line is sent: if only the prompt was lost this brings it back, and if the controller
+    /// is still busy it is answered later.
+    pub(super) fn read_reply(
+        &mut self,
+        sent: &str,
+        timeout: Duration,
+        config: &ClientConfig,
+    ) -> Result<Reply, ArmError> {
+        let mut reader = Self::reader(config);
+        let begun = self.line.clock();
+        let until = begun.saturating_add(timeout);
+        loop {
+            let ending = reader.ending();
+            let left = until.saturating_sub(self.line.clock());
+            let wait = match ending {
+                Some(_) => config.quiet,
+                None => config.reply_timeout.min(left).max(Duration::from_millis(1)),
+            };
+            if let Some(bytes) = self.receive(wait, sent)? {
+                reader.push(&bytes);
+                if reader.overflowed() {
+                    return Err(self.garbled(sent, "a reply of bounded length", &shortened(reader.text())));
+                }
+                if left.is_zero() && ending.is_none() {
+                    return Err(self.garbled(sent, "a reply that ends", &shortened(reader.text())));
+                }
+                continue;
+            }
+            if let Some(ending) = ending {
+                return Ok(Reply {
+                    text: reader.text().to_owned(),
+                    ending,
+                });
+            }
+            if self.line.clock() >= until {
+                let expected = format!("the prompt `{}`", config.idle_prompt);
+                return Err(self.silence(sent, &expected, &shortened(reader.text()), timeout));
+            }
+            self.send(NUDGE, sent)?;
+        }
+    }
+
+    /// As [`Wire::exchange`], for lines after which a program runs: until it ends or asks.
+    pub(super) fn exchange_to_end(
+        &mut self,
+        line: &str,
+        timeout: Duration,
+        config: &ClientConfig,
+    ) -> Result<Reply, Failed> {
+        let until = self.line.clock().saturating_add(timeout);
+        let mut reply = self.exchange(line, timeout, config)?;
+        while reply.ending == Ending::Running && reply.text.len() <= config.reply_limit {
+            let left = until.saturating_sub(self.line.clock());
+            let more = self.read_reply(line, left, config).map_err(Failed::after)?;
+            reply.text.push_str(&more.text);
+            reply.ending = more.ending;
+        }
+        Ok(reply)
+    }
+
+    /// Makes a half-typed line harmless and reads what the controller says to it.
+    pub(super) fn spoil(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
+        while self.receive(config.quiet, "clearing the line")?.is_some() {}
+        self.send(SPOIL, "clearing the line")?;
+        let reply = self.read_reply("an empty line", config.reply_timeout * 4, config)?;
+        if reply.ending == Ending::Question && is_boot_question(&reply.text) {
+            return Err(ArmError::Restarted {
+                port: self.port(),
+                heard: shortened(&reply.text),
+            });
+        }
+        Ok(reply.ending)
+    }
+
+    /// Gets back to the monitor's prompt from whatever dialogue the line is in, saying no to everything.
+    pub(super) fn settle(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
+        let mut ending = self.spoil(config)?;
+        for _ in 0..4 {
+            if ending != Ending::Question {
+                return Ok(ending);
+            }
+            self.send(b"\r", "leaving a dialogue")?;
+            let reply = self.read_reply("an empty line", config.reply_timeout * 4, config)?;
+            ending = reply.ending;
+            if ending != Ending::Question {
+                return Ok(ending);
+            }
+            let answer = refusal(&reply.text);
+            self.send(answer, "leaving a dialogue")?;
+            let reply = self.read_reply("a refusal", config.reply_timeout * 4, config)?;
+            ending = reply.ending;
+        }
+        Err(self.garbled(
+            "an empty line",
+            "the monitor's prompt",
+            "one question after another",
+        ))
+    }
+
+    pub(super) fn silence(&self, sent: &str, expected: &str, heard: &str, waited: Duration) -> ArmError {
+        ArmError::Silence {
+            port: self.port(),
+            sent: sent.to_owned(),
+            expected: expected.to_owned(),
+            heard: heard.to_owned(),
+            waited,
+        }
+    }
+
+    pub(super) fn garbled(&self, sent: &str, expected: &str, heard: &str) -> ArmError {
+        ArmError::Garbled {
+            port: self.port(),
+            sent: sent.to_owned(),
+            expected: expected.to_owned(),
+            heard: heard.to_owned(),
+        }
+    }
+}
+
+/// Whether the last question of a text is one of the start-up dialogue.
+pub(super) fn is_boot_question(text: &str) -> bool {
+    let question = last_line(text).to_ascii_uppercase();
+    question.contains("(Y/N)") && (question.contains("LOAD") || question.contains("INIT"))
+}
+
+/// The line that a dialogue of any kind is left with.
+pub(super) fn refusal(text: &str) -> &'static [u8] {
+    let question = last_line(text).to_ascii_uppercase();
+    let words = question.trim_end_matches(['?', ' ']);
+    if words.trim_end_matches('.').trim().parse::<u32>().is_ok() {
+        b"E\r"
+    } else if question.starts_with("GO?") {
+        // Our own resident program.
+        b"9\r"
+    } else if question.contains("Y/N") {
+        b"N\r"
+    } else {
+        // An empty line has been tried.
+        b"\x03\r"
+    }
+}
+
+pub(super) fn last_line(text: &str) -> &str {
+    text.trim_end().rsplit(['\r', '\n']).next().unwrap_or_default()
+}
+
+/// The end of a text, short enough for a message.
+pub(super) fn shortened(text: &str) -> String {
+    let count = text.chars().count();
+    if count <= 120 {
+        text.to_owned()
+    } else {
+        format!("...{}", text.chars().skip(count - 117).collect::<String>())
+    }
+}

@@ -1,0 +1,379 @@
+//! The emulated arm: where it stands, what moves it, what it refuses.
+
+use std::time::Duration;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::instruction::{Posture, SpeedUnit};
+use super::motion::{Motion, Pace};
+use super::place::Place;
+use super::{Fault, Message, Profile};
+use crate::{Configuration, DriveTrain, Frames, Gripper, Joint, Joints, PumaParams, Unreachable};
+
+#[derive(Clone, Debug)]
+pub(super) struct Arm {
+    pub(super) params: PumaParams,
+    drives: Option<DriveTrain>,
+    joints: Joints,
+    motion: Option<Motion>,
+    pub(super) power: bool,
+    pub(super) calibrated: bool,
+    pub(super) frames: Frames,
+    pub(super) gripper: Gripper,
+    gripper_next: Option<Gripper>,
+    postures_next: Vec<Posture>,
+    keeps_posture: bool,
+    /// Percent.
+    pub(super) monitor_speed: f64,
+    pub(super) program_speed: Speed,
+    next_speed: Option<Speed>,
+}
+
+/// A program speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Speed {
+    value: f64,
+    unit: SpeedUnit,
+}
+
+impl Speed {
+    pub(super) const FULL: Self = Self::percent(100.0);
+
+    pub(super) const fn percent(value: f64) -> Self {
+        Self {
+            value,
+            unit: SpeedUnit::Percent,
+        }
+    }
+
+    pub(super) fn new(value: f64, unit: SpeedUnit) -> Result<Self, Fault> {
+        if value > 0.0 && value <= 100_000.0 {
+            Ok(Self { value, unit })
+        } else {
+            Err(Message::InvalidArgument.into())
+        }
+    }
+
+    /// Fraction of full speed, `line_speed` metres per second being full for a speed in units of length.
+    fn fraction(self, line_speed: f64) -> f64 {
+        match self.unit {
+            SpeedUnit::Percent => self.value / 100.0,
+            SpeedUnit::MillimetresPerSecond => self.value / 1000.0 / line_speed,
+            SpeedUnit::InchesPerSecond => self.value * 0.0254 / line_speed,
+        }
+    }
+
+    /// The number as the controller shows it.
+    pub(super) fn shown(self) -> f64 {
+        self.value
+    }
+}
+
+impl Arm {
+    pub(super) fn new(params: PumaParams, profile: &Profile) -> Self {
+        let drives = profile.encoder_counts.then(DriveTrain::puma560);
+        Self {
+            params,
+            joints: drives.map_or(profile.start, |d| d.quantized(&profile.start)),
+            drives,
+            motion: None,
+            power: profile.start_power == super::StartPower::On,
+            calibrated: profile.start_calibrated,
+            frames: Frames::default(),
+            gripper: Gripper::Open,
+            gripper_next: None,
+            postures_next: Vec::new(),
+            keeps_posture: profile.keeps_posture,
+            monitor_speed: 100.0,
+            program_speed: Speed::FULL,
+            next_speed: None,
+        }
+    }
+
+    /// Stands at `joints` (or the nearest whole encoder counts) from now on.
+    pub(super) fn put(&mut self, joints: Joints) {
+        self.motion = None;
+        self.joints = joints;
+        self.joints = self.shown();
+    }
+
+    /// Joint angles at the time of the last [`Arm::advance`].
+    pub(super) fn joints(&self) -> Joints {
+        self.joints
+    }
+
+    /// Joint angles as the encoders give them.
+    pub(super) fn shown(&self) -> Joints {
+        self.drives.map_or(self.joints, |d| d.quantized(&self.joints))
+    }
+
+    /// Where the present motion ends, or where the arm stands.
+    pub(super) fn destination(&self) -> Joints {
+        self.motion.as_ref().map_or_else(|| self.shown(), Motion::target)
+    }
+
+    /// The hand in the world frame.
+    pub(super) fn hand(&self, joints: &Joints) -> Isometry3<f64> {
+        self.frames.hand(&self.params, joints)
+    }
+
+    pub(super) fn moving(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    pub(super) fn motion_end(&self) -> Option<Duration> {
+        self.motion.as_ref().map(Motion::end)
+    }
+
+    /// Follows the motion to `now`. If it has ended, says how: with the fault that the path ended in, if any.
+    pub(super) fn advance(&mut self, now: Duration) -> Option<Result<(), Fault>> {
+        let motion = self.motion.as_ref()?;
+        self.joints = motion.at(now);
+        if now < motion.end() {
+            return None;
+        }
+        self.joints = self.shown();
+        let motion = self.motion.take()?;
+        match motion.failure {
+            Some(fault) if !motion.is_broken_off() => Some(Err(fault)),
+            _ => Some(Ok(())),
+        }
+    }
+
+    /// Brings a motion under way to a stand.
+    pub(super) fn break_off(&mut self, now: Duration, time: Duration) {
+        if let Some(motion) = &mut self.motion {
+            motion.break_off(now, time);
+        }
+    }
+
+    /// What is asked of the next motion by words that come before it is forgotten.
+    pub(super) fn forget_words(&mut self) {
+        self.gripper_next = None;
+        self.postures_next.clear();
+        self.next_speed = None;
+    }
+
+    pub(super) fn set_gripper_next(&mut self, to: Gripper) {
+        self.gripper_next = Some(to);
+    }
+
+    pub(super) fn set_posture_next(&mut self, posture: Posture) {
+        if self.postures_next.len() < 16 {
+            self.postures_next.push(posture);
+        }
+    }
+
+    pub(super) fn set_speed_next(&mut self, speed: Speed) {
+        self.next_speed = Some(speed);
+    }
+
+    /// Whether the arm may be moved at all.
+    pub(super) fn check_ready(&self) -> Result<(), Fault> {
+        if !self.power {
+            return Err(Message::ArmPowerOff.into());
+        }
+        if !self.calibrated {
+            return Err(Message::NotCalibrated.into());
+        }
+        Ok(())
+    }
+
+    fn check_limits(&self, joints: &Joints) -> Result<(), Fault> {
+        // Half a count of slack, so that an arm standing at its limit can move away along it.
+        let slack = 1e-4;
+        for joint in Joint::ALL {
+            let range = self.params.ranges[joint.index()];
+            if !(range.min - slack..=range.max + slack).contains(&joints[joint]) {
+                return Err(Fault::at(Message::OutOfRange, joint));
+            }
+        }
+        Ok(())
+    }
+
+    fn pace(&mut self, profile: &Profile, speed: Option<Speed>) -> Pace {
+        let speed = speed.or(self.next_speed.take()).unwrap_or(self.program_speed);
+        let fraction = speed.fraction(profile.line_speed) * self.monitor_speed / 100.0;
+        Pace {
+            fraction: fraction.clamp(1e-4, 1.0),
+            acceleration_time: profile.acceleration_time.as_secs_f64().max(1e-3),
+        }
+    }
+
+    fn begin(&mut self, motion: Motion) {
+        if let Some(gripper) = self.gripper_next.take() {
+            self.gripper = gripper;
+        }
+        self.postures_next.clear();
+        self.motion = Some(motion);
+    }
+
+    /// Starts a joint-interpolated motion. `speed` overrides the program's.
+    pub(super) fn start_joints(
+        &mut self,
+        to: Joints,
+        speed: Option<Speed>,
+        now: Duration,
+        profile: &Profile,
+    ) -> Result<(), Fault> {
+        self.check_ready()?;
+        self.check_limits(&to)?;
+        let pace = self.pace(profile, speed);
+        let motion = Motion::joint_interpolated(self.joints, to, now, pace, &self.params);
+        self.begin(motion);
+        Ok(())
+    }
+
+    /// The joint angles that reach a location, in the posture asked for or else the present one.
+    pub(super) fn resolve(&self, place: &Place) -> Result<Joints, Fault> {
+        let pose = match place {
+            Place::PrecisionPoint(joints) => return Ok(*joints),
+            Place::Transformation(pose) => pose,
+        };
+        let words = &self.postures_next;
+        let asked = |c: Configuration| {
+            words
+                .iter()
+                .rev()
+                .fold([None; 3], |[side, elbow, wrist], word| match *word {
+                    Posture::Side(s) => [side.or(Some(s == c.side)), elbow, wrist],
+                    Posture::Elbow(e) => [side, elbow.or(Some(e == c.elbow)), wrist],
+                    Posture::Wrist(w) => [side, elbow, wrist.or(Some(w == c.wrist))],
+                })
+        };
+        let now = self.params.configuration(&self.joints);
+        let [side_open, wrist_open] = self.between_postures();
+        let keeps = |c: Configuration| {
+            let [side, elbow, wrist] = asked(c);
+            side.unwrap_or(side_open || c.side == now.side)
+                && elbow.unwrap_or(side_open || c.elbow == now.elbow)
+                && wrist.unwrap_or(wrist_open || c.wrist == now.wrist)
+        };
+        let obeys = |c: Configuration| asked(c).iter().all(|fits| fits.unwrap_or(true));
+        self.reach(pose, &self.joints, keeps).or_else(|fault| {
+            if self.keeps_posture {
+                Err(fault)
+            } else {
+                self.reach(pose, &self.joints, obeys).map_err(|_| fault)
+            }
+        })
+    }
+
+    /// Whether the arm stands so near to the border between two postures that it is in neither: the upright arm between left and right, the
+    /// straight wrist between flip and no flip.
+    fn between_postures(&self) -> [bool; 2] {
+        let [_, t2, t3, _, t5, _] = self.joints.0;
+        let p = &self.params;
+        let ahead = p.d4 * (t2 + t3).sin() + p.a3 * (t2 + t3).cos() + p.a2 * t2.cos();
+        [ahead.abs() < 0.03, t5.abs() < 0.1_f64.to_radians()]
+    }
+
+    fn reach(
+        &self,
+        hand: &Isometry3<f64>,
+        near: &Joints,
+        allowed: impl Fn(Configuration) -> bool,
+    ) -> Result<Joints, Fault> {
+        let flange = self.frames.flange(hand);
+        self.params
+            .inverse_among(&flange, near, allowed)
+            .map_err(|why| match why {
+                Unreachable::TooClose { .. } => Message::TooClose.into(),
+                Unreachable::Limit { joint, .. } => Fault::at(Message::OutOfRange, joint),
+                _ => Message::OutOfRange.into(),
+            })
+    }
+
+    /// Starts a straight-line motion of the hand, in the present posture.
+    pub(super) fn start_line(&mut self, to: &Place, now: Duration, profile: &Profile) -> Result<(), Fault> {
+        self.check_ready()?;
+        let to = match to {
+            Place::Transformation(pose) => *pose,
+            Place::PrecisionPoint(joints) => self.hand(joints),
+        };
+        let from = self.hand(&self.joints);
+        let posture = self.params.configuration(&self.joints);
+        self.reach(&to, &self.joints, |c| c == posture)?;
+        let length = (to.translation.vector - from.translation.vector).norm();
+        let turn = from.rotation.angle_to(&to.rotation);
+        // A knot every 5 mm or 2 degrees keeps the joint-interpolated chord within some micrometres of the line.
+        let spans = (length / 0.005)
+            .max(turn / 2.0_f64.to_radians())
+            .ceil()
+            .clamp(1.0, 2000.0) as usize;
+        let mut knots = vec![self.joints];
+        let mut failure = None;
+        for i in 1..=spans {
+            let part = i as f64 / spans as f64;
+            let position = from.translation.vector.lerp(&to.translation.vector, part);
+            let rotation = from
+                .rotation
+                .try_slerp(&to.rotation, part, 1e-9)
+                .unwrap_or(to.rotation);
+            let hand = Isometry3::from_parts(Translation3::from(position), rotation);
+            match self.reach(&hand, &knots[i - 1], |c| c == posture) {
+                Ok(joints) => knots.push(joints),
+                Err(fault) if profile.check_line_ahead || i == 1 => return Err(fault),
+                Err(fault) => {
+                    failure = Some(fault);
+                    break;
+                }
+            }
+        }
+        let travelled = (knots.len() - 1) as f64 / spans as f64;
+        let mut pace = self.pace(profile, None);
+        let seconds = (length / profile.line_speed).max(turn / profile.line_turn) * travelled;
+        let path_speed = pace.fraction / seconds.max(1e-6);
+        // A line's speed is a matter of the hand; the joints are held to their own limits at full speed.
+        pace.fraction = 1.0;
+        let mut motion = Motion::along(knots, now, path_speed, pace, &self.params);
+        motion.failure = failure;
+        self.begin(motion);
+        Ok(())
+    }
+
+    /// `place` moved by `distance` metres back along its own tool axis.
+    pub(super) fn approach(&self, place: &Place, distance: f64) -> Place {
+        let pose = match place {
+            Place::Transformation(pose) => *pose,
+            Place::PrecisionPoint(joints) => self.hand(joints),
+        };
+        Place::Transformation(pose * Translation3::new(0.0, 0.0, -distance))
+    }
+
+    /// The present pose with the tool axis turned to the nearest axis of the world.
+    pub(super) fn aligned(&self) -> Place {
+        let hand = self.hand(&self.destination());
+        let axis = hand * Vector3::z();
+        let (nearest, _) = axis.iter().enumerate().fold((0, 0.0), |(best, size), (i, v)| {
+            if v.abs() > size {
+                (i, v.abs())
+            } else {
+                (best, size)
+            }
+        });
+        let mut wanted = Vector3::zeros();
+        wanted[nearest] = if axis[nearest] < 0.0 { -1.0 } else { 1.0 };
+        let turn = UnitQuaternion::rotation_between(&axis, &wanted).unwrap_or_default();
+        Place::Transformation(Isometry3::from_parts(hand.translation, turn * hand.rotation))
+    }
+
+    /// Every joint by a degree and a half and back, which passes an index pulse of each encoder.
+    pub(super) fn start_calibration(&mut self, now: Duration, profile: &Profile) {
+        let pace = Pace {
+            fraction: 0.05,
+            acceleration_time: profile.acceleration_time.as_secs_f64().max(1e-3),
+        };
+        let by = 1.5_f64.to_radians();
+        let away = Joints(std::array::from_fn(|i| {
+            let range = self.params.ranges[i];
+            if self.joints.0[i] + by <= range.max {
+                self.joints.0[i] + by
+            } else {
+                self.joints.0[i] - by
+            }
+        }));
+        let knots = vec![self.joints, away, self.joints];
+        self.motion = Some(Motion::along(knots, now, f64::INFINITY, pace, &self.params));
+    }
+}

@@ -1,0 +1,345 @@
+//! What the next line from the terminal is for.
+
+use super::editor::Editing;
+use super::expr::Variable;
+use super::interpreter::Job;
+use super::lexer::{Cursor, Token, tokens};
+use super::place::Place;
+use super::{Emulator, Event, Fault, Message, display};
+use crate::Joints;
+
+#[derive(Debug)]
+pub(super) enum Mode {
+    /// The answer to the start-up question of this number.
+    Boot(usize),
+    /// A command.
+    Monitor,
+    /// The answer to "are you sure?".
+    Confirm(Confirm),
+    /// New values for a location, or nothing to keep what it has.
+    Change { key: String, place: Place },
+    /// A line for the editor.
+    Editor(Editing),
+    /// Values for a program's `PROMPT`.
+    Answer(Vec<Variable>),
+    /// Nothing: `DO` has the terminal until its motion ends.
+    Busy,
+}
+
+/// What is done when the answer is yes.
+#[derive(Debug)]
+pub(super) enum Confirm {
+    Calibrate,
+    Zero,
+    Delete(Vec<(Kind, String)>),
+    Format,
+}
+
+/// A kind of thing that has a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Program,
+    Place,
+    Real,
+    File,
+}
+
+impl Emulator {
+    pub(super) fn print(&mut self, text: &str) {
+        self.terminal.print(text, self.now);
+    }
+
+    /// Prints a whole line, starting a new one if need be.
+    pub(super) fn print_line(&mut self, text: &str) {
+        self.terminal.fresh_line(&self.profile, self.now);
+        self.print(text);
+        self.print(self.profile.eol);
+    }
+
+    /// Prints a fault between asterisks.
+    pub(super) fn refuse(&mut self, fault: Fault) {
+        let text = self.profile.text(fault.message);
+        let line = match fault.joint {
+            Some(joint) => format!("*{text}* Jt {}", joint.number()),
+            None => format!("*{text}*"),
+        };
+        self.print_line(&line);
+        self.note(Event::Refused(fault));
+    }
+
+    /// Back to the monitor, with its prompt.
+    pub(super) fn prompt(&mut self) {
+        self.mode = Mode::Monitor;
+        self.terminal.resume();
+        self.terminal.fresh_line(&self.profile, self.now);
+        let running = self.job.as_ref().is_some_and(Job::is_program);
+        let prompt = if running {
+            self.profile.run_prompt
+        } else {
+            self.profile.idle_prompt
+        };
+        self.print(prompt.encode_utf8(&mut [0; 4]));
+    }
+
+    pub(super) fn boot(&mut self, question: usize) {
+        match self.profile.boot.get(question) {
+            Some(asked) => {
+                let text = asked.text.clone();
+                self.mode = Mode::Boot(question);
+                self.print(&text);
+            }
+            None => {
+                if !self.profile.banner.is_empty() {
+                    let banner = self.profile.banner.clone();
+                    self.print_line(&banner);
+                }
+                self.prompt();
+            }
+        }
+    }
+
+    /// Whether a complete line would be worked on now.
+    pub(super) fn takes_lines(&self) -> bool {
+        !matches!(self.mode, Mode::Busy)
+    }
+
+    /// A line has just been completed. While `DO` blocks only the words that stop the arm are heard.
+    pub(super) fn line_complete(&mut self) {
+        if self.takes_lines() || !self.profile.stop_while_busy {
+            return;
+        }
+        let word = self
+            .terminal
+            .newest_line()
+            .unwrap_or_default()
+            .trim()
+            .to_ascii_uppercase();
+        if word == "PANIC" || word == "ABORT" {
+            self.terminal.forget_lines();
+            self.stop_job(Message::Aborted);
+        }
+    }
+
+    /// Ctrl-C.
+    pub(super) fn cancel(&mut self) {
+        match self.mode {
+            Mode::Busy => self.stop_job(Message::Aborted),
+            Mode::Boot(question) => self.boot(question),
+            _ => self.prompt(),
+        }
+    }
+
+    /// Ctrl-Z.
+    pub(super) fn end_of_input(&mut self) {
+        match &self.mode {
+            Mode::Editor(_) => self.leave_editor(),
+            Mode::Change { .. } | Mode::Confirm(_) => self.prompt(),
+            _ => {}
+        }
+    }
+
+    /// Works on a line.
+    pub(super) fn line(&mut self, line: &str) {
+        self.sense();
+        for _ in 0..self.profile.blank_lines.min(8) {
+            self.print(self.profile.eol);
+        }
+        match std::mem::replace(&mut self.mode, Mode::Monitor) {
+            Mode::Boot(question) => self.answer_boot(question, line),
+            Mode::Monitor => self.command(line),
+            Mode::Confirm(confirm) => self.answer_confirm(confirm, line),
+            Mode::Change { key, place } => self.change(key, place, line),
+            Mode::Editor(editing) => self.edit_line(editing, line),
+            Mode::Answer(variables) => self.answer_prompt(variables, line),
+            Mode::Busy => self.mode = Mode::Busy,
+        }
+    }
+
+    fn answer_boot(&mut self, question: usize, line: &str) {
+        match yes_or_no(line) {
+            None => {
+                let text = self.profile.text(Message::AnswerYesOrNo).to_owned();
+                self.print_line(&text);
+                self.boot(question);
+            }
+            Some(yes) => {
+                if yes && self.profile.boot.get(question).is_some_and(|q| q.initializes) {
+                    self.forget_everything();
+                    self.arm.monitor_speed = 100.0;
+                }
+                self.boot(question + 1);
+            }
+        }
+    }
+
+    pub(super) fn ask(&mut self, confirm: Confirm) {
+        let text = format!("{} (Y/N)? ", self.profile.text(Message::AreYouSure));
+        self.terminal.fresh_line(&self.profile, self.now);
+        self.print(&text);
+        self.mode = Mode::Confirm(confirm);
+    }
+
+    fn answer_confirm(&mut self, confirm: Confirm, line: &str) {
+        match yes_or_no(line) {
+            None => {
+                let text = self.profile.text(Message::AnswerYesOrNo).to_owned();
+                self.print_line(&text);
+                self.ask(confirm);
+            }
+            Some(false) => self.prompt(),
+            Some(true) => self.confirmed(confirm),
+        }
+    }
+
+    fn confirmed(&mut self, confirm: Confirm) {
+        match confirm {
+            Confirm::Calibrate => return self.calibrate(),
+            Confirm::Zero => self.forget_everything(),
+            Confirm::Format => self.floppy.clear(),
+            Confirm::Delete(names) => {
+                for (kind, name) in names {
+                    match kind {
+                        Kind::Program => drop(self.memory.programs.remove(&name)),
+                        Kind::Place => drop(self.memory.places.remove(&name)),
+                        Kind::Real => drop(self.memory.reals.remove(&name)),
+                        Kind::File => drop(self.floppy.remove(&name)),
+                    }
+                }
+            }
+        }
+        self.prompt();
+    }
+
+    fn forget_everything(&mut self) {
+        self.memory = super::memory::Memory::default();
+        self.paused = None;
+        self.reactions.clear();
+    }
+
+    /// Shows a location and asks for changes.
+    pub(super) fn ask_change(&mut self, key: String, place: Place) {
+        let heading = display::place_heading(&self.profile);
+        let values = display::place_values(&place, &self.profile);
+        let question = self.profile.change_text.clone();
+        self.print_line(&heading);
+        self.print_line(&values);
+        self.print_line(&question);
+        self.mode = Mode::Change { key, place };
+    }
+
+    /// Elements between commas replace those of the location; an empty line, or one that changes nothing, ends the dialogue.
+    fn change(&mut self, key: String, place: Place, line: &str) {
+        match changed(&place, line) {
+            Ok(None) => self.prompt(),
+            Ok(Some(new)) => match self.memory.set_place(key.clone(), new, &self.profile) {
+                Ok(()) => self.ask_change(key, new),
+                Err(fault) => {
+                    self.refuse(fault);
+                    self.prompt();
+                }
+            },
+            Err(fault) => {
+                self.refuse(fault);
+                self.ask_change(key, place);
+            }
+        }
+    }
+
+    /// The values typed to a program's `PROMPT`.
+    fn answer_prompt(&mut self, variables: Vec<Variable>, line: &str) {
+        match numbers(line) {
+            Ok(values) => {
+                let stored = variables.iter().enumerate().try_for_each(|(i, variable)| {
+                    let key = variable.key(&self.scope())?;
+                    let value = values.get(i).copied().flatten().unwrap_or_default();
+                    self.memory.set_real(key, value, &self.profile)
+                });
+                self.mode = Mode::Monitor;
+                match stored {
+                    Ok(()) => self.answered(),
+                    Err(fault) => self.fail_job(fault),
+                }
+            }
+            Err(fault) => {
+                self.refuse(fault);
+                self.mode = Mode::Answer(variables);
+                self.print("? ");
+            }
+        }
+    }
+
+    /// Moves every joint a little to find the index pulses of the encoders.
+    fn calibrate(&mut self) {
+        if !self.arm.power
+            && self.profile.start_power == super::StartPower::OnAtCalibration
+            && !self.panel_used
+        {
+            self.switch_power(true);
+        }
+        if !self.arm.power {
+            self.refuse(Message::ArmPowerOff.into());
+            return self.prompt();
+        }
+        self.arm.start_calibration(self.now, &self.profile);
+        self.note(Event::MotionStarted);
+        self.start_calibration_job();
+    }
+
+    /// The true joint angles are taken over: what the arm shows from now on.
+    pub(super) fn calibration_done(&mut self) {
+        self.arm.calibrated = true;
+        self.note(Event::Calibrated);
+    }
+
+    /// Puts the arm somewhere, as if it had been pushed there by hand. A motion under way is over.
+    pub fn place_arm(&mut self, joints: Joints) {
+        self.arm.put(joints);
+    }
+}
+
+/// Yes, no (also for an empty line), or neither.
+fn yes_or_no(line: &str) -> Option<bool> {
+    match line.trim().to_ascii_uppercase().as_str() {
+        "Y" | "YES" => Some(true),
+        "N" | "NO" | "" => Some(false),
+        _ => None,
+    }
+}
+
+/// Numbers between commas; `None` where one is left out.
+fn numbers(line: &str) -> Result<Vec<Option<f64>>, Fault> {
+    let tokens = tokens(line)?;
+    let mut cursor = Cursor::new(&tokens);
+    let mut found = Vec::new();
+    loop {
+        let negative = cursor.sign("-");
+        let value = match cursor.peek() {
+            Some(Token::Number(number)) => {
+                cursor.next();
+                Some(if negative { -number } else { *number })
+            }
+            _ if negative => return Err(Message::InvalidArgument.into()),
+            _ => None,
+        };
+        found.push(value);
+        if cursor.at_end() {
+            return Ok(found);
+        }
+        cursor.expect_sign(",")?;
+    }
+}
+
+fn changed(place: &Place, line: &str) -> Result<Option<Place>, Fault> {
+    let typed = numbers(line)?;
+    if typed.len() > 6 {
+        return Err(Message::InvalidArgument.into());
+    }
+    if typed.iter().all(Option::is_none) {
+        return Ok(None);
+    }
+    let mut values = place.val();
+    for (value, typed) in values.iter_mut().zip(typed) {
+        *value = typed.unwrap_or(*value);
+    }
+    Ok(Some(place.with_val(values)))
+}

@@ -1,0 +1,111 @@
+//! Numbers and blocks as the controller prints them.
+
+use super::place::Place;
+use super::{Profile, WhereLayout};
+use crate::{Gripper, Joints, Xyzoat};
+
+/// A fixed-point number, right-aligned, never `-0.000`.
+pub(super) fn number(value: f64, width: usize, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.starts_with('-') && text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
+    let text = if is_zero { &text[1..] } else { &text };
+    // A column too narrow for its number still keeps it apart from the one before.
+    if text.len() >= width {
+        format!(" {text}")
+    } else {
+        format!("{text:>width$}")
+    }
+}
+
+/// A real as `TYPE` and `LISTR` show it by default: whole numbers plain, others with up to four decimals.
+pub(super) fn plain(value: f64) -> String {
+    let text = format!("{value:.4}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// A word over the middle of a column of numbers.
+fn above(word: &str, width: usize) -> String {
+    let before = (width.saturating_sub(word.len()) + 2) / 2;
+    let text = format!(" {:>1$}{word}", "", before.saturating_sub(1));
+    format!("{text:<width$}")
+}
+
+/// The two blocks of `WHERE`, each a heading and a line of values.
+pub(super) fn whereabouts(
+    joints: &Joints,
+    hand: &Xyzoat,
+    gripper: Gripper,
+    profile: &Profile,
+) -> Vec<String> {
+    let width = profile.width;
+    let heading = |words: [String; 6]| words.map(|w| above(&w, width)).concat();
+    let mut cartesian_heading = heading(["X", "Y", "Z", "O", "A", "T"].map(String::from));
+    let values = hand.val();
+    let mut cartesian: String = (0..6)
+        .map(|i| {
+            let decimals = if i < 3 {
+                profile.length_decimals
+            } else {
+                profile.angle_decimals
+            };
+            number(values[i], width, decimals)
+        })
+        .collect();
+    if profile.hand_column {
+        cartesian_heading.push_str(&above("HAND", width));
+        let opening = if gripper == Gripper::Open { 50.0 } else { 0.0 };
+        cartesian.push_str(&number(opening, width, profile.length_decimals));
+    }
+    let joint_heading = heading(std::array::from_fn(|i| {
+        format!("{}{}", profile.joint_heading, i + 1)
+    }));
+    let joint_line: String = joints
+        .degrees()
+        .map(|v| number(v, width, profile.angle_decimals))
+        .concat();
+    let [cartesian_heading, joint_heading] =
+        [cartesian_heading, joint_heading].map(|h| h.trim_end().to_owned());
+    match profile.where_layout {
+        WhereLayout::CartesianFirst => vec![cartesian_heading, cartesian, joint_heading, joint_line],
+        WhereLayout::JointsFirst => vec![joint_heading, joint_line, cartesian_heading, cartesian],
+    }
+}
+
+/// The heading that `HERE`, `POINT` and `LISTL` put above locations of either kind.
+pub(super) fn place_heading(profile: &Profile) -> String {
+    let width = profile.width + 1;
+    ["X/JT1", "Y/JT2", "Z/JT3", "O/JT4", "A/JT5", "T/JT6"]
+        .map(|w| format!("{w:>width$}"))
+        .concat()
+}
+
+/// The six values of a location below that heading.
+pub(super) fn place_values(place: &Place, profile: &Profile) -> String {
+    let values = place.val();
+    let lengths = matches!(place, Place::Transformation(_));
+    (0..6)
+        .map(|i| {
+            let decimals = if lengths && i < 3 {
+                profile.length_decimals
+            } else {
+                profile.angle_decimals
+            };
+            number(values[i], profile.width + 1, decimals)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(number(-0.0004, 9, 3), "    0.000");
+        assert_eq!(number(-0.0006, 9, 3), "   -0.001");
+        assert_eq!(number(-12345.678, 5, 3), " -12345.678");
+        assert_eq!(plain(-0.00001), "0");
+        assert_eq!(plain(2.5), "2.5");
+    }
+}

@@ -1,0 +1,145 @@
+//! The program editor.
+
+use super::dialogue::Mode;
+use super::lexer::{Cursor, Token};
+use super::program::{Program, Step};
+use super::scope::check_name;
+use super::{Emulator, Fault, Message};
+
+#[derive(Debug)]
+pub(super) struct Editing {
+    name: String,
+    program: Program,
+    /// The step that the next line is for, from 0.
+    at: usize,
+    /// Whether lines are inserted before the step instead of replacing it.
+    inserting: bool,
+}
+
+/// A step as it is listed.
+pub(super) fn numbered(index: usize, text: &str) -> String {
+    format!("{:>3}.  {text}", index + 1)
+}
+
+impl Emulator {
+    /// `EDIT program[,step]`.
+    pub(super) fn edit(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let name = match cursor.peek() {
+            None => self.edited_last.clone().ok_or(Message::UndefinedProgram)?,
+            Some(_) => cursor.name()?,
+        };
+        let mut at = 0;
+        if cursor.sign(",") {
+            match cursor.next() {
+                Some(Token::Number(step)) if *step >= 1.0 && *step <= 32767.0 => at = *step as usize - 1,
+                _ => return Err(Message::InvalidArgument.into()),
+            }
+        }
+        cursor.expect_end()?;
+        check_name(&name, &self.profile)?;
+        let program = match self.memory.programs.get(&name) {
+            Some(program) => (**program).clone(),
+            None => {
+                // It exists from now on, and memory for it is found or not.
+                self.memory
+                    .set_program(name.clone(), Program::default(), &self.profile)?;
+                Program::default()
+            }
+        };
+        self.print_line(&format!(".PROGRAM {name}"));
+        self.edited_last = Some(name.clone());
+        let at = at.min(program.steps.len());
+        self.editor_prompt(Editing {
+            name,
+            program,
+            at,
+            inserting: false,
+        });
+        Ok(())
+    }
+
+    fn editor_prompt(&mut self, editing: Editing) {
+        if let Some(step) = editing.program.steps.get(editing.at)
+            && !editing.inserting
+        {
+            self.print_line(&numbered(editing.at, &step.text));
+        }
+        self.terminal.fresh_line(&self.profile, self.now);
+        self.print(&format!("{:>2}.? ", editing.at + 1));
+        self.mode = Mode::Editor(editing);
+    }
+
+    /// Ends editing; the program is kept as it is then.
+    pub(super) fn leave_editor(&mut self) {
+        if let Mode::Editor(editing) = std::mem::replace(&mut self.mode, Mode::Monitor) {
+            self.keep(editing);
+        }
+        self.prompt();
+    }
+
+    fn keep(&mut self, editing: Editing) {
+        let Editing { name, program, .. } = editing;
+        if let Err(fault) = self.memory.set_program(name, program, &self.profile) {
+            self.refuse(fault);
+        }
+    }
+
+    /// A line typed to the editor: one of its own commands, or a step.
+    ///
+    /// `E` ends; an empty line goes to the next step; `S n` to step n, `P n` prints n steps, `L` goes one step back, `D n` deletes n steps,
+    /// `I` inserts until an empty line.
+    pub(super) fn edit_line(&mut self, mut editing: Editing, line: &str) {
+        let text = line.trim().to_ascii_uppercase();
+        let mut words = text.split_whitespace();
+        let command = words.next().unwrap_or_default();
+        let argument = words.next().map(str::parse::<usize>);
+        let count = match argument {
+            None => Some(1),
+            Some(Ok(number)) => Some(number.min(self.profile.max_entries)),
+            Some(Err(_)) => None,
+        };
+        match (command, count) {
+            ("E", Some(_)) if argument.is_none() => {
+                self.keep(editing);
+                return self.prompt();
+            }
+            ("S", Some(number)) => editing.at = number.saturating_sub(1).min(editing.program.steps.len()),
+            ("L", Some(number)) => editing.at = editing.at.saturating_sub(number),
+            ("P", Some(number)) => {
+                let end = (editing.at + number).min(editing.program.steps.len());
+                for i in editing.at..end {
+                    self.print_line(&numbered(i, &editing.program.steps[i].text));
+                }
+                editing.at = end;
+            }
+            ("D", Some(number)) => {
+                let end = (editing.at + number).min(editing.program.steps.len());
+                editing.program.steps.drain(editing.at..end);
+            }
+            ("I", Some(_)) if argument.is_none() => editing.inserting = true,
+            ("", _) if editing.inserting => editing.inserting = false,
+            ("", _) => editing.at = (editing.at + 1).min(editing.program.steps.len()),
+            _ => {
+                if let Err(fault) = self.enter_step(&mut editing, line) {
+                    self.refuse(fault);
+                }
+            }
+        }
+        self.editor_prompt(editing);
+    }
+
+    fn enter_step(&mut self, editing: &mut Editing, line: &str) -> Result<(), Fault> {
+        let step = Step::parse(line)?;
+        let steps = &mut editing.program.steps;
+        if editing.inserting || editing.at >= steps.len() {
+            if steps.len() >= self.profile.max_entries {
+                return Err(Message::OutOfMemory.into());
+            }
+            steps.insert(editing.at, step);
+        } else {
+            steps[editing.at] = step;
+        }
+        editing.at += 1;
+        Ok(())
+    }
+}

@@ -1,0 +1,234 @@
+//! Programs, locations and variables as text: the emulated floppy disk.
+//!
+//! ```text
+//! .PROGRAM LOOK
+//!  SPEED 20 ALWAYS
+//!  MOVES P1
+//! .END
+//! .LOCATIONS
+//! P1 75.14,164.64,915.57,100,-80,0
+//! #P2 10,-85,95,0,0,0
+//! .END
+//! .REALS
+//! N 3
+//! .END
+//! ```
+
+use std::collections::BTreeMap;
+
+use super::dialogue::Kind;
+use super::lexer::Cursor;
+use super::memory::Memory;
+use super::place::Place;
+use super::program::{Program, Step};
+use super::scope::check_name;
+use super::{Emulator, Event, Fault, Message, Profile};
+use crate::{Joints, Xyzoat};
+
+/// Why a text is not one of programs, locations and variables.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {fault}: {text}")]
+pub struct TextError {
+    /// The line, from 1.
+    pub line: usize,
+    /// What is wrong with it.
+    pub fault: Fault,
+    /// The line itself.
+    pub text: String,
+}
+
+impl Emulator {
+    /// All programs, locations and real variables as text, which [`Emulator::load_text`] takes back.
+    pub fn text(&self) -> String {
+        text_of(&self.memory, |_, _| true)
+    }
+
+    /// Adds the programs, locations and variables of a text to the memory, replacing those of the same names. Nothing is changed if any line
+    /// is wrong.
+    ///
+    /// # Errors
+    /// The first line that does not fit.
+    pub fn load_text(&mut self, text: &str) -> Result<(), TextError> {
+        self.memory = parsed(text, self.memory.clone(), &self.profile)?;
+        Ok(())
+    }
+
+    /// The files on the floppy disk, by name.
+    pub fn floppy(&self) -> &BTreeMap<String, String> {
+        &self.floppy
+    }
+
+    /// Puts a file on the floppy disk, as `STORE` does. The name is kept in upper case.
+    pub fn insert_file(&mut self, name: &str, text: String) {
+        self.floppy.insert(name.to_ascii_uppercase(), text);
+    }
+
+    /// `STORE file[=name,...]`: everything, or only programs, locations or variables, or only those named.
+    pub(super) fn store(&mut self, kind: Option<Kind>, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let file = cursor.name()?;
+        check_name(&file, &self.profile)?;
+        let mut names = Vec::new();
+        if cursor.sign("=") {
+            names.push(self.stored_name(cursor)?);
+            while cursor.sign(",") {
+                names.push(self.stored_name(cursor)?);
+            }
+        }
+        cursor.expect_end()?;
+        let wanted = |k: Kind, name: &str| {
+            kind.is_none_or(|kind| kind == k) && (names.is_empty() || names.iter().any(|n| n == name))
+        };
+        let text = text_of(&self.memory, wanted);
+        if self.floppy.len() >= self.profile.max_entries && !self.floppy.contains_key(&file) {
+            return Err(Message::File.into());
+        }
+        self.floppy.insert(file.clone(), text);
+        self.note(Event::FileStored(file));
+        Ok(())
+    }
+
+    fn stored_name(&self, cursor: &mut Cursor<'_>) -> Result<String, Fault> {
+        super::place::PlaceName::parse(cursor)?.key(&self.scope())
+    }
+
+    /// `LOAD file`.
+    pub(super) fn load(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let file = cursor.name()?;
+        cursor.expect_end()?;
+        let text = self.floppy.get(&file).ok_or(Message::File)?;
+        self.memory = parsed(text, self.memory.clone(), &self.profile).map_err(|error| error.fault)?;
+        Ok(())
+    }
+}
+
+fn text_of(memory: &Memory, wanted: impl Fn(Kind, &str) -> bool) -> String {
+    let mut text = String::new();
+    for (name, program) in memory.programs.iter().filter(|(n, _)| wanted(Kind::Program, n)) {
+        text.push_str(&format!(".PROGRAM {name}\n"));
+        for step in &program.steps {
+            text.push_str(&format!(" {}\n", step.text));
+        }
+        text.push_str(".END\n");
+    }
+    let places: Vec<_> = memory
+        .places
+        .iter()
+        .filter(|(n, _)| wanted(Kind::Place, n))
+        .collect();
+    if !places.is_empty() {
+        text.push_str(".LOCATIONS\n");
+        for (name, place) in places {
+            let values = place.val().map(|v| format!("{v:.6}")).join(",");
+            text.push_str(&format!("{name} {values}\n"));
+        }
+        text.push_str(".END\n");
+    }
+    let reals: Vec<_> = memory
+        .reals
+        .iter()
+        .filter(|(n, _)| wanted(Kind::Real, n))
+        .collect();
+    if !reals.is_empty() {
+        text.push_str(".REALS\n");
+        for (name, value) in reals {
+            text.push_str(&format!("{name} {value}\n"));
+        }
+        text.push_str(".END\n");
+    }
+    text
+}
+
+enum Section {
+    None,
+    Program(String, Program),
+    Locations,
+    Reals,
+}
+
+fn parsed(text: &str, mut memory: Memory, profile: &Profile) -> Result<Memory, TextError> {
+    let mut section = Section::None;
+    for (index, line) in text.lines().enumerate() {
+        take_line(line.trim(), &mut section, &mut memory, profile).map_err(|fault| TextError {
+            line: index + 1,
+            fault,
+            text: line.chars().take(80).collect(),
+        })?;
+    }
+    match section {
+        Section::None => Ok(memory),
+        _ => Err(TextError {
+            line: text.lines().count(),
+            fault: Message::ControlStructure.into(),
+            text: "the section is not closed by .END".into(),
+        }),
+    }
+}
+
+fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &Profile) -> Result<(), Fault> {
+    let upper = line.to_ascii_uppercase();
+    let words: Vec<&str> = upper.split_whitespace().collect();
+    match section {
+        Section::None => {
+            *section = match words[..] {
+                [] => return Ok(()),
+                [".PROGRAM", name] => Section::Program(sound_name(name, profile)?, Program::default()),
+                [".LOCATIONS"] => Section::Locations,
+                [".REALS"] => Section::Reals,
+                _ => return Err(Message::InvalidArgument.into()),
+            };
+        }
+        _ if upper == ".END" => {
+            if let Section::Program(name, program) = std::mem::replace(section, Section::None) {
+                memory.set_program(name, program, profile)?;
+            }
+        }
+        Section::Program(_, program) => {
+            if program.steps.len() >= profile.max_entries {
+                return Err(Message::OutOfMemory.into());
+            }
+            program.steps.push(Step::parse(line)?);
+        }
+        Section::Locations => {
+            let [name, values] = words[..] else {
+                return Err(Message::InvalidArgument.into());
+            };
+            let values: Vec<f64> = values.split(',').filter_map(|v| v.parse().ok()).collect();
+            let values: [f64; 6] = values.try_into().map_err(|_| Message::InvalidArgument)?;
+            let (place, plain) = match name.strip_prefix('#') {
+                Some(plain) => (Place::PrecisionPoint(Joints::from_degrees(values)), plain),
+                None => (Place::Transformation(Xyzoat::from_val(values).pose()), name),
+            };
+            sound_name(plain, profile)?;
+            memory.set_place(name.to_owned(), place, profile)?;
+        }
+        Section::Reals => {
+            let [name, value] = words[..] else {
+                return Err(Message::InvalidArgument.into());
+            };
+            let value: f64 = value.parse().map_err(|_| Message::InvalidArgument)?;
+            if !value.is_finite() {
+                return Err(Message::InvalidArgument.into());
+            }
+            memory.set_real(sound_name(name, profile)?, value, profile)?;
+        }
+    }
+    Ok(())
+}
+
+/// A name as it is kept, possibly with an index.
+fn sound_name(name: &str, profile: &Profile) -> Result<String, Fault> {
+    let plain = match name.split_once('[') {
+        Some((plain, index)) if index.strip_suffix(']').is_some_and(|i| i.parse::<u16>().is_ok()) => plain,
+        Some(_) => return Err(Message::InvalidArgument.into()),
+        None => name,
+    };
+    let fits = plain.starts_with(|c: char| c.is_ascii_alphabetic())
+        && plain
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '.' || c == '_');
+    if !fits {
+        return Err(Message::InvalidArgument.into());
+    }
+    check_name(plain, profile)?;
+    Ok(name.to_owned())
+}

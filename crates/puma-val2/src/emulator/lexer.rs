@@ -1,0 +1,171 @@
+//! A line of VAL II cut into words, numbers, texts and signs.
+
+use super::{Fault, Message};
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Token {
+    /// A name or keyword, upper case.
+    Name(String),
+    Number(f64),
+    Text(String),
+    Sign(&'static str),
+}
+
+const SIGNS: [&str; 20] = [
+    "==", "<>", "<=", ">=", "=<", "=>", "<", ">", "=", "+", "-", "*", "/", "^", "(", ")", "[", "]", ":", ",",
+];
+
+/// Cuts a line into tokens; a comment after `;` is dropped.
+pub(super) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
+    let mut found = Vec::new();
+    let mut rest = line.trim_start();
+    while let Some(first) = rest.chars().next() {
+        match first {
+            ';' => break,
+            '"' => {
+                let inner = &rest[1..];
+                let end = inner.find('"').ok_or(Message::InvalidArgument)?;
+                found.push(Token::Text(inner[..end].to_owned()));
+                rest = &inner[end + 1..];
+            }
+            c if c.is_ascii_digit() || (c == '.' && rest[1..].starts_with(|d: char| d.is_ascii_digit())) => {
+                let end = rest
+                    .find(|d: char| !(d.is_ascii_digit() || d == '.'))
+                    .unwrap_or(rest.len());
+                let number: f64 = rest[..end].parse().map_err(|_| Message::InvalidArgument)?;
+                if !number.is_finite() || number.abs() > 1e15 {
+                    return Err(Message::InvalidArgument.into());
+                }
+                found.push(Token::Number(number));
+                rest = &rest[end..];
+            }
+            c if c.is_ascii_alphabetic() => {
+                let end = rest
+                    .find(|d: char| !(d.is_ascii_alphanumeric() || d == '.' || d == '_'))
+                    .unwrap_or(rest.len());
+                found.push(Token::Name(rest[..end].to_ascii_uppercase()));
+                rest = &rest[end..];
+            }
+            '#' => {
+                found.push(Token::Sign("#"));
+                rest = &rest[1..];
+            }
+            _ => {
+                let sign = SIGNS
+                    .into_iter()
+                    .find(|s| rest.starts_with(s))
+                    .ok_or(Message::InvalidArgument)?;
+                found.push(Token::Sign(sign));
+                rest = &rest[sign.len()..];
+            }
+        }
+        rest = rest.trim_start();
+    }
+    Ok(found)
+}
+
+/// A reader over the tokens of a line.
+#[derive(Debug)]
+pub(super) struct Cursor<'a> {
+    tokens: &'a [Token],
+    depth: usize,
+}
+
+impl<'a> Cursor<'a> {
+    pub(super) fn new(tokens: &'a [Token]) -> Self {
+        Self { tokens, depth: 0 }
+    }
+
+    pub(super) fn peek(&self) -> Option<&'a Token> {
+        self.tokens.first()
+    }
+
+    pub(super) fn peek_second(&self) -> Option<&'a Token> {
+        self.tokens.get(1)
+    }
+
+    pub(super) fn next(&mut self) -> Option<&'a Token> {
+        let (first, rest) = self.tokens.split_first()?;
+        self.tokens = rest;
+        Some(first)
+    }
+
+    pub(super) fn at_end(&self) -> bool {
+        self.tokens.is_empty()
+    }
+
+    /// Takes the sign if it comes next.
+    pub(super) fn sign(&mut self, sign: &str) -> bool {
+        let is_next = matches!(self.peek(), Some(Token::Sign(s)) if *s == sign);
+        if is_next {
+            self.next();
+        }
+        is_next
+    }
+
+    /// Takes the word if it comes next.
+    pub(super) fn word(&mut self, word: &str) -> bool {
+        let is_next = matches!(self.peek(), Some(Token::Name(n)) if n == word);
+        if is_next {
+            self.next();
+        }
+        is_next
+    }
+
+    pub(super) fn expect_sign(&mut self, sign: &str) -> Result<(), Fault> {
+        if self.sign(sign) {
+            Ok(())
+        } else {
+            Err(Message::InvalidArgument.into())
+        }
+    }
+
+    pub(super) fn expect_word(&mut self, word: &str) -> Result<(), Fault> {
+        if self.word(word) {
+            Ok(())
+        } else {
+            Err(Message::InvalidArgument.into())
+        }
+    }
+
+    pub(super) fn name(&mut self) -> Result<String, Fault> {
+        match self.next() {
+            Some(Token::Name(name)) => Ok(name.clone()),
+            _ => Err(Message::InvalidArgument.into()),
+        }
+    }
+
+    pub(super) fn expect_end(&self) -> Result<(), Fault> {
+        if self.at_end() {
+            Ok(())
+        } else {
+            Err(Message::InvalidArgument.into())
+        }
+    }
+
+    /// Goes one bracket deeper, up to a bound that no line of sense reaches.
+    pub(super) fn descend(&mut self) -> Result<(), Fault> {
+        self.depth += 1;
+        if self.depth > 24 {
+            return Err(Message::InvalidArgument.into());
+        }
+        Ok(())
+    }
+
+    pub(super) fn ascend(&mut self) {
+        self.depth -= 1;
+    }
+}
+
+/// The one entry of `words` that `typed` names: itself, or the only one that it abbreviates.
+pub(super) fn keyword<T: Copy>(typed: &str, words: &[(&str, T)], unknown: Message) -> Result<T, Fault> {
+    if let Some((_, found)) = words.iter().find(|(word, _)| *word == typed) {
+        return Ok(*found);
+    }
+    let mut matching = words.iter().filter(|(word, _)| word.starts_with(typed));
+    match (matching.next(), matching.next()) {
+        (Some((_, found)), None) => Ok(*found),
+        (None, _) => Err(unknown.into()),
+        _ => Err(Message::AmbiguousName.into()),
+    }
+}

@@ -1,0 +1,45 @@
+//! What the controller remembers: programs, locations, real variables.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::place::Place;
+use super::program::Program;
+use super::{Fault, Message, Profile};
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    pub(super) programs: BTreeMap<String, Arc<Program>>,
+    pub(super) places: BTreeMap<String, Place>,
+    pub(super) reals: BTreeMap<String, f64>,
+}
+
+impl Memory {
+    pub(super) fn set_place(&mut self, key: String, place: Place, profile: &Profile) -> Result<(), Fault> {
+        if !place.val().iter().all(|v| v.is_finite()) {
+            return Err(Message::ArithmeticError.into());
+        }
+        insert(&mut self.places, key, place, profile)
+    }
+
+    pub(super) fn set_real(&mut self, key: String, value: f64, profile: &Profile) -> Result<(), Fault> {
+        insert(&mut self.reals, key, value, profile)
+    }
+
+    pub(super) fn set_program(
+        &mut self,
+        name: String,
+        program: Program,
+        profile: &Profile,
+    ) -> Result<(), Fault> {
+        insert(&mut self.programs, name, Arc::new(program), profile)
+    }
+}
+
+fn insert<T>(map: &mut BTreeMap<String, T>, key: String, value: T, profile: &Profile) -> Result<(), Fault> {
+    if map.len() >= profile.max_entries && !map.contains_key(&key) {
+        return Err(Message::OutOfMemory.into());
+    }
+    map.insert(key, value);
+    Ok(())
+}

@@ -1,0 +1,135 @@
+//! What the controller says when it will not, or when something has ended.
+
+use std::fmt;
+
+use crate::Joint;
+
+/// A message of the controller, by its meaning. The wording is the profile's: the classes are known, the texts mostly are not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Message {
+    /// No such monitor command.
+    IllegalCommand,
+    /// An instruction that may not stand here.
+    IllegalInstruction,
+    /// No such instruction.
+    UnknownInstruction,
+    /// An argument that is missing, superfluous or makes no sense.
+    InvalidArgument,
+    /// An abbreviation that more than one word answers to.
+    AmbiguousName,
+    /// A name longer than the controller keeps.
+    NameTooLong,
+    /// A location or variable that has no value.
+    UndefinedValue,
+    /// A program that does not exist.
+    UndefinedProgram,
+    /// A label that no step bears.
+    UndefinedLabel,
+    /// `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their ends do not match.
+    ControlStructure,
+    /// Too many programs, names or nested calls.
+    OutOfMemory,
+    /// A number without a meaning: division by zero, root of a negative number.
+    ArithmeticError,
+    /// A signal number that is not there, or an input that was to be set.
+    IllegalSignal,
+    /// A place out of reach, or a joint out of its range.
+    OutOfRange,
+    /// A place too close to the column.
+    TooClose,
+    /// A servo did not follow.
+    EnvelopeError,
+    /// Arm power is off.
+    ArmPowerOff,
+    /// The arm does not know its joint angles yet.
+    NotCalibrated,
+    /// A program runs: the command has to wait.
+    Busy,
+    /// No program runs or can go on.
+    NotRunning,
+    /// A file cannot be read or written.
+    File,
+    /// A program ended.
+    Completed,
+    /// A program was aborted.
+    Aborted,
+    /// A program came to `PAUSE`.
+    Paused,
+    /// A program came to `HALT`.
+    Halted,
+    /// A question that asks for confirmation, without its `(Y/N)?`.
+    AreYouSure,
+    /// The answer was neither yes nor no.
+    AnswerYesOrNo,
+}
+
+impl Message {
+    /// The wording of the standard profile.
+    pub const fn default_text(self) -> &'static str {
+        match self {
+            Self::IllegalCommand => "Illegal monitor command",
+            Self::IllegalInstruction => "Illegal instruction",
+            Self::UnknownInstruction => "Unknown instruction",
+            Self::InvalidArgument => "Invalid argument",
+            Self::AmbiguousName => "Ambiguous name",
+            Self::NameTooLong => "Name too long",
+            Self::UndefinedValue => "Undefined value",
+            Self::UndefinedProgram => "Undefined program",
+            Self::UndefinedLabel => "Undefined label",
+            Self::ControlStructure => "Control structure error",
+            Self::OutOfMemory => "Out of memory",
+            Self::ArithmeticError => "Arithmetic error",
+            Self::IllegalSignal => "Illegal signal number",
+            Self::OutOfRange => "Location out of range",
+            Self::TooClose => "Location too close",
+            Self::EnvelopeError => "Envelope error",
+            Self::ArmPowerOff => "Arm power off",
+            Self::NotCalibrated => "Arm not calibrated",
+            Self::Busy => "Program executing",
+            Self::NotRunning => "No program executing",
+            Self::File => "File error",
+            Self::Completed => "Program completed",
+            Self::Aborted => "Program aborted",
+            Self::Paused => "Program paused",
+            Self::Halted => "Program halted",
+            Self::AreYouSure => "Are you sure",
+            Self::AnswerYesOrNo => "Answer with one of: Y, N",
+        }
+    }
+}
+
+/// A message that ends what was asked for, with the joint it concerns if there is one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// What is wrong.
+    pub message: Message,
+    /// The joint that it is about.
+    pub joint: Option<Joint>,
+}
+
+impl Fault {
+    /// A fault that concerns `joint`.
+    pub(super) fn at(message: Message, joint: Joint) -> Self {
+        Self {
+            message,
+            joint: Some(joint),
+        }
+    }
+}
+
+impl From<Message> for Fault {
+    fn from(message: Message) -> Self {
+        Self { message, joint: None }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.message.default_text())?;
+        match self.joint {
+            Some(joint) => write!(f, " {joint}"),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Locations: transformations, precision points and the expressions that make them.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::expr::{self, Expr};
+use super::lexer::{Cursor, Token};
+use super::scope::Scope;
+use super::{Fault, Message};
+use crate::{Joints, Xyzoat};
+
+/// A location's value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// A hand pose in the world frame (or relative to another one), metres.
+    Transformation(Isometry3<f64>),
+    /// A precision point: six joint angles.
+    PrecisionPoint(Joints),
+}
+
+impl Place {
+    /// The six numbers that VAL shows: millimetres and degrees, or six joint angles in degrees.
+    pub fn val(&self) -> [f64; 6] {
+        match self {
+            Self::Transformation(pose) => Xyzoat::from_pose(pose).val(),
+            Self::PrecisionPoint(joints) => joints.degrees(),
+        }
+    }
+
+    /// The value with its six numbers replaced; of the same kind.
+    pub(super) fn with_val(&self, values: [f64; 6]) -> Self {
+        match self {
+            Self::Transformation(_) => Self::Transformation(Xyzoat::from_val(values).pose()),
+            Self::PrecisionPoint(_) => Self::PrecisionPoint(Joints::from_degrees(values)),
+        }
+    }
+}
+
+/// The name of a location: `P1`, `#P1`, `P[3]`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PlaceName {
+    pub(super) precision: bool,
+    pub(super) name: String,
+    pub(super) index: Option<Box<Expr>>,
+}
+
+impl PlaceName {
+    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+        let precision = cursor.sign("#");
+        let name = cursor.name()?;
+        let index = expr::parse_index(cursor)?;
+        Ok(Self {
+            precision,
+            name,
+            index,
+        })
+    }
+
+    /// The name under which the value is kept; that of a precision point begins with `#`.
+    pub(super) fn key(&self, scope: &Scope<'_>) -> Result<String, Fault> {
+        let key = expr::key(&self.name, self.index.as_deref(), scope)?;
+        Ok(if self.precision { format!("#{key}") } else { key })
+    }
+}
+
+/// A location expression: terms joined by `:`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PlaceExpr(Vec<Term>);
+
+#[derive(Clone, Debug, PartialEq)]
+enum Term {
+    Named(PlaceName),
+    Trans([Option<Expr>; 6]),
+    Ppoint([Option<Expr>; 6]),
+    Shift(Box<PlaceExpr>, [Option<Expr>; 3]),
+    Inverse(Box<PlaceExpr>),
+    Frame(Box<[PlaceExpr; 4]>),
+    Here,
+    Dest,
+    Null,
+}
+
+impl PlaceExpr {
+    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+        cursor.descend()?;
+        let mut terms = vec![Term::parse(cursor)?];
+        while cursor.sign(":") {
+            terms.push(Term::parse(cursor)?);
+        }
+        cursor.ascend();
+        Ok(Self(terms))
+    }
+
+    /// The value. A precision point stands alone: it cannot be part of a compound.
+    pub(super) fn place(&self, scope: &Scope<'_>) -> Result<Place, Fault> {
+        let (first, rest) = self.0.split_first().ok_or(Message::InvalidArgument)?;
+        let first = first.place(scope)?;
+        if rest.is_empty() {
+            return Ok(first);
+        }
+        let mut pose = transformation(first)?;
+        for term in rest {
+            pose *= transformation(term.place(scope)?)?;
+        }
+        Ok(Place::Transformation(pose))
+    }
+
+    /// The value, which must be a transformation.
+    pub(super) fn transformation(&self, scope: &Scope<'_>) -> Result<Isometry3<f64>, Fault> {
+        transformation(self.place(scope)?)
+    }
+}
+
+fn transformation(place: Place) -> Result<Isometry3<f64>, Fault> {
+    match place {
+        Place::Transformation(pose) => Ok(pose),
+        Place::PrecisionPoint(_) => Err(Message::InvalidArgument.into()),
+    }
+}
+
+impl Term {
+    fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+        let is_call = matches!(cursor.peek_second(), Some(Token::Sign("(")));
+        match cursor.peek() {
+            Some(Token::Name(name)) if is_call => {
+                cursor.next();
+                cursor.next();
+                let term = match name.as_str() {
+                    "TRANS" => Self::Trans(arguments(cursor)?),
+                    "SHIFT" => {
+                        let of = PlaceExpr::parse(cursor)?;
+                        cursor.expect_word("BY")?;
+                        Self::Shift(Box::new(of), arguments(cursor)?)
+                    }
+                    "INVERSE" => Self::Inverse(Box::new(PlaceExpr::parse(cursor)?)),
+                    "FRAME" => {
+                        let a = PlaceExpr::parse(cursor)?;
+                        cursor.expect_sign(",")?;
+                        let b = PlaceExpr::parse(cursor)?;
+                        cursor.expect_sign(",")?;
+                        let c = PlaceExpr::parse(cursor)?;
+                        cursor.expect_sign(",")?;
+                        let d = PlaceExpr::parse(cursor)?;
+                        Self::Frame(Box::new([a, b, c, d]))
+                    }
+                    _ => return Err(Message::InvalidArgument.into()),
+                };
+                cursor.expect_sign(")")?;
+                Ok(term)
+            }
+            Some(Token::Name(name)) => {
+                let fixed = match name.as_str() {
+                    "HERE" => Self::Here,
+                    "DEST" => Self::Dest,
+                    "NULL" => Self::Null,
+                    _ => return Ok(Self::Named(PlaceName::parse(cursor)?)),
+                };
+                cursor.next();
+                Ok(fixed)
+            }
+            Some(Token::Sign("#")) => {
+                let name = PlaceName::parse(cursor)?;
+                if name.name == "PPOINT" && cursor.sign("(") {
+                    let values = arguments(cursor)?;
+                    cursor.expect_sign(")")?;
+                    return Ok(Self::Ppoint(values));
+                }
+                Ok(Self::Named(name))
+            }
+            _ => Err(Message::InvalidArgument.into()),
+        }
+    }
+
+    fn place(&self, scope: &Scope<'_>) -> Result<Place, Fault> {
+        Ok(match self {
+            Self::Named(name) => scope.place(&name.key(scope)?)?,
+            Self::Trans(arguments) => {
+                Place::Transformation(Xyzoat::from_val(values(arguments, scope)?).pose())
+            }
+            Self::Ppoint(_) if !scope.has_ppoint() => return Err(Message::InvalidArgument.into()),
+            Self::Ppoint(arguments) => Place::PrecisionPoint(Joints::from_degrees(values(arguments, scope)?)),
+            Self::Shift(of, by) => {
+                let by = Vector3::from(values(by, scope)?) / 1000.0;
+                let mut pose = of.transformation(scope)?;
+                pose.translation.vector += by;
+                Place::Transformation(pose)
+            }
+            Self::Inverse(of) => Place::Transformation(of.transformation(scope)?.inverse()),
+            Self::Frame(of) => {
+                let [a, b, c, d] = &**of;
+                let at = |p: &PlaceExpr| p.transformation(scope).map(|t| t.translation.vector);
+                Place::Transformation(frame(at(a)?, at(b)?, at(c)?, at(d)?)?)
+            }
+            Self::Here => Place::Transformation(scope.here()),
+            Self::Dest => Place::Transformation(scope.destination()),
+            Self::Null => Place::Transformation(Isometry3::identity()),
+        })
+    }
+}
+
+/// Up to `N` arguments between commas; what is left out is zero.
+pub(super) fn arguments<const N: usize>(cursor: &mut Cursor<'_>) -> Result<[Option<Expr>; N], Fault> {
+    let mut found = [const { None }; N];
+    for (i, place) in found.iter_mut().enumerate() {
+        if i > 0 && !cursor.sign(",") {
+            break;
+        }
+        *place = Expr::parse_optional(cursor)?;
+    }
+    Ok(found)
+}
+
+/// The values of arguments, zero for those left out.
+pub(super) fn values<const N: usize>(
+    arguments: &[Option<Expr>; N],
+    scope: &Scope<'_>,
+) -> Result<[f64; N], Fault> {
+    let mut found = [0.0; N];
+    for (value, argument) in found.iter_mut().zip(arguments) {
+        if let Some(argument) = argument {
+            *value = argument.value(scope)?;
+        }
+    }
+    Ok(found)
+}
+
+/// A frame with its x axis from `a` to `b`, its xy plane through `c` (on the side of positive y) and its origin at `d`.
+fn frame(
+    a: Vector3<f64>,
+    b: Vector3<f64>,
+    c: Vector3<f64>,
+    d: Vector3<f64>,
+) -> Result<Isometry3<f64>, Fault> {
+    let too_close = Fault::from(Message::InvalidArgument);
+    let x = (b - a).try_normalize(1e-9).ok_or_else(|| too_close.clone())?;
+    let z = x.cross(&(c - a)).try_normalize(1e-12).ok_or(too_close)?;
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
+    Ok(Isometry3::from_parts(
+        Translation3::from(d),
+        UnitQuaternion::from_rotation_matrix(&rotation),
+    ))
+}

@@ -1,0 +1,251 @@
+//! Everything about a controller that is not known for certain, as values.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::Message;
+use crate::Joints;
+
+/// A question of the start-up dialogue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BootQuestion {
+    /// The text, with its trailing blank.
+    pub text: String,
+    /// Whether `Y` erases programs, locations and variables and sets the speed to 100 %.
+    pub initializes: bool,
+}
+
+/// Which block of `WHERE` comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WhereLayout {
+    /// X Y Z O A T, then the joints (VAL II).
+    CartesianFirst,
+    /// The joints, then X Y Z O A T (AS, its Japanese relative).
+    JointsFirst,
+}
+
+/// Where arm power stands when the controller starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartPower {
+    /// Off; [`Emulator::set_arm_power`](super::Emulator::set_arm_power) switches it on.
+    Off,
+    /// On.
+    On,
+    /// Off until `CALIBRATE` is answered with yes, as if somebody stood at the panel and pressed the button then. Once the panel has been
+    /// used, power stays as it was set there.
+    OnAtCalibration,
+}
+
+/// What of an emulated controller may differ from one machine, release or source to another.
+///
+/// The wire protocol of VAL II is documented in fragments only. What two independent sources agree on is built in; everything else is here,
+/// so that a client can be tried against controllers that answer otherwise. Defaults are those of [`Profile::val2`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// Name for messages and for choosing it on a command line.
+    pub name: &'static str,
+    /// Questions at start-up, in order (default: load from floppy, initialize).
+    pub boot: Vec<BootQuestion>,
+    /// Line printed after them (default: `PUMA 560  VAL-II`); empty for none.
+    pub banner: String,
+    /// Whether what is typed comes back (default: yes).
+    pub echo: bool,
+    /// End of a line to the terminal (default: CR LF).
+    pub eol: &'static str,
+    /// Blank lines before every reply (default: 0).
+    pub blank_lines: usize,
+    /// Prompt when no program runs (default: `.`).
+    pub idle_prompt: char,
+    /// Prompt while a program runs (default: `*`).
+    pub run_prompt: char,
+    /// Order of the two blocks of `WHERE` (default: Cartesian first).
+    pub where_layout: WhereLayout,
+    /// Width of a number column (default: 9 in `WHERE`; `HERE` and `POINT` add one).
+    pub width: usize,
+    /// Decimals of millimetres (default: 2).
+    pub length_decimals: usize,
+    /// Decimals of degrees (default: 3).
+    pub angle_decimals: usize,
+    /// Words that head the joint columns of `WHERE` before their digit (default: `JT`).
+    pub joint_heading: &'static str,
+    /// Whether `WHERE` shows a hand column at the end of the Cartesian line (default: no).
+    pub hand_column: bool,
+    /// What `HERE` and `POINT` ask (default: `Change?`); a line end follows.
+    pub change_text: String,
+    /// Whether the prompt after `DO` waits for the end of the motion (default: yes).
+    pub do_blocks: bool,
+    /// Whether `PANIC` and `ABORT` are heard while `DO` blocks (default: yes).
+    pub stop_while_busy: bool,
+    /// Whether `#PPOINT(...)` is known (default: yes).
+    pub ppoint: bool,
+    /// Whether `DO REACTI` watches a signal without a program running (default: yes).
+    pub react_at_monitor: bool,
+    /// Largest value of the monitor's `SPEED`, percent (default: 200); larger ones are cut to it.
+    pub speed_max: f64,
+    /// Words that differ from [`Message::default_text`].
+    pub messages: BTreeMap<Message, String>,
+    /// Longest name of a program, location or variable (default: 15).
+    pub max_name: usize,
+    /// Longest line that can be typed (default: 128); further characters are refused with a bell.
+    pub max_line: usize,
+    /// Most entries of each kind (programs, locations, variables) and most steps of a program (default: 1000).
+    pub max_entries: usize,
+    /// Time one character takes on the line in either direction (default: none); 9600 baud: 10/9600 s.
+    pub char_time: Option<Duration>,
+    /// Time the monitor takes to digest a line (default: 0). Characters that arrive meanwhile wait in `input_buffer`.
+    pub line_time: Duration,
+    /// Characters that can wait while the monitor is busy (default: 256); further ones are lost.
+    pub input_buffer: usize,
+    /// Time one program step takes (default: 2 ms), at least 0.1 ms.
+    pub step_time: Duration,
+    /// Whether Ctrl-C cancels a line or the running command, Ctrl-U deletes the line, DEL and BS a character, Ctrl-S and Ctrl-Q hold and release
+    /// the output, Ctrl-O drops it (default: yes).
+    pub control_characters: bool,
+    /// Arm power at start (default: on at calibration).
+    pub start_power: StartPower,
+    /// Whether the arm already knows its joint angles at start (default: no).
+    pub start_calibrated: bool,
+    /// Joint angles at start (default: READY).
+    pub start: Joints,
+    /// Where `NEST` goes. The real pose is not known; this is an assumption: the arm folded above the shoulder.
+    pub nest: Joints,
+    /// Time in which a joint reaches its full speed (default: 0.25 s).
+    pub acceleration_time: Duration,
+    /// Time in which a motion that is broken off comes to a stand (default: 60 ms).
+    pub stop_time: Duration,
+    /// Speed of straight-line motion at 100 %, metres per second (default: 0.5).
+    pub line_speed: f64,
+    /// Turning speed of straight-line motion at 100 %, radians per second (default: pi/2).
+    pub line_turn: f64,
+    /// Time of a full opening or closing of the hand (default: 0.3 s).
+    pub hand_time: Duration,
+    /// Period at which sensors and armed reactions are looked at during a motion (default: 28 ms, VAL's trajectory period).
+    pub tick: Duration,
+    /// Whether the arm stands, and is shown, at whole encoder counts only (default: no).
+    pub encoder_counts: bool,
+    /// Whether a straight line is checked over its whole length before it starts (default: no: the arm stops where the line leaves its reach).
+    pub check_line_ahead: bool,
+    /// Whether a joint-interpolated move to a transformation is refused when the present posture cannot reach it, though another could
+    /// (default: no). From a pose between two postures, READY for instance, the nearer one is taken in either case.
+    pub keeps_posture: bool,
+    /// Whether `DRIVE` ends a little short, by this many degrees (default: 0); a fault for trying out clients.
+    pub drive_error_degrees: f64,
+}
+
+impl Profile {
+    /// What the sources agree on, with the plainest assumption where they are silent.
+    pub fn val2() -> Self {
+        Self {
+            name: "val2",
+            boot: vec![
+                BootQuestion {
+                    text: "Load VAL from floppy (Y/N)? ".into(),
+                    initializes: false,
+                },
+                BootQuestion {
+                    text: "Initialize (Y/N)? ".into(),
+                    initializes: true,
+                },
+            ],
+            banner: "PUMA 560  VAL-II".into(),
+            echo: true,
+            eol: "\r\n",
+            blank_lines: 0,
+            idle_prompt: '.',
+            run_prompt: '*',
+            where_layout: WhereLayout::CartesianFirst,
+            width: 9,
+            length_decimals: 2,
+            angle_decimals: 3,
+            joint_heading: "JT",
+            hand_column: false,
+            change_text: "Change?".into(),
+            do_blocks: true,
+            stop_while_busy: true,
+            ppoint: true,
+            react_at_monitor: true,
+            speed_max: 200.0,
+            messages: BTreeMap::new(),
+            max_name: 15,
+            max_line: 128,
+            max_entries: 1000,
+            char_time: None,
+            line_time: Duration::ZERO,
+            input_buffer: 256,
+            step_time: Duration::from_millis(2),
+            control_characters: true,
+            start_power: StartPower::OnAtCalibration,
+            start_calibrated: false,
+            start: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+            nest: Joints::from_degrees([0.0, -215.0, 215.0, 0.0, 0.0, 0.0]),
+            acceleration_time: Duration::from_millis(250),
+            stop_time: Duration::from_millis(60),
+            line_speed: 0.5,
+            line_turn: std::f64::consts::FRAC_PI_2,
+            hand_time: Duration::from_millis(300),
+            tick: Duration::from_millis(28),
+            encoder_counts: false,
+            check_line_ahead: false,
+            keeps_posture: false,
+            drive_error_degrees: 0.0,
+        }
+    }
+
+    /// Only what a client for a real PUMA 260 controller has relied on: no `#PPOINT`, no control characters, no reactions from the monitor,
+    /// six-character names, and arm power that somebody has to switch on.
+    pub fn val2_strict_miz() -> Self {
+        Self {
+            name: "val2_strict_miz",
+            ppoint: false,
+            control_characters: false,
+            react_at_monitor: false,
+            stop_while_busy: false,
+            max_name: 6,
+            speed_max: 100.0,
+            start_power: StartPower::On,
+            ..Self::val2()
+        }
+    }
+
+    /// The wear of a real line and arm on top of [`Profile::val2`]: 9600 baud, a slow monitor with a small input buffer, joint angles in whole
+    /// encoder counts.
+    pub fn val2_hardware() -> Self {
+        Self {
+            name: "val2_hardware",
+            char_time: Some(char_time(9600)),
+            line_time: Duration::from_millis(20),
+            input_buffer: 80,
+            encoder_counts: true,
+            ..Self::val2()
+        }
+    }
+
+    /// The profiles that ship, for a command line.
+    pub fn all() -> [Self; 3] {
+        [Self::val2(), Self::val2_strict_miz(), Self::val2_hardware()]
+    }
+
+    /// The profile of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().into_iter().find(|p| p.name == name)
+    }
+
+    /// The wording of a message.
+    pub fn text(&self, message: Message) -> &str {
+        self.messages
+            .get(&message)
+            .map_or(message.default_text(), String::as_str)
+    }
+}
+
+impl Default for Profile {
+    /// [`Profile::val2`].
+    fn default() -> Self {
+        Self::val2()
+    }
+}
+
+/// Time of one character (start bit, eight data bits, stop bit) at `baud` bits per second; at least one baud is assumed.
+pub fn char_time(baud: u32) -> Duration {
+    Duration::from_secs(10) / baud.max(1)
+}

@@ -1,0 +1,156 @@
+//! A stored program: its steps, and which step each control word leads to.
+
+use super::instruction::Instruction;
+use super::lexer::{Cursor, Token, tokens};
+use super::{Fault, Message};
+
+/// A stored program.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Program {
+    pub(super) steps: Vec<Step>,
+}
+
+/// One line of a program.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Step {
+    pub(super) label: Option<u32>,
+    /// The line as it is listed.
+    pub(super) text: String,
+    pub(super) instruction: Instruction,
+}
+
+impl Step {
+    /// Parses a line: an optional label and an instruction.
+    pub(super) fn parse(line: &str) -> Result<Self, Fault> {
+        let tokens = tokens(line)?;
+        let mut cursor = Cursor::new(&tokens);
+        let mut label = None;
+        if let Some(Token::Number(number)) = cursor.peek() {
+            if number.fract() != 0.0 || !(0.0..=65535.0).contains(number) {
+                return Err(Message::InvalidArgument.into());
+            }
+            label = Some(*number as u32);
+            cursor.next();
+        }
+        Ok(Self {
+            label,
+            text: upper_case(line.trim()),
+            instruction: Instruction::parse(&mut cursor)?,
+        })
+    }
+}
+
+/// Upper case, as the controller stores what is typed, but for texts in quotes and comments.
+fn upper_case(line: &str) -> String {
+    let mut quoted = false;
+    let mut comment = false;
+    line.chars()
+        .map(|c| {
+            quoted ^= c == '"' && !comment;
+            comment |= c == ';' && !quoted;
+            if quoted || comment {
+                c
+            } else {
+                c.to_ascii_uppercase()
+            }
+        })
+        .collect()
+}
+
+impl Program {
+    /// The step that bears the label.
+    pub(super) fn labelled(&self, label: u32) -> Result<usize, Fault> {
+        self.steps
+            .iter()
+            .position(|s| s.label == Some(label))
+            .ok_or(Message::UndefinedLabel.into())
+    }
+
+    /// The control word that belongs to the one at `step` and comes next at its level: from `IF` the `ELSE` or `END`, from `CASE` or `VALUE`
+    /// the next `VALUE`, `ANY` or `END`, from `DO` the `UNTIL`, from the others the `END`.
+    pub(super) fn next_part(&self, step: usize) -> Result<usize, Fault> {
+        let mut depth = 0;
+        for (i, later) in self.steps.iter().enumerate().skip(step + 1) {
+            match later.instruction {
+                Instruction::IfThen(_)
+                | Instruction::For { .. }
+                | Instruction::While(_)
+                | Instruction::Do
+                | Instruction::Case(_) => depth += 1,
+                Instruction::End | Instruction::Until(_) => {
+                    if depth == 0 {
+                        return Ok(i);
+                    }
+                    depth -= 1;
+                }
+                Instruction::Else | Instruction::Value(_) | Instruction::Any if depth == 0 => return Ok(i),
+                _ => {}
+            }
+        }
+        Err(Message::ControlStructure.into())
+    }
+
+    /// The `END` or `UNTIL` of the structure that `step` is part of the head or a branch of.
+    pub(super) fn end_of(&self, step: usize) -> Result<usize, Fault> {
+        let mut at = self.next_part(step)?;
+        while !matches!(
+            self.steps[at].instruction,
+            Instruction::End | Instruction::Until(_)
+        ) {
+            at = self.next_part(at)?;
+        }
+        Ok(at)
+    }
+
+    /// The head (`IF`, `FOR`, `WHILE`, `DO`, `CASE`) of the structure that ends at `step`.
+    pub(super) fn head_of(&self, step: usize) -> Result<usize, Fault> {
+        let mut depth = 0;
+        for (i, earlier) in self.steps.iter().enumerate().take(step).rev() {
+            match earlier.instruction {
+                Instruction::End | Instruction::Until(_) => depth += 1,
+                Instruction::IfThen(_)
+                | Instruction::For { .. }
+                | Instruction::While(_)
+                | Instruction::Do
+                | Instruction::Case(_) => {
+                    if depth == 0 {
+                        return Ok(i);
+                    }
+                    depth -= 1;
+                }
+                _ => {}
+            }
+        }
+        Err(Message::ControlStructure.into())
+    }
+
+    /// Whether the words of every structure match; the first step that does not fit otherwise.
+    pub(super) fn check(&self) -> Result<(), usize> {
+        let mut open: Vec<&Instruction> = Vec::new();
+        for (i, step) in self.steps.iter().enumerate() {
+            let fits = match &step.instruction {
+                head @ (Instruction::IfThen(_)
+                | Instruction::For { .. }
+                | Instruction::While(_)
+                | Instruction::Do
+                | Instruction::Case(_)) => {
+                    open.push(head);
+                    true
+                }
+                Instruction::Else => matches!(open.last(), Some(Instruction::IfThen(_))),
+                Instruction::Value(_) | Instruction::Any => matches!(open.last(), Some(Instruction::Case(_))),
+                Instruction::Until(_) => matches!(open.pop(), Some(Instruction::Do)),
+                Instruction::End => !matches!(open.pop(), None | Some(Instruction::Do)),
+                _ => true,
+            };
+            if !fits {
+                return Err(i);
+            }
+        }
+        if open.is_empty() {
+            Ok(())
+        } else {
+            Err(self.steps.len().saturating_sub(1))
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! The controller's end of the line: characters in, lines out; text in, characters out, each in its time.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::Profile;
+
+/// What a character that came in amounts to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Typed {
+    /// Nothing to act on yet.
+    Nothing,
+    /// A line is complete.
+    Line,
+    /// Ctrl-C.
+    Cancel,
+    /// Ctrl-Z.
+    EndOfInput,
+    /// The character found no room.
+    Lost,
+}
+
+/// Most characters that may wait to be sent; a reply that is never read does not grow beyond it.
+const OUTPUT_LIMIT: usize = 1 << 20;
+
+#[derive(Debug)]
+pub(super) struct Terminal {
+    arriving: VecDeque<(Duration, u8)>,
+    line_busy_until: Duration,
+    typed: String,
+    lines: VecDeque<String>,
+    waiting: usize,
+    sending: VecDeque<u8>,
+    sent_at: Duration,
+    at_line_start: bool,
+    held: bool,
+    dropped: bool,
+}
+
+impl Terminal {
+    pub(super) fn new() -> Self {
+        Self {
+            arriving: VecDeque::new(),
+            line_busy_until: Duration::ZERO,
+            typed: String::new(),
+            lines: VecDeque::new(),
+            waiting: 0,
+            sending: VecDeque::new(),
+            sent_at: Duration::ZERO,
+            at_line_start: true,
+            held: false,
+            dropped: false,
+        }
+    }
+
+    /// Takes bytes off the wire; each is complete a character's time after the one before.
+    pub(super) fn arrive(&mut self, bytes: &[u8], now: Duration, profile: &Profile) {
+        for &byte in bytes {
+            let at = match profile.char_time {
+                Some(time) => self.line_busy_until.max(now).saturating_add(time),
+                None => now,
+            };
+            self.line_busy_until = at;
+            self.arriving.push_back((at, byte));
+        }
+    }
+
+    /// When the next character is complete.
+    pub(super) fn next_arrival(&self) -> Option<Duration> {
+        self.arriving.front().map(|(at, _)| *at)
+    }
+
+    /// Handles the next character if it is complete by `now`.
+    pub(super) fn take_character(&mut self, now: Duration, profile: &Profile) -> Option<Typed> {
+        let (at, byte) = *self.arriving.front()?;
+        if at > now {
+            return None;
+        }
+        self.arriving.pop_front();
+        Some(self.character(byte, now, profile))
+    }
+
+    fn character(&mut self, byte: u8, now: Duration, profile: &Profile) -> Typed {
+        let control = profile.control_characters;
+        match byte {
+            b'\r' => {
+                if profile.echo {
+                    self.print(profile.eol, now);
+                } else {
+                    // The terminal's own local echo is off too: the cursor still stands behind the prompt.
+                    self.at_line_start = false;
+                }
+                self.waiting += 1;
+                self.lines.push_back(std::mem::take(&mut self.typed));
+                if self.lines.len() > 64 {
+                    self.lines.pop_front();
+                    return Typed::Lost;
+                }
+                Typed::Line
+            }
+            0x03 if control => {
+                self.typed.clear();
+                self.forget_lines();
+                self.echo("^C", now, profile);
+                self.fresh_line(profile, now);
+                Typed::Cancel
+            }
+            0x1a if control => {
+                self.echo("^Z", now, profile);
+                Typed::EndOfInput
+            }
+            0x15 if control => {
+                self.typed.clear();
+                self.echo("^U", now, profile);
+                self.fresh_line(profile, now);
+                Typed::Nothing
+            }
+            0x08 | 0x7f if control => {
+                if self.typed.pop().is_some() {
+                    self.echo("\x08 \x08", now, profile);
+                }
+                Typed::Nothing
+            }
+            0x13 if control => {
+                self.held = true;
+                Typed::Nothing
+            }
+            0x11 if control => {
+                self.held = false;
+                Typed::Nothing
+            }
+            0x0f if control => {
+                self.dropped = !self.dropped;
+                Typed::Nothing
+            }
+            b'\t' => self.character(b' ', now, profile),
+            0x20..=0x7e => {
+                let room = self.typed.len() < profile.max_line
+                    && self.waiting + self.typed.len() < profile.input_buffer;
+                if room {
+                    self.typed.push(byte as char);
+                    let mut text = [0; 4];
+                    self.echo((byte as char).encode_utf8(&mut text), now, profile);
+                    Typed::Nothing
+                } else {
+                    self.echo("\x07", now, profile);
+                    Typed::Lost
+                }
+            }
+            // LF after CR, NUL as filler, and noise with the eighth bit set.
+            _ => Typed::Nothing,
+        }
+    }
+
+    /// The oldest complete line that has not been worked on.
+    pub(super) fn next_line(&mut self) -> Option<String> {
+        let line = self.lines.pop_front()?;
+        self.waiting = self.lines.iter().map(String::len).sum();
+        Some(line)
+    }
+
+    /// The newest complete line, without taking it.
+    pub(super) fn newest_line(&self) -> Option<&str> {
+        self.lines.back().map(String::as_str)
+    }
+
+    /// Whether complete lines wait.
+    pub(super) fn has_line(&self) -> bool {
+        !self.lines.is_empty()
+    }
+
+    /// Drops the lines typed ahead.
+    pub(super) fn forget_lines(&mut self) {
+        self.lines.clear();
+        self.waiting = 0;
+    }
+
+    fn echo(&mut self, text: &str, now: Duration, profile: &Profile) {
+        if profile.echo {
+            self.print(text, now);
+        }
+    }
+
+    /// Queues text for the line.
+    pub(super) fn print(&mut self, text: &str, now: Duration) {
+        if text.is_empty() || self.dropped {
+            return;
+        }
+        self.at_line_start = text.ends_with(['\n', '\r']);
+        if self.sending.is_empty() {
+            self.sent_at = self.sent_at.max(now);
+        }
+        if self.sending.len() + text.len() <= OUTPUT_LIMIT {
+            self.sending.extend(text.bytes());
+        }
+    }
+
+    /// Ends the line that output stands in, unless it stands at the start of one.
+    pub(super) fn fresh_line(&mut self, profile: &Profile, now: Duration) {
+        if !self.at_line_start {
+            self.print(profile.eol, now);
+        }
+    }
+
+    /// Output that Ctrl-O has suppressed resumes with the next prompt.
+    pub(super) fn resume(&mut self) {
+        self.dropped = false;
+    }
+
+    /// When the next character goes out, if output waits.
+    pub(super) fn next_departure(&self, profile: &Profile) -> Option<Duration> {
+        let waits = !self.sending.is_empty() && !self.held;
+        waits.then(|| self.sent_at.saturating_add(profile.char_time.unwrap_or_default()))
+    }
+
+    /// What has gone out by `now`.
+    pub(super) fn departed(&mut self, now: Duration, profile: &Profile) -> Vec<u8> {
+        if self.held {
+            return Vec::new();
+        }
+        let Some(time) = profile.char_time.filter(|t| !t.is_zero()) else {
+            return self.sending.drain(..).collect();
+        };
+        let due = now.saturating_sub(self.sent_at).as_nanos() / time.as_nanos();
+        let count = usize::try_from(due).unwrap_or(usize::MAX).min(self.sending.len());
+        self.sent_at += time * u32::try_from(count).unwrap_or(u32::MAX);
+        self.sending.drain(..count).collect()
+    }
+}

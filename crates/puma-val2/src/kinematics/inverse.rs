@@ -1,0 +1,390 @@
+//! Hand pose to joint angles, in closed form.
+
+use std::f64::consts::{PI, TAU};
+use std::fmt;
+
+use nalgebra::Isometry3;
+
+use crate::{Joint, Joints, PumaParams};
+
+/// The upper arm as seen from behind: a right or a left arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum ArmSide {
+    /// VAL's `RIGHTY`.
+    Righty,
+    /// VAL's `LEFTY`.
+    Lefty,
+}
+
+/// The elbow above or below the line from shoulder to wrist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Elbow {
+    /// VAL's `ABOVE`.
+    Above,
+    /// VAL's `BELOW`.
+    Below,
+}
+
+/// The sign of `JT5`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Wrist {
+    /// VAL's `FLIP`: `JT5` negative.
+    Flip,
+    /// VAL's `NOFLIP`: `JT5` positive or zero.
+    NoFlip,
+}
+
+/// Which of the eight postures that reach one pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Configuration {
+    /// Right or left arm.
+    pub side: ArmSide,
+    /// Elbow up or down.
+    pub elbow: Elbow,
+    /// Sign of `JT5`.
+    pub wrist: Wrist,
+}
+
+impl fmt::Display for Configuration {
+    /// VAL's words: `RIGHTY ABOVE NOFLIP`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = match self.side {
+            ArmSide::Righty => "RIGHTY",
+            ArmSide::Lefty => "LEFTY",
+        };
+        let elbow = match self.elbow {
+            Elbow::Above => "ABOVE",
+            Elbow::Below => "BELOW",
+        };
+        let wrist = match self.wrist {
+            Wrist::Flip => "FLIP",
+            Wrist::NoFlip => "NOFLIP",
+        };
+        write!(f, "{side} {elbow} {wrist}")
+    }
+}
+
+/// Joint angles that reach a pose, and the posture they stand for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// Angles in [-pi, pi), not checked against joint ranges.
+    pub joints: Joints,
+    /// The posture.
+    pub configuration: Configuration,
+}
+
+/// Up to eight solutions of one pose, without allocation. Dereferences to a slice.
+#[derive(Clone, Copy, Debug)]
+pub struct Solutions {
+    items: [Solution; 8],
+    len: usize,
+}
+
+impl std::ops::Deref for Solutions {
+    type Target = [Solution];
+
+    fn deref(&self) -> &[Solution] {
+        &self.items[..self.len]
+    }
+}
+
+/// Why a pose cannot be taken up.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unreachable {
+    /// A coordinate of the pose is NaN or infinite.
+    #[error("the pose holds a number that is not finite")]
+    NotFinite,
+    /// No posture was allowed.
+    #[error("no posture is allowed")]
+    NotAllowed,
+    /// The wrist centre would lie nearer to the waist axis than the arm's lateral offset allows.
+    #[error("the wrist would have to stand {by:.4} m further from the waist axis")]
+    TooClose {
+        /// Missing distance, metres.
+        by: f64,
+    },
+    /// The wrist centre lies beyond the stretched (or inside the folded) arm.
+    #[error("the wrist centre is {by:.4} m out of the arm's reach")]
+    TooFar {
+        /// Missing distance, metres.
+        by: f64,
+    },
+    /// Every posture that was allowed takes some joint out of its range.
+    #[error(
+        "{joint} would have to go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to {max_degrees:.1}"
+    )]
+    Limit {
+        /// The joint that is out in the posture that comes nearest.
+        joint: Joint,
+        /// Where it would have to go.
+        wanted_degrees: f64,
+        /// Lower limit.
+        min_degrees: f64,
+        /// Upper limit.
+        max_degrees: f64,
+    },
+}
+
+impl PumaParams {
+    /// All postures that put the flange at `flange` (world frame, metres): eight inside the working space, none outside.
+    ///
+    /// At a wrist singularity (`JT5` = 0) the sum of `JT4` and `JT6` is all that counts: `JT4` is given as 0 then.
+    /// Joint ranges are not looked at; [`PumaParams::inverse_near`] does.
+    ///
+    /// # Errors
+    /// [`Unreachable`], never its `Limit`.
+    pub fn inverse(&self, flange: &Isometry3<f64>) -> Result<Solutions, Unreachable> {
+        let r = flange.rotation.to_rotation_matrix().into_inner();
+        let p = flange.translation.vector - r.column(2) * self.d6;
+        if !(p.iter().chain(r.iter()).all(|v| v.is_finite())) {
+            return Err(Unreachable::NotFinite);
+        }
+        let radius = p.x.hypot(p.y);
+        if radius < self.d2.abs() {
+            return Err(Unreachable::TooClose {
+                by: self.d2.abs() - radius,
+            });
+        }
+        let forward = (radius * radius - self.d2 * self.d2).sqrt();
+        // x' = a2 c2 + a3 c23 + d4 s23 and z' = p.z span the arm's plane; k = a3 c3 + d4 s3.
+        let forearm = self.a3.hypot(self.d4);
+        let distance2 = forward * forward + p.z * p.z;
+        let k = (distance2 - self.a2 * self.a2 - forearm * forearm) / (2.0 * self.a2);
+        let lever2 = forearm * forearm - k * k;
+        if lever2 < 0.0 {
+            let distance = distance2.sqrt();
+            let by = (distance - (self.a2 + forearm)).max((self.a2 - forearm).abs() - distance);
+            return Err(Unreachable::TooFar { by: by.max(0.0) });
+        }
+        let lever = lever2.sqrt();
+        let elbow_offset = self.a3.atan2(self.d4);
+        let azimuth = p.y.atan2(p.x);
+        let mut found = Solutions {
+            items: [EMPTY; 8],
+            len: 0,
+        };
+        for side in [ArmSide::Righty, ArmSide::Lefty] {
+            let (sign, x) = match side {
+                ArmSide::Righty => (1.0, -forward),
+                ArmSide::Lefty => (-1.0, forward),
+            };
+            let t1 = azimuth - self.d2.atan2(x);
+            let (s1, c1) = t1.sin_cos();
+            let elevation = (-p.z).atan2(x);
+            for elbow in [Elbow::Above, Elbow::Below] {
+                let n = match elbow {
+                    Elbow::Above => sign * lever,
+                    Elbow::Below => -sign * lever,
+                };
+                let t3 = k.atan2(n) - elbow_offset;
+                let t2 = elevation + n.atan2(self.a2 + k);
+                let (s23, c23) = (t2 + t3).sin_cos();
+                // Ry(-t23) Rz(-t1) R, of which the last column and the last row are needed.
+                let along = |i: usize| c1 * r[(0, i)] + s1 * r[(1, i)];
+                let w02 = c23 * along(2) - s23 * r[(2, 2)];
+                let w12 = -s1 * r[(0, 2)] + c1 * r[(1, 2)];
+                let w22 = s23 * along(2) + c23 * r[(2, 2)];
+                let bend = w02.hypot(w12);
+                let [(t4, t5, t6), flipped] = if bend > 1e-12 {
+                    let w20 = s23 * along(0) + c23 * r[(2, 0)];
+                    let w21 = s23 * along(1) + c23 * r[(2, 1)];
+                    let (t4, t5, t6) = (w12.atan2(w02), bend.atan2(w22), w21.atan2(-w20));
+                    [(t4, t5, t6), (t4 + PI, -t5, t6 + PI)]
+                } else {
+                    let w10 = -s1 * r[(0, 0)] + c1 * r[(1, 0)];
+                    let w11 = -s1 * r[(0, 1)] + c1 * r[(1, 1)];
+                    let straight = (0.0, if w22 > 0.0 { 0.0 } else { PI }, w10.atan2(w11));
+                    [straight, (PI, straight.1, straight.2 + PI)]
+                };
+                for (wrist, (t4, t5, t6)) in [(Wrist::NoFlip, (t4, t5, t6)), (Wrist::Flip, flipped)] {
+                    found.items[found.len] = Solution {
+                        joints: Joints([t1, t2, t3, t4, t5, t6].map(wrap)),
+                        configuration: Configuration { side, elbow, wrist },
+                    };
+                    found.len += 1;
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// The posture that `joints` stand in.
+    pub fn configuration(&self, joints: &Joints) -> Configuration {
+        let [_, t2, t3, _, t5, _] = joints.0;
+        let reach = self.d4 * (t2 + t3).sin() + self.a3 * (t2 + t3).cos() + self.a2 * t2.cos();
+        let righty = reach <= 0.0;
+        let lever = self.d4 * t3.cos() - self.a3 * t3.sin();
+        Configuration {
+            side: if righty { ArmSide::Righty } else { ArmSide::Lefty },
+            elbow: if (lever >= 0.0) == righty {
+                Elbow::Above
+            } else {
+                Elbow::Below
+            },
+            wrist: if wrap(t5) < 0.0 {
+                Wrist::Flip
+            } else {
+                Wrist::NoFlip
+            },
+        }
+    }
+
+    /// The joint angles within their ranges that reach `flange` and lie nearest to `near`, in the posture `configuration` or, with
+    /// `None`, in any.
+    ///
+    /// Of the turns that a joint's range leaves open (`JT4` and `JT6` have more than one) the nearest is taken. "Nearest" is the
+    /// largest joint travel measured in time at full joint speed.
+    ///
+    /// # Errors
+    /// [`Unreachable`] says what is missing; with several postures `Limit` names the joint of the one that misses its range by least.
+    pub fn inverse_near(
+        &self,
+        flange: &Isometry3<f64>,
+        near: &Joints,
+        configuration: Option<Configuration>,
+    ) -> Result<Joints, Unreachable> {
+        self.inverse_among(flange, near, |c| configuration.is_none_or(|wanted| wanted == c))
+    }
+
+    /// As [`PumaParams::inverse_near`], in any of the postures that `allowed` accepts.
+    ///
+    /// # Errors
+    /// As for [`PumaParams::inverse_near`]; [`Unreachable::NotAllowed`] if no posture is accepted.
+    pub fn inverse_among(
+        &self,
+        flange: &Isometry3<f64>,
+        near: &Joints,
+        allowed: impl Fn(Configuration) -> bool,
+    ) -> Result<Joints, Unreachable> {
+        let mut best: Option<(f64, Joints)> = None;
+        let mut least: Option<(f64, Unreachable)> = None;
+        for solution in self.inverse(flange)?.iter() {
+            if !allowed(solution.configuration) {
+                continue;
+            }
+            match self.place_in_ranges(&solution.joints, near) {
+                Ok(joints) => {
+                    let travel = (0..6)
+                        .map(|i| (joints.0[i] - near.0[i]).abs() / self.ranges[i].speed)
+                        .fold(0.0, f64::max);
+                    if best.is_none_or(|(t, _)| travel < t) {
+                        best = Some((travel, joints));
+                    }
+                }
+                Err((excess, why)) => {
+                    if least.is_none_or(|(e, _)| excess < e) {
+                        least = Some((excess, why));
+                    }
+                }
+            }
+        }
+        match (best, least) {
+            (Some((_, joints)), _) => Ok(joints),
+            (None, Some((_, why))) => Err(why),
+            (None, None) => Err(Unreachable::NotAllowed),
+        }
+    }
+
+    /// The turns of `joints` that lie in range and nearest to `near`, or the joint that has none and by how much it misses.
+    fn place_in_ranges(&self, joints: &Joints, near: &Joints) -> Result<Joints, (f64, Unreachable)> {
+        let slack = 1e-9;
+        let mut placed = *joints;
+        for joint in Joint::ALL {
+            let (i, range) = (joint.index(), self.ranges[joint.index()]);
+            let turns = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|n| joints.0[i] + n * TAU);
+            let inside = turns
+                .into_iter()
+                .filter(|a| *a >= range.min - slack && *a <= range.max + slack)
+                .min_by(|a, b| (a - near.0[i]).abs().total_cmp(&(b - near.0[i]).abs()));
+            let Some(angle) = inside else {
+                let excess = |a: f64| (range.min - a).max(a - range.max);
+                let wanted = turns
+                    .into_iter()
+                    .fold(joints.0[i], |a, b| if excess(b) < excess(a) { b } else { a });
+                return Err((
+                    excess(wanted),
+                    Unreachable::Limit {
+                        joint,
+                        wanted_degrees: wanted.to_degrees(),
+                        min_degrees: range.min.to_degrees(),
+                        max_degrees: range.max.to_degrees(),
+                    },
+                ));
+            };
+            placed.0[i] = angle;
+        }
+        Ok(placed)
+    }
+}
+
+const EMPTY: Solution = Solution {
+    joints: Joints([0.0; 6]),
+    configuration: Configuration {
+        side: ArmSide::Righty,
+        elbow: Elbow::Above,
+        wrist: Wrist::NoFlip,
+    },
+};
+
+/// An angle in [-pi, pi). What is reached here lies within three turns, so steps are cheaper than a remainder.
+fn wrap(mut angle: f64) -> f64 {
+    if !angle.is_finite() || angle.abs() > 100.0 {
+        return (angle + PI).rem_euclid(TAU) - PI;
+    }
+    while angle >= PI {
+        angle -= TAU;
+    }
+    while angle < -PI {
+        angle += TAU;
+    }
+    angle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_branch_leads_back_to_the_pose_in_its_own_posture() {
+        let arm = PumaParams::unimation();
+        let joints = Joints::from_degrees([30.0, -60.0, 140.0, 25.0, 50.0, -70.0]);
+        let pose = arm.forward(&joints);
+        let all = arm.inverse(&pose).unwrap();
+        assert_eq!(all.len(), 8);
+        for solution in all.iter() {
+            let back = arm.forward(&solution.joints);
+            assert!((back.to_homogeneous() - pose.to_homogeneous()).amax() < 1e-12);
+            assert_eq!(arm.configuration(&solution.joints), solution.configuration);
+        }
+        let same = arm
+            .inverse_near(&pose, &joints, Some(arm.configuration(&joints)))
+            .unwrap();
+        assert!((same - joints).0.iter().all(|d| d.abs() < 1e-12));
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let arm = PumaParams::unimation();
+        let at = |x, y, z| Isometry3::translation(x, y, z + arm.d6);
+        assert!(
+            matches!(arm.inverse(&at(0.0, 0.1, 0.3)), Err(Unreachable::TooClose { by }) if (by - 0.04909).abs() < 1e-12)
+        );
+        assert!(matches!(arm.inverse(&at(1.2, 0.0, 0.3)), Err(Unreachable::TooFar { by }) if by > 0.3));
+        assert_eq!(
+            arm.inverse(&at(f64::NAN, 0.0, 0.3)).unwrap_err(),
+            Unreachable::NotFinite
+        );
+    }
+
+    #[test]
+    fn ready_is_a_right_arm_with_its_elbow_above() {
+        let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        let words = PumaParams::unimation().configuration(&ready).to_string();
+        assert_eq!(words, "RIGHTY ABOVE NOFLIP");
+    }
+}

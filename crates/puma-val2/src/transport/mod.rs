@@ -1,0 +1,72 @@
+//! Lines to a controller.
+
+mod memory;
+#[cfg(feature = "serial")]
+mod serial;
+mod tcp;
+mod transcript;
+
+use std::io;
+use std::time::Duration;
+
+pub use memory::MemoryLine;
+#[cfg(feature = "serial")]
+pub use serial::SerialLine;
+pub use tcp::TcpLine;
+pub use transcript::Recorded;
+pub(crate) use transcript::Transcript;
+
+/// A line to a controller: bytes out, bytes in within a time, and the time itself.
+pub trait Transport {
+    /// Sends all of `bytes`.
+    ///
+    /// # Errors
+    /// The line is closed or broken.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits until something comes and puts it at the start of `buffer`: `Some(count)` with at least one byte, or `None` if nothing came within
+    /// `timeout`. With a timeout of zero only what is already there is taken.
+    ///
+    /// # Errors
+    /// The line is closed or broken; its end is [`io::ErrorKind::UnexpectedEof`].
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>>;
+
+    /// The time by this line's clock, since any fixed origin. It never runs backwards.
+    fn clock(&self) -> Duration;
+
+    /// What to call the line in messages: a device path, an address.
+    fn name(&self) -> &str;
+}
+
+impl<T: Transport + ?Sized> Transport for Box<T> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
+        (**self).receive(buffer, timeout)
+    }
+
+    fn clock(&self) -> Duration {
+        (**self).clock()
+    }
+
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+}
+
+/// What a read that was to wait for a while came to: bytes, nothing, or the end of the line.
+fn received(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
+    match outcome {
+        Ok(0) => Err(io::Error::new(
+            io::ErrorKind::UnexpectedEof,
+            "the other side closed the line",
+        )),
+        Ok(count) => Ok(Some(count)),
+        Err(error) => match error.kind() {
+            io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(None),
+            _ => Err(error),
+        },
+    }
+}

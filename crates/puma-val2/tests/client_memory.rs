@@ -1,0 +1,175 @@
+//! The client against an emulator in memory.
+#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
+
+use std::time::Duration;
+
+use puma_val2::{
+    ArmError, ClientConfig, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MemoryLine, MoveWay,
+    Profile, PumaParams, Val2Client,
+};
+
+fn emulator(profile: Profile) -> Emulator {
+    Emulator::new(PumaParams::unimation(), profile)
+}
+
+fn client(profile: Profile) -> Val2Client<MemoryLine> {
+    let mut client =
+        Val2Client::connect(MemoryLine::new(emulator(profile)), ClientConfig::default()).unwrap();
+    client.calibrate().unwrap();
+    client
+}
+
+fn assert_at(client: &Val2Client<MemoryLine>, degrees: [f64; 6]) {
+    let off = client.line().emulator().joints() - Joints::from_degrees(degrees);
+    assert!(
+        off.degrees().iter().all(|d| d.abs() < 0.02),
+        "{} instead of {degrees:?}",
+        client.line().emulator().joints()
+    );
+}
+
+#[test]
+fn every_profile_and_every_way_moves_the_arm_where_it_was_sent() {
+    for profile in Profile::all() {
+        for way in [MoveWay::Automatic, MoveWay::Drive, MoveWay::Point] {
+            let config = ClientConfig {
+                way,
+                ..ClientConfig::default()
+            };
+            let line = MemoryLine::new(emulator(profile.clone()));
+            let mut client = Val2Client::connect(line, config).unwrap();
+            client.calibrate().unwrap();
+            client
+                .move_by(JointDelta::from_degrees([10.0, 5.0, 5.0, 0.0, 0.0, 0.0]))
+                .unwrap_or_else(|e| panic!("{} {way:?}: {e}", profile.name));
+            assert_at(&client, [10.0, -85.0, 95.0, 0.0, 0.0, 0.0]);
+            client
+                .move_to(Joints::from_degrees([-20.0, -100.0, 100.0, 10.0, 45.0, -30.0]))
+                .unwrap();
+            assert_at(&client, [-20.0, -100.0, 100.0, 10.0, 45.0, -30.0]);
+            client.drive(Joint::J3, -0.1, 100.0).unwrap();
+            client.ready().unwrap();
+            assert_at(&client, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        }
+    }
+}
+
+#[test]
+fn the_hand_opens_and_closes() {
+    let mut client = client(Profile::val2());
+    client.set_gripper(Gripper::Closed).unwrap();
+    assert_eq!(client.line().emulator().gripper(), Gripper::Closed);
+    client.set_gripper(Gripper::Open).unwrap();
+    assert_eq!(client.line().emulator().gripper(), Gripper::Open);
+}
+
+#[test]
+fn moves_out_of_range_are_refused_before_anything_is_sent() {
+    let mut client = client(Profile::val2());
+    client.joints().unwrap();
+    let before = client.line().traffic();
+    let out = JointDelta::from_degrees([0.0, 0.0, 136.0, 0.0, 0.0, 0.0]);
+    assert!(matches!(
+        client.move_by(out),
+        Err(ArmError::JointLimit { joint: Joint::J3, wanted_degrees, max_degrees, .. })
+            if (wanted_degrees - 226.0).abs() < 1e-9 && (max_degrees - 225.0).abs() < 1e-9
+    ));
+    assert!(matches!(
+        client.drive(Joint::J2, f64::NAN, 100.0),
+        Err(ArmError::NotFinite { joint: Joint::J2 })
+    ));
+    assert!(matches!(
+        client.drive(Joint::J2, 0.1, 0.0),
+        Err(ArmError::Setting { .. })
+    ));
+    assert!(matches!(
+        client.set_speed(f64::INFINITY),
+        Err(ArmError::Setting { .. })
+    ));
+    let mut nowhere = Joints::default();
+    nowhere.0[5] = f64::INFINITY;
+    assert!(matches!(
+        client.move_to(nowhere),
+        Err(ArmError::NotFinite { joint: Joint::J6 })
+    ));
+    assert_eq!(client.line().traffic(), before);
+}
+
+#[test]
+fn arm_power_off_is_reported_and_waited_for_if_so_configured() {
+    let line = || {
+        let mut emulator = emulator(Profile::val2());
+        emulator.set_arm_power(false);
+        MemoryLine::new(emulator)
+    };
+    let mut client = Val2Client::connect(line(), ClientConfig::default()).unwrap();
+    assert!(
+        matches!(client.calibrate(), Err(ArmError::Refused { message, .. }) if message == "Arm power off")
+    );
+    let patient = ClientConfig {
+        power_retries: 2,
+        power_retry_delay: Duration::from_secs(5),
+        ..ClientConfig::default()
+    };
+    let mut client = Val2Client::connect(line(), patient).unwrap();
+    let begun = client.line().emulator().now();
+    assert!(client.calibrate().is_err());
+    assert!(client.line().emulator().now() - begun > Duration::from_secs(10));
+    client.line_mut().emulator_mut().set_arm_power(true);
+    client.calibrate().unwrap();
+}
+
+#[test]
+fn a_half_typed_line_is_never_carried_out() {
+    let mut line = MemoryLine::new(emulator(Profile::val2()));
+    {
+        use puma_val2::Transport;
+        line.send(b"N\rN\rCAL\rY\r").unwrap();
+        let mut buffer = [0; 4096];
+        while line
+            .receive(&mut buffer, Duration::from_secs(10))
+            .unwrap()
+            .is_some()
+        {}
+        line.send(b"DO DRIVE 1,50,100").unwrap();
+    }
+    let client = Val2Client::connect(line, ClientConfig::default()).unwrap();
+    assert_at(&client, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn silence_and_garbage_are_told_apart_in_time() {
+    struct Dead(Duration, &'static [u8]);
+    impl puma_val2::Transport for Dead {
+        fn send(&mut self, _: &[u8]) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> std::io::Result<Option<usize>> {
+            self.0 += timeout.min(Duration::from_millis(10));
+            let count = self.1.len().min(buffer.len());
+            buffer[..count].copy_from_slice(&self.1[..count]);
+            if count == 0 {
+                self.0 += timeout;
+            }
+            Ok((count > 0).then_some(count))
+        }
+        fn clock(&self) -> Duration {
+            self.0
+        }
+        fn name(&self) -> &str {
+            "/dev/nothing"
+        }
+    }
+    let silent = Val2Client::connect(Dead(Duration::ZERO, b""), ClientConfig::default()).map(drop);
+    assert!(
+        matches!(&silent, Err(ArmError::Silence { port, waited, .. }) if port == "/dev/nothing" && waited.as_secs() == 10),
+        "{silent:?}"
+    );
+    for noise in [&b"\xff\x00\x81"[..], b"login: ", b"42 "] {
+        let garbled = Val2Client::connect(Dead(Duration::ZERO, noise), ClientConfig::default()).map(drop);
+        assert!(
+            matches!(garbled, Err(ArmError::Garbled { .. })),
+            "{noise:?}: {garbled:?}"
+        );
+    }
+}

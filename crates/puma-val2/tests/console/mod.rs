@@ -1,0 +1,130 @@
+//! A person at the terminal of an emulated controller.
+#![allow(
+    dead_code,
+    unreachable_pub,
+    missing_debug_implementations,
+    clippy::unwrap_used,
+    clippy::panic
+)]
+// Each test file uses its part; functions that serve tests may fail as tests do.
+
+use std::time::Duration;
+
+use puma_val2::{Emulator, Profile, PumaParams};
+
+pub struct Console {
+    pub emulator: Emulator,
+    pub now: Duration,
+    /// Everything the terminal has shown.
+    pub screen: String,
+}
+
+impl Console {
+    /// At the start-up dialogue.
+    pub fn switched_on(profile: Profile) -> Self {
+        let mut console = Self {
+            emulator: Emulator::new(PumaParams::unimation(), profile),
+            now: Duration::ZERO,
+            screen: String::new(),
+        };
+        console.wait(Duration::ZERO);
+        console
+    }
+
+    /// At the monitor, calibrated, with arm power.
+    pub fn ready() -> Self {
+        Self::ready_with(Profile::val2())
+    }
+
+    pub fn ready_with(profile: Profile) -> Self {
+        let mut console = Self::switched_on(profile);
+        for line in ["N", "N", "CAL", "Y"] {
+            console.line(line);
+        }
+        console
+    }
+
+    /// Types a line and returns what follows on the screen until nothing more is due within a minute, or for a tenth of a second where
+    /// something goes on and on.
+    pub fn line(&mut self, line: &str) -> String {
+        let before = self.screen.len();
+        let said = self.emulator.feed(format!("{line}\r").as_bytes(), self.now);
+        self.show(&said);
+        self.settle();
+        self.screen[before..].to_owned()
+    }
+
+    /// Types lines, and returns what follows the last.
+    pub fn lines(&mut self, text: &str) -> String {
+        text.lines()
+            .map(|line| self.line(line.trim()))
+            .last()
+            .unwrap_or_default()
+    }
+
+    /// Lets the clock jump while the controller waits for nothing but time.
+    pub fn settle(&mut self) {
+        let until = self.now + Duration::from_secs(60);
+        for _ in 0..4000 {
+            match self.emulator.next_deadline() {
+                Some(at) if at <= until => self.now = self.now.max(at),
+                _ => return,
+            }
+            let said = self.emulator.poll(self.now);
+            self.show(&said);
+        }
+    }
+
+    /// Lets this much time pass.
+    pub fn wait(&mut self, time: Duration) -> String {
+        let before = self.screen.len();
+        self.now += time;
+        let said = self.emulator.poll(self.now);
+        self.show(&said);
+        self.screen[before..].to_owned()
+    }
+
+    /// Types a line without letting time pass.
+    pub fn line_now(&mut self, line: &str) -> String {
+        let said = self.emulator.feed(format!("{line}\r").as_bytes(), self.now);
+        self.show(&said);
+        String::from_utf8(said).unwrap()
+    }
+
+    fn show(&mut self, bytes: &[u8]) {
+        self.screen.push_str(std::str::from_utf8(bytes).unwrap());
+    }
+
+    /// Stores a program through the editor.
+    pub fn program(&mut self, name: &str, steps: &str) {
+        self.line(&format!("EDIT {name}"));
+        for step in steps.lines().map(str::trim).filter(|s| !s.is_empty()) {
+            let said = self.line(step);
+            assert!(!said.contains("\n*"), "{step}: {said}");
+        }
+        self.line("E");
+    }
+
+    /// Runs a program of these steps to its end and returns what it printed.
+    pub fn run(&mut self, steps: &str) -> String {
+        self.program("TEST", steps);
+        let said = self.line("EXECUTE TEST");
+        self.line("DELETEP TEST");
+        self.line("Y");
+        said
+    }
+
+    pub fn degrees(&self) -> [f64; 6] {
+        self.emulator.joints().degrees()
+    }
+
+    pub fn assert_at(&self, degrees: [f64; 6]) {
+        let off = self
+            .degrees()
+            .iter()
+            .zip(degrees)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert!(off < 1e-6, "{} instead of {degrees:?}", self.emulator.joints());
+    }
+}

@@ -1,0 +1,94 @@
+//! A real pseudo-terminal, opened through the `serialport` crate.
+#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
+#![cfg(all(unix, feature = "serial"))]
+
+use puma_val2::{
+    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Manipulator, Profile, PtyServer, PumaParams,
+    SerialLine, ServeConfig, Val2Client,
+};
+
+fn emulator() -> Emulator {
+    Emulator::new(PumaParams::unimation(), Profile::val2())
+}
+
+#[test]
+fn a_session_over_a_pseudo_terminal_which_is_closed_and_reopened() {
+    let server = PtyServer::spawn(emulator(), ServeConfig::default()).unwrap();
+    let path = server.path().to_str().unwrap().to_owned();
+    let connect = || {
+        Val2Client::connect(
+            SerialLine::open(&path, 9600).unwrap(),
+            ClientConfig::for_emulator(),
+        )
+    };
+
+    let mut client = connect().unwrap();
+    client.calibrate().unwrap();
+    let joints = client
+        .move_by(JointDelta::from_degrees([10.0, 5.0, 5.0, 0.0, 0.0, 0.0]))
+        .unwrap();
+    assert!(
+        (server.joints() - joints)
+            .degrees()
+            .iter()
+            .all(|d| d.abs() < 1e-3)
+    );
+    drop(client);
+
+    let mut client = connect().unwrap();
+    assert!(
+        (client.joints().unwrap() - joints)
+            .degrees()
+            .iter()
+            .all(|d| d.abs() < 1e-3)
+    );
+    client.set_gripper(Gripper::Closed).unwrap();
+    assert_eq!(server.gripper(), Gripper::Closed);
+    drop(server);
+    assert!(matches!(client.joints(), Err(ArmError::Line { .. })));
+}
+
+#[test]
+fn the_link_leads_to_the_terminal_and_goes_with_the_server() {
+    let folder = std::env::temp_dir().join(format!("puma-val2-link-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let link = folder.join("arm");
+    let config = || ServeConfig {
+        link: Some(link.clone()),
+        ..ServeConfig::default()
+    };
+    let server = PtyServer::spawn(emulator(), config()).unwrap();
+    let mut client = Val2Client::connect(
+        SerialLine::open(link.to_str().unwrap(), 9600).unwrap(),
+        ClientConfig::for_emulator(),
+    )
+    .unwrap();
+    client.joints().unwrap();
+    drop(server);
+    assert!(std::fs::symlink_metadata(&link).is_err());
+    std::fs::write(&link, "something of value").unwrap();
+    assert!(PtyServer::spawn(emulator(), config()).is_err());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn real_time_takes_the_time_of_the_motion() {
+    let config = ServeConfig {
+        realtime: true,
+        ..ServeConfig::default()
+    };
+    let profile = Profile {
+        start_calibrated: true,
+        start_power: puma_val2::StartPower::On,
+        ..Profile::val2()
+    };
+    let server = PtyServer::spawn(Emulator::new(PumaParams::unimation(), profile), config).unwrap();
+    let line = SerialLine::open(server.path().to_str().unwrap(), 9600).unwrap();
+    let mut client = Val2Client::connect(line, ClientConfig::for_emulator()).unwrap();
+    let begun = std::time::Instant::now();
+    client
+        .move_by(JointDelta::from_degrees([41.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        .unwrap();
+    // 41 degrees at half of 82 degrees per second, and the ramps.
+    assert!(begun.elapsed().as_secs_f64() > 1.0);
+}

@@ -1,0 +1,155 @@
+//! Bytes of any kind: no panic, no endless loop, bounded memory.
+
+use std::time::Duration;
+
+use proptest::prelude::*;
+use puma_val2::{Emulator, Location, Profile, PumaParams, ReplyReader};
+
+/// Pieces of VAL II in which chance finds more than in bytes.
+fn line() -> impl Strategy<Value = String> {
+    let word = prop_oneof![
+        Just("WHERE"),
+        Just("DO"),
+        Just("CAL"),
+        Just("Y"),
+        Just("N"),
+        Just("SPEED"),
+        Just("HERE"),
+        Just("POINT"),
+        Just("EDIT"),
+        Just("EXECUTE"),
+        Just("ABORT"),
+        Just("A"),
+        Just("#P"),
+        Just("P"),
+        Just("10"),
+        Just("-3.5"),
+        Just(","),
+        Just("("),
+        Just(")"),
+        Just("="),
+        Just("["),
+        Just("]"),
+        Just(":"),
+        Just("+"),
+        Just("*"),
+        Just("MOVE"),
+        Just("MOVES"),
+        Just("DRIVE"),
+        Just("TRANS"),
+        Just("#PPOINT"),
+        Just("IF"),
+        Just("THEN"),
+        Just("GOTO"),
+        Just("FOR"),
+        Just("TO"),
+        Just("END"),
+        Just("WHILE"),
+        Just("CASE"),
+        Just("OF"),
+        Just("VALUE"),
+        Just("UNTIL"),
+        Just("TYPE"),
+        Just("PROMPT"),
+        Just("\"x\""),
+        Just("/X9"),
+        Just("REACTI"),
+        Just("1001"),
+        Just("SIG"),
+        Just("WAIT"),
+        Just("CALL"),
+        Just("DELAY"),
+        Just("E"),
+        Just("I"),
+        Just("D"),
+        Just("S"),
+        Just("STORE"),
+        Just("LOAD"),
+        Just("TOOL"),
+        Just("BASE"),
+        Just("SHIFT"),
+        Just("BY"),
+        Just("FRAME"),
+        Just("READY"),
+        Just(";"),
+        Just("DECOMPOSE"),
+        Just("SET"),
+        Just("DELETE"),
+        Just("LISTP"),
+        Just("RETRY"),
+        Just("PROCEED"),
+        Just("NEXT"),
+        Just("DRAW"),
+    ];
+    prop::collection::vec(word, 0..10).prop_map(|words| words.join(" "))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_controller_takes_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..2000), step in 0_u64..5000) {
+        let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+        let mut now = Duration::ZERO;
+        for chunk in bytes.chunks(37) {
+            now += Duration::from_millis(step);
+            let said = emulator.feed(chunk, now);
+            prop_assert!(said.len() < 1 << 20);
+        }
+    }
+
+    #[test]
+    fn the_controller_takes_any_lines(lines in prop::collection::vec(line(), 0..60), step in 0_u64..5000) {
+        let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+        let mut now = Duration::ZERO;
+        emulator.feed(b"N\rN\rCAL\rY\r", now);
+        now += Duration::from_secs(10);
+        for line in lines {
+            emulator.feed(format!("{line}\r").as_bytes(), now);
+            now += Duration::from_millis(step);
+            let said = emulator.poll(now);
+            prop_assert!(said.len() < 1 << 21);
+            prop_assert!(emulator.joints().0.iter().all(|j| j.is_finite()));
+            let limits = emulator.params();
+            for (angle, range) in emulator.joints().0.iter().zip(limits.ranges) {
+                prop_assert!(*angle > range.min - 1e-3 && *angle < range.max + 1e-3);
+            }
+        }
+        // What was stored can be stored and read again.
+        let text = emulator.text();
+        let mut other = Emulator::new(PumaParams::unimation(), Profile::val2());
+        prop_assert!(other.load_text(&text).is_ok(), "{text}");
+    }
+
+    #[test]
+    fn texts_of_any_kind_are_refused_or_taken(text in "(\\.PROGRAM A\n|\\.END\n|\\.REALS\n|\\.LOCATIONS\n|P 1,2,3,4,5,6\n|N 3\n|[ -~]{0,20}\n){0,20}") {
+        let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+        let _ = emulator.load_text(&text);
+    }
+
+    #[test]
+    fn the_reader_takes_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
+        let mut reader = ReplyReader::new(1000, '.', '*');
+        for chunk in bytes.chunks(11) {
+            reader.push(chunk);
+            let _ = reader.ending();
+            prop_assert!(reader.text().len() <= 1000 + 3 * 11);
+        }
+        let _ = Location::parse(reader.text());
+    }
+
+    #[test]
+    fn where_is_read_from_any_numbers(values in prop::array::uniform12(-1000.0_f64..1000.0), width in 0_usize..12) {
+        let show = |v: &[f64]| v.iter().map(|x| format!(" {x:>width$.3}")).collect::<String>();
+        let reply = format!(
+            "WHERE\r\nX Y Z O A T\r\n{}\r\nJT1 JT2 JT3 JT4 JT5 JT6\r\n{}\r\n.", show(&values[..6]), show(&values[6..])
+        );
+        let location = Location::parse(&reply).expect("a sound reply");
+        for (read, sent) in location.joints.degrees().iter().zip(&values[6..]) {
+            prop_assert!((read - sent).abs() < 0.001);
+        }
+        for (read, sent) in location.hand.val().iter().zip(&values[..6]) {
+            prop_assert!((read - sent).abs() < 0.001);
+        }
+    }
+}

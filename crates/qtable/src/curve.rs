@@ -1,0 +1,68 @@
+//! The learning curve: what happened between one record and the next.
+
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+/// One point of a learning curve. Counts are totals since the start; shares and means are over the actions and
+/// the episodes ended since the record before, and `None` where there were none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct Record {
+    /// Actions taken so far.
+    pub actions: u64,
+    /// Episodes ended so far.
+    pub episodes: u64,
+    /// Share of the episodes that ended in success, `0..=1`: terminated with a positive reward, unless the
+    /// environment says otherwise ([`Environment::succeeded`](crate::Environment::succeeded)).
+    pub success_share: Option<f64>,
+    /// Mean reward of an action.
+    pub mean_reward: Option<f64>,
+    /// Mean sum of rewards, undiscounted, of an episode.
+    pub mean_return: Option<f64>,
+    /// Mean number of actions of an episode.
+    pub mean_steps: Option<f64>,
+    /// Mean size of the temporal-difference error of an action, before its update.
+    pub mean_td_error: Option<f64>,
+}
+
+/// Sums between two records.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub(crate) struct Tally {
+    actions: u64,
+    reward: f64,
+    td_error: f64,
+    episodes: u64,
+    successes: u64,
+    episode_steps: u64,
+    episode_returns: f64,
+}
+
+impl Tally {
+    pub(crate) fn add_action(&mut self, reward: f64, td_error: f64) {
+        self.actions += 1;
+        self.reward += reward;
+        self.td_error += td_error.abs();
+    }
+
+    pub(crate) fn add_episode(&mut self, steps: u64, sum: f64, success: bool) {
+        self.episodes += 1;
+        self.episode_steps += steps;
+        self.episode_returns += sum;
+        self.successes += u64::from(success);
+    }
+
+    /// The record of what was added, at the totals given.
+    pub(crate) fn record(&self, actions: u64, episodes: u64) -> Record {
+        let mean = |sum: f64, count: u64| (count > 0).then(|| sum / count as f64);
+        Record {
+            actions,
+            episodes,
+            success_share: mean(self.successes as f64, self.episodes),
+            mean_reward: mean(self.reward, self.actions),
+            mean_return: mean(self.episode_returns, self.episodes),
+            mean_steps: mean(self.episode_steps as f64, self.episodes),
+            mean_td_error: mean(self.td_error, self.actions),
+        }
+    }
+}

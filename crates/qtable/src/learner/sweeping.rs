@@ -1,0 +1,229 @@
+//! Prioritized sweeping: planning where it changes most.
+
+use std::collections::BinaryHeap;
+
+use rand::Rng;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+use super::{Experience, Learner, check};
+use crate::error::{check_gamma, check_setting};
+use crate::validated::validated;
+use crate::{Action, Error, ModelEstimate, Policy, QTable, State, Status, Value};
+
+/// Prioritized sweeping (Moore and Atkeson 1993): after each real step the model is brought up to date and up to k
+/// pairs, those first whose value would change most, get their full backup under the model,
+/// `Q(s,a) <- Σ p(s'|s,a) (r + γ max over b of Q(s',b))`. The pairs that lead to a changed state are queued in turn.
+///
+/// There is no α: the model's counts do the averaging. Default: k = 5, changes below 1e-4 are not queued.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+pub struct PrioritizedSweeping {
+    gamma: f64,
+    backups: u32,
+    threshold: f64,
+    model: Option<ModelEstimate>,
+    queue: Queue,
+}
+
+impl PrioritizedSweeping {
+    /// With the discount factor γ.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if γ leaves `0..=1`.
+    pub fn new(gamma: f64) -> Result<Self, Error> {
+        Self {
+            gamma,
+            backups: 5,
+            threshold: 1e-4,
+            model: None,
+            queue: Queue::default(),
+        }
+        .restore()
+    }
+
+    /// Another number of backups after each real step, at least 1.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub fn with_backups(self, backups: u32) -> Result<Self, Error> {
+        Self { backups, ..self }.restore()
+    }
+
+    /// Another smallest change that is queued, in units of the values, positive.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub fn with_threshold(self, threshold: f64) -> Result<Self, Error> {
+        Self { threshold, ..self }.restore()
+    }
+
+    /// What was learned of the environment, once there is something.
+    pub fn model(&self) -> Option<&ModelEstimate> {
+        self.model.as_ref()
+    }
+
+    fn restore(self) -> Result<Self, Error> {
+        check_gamma(self.gamma)?;
+        check_setting("backups", f64::from(self.backups), self.backups > 0, "at least 1")?;
+        let positive = self.threshold.is_finite() && self.threshold > 0.0;
+        check_setting("threshold", self.threshold, positive, "positive and finite")?;
+        let needed = self
+            .model
+            .as_ref()
+            .map_or(0, |model| model.states() * model.actions());
+        let found = self.queue.priorities.len();
+        if found != 0 && found != needed {
+            return Err(Error::WrongLength {
+                what: "the queue",
+                needed,
+                found,
+            });
+        }
+        if let Some(&priority) = self.queue.priorities.iter().find(|p| !p.is_finite() || **p < 0.0) {
+            check_setting("a priority", priority, false, "finite and not negative")?;
+        }
+        Ok(self)
+    }
+}
+
+validated!(PrioritizedSweeping);
+
+impl<V: Value> Learner<V> for PrioritizedSweeping {
+    fn learn(
+        &mut self,
+        table: &mut QTable<V>,
+        experience: &Experience,
+        _policy: &dyn Policy<V>,
+        _rng: &mut dyn Rng,
+    ) -> Result<f64, Error> {
+        let Experience {
+            state, action, step, ..
+        } = *experience;
+        check(table, state, action, &step)?;
+        let next = match step.status {
+            Status::Terminated => 0.0,
+            Status::Continuing | Status::Truncated => table.max(step.observation).to_f64(),
+        };
+        let error = step.reward + self.gamma * next - table.value(state, action).to_f64();
+        let mut model = match self.model.take() {
+            Some(model) => model,
+            None => ModelEstimate::new(table.states(), table.actions())?,
+        };
+        table.check_shape("the model", model.states(), model.actions())?;
+        model.observe(state, action, &step)?;
+        table.visit(state, action)?;
+
+        let change = |table: &QTable<V>, state, action| {
+            model
+                .backup(state, action, self.gamma, |next| table.max(next).to_f64())
+                .map(|value| (value - table.value(state, action).to_f64()).abs())
+        };
+        let mut outcome = Ok(error);
+        self.queue.raise(
+            &model,
+            state,
+            action,
+            change(table, state, action),
+            self.threshold,
+        );
+        for _ in 0..self.backups {
+            let Some((state, action)) = self.queue.pop(&model) else {
+                break;
+            };
+            let backup = model.backup(state, action, self.gamma, |next| table.max(next).to_f64());
+            let before = table.max(state);
+            if let Err(error) = backup.map_or(Ok(()), |value| table.store(state, action, value)) {
+                outcome = Err(error);
+                break;
+            }
+            if table.max(state) == before {
+                continue;
+            }
+            for (state, action) in model.predecessors(state) {
+                self.queue.raise(
+                    &model,
+                    state,
+                    action,
+                    change(table, state, action),
+                    self.threshold,
+                );
+            }
+        }
+        self.model = Some(model);
+        outcome
+    }
+}
+
+/// Pairs by the change that their backup would make. Of equal changes the lower pair comes first, so that the
+/// order does not depend on how the queue grew.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(from = "Vec<f64>", into = "Vec<f64>")
+)]
+struct Queue {
+    /// Priority of each pair, 0 for those not queued.
+    priorities: Vec<f64>,
+    /// Bits of the priority (ordered as the positive number itself) and the pair; outdated entries stay until
+    /// they are met.
+    heap: BinaryHeap<(u64, std::cmp::Reverse<usize>)>,
+}
+
+impl PartialEq for Queue {
+    fn eq(&self, other: &Self) -> bool {
+        self.priorities == other.priorities
+    }
+}
+
+impl From<Vec<f64>> for Queue {
+    fn from(priorities: Vec<f64>) -> Self {
+        let queued = |&(_, &p): &(usize, &f64)| p > 0.0;
+        let heap = priorities
+            .iter()
+            .enumerate()
+            .filter(queued)
+            .map(|(pair, p)| (p.to_bits(), std::cmp::Reverse(pair)))
+            .collect();
+        Self { priorities, heap }
+    }
+}
+
+impl From<Queue> for Vec<f64> {
+    fn from(queue: Queue) -> Self {
+        queue.priorities
+    }
+}
+
+impl Queue {
+    /// Queues a pair, or moves it forward, if the change is above the threshold.
+    fn raise(
+        &mut self,
+        model: &ModelEstimate,
+        state: State,
+        action: Action,
+        change: Option<f64>,
+        threshold: f64,
+    ) {
+        let Some(change) = change.filter(|&change| change > threshold) else {
+            return;
+        };
+        self.priorities.resize(model.states() * model.actions(), 0.0);
+        let pair = state.0 * model.actions() + action.0;
+        if change > self.priorities[pair] {
+            self.priorities[pair] = change;
+            self.heap.push((change.to_bits(), std::cmp::Reverse(pair)));
+        }
+    }
+
+    fn pop(&mut self, model: &ModelEstimate) -> Option<(State, Action)> {
+        while let Some((bits, std::cmp::Reverse(pair))) = self.heap.pop() {
+            if self.priorities[pair].to_bits() == bits {
+                self.priorities[pair] = 0.0;
+                return Some((State(pair / model.actions()), Action(pair % model.actions())));
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,148 @@
+//! A known model, played.
+
+use rand::{Rng, RngExt};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+use super::{Assessment, Comparison, Model};
+use crate::validated::validated;
+use crate::{Action, Environment, Error, QTable, State, Status, Step, Value};
+
+/// An [`Environment`] that draws from a [`Model`]: problems of which the optimum is known.
+///
+/// Before the first `reset` it stands in the first of its first states. An action that the present state does not
+/// offer changes nothing and pays nothing.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+pub struct ModelEnvironment {
+    model: Model,
+    start: Vec<(State, f64)>,
+    any_termination_succeeds: bool,
+    state: State,
+}
+
+impl ModelEnvironment {
+    /// With the probability of each first state.
+    ///
+    /// # Errors
+    /// A first state out of range, or probabilities that do not sum to 1.
+    pub fn new(model: Model, start: &[(State, f64)]) -> Result<Self, Error> {
+        let state = start.first().map_or(State(0), |&(state, _)| state);
+        Self {
+            model,
+            start: start.to_vec(),
+            any_termination_succeeds: false,
+            state,
+        }
+        .restore()
+    }
+
+    /// Counts every termination as a success, for problems that end in success only but pay nothing for it.
+    pub fn with_success_at_any_termination(self) -> Self {
+        Self {
+            any_termination_succeeds: true,
+            ..self
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The probability of each first state.
+    pub fn start(&self) -> &[(State, f64)] {
+        &self.start
+    }
+
+    /// The present state.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// What a deterministic policy achieves here within `limit` steps: [`Model::assess`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn assess(&self, policy: &[Action], gamma: f64, limit: u64) -> Result<Assessment, Error> {
+        self.model
+            .assess(policy, &self.start, gamma, limit, |step| self.succeeded(step))
+    }
+
+    /// The greedy policy of a table beside an optimal one: [`Model::compare`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn compare<V: Value>(&self, table: &QTable<V>, gamma: f64, limit: u64) -> Result<Comparison, Error> {
+        self.model
+            .compare(table, &self.start, gamma, limit, |step| self.succeeded(step))
+    }
+
+    fn restore(self) -> Result<Self, Error> {
+        self.model.spread_start(&self.start)?;
+        if self.state.0 < self.model.states() {
+            Ok(self)
+        } else {
+            Err(Error::StateOutOfRange {
+                state: self.state,
+                states: self.model.states(),
+            })
+        }
+    }
+}
+
+validated!(ModelEnvironment);
+
+impl Environment for ModelEnvironment {
+    fn states(&self) -> usize {
+        self.model.states()
+    }
+
+    fn actions(&self) -> usize {
+        self.model.actions()
+    }
+
+    fn reset(&mut self, rng: &mut dyn Rng) -> State {
+        self.state = draw(self.start.iter().copied(), rng).unwrap_or_default();
+        self.state
+    }
+
+    /// # Panics
+    /// As a slice does if the action is out of range.
+    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step {
+        let outcomes = self.model.outcomes(self.state, action);
+        let step = match draw(outcomes.iter().map(|outcome| (outcome, outcome.probability)), rng) {
+            Some(outcome) => outcome.step(),
+            None => Step {
+                observation: self.state,
+                reward: 0.0,
+                status: Status::Continuing,
+            },
+        };
+        self.state = step.observation;
+        step
+    }
+
+    fn allows(&self, state: State, action: Action) -> bool {
+        !self.model.outcomes(state, action).is_empty()
+    }
+
+    fn succeeded(&self, last: &Step) -> bool {
+        last.status == Status::Terminated && (self.any_termination_succeeds || last.reward > 0.0)
+    }
+}
+
+/// One of several things by their probabilities, which sum to 1; the last one if rounding leaves a crumb. A single
+/// thing takes nothing from the generator.
+fn draw<T: Copy>(choices: impl ExactSizeIterator<Item = (T, f64)>, rng: &mut dyn Rng) -> Option<T> {
+    let mut rest = if choices.len() > 1 { rng.random() } else { 0.0 };
+    let mut drawn = None;
+    for (choice, probability) in choices {
+        drawn = Some(choice);
+        rest -= probability;
+        if rest < 0.0 {
+            break;
+        }
+    }
+    drawn
+}

@@ -1,0 +1,279 @@
+//! A model learned from experience.
+
+use rand::{Rng, RngExt};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+use super::{Model, Outcome};
+use crate::mask::checked_entries;
+use crate::validated::validated;
+use crate::{Action, Error, State, Status, Step};
+
+/// How often each action led to what: the maximum-likelihood model of an environment.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+pub struct ModelEstimate {
+    actions: usize,
+    /// The outcomes seen of each pair.
+    seen: Vec<Vec<Seen>>,
+    /// Pairs with an outcome, in the order of their first trial.
+    tried: Vec<usize>,
+    /// Pairs that led to each state without ending the episode, ascending.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    sources: Vec<Vec<usize>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+struct Seen {
+    next: State,
+    terminated: bool,
+    count: u32,
+    mean_reward: f64,
+}
+
+impl ModelEstimate {
+    /// With nothing seen.
+    ///
+    /// # Errors
+    /// An empty shape, or one that does not fit into memory.
+    pub fn new(states: usize, actions: usize) -> Result<Self, Error> {
+        let entries = checked_entries(states, actions)?;
+        let too_large = |_| Error::TooLarge { states, actions };
+        let (mut seen, mut sources) = (Vec::new(), Vec::new());
+        seen.try_reserve_exact(entries).map_err(too_large)?;
+        sources.try_reserve_exact(states).map_err(too_large)?;
+        seen.resize_with(entries, Vec::new);
+        sources.resize_with(states, Vec::new);
+        Ok(Self {
+            actions,
+            seen,
+            tried: Vec::new(),
+            sources,
+        })
+    }
+
+    /// Counts a step. A truncated one is as good as any: it tells where the action leads.
+    ///
+    /// # Errors
+    /// A state or action out of range, or a reward that is not finite.
+    pub fn observe(&mut self, state: State, action: Action, step: &Step) -> Result<(), Error> {
+        let states = self.states();
+        if let Some(state) = [state, step.observation]
+            .into_iter()
+            .find(|state| state.0 >= states)
+        {
+            return Err(Error::StateOutOfRange { state, states });
+        }
+        if action.0 >= self.actions {
+            return Err(Error::ActionOutOfRange {
+                action,
+                actions: self.actions,
+            });
+        }
+        if !step.reward.is_finite() {
+            return Err(Error::RewardNotFinite {
+                state,
+                action,
+                reward: step.reward,
+            });
+        }
+        let pair = state.0 * self.actions + action.0;
+        let terminated = step.status == Status::Terminated;
+        let outcomes = &mut self.seen[pair];
+        if outcomes.is_empty() {
+            self.tried.push(pair);
+        }
+        let same = |seen: &&mut Seen| seen.next == step.observation && seen.terminated == terminated;
+        if let Some(seen) = outcomes.iter_mut().find(same) {
+            seen.count = seen.count.saturating_add(1);
+            // Halved, so that no difference of finite rewards overflows.
+            let half = step.reward / 2.0 - seen.mean_reward / 2.0;
+            seen.mean_reward += half / f64::from(seen.count) * 2.0;
+        } else {
+            outcomes.push(Seen {
+                next: step.observation,
+                terminated,
+                count: 1,
+                mean_reward: step.reward,
+            });
+            if !terminated {
+                note_source(&mut self.sources[step.observation.0], pair);
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of states.
+    pub fn states(&self) -> usize {
+        self.sources.len()
+    }
+
+    /// Number of actions.
+    pub fn actions(&self) -> usize {
+        self.actions
+    }
+
+    /// Number of pairs tried at least once.
+    pub fn tried(&self) -> usize {
+        self.tried.len()
+    }
+
+    /// How often a pair was tried; 0 also for one out of range.
+    pub fn trials(&self, state: State, action: Action) -> u64 {
+        self.outcomes(state, action)
+            .iter()
+            .map(|seen| u64::from(seen.count))
+            .sum()
+    }
+
+    /// The model as far as it is known. A pair never tried is taken to end the episode with the reward `untried`:
+    /// a high one makes a planner curious (the R-max of Brafman and Tennenholtz 2002), a low one careful.
+    ///
+    /// # Errors
+    /// [`Error::RewardNotFinite`] for an `untried` that is not finite.
+    pub fn to_model(&self, untried: f64) -> Result<Model, Error> {
+        Model::new(self.states(), self.actions, |state, action| {
+            let trials = self.trials(state, action) as f64;
+            if self.outcomes(state, action).is_empty() {
+                return vec![Outcome::certain(state, untried, true)];
+            }
+            let outcome = |seen: &Seen| Outcome {
+                probability: f64::from(seen.count) / trials,
+                next: seen.next,
+                reward: seen.mean_reward,
+                terminated: seen.terminated,
+            };
+            self.outcomes(state, action).iter().map(outcome).collect()
+        })
+    }
+
+    fn outcomes(&self, state: State, action: Action) -> &[Seen] {
+        if state.0 >= self.states() || action.0 >= self.actions {
+            return &[];
+        }
+        &self.seen[state.0 * self.actions + action.0]
+    }
+
+    fn pair(&self, index: usize) -> (State, Action) {
+        (State(index / self.actions), Action(index % self.actions))
+    }
+
+    /// A pair tried before, each as likely as the other, and one of its outcomes, as often as it was seen.
+    pub(crate) fn draw(&self, rng: &mut dyn Rng) -> Option<(State, Action, Step)> {
+        if self.tried.is_empty() {
+            return None;
+        }
+        let (state, action) = self.pair(self.tried[rng.random_range(0..self.tried.len())]);
+        let outcomes = self.outcomes(state, action);
+        let mut rest = match outcomes.len() {
+            1 => 0,
+            _ => rng.random_range(0..self.trials(state, action)),
+        };
+        let drawn = outcomes.iter().find(|seen| {
+            let here = rest < u64::from(seen.count);
+            rest = rest.saturating_sub(u64::from(seen.count));
+            here
+        })?;
+        let status = if drawn.terminated {
+            Status::Terminated
+        } else {
+            Status::Continuing
+        };
+        Some((
+            state,
+            action,
+            Step {
+                observation: drawn.next,
+                reward: drawn.mean_reward,
+                status,
+            },
+        ))
+    }
+
+    /// The expected `r + γ value(s')` of a pair, or `None` if it was never tried.
+    pub(crate) fn backup(
+        &self,
+        state: State,
+        action: Action,
+        gamma: f64,
+        value: impl Fn(State) -> f64,
+    ) -> Option<f64> {
+        let outcomes = self.outcomes(state, action);
+        let trials = self.trials(state, action) as f64;
+        let outcome = |seen: &Seen| {
+            let next = if seen.terminated {
+                0.0
+            } else {
+                gamma * value(seen.next)
+            };
+            f64::from(seen.count) / trials * (seen.mean_reward + next)
+        };
+        (!outcomes.is_empty()).then(|| outcomes.iter().map(outcome).sum())
+    }
+
+    /// The pairs that have led to a state without ending the episode.
+    pub(crate) fn predecessors(&self, state: State) -> impl Iterator<Item = (State, Action)> + '_ {
+        self.sources[state.0].iter().map(|&index| self.pair(index))
+    }
+
+    #[cfg(feature = "serde")]
+    fn restore(mut self) -> Result<Self, Error> {
+        let actions = self.actions;
+        let states = self.seen.len() / actions.max(1);
+        let needed = checked_entries(states, actions)?;
+        if needed != self.seen.len() {
+            return Err(Error::WrongLength {
+                what: "the model estimate",
+                needed,
+                found: self.seen.len(),
+            });
+        }
+        let mut listed = self.tried.clone();
+        listed.sort_unstable();
+        let tried: Vec<usize> = (0..needed).filter(|&pair| !self.seen[pair].is_empty()).collect();
+        if listed != tried {
+            let (what, needed, found) = ("the list of tried pairs", tried.len(), listed.len());
+            return Err(Error::WrongLength { what, needed, found });
+        }
+        self.sources = vec![Vec::new(); states];
+        for &index in &tried {
+            let (state, action) = self.pair(index);
+            for seen in &self.seen[index] {
+                if seen.next.0 >= states {
+                    return Err(Error::StateOutOfRange {
+                        state: seen.next,
+                        states,
+                    });
+                }
+                if !seen.mean_reward.is_finite() {
+                    return Err(Error::RewardNotFinite {
+                        state,
+                        action,
+                        reward: seen.mean_reward,
+                    });
+                }
+                if seen.count == 0 {
+                    return Err(Error::NotADistribution {
+                        state,
+                        action,
+                        sum: 0.0,
+                    });
+                }
+                if !seen.terminated {
+                    note_source(&mut self.sources[seen.next.0], index);
+                }
+            }
+        }
+        Ok(self)
+    }
+}
+
+validated!(ModelEstimate);
+
+/// Keeps the list sorted, so that it is the same whatever the order in which pairs were met.
+fn note_source(sources: &mut Vec<usize>, pair: usize) {
+    if let Err(place) = sources.binary_search(&pair) {
+        sources.insert(place, pair);
+    }
+}

@@ -1,0 +1,293 @@
+//! Finds circles in image files.
+//!
+//! ```text
+//! cargo run --release --example detect_circles -- --csv - --overlay out/circles photo.jpg folder/
+//! ```
+
+use std::collections::HashSet;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Parser, ValueEnum};
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{
+    Acceptance, Canny, Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic,
+    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
+    StandardHoughConfig,
+};
+
+use files::{writable_folder, write_png, write_whole};
+use overlay::Overlay;
+
+mod files;
+mod overlay;
+
+/// Find circles in images: PNG, JPEG or PGM files, colour turned to luma, or folders of them.
+///
+/// Without --csv the circles are printed as a table. Coordinates are pixels, (0,0) being the centre of the top-left pixel. The exit code
+/// is 1 when a file could not be read; the others are processed all the same.
+#[derive(Parser, Debug)]
+struct Options {
+    /// Which detector to use
+    #[arg(long, value_enum, default_value_t = DetectorName::Heuristic)]
+    detector: DetectorName,
+
+    /// Smallest radius, pixels
+    #[arg(long, value_name = "PX", default_value_t = 8.0)]
+    min_radius: f64,
+
+    /// Largest radius, pixels
+    #[arg(long, value_name = "PX", default_value_t = 280.0)]
+    max_radius: f64,
+
+    /// Most circles per image
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    max_circles: usize,
+
+    /// Detect N times in each image and report the least time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    repeat: u32,
+
+    /// Seed of the random sampling
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+
+    /// Write file,cx,cy,r,score to FILE, a row a circle, best first; `-` is standard output
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+
+    /// Write file,cpu_us to FILE: CPU time of this thread from gray image to circles
+    #[arg(long, value_name = "FILE")]
+    times: Option<PathBuf>,
+
+    /// Write every image with its circles drawn in to DIR, as PNG
+    #[arg(long, value_name = "DIR")]
+    overlay: Option<PathBuf>,
+
+    /// Image files and folders
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DetectorName {
+    /// Three random edge pixels, belonging against a threshold (the paper's)
+    Heuristic,
+    /// The same, all three pixels from the whole image, as the paper samples
+    HeuristicAnywhere,
+    /// Randomized Hough transform
+    Rht,
+    /// Standard Hough transform; takes seconds on large images
+    Sht,
+    /// Standard Hough transform that votes along the gradient
+    ShtGradient,
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Processes every image; false when one could not be read.
+fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
+    let mut detector = detector(options)?;
+    if let Some(folder) = &options.overlay {
+        writable_folder(folder)?;
+    }
+    let mut results = Results::default();
+    let mut all_read = true;
+    for path in &options.paths {
+        let mut files = match ImageFiles::open(path) {
+            Ok(files) => files,
+            Err(error) => {
+                eprintln!("error: {error}");
+                all_read = false;
+                continue;
+            }
+        };
+        loop {
+            match files.grab() {
+                Ok(frame) if frame.is_empty() => {
+                    eprintln!(
+                        "error: {}: the image has no pixels",
+                        files.last_path().unwrap_or(path).display()
+                    );
+                    all_read = false;
+                }
+                Ok(frame) => {
+                    results.add(files.last_path().unwrap_or(path), &frame, &mut *detector, options)?
+                }
+                Err(FrameError::End) => break,
+                Err(error) => {
+                    eprintln!("error: {error}");
+                    all_read = false;
+                }
+            }
+        }
+    }
+    results.write(options)?;
+    Ok(all_read)
+}
+
+/// What has been found so far.
+#[derive(Default)]
+struct Results {
+    csv: String,
+    times: String,
+    overlays: HashSet<String>,
+    found: Vec<Detection>,
+}
+
+impl Results {
+    /// Finds the circles of one frame.
+    fn add(
+        &mut self,
+        path: &Path,
+        frame: &GrayImage,
+        detector: &mut dyn CircleDetector,
+        options: &Options,
+    ) -> Result<(), Box<dyn Error>> {
+        let mut least = Duration::MAX;
+        for _ in 0..options.repeat {
+            let before = cpu_time();
+            detector.detect_into(frame, &mut self.found);
+            least = least.min(cpu_time().saturating_sub(before));
+        }
+        let name = path.display().to_string();
+        for Detection { circle, score } in &self.found {
+            let Circle { x, y, radius } = circle;
+            writeln!(self.csv, "{},{x:.3},{y:.3},{radius:.3},{score:.4}", quoted(&name))?;
+        }
+        writeln!(self.times, "{},{:.1}", quoted(&name), least.as_secs_f64() * 1e6)?;
+        if options.csv.is_none() {
+            print_table(&name, &self.found, least);
+        }
+        if let Some(folder) = &options.overlay {
+            let mut picture = Overlay::new(frame);
+            self.found
+                .iter()
+                .for_each(|detection| picture.circle(&detection.circle));
+            picture.caption(&format!("{} circles", self.found.len()));
+            write_png(
+                &folder.join(overlay_name(path, &mut self.overlays)),
+                &picture.into_image(),
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Writes the files that were asked for.
+    fn write(&self, options: &Options) -> Result<(), Box<dyn Error>> {
+        let csv = format!("file,cx,cy,r,score\n{}", self.csv);
+        match &options.csv {
+            Some(path) if path.as_os_str() == "-" => print!("{csv}"),
+            Some(path) => write_whole(path, csv.as_bytes())?,
+            None => {}
+        }
+        match &options.times {
+            Some(path) => write_whole(path, format!("file,cpu_us\n{}", self.times).as_bytes()),
+            None => Ok(()),
+        }
+    }
+}
+
+fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
+    let accept = Acceptance {
+        min_radius: options.min_radius,
+        max_radius: options.max_radius,
+        max_circles: options.max_circles,
+        ..Acceptance::default()
+    };
+    let heuristic = |sampling| {
+        Heuristic::with_canny(HeuristicConfig {
+            min_radius: accept.min_radius,
+            max_radius: accept.max_radius,
+            max_circles: accept.max_circles,
+            seed: options.seed,
+            sampling,
+            ..HeuristicConfig::default()
+        })
+    };
+    let standard = |gradient| {
+        let config = StandardHoughConfig {
+            accept,
+            gradient,
+            ..StandardHoughConfig::default()
+        };
+        StandardHough::new(config, Canny::default())
+    };
+    Ok(match options.detector {
+        DetectorName::Heuristic => Box::new(heuristic(Sampling::Near)?),
+        DetectorName::HeuristicAnywhere => Box::new(heuristic(Sampling::Anywhere)?),
+        DetectorName::Rht => {
+            let config = RandomizedHoughConfig {
+                accept,
+                seed: options.seed,
+                ..RandomizedHoughConfig::default()
+            };
+            Box::new(RandomizedHough::new(config, Canny::default())?)
+        }
+        DetectorName::Sht => Box::new(standard(false)?),
+        DetectorName::ShtGradient => Box::new(standard(true)?),
+    })
+}
+
+fn print_table(name: &str, found: &[Detection], cpu: Duration) {
+    println!(
+        "{name}: {} circles, {:.1} ms",
+        found.len(),
+        cpu.as_secs_f64() * 1e3
+    );
+    for Detection { circle, score } in found {
+        println!(
+            "  x {:8.2}  y {:8.2}  r {:7.2}  score {score:.3}",
+            circle.x, circle.y, circle.radius
+        );
+    }
+}
+
+/// A CSV field: in quotes where the name has a comma, a quote or a line break in it.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}
+
+/// A file name for the picture of `path` that no picture of this run has yet.
+fn overlay_name(path: &Path, taken: &mut HashSet<String>) -> String {
+    let stem = path
+        .file_stem()
+        .map_or("image".into(), |stem| stem.to_string_lossy().into_owned());
+    let mut name = format!("{stem}.png");
+    let mut number = 2;
+    while !taken.insert(name.clone()) {
+        name = format!("{stem}-{number}.png");
+        number += 1;
+    }
+    name
+}
+
+/// CPU time of this thread.
+#[cfg(unix)]
+fn cpu_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+}
+
+/// Time on the wall where the system's CPU time is not at hand.
+#[cfg(not(unix))]
+fn cpu_time() -> Duration {
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed()
+}

@@ -1,0 +1,80 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Parser, ValueEnum};
+
+/// Learn to reach a ball in simulation, then see, reach and grasp it with a (simulated) PUMA 560 through VAL II.
+///
+/// Without options everything runs here: a controller emulator is started on a pseudo-terminal, opened like a serial line, and the
+/// camera's frames are rendered from the pose of the emulated arm.
+#[derive(Parser, Debug)]
+pub(crate) struct Options {
+    /// Folder for the results; made if need be, files of an earlier run in it are replaced
+    #[arg(long, value_name = "DIR", default_value = "out/grasp")]
+    pub(crate) out: PathBuf,
+
+    /// Seed of everything random; the same seed gives the same run
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    pub(crate) seed: u64,
+
+    /// How many balls to go for
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub(crate) runs: usize,
+
+    /// Serial device of a VAL II controller (or of an emulator), 9600 8N1, instead of starting one
+    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
+    pub(crate) port: Option<String>,
+
+    /// Socket of a VAL II controller behind a terminal server (or of an emulator), as HOST:PORT
+    #[arg(long, value_name = "ADDR")]
+    pub(crate) tcp: Option<String>,
+
+    /// Folder with centering.policy and approaching.policy of an earlier run; skips training
+    #[arg(long, value_name = "DIR")]
+    pub(crate) policy: Option<PathBuf>,
+
+    /// How the circle is found
+    #[arg(long, value_enum, default_value_t = DetectorName::Heuristic)]
+    pub(crate) detector: DetectorName,
+
+    /// Reward while learning: the paper's formulas as printed do not teach the goal
+    #[arg(long, value_enum, default_value_t = RewardName::Mended)]
+    pub(crate) reward: RewardName,
+
+    /// Form of the regression simulator
+    #[arg(long, value_enum, default_value_t = FormName::Rigid22)]
+    pub(crate) simulator: FormName,
+
+    /// Let the emulated arm take the time that a real one would
+    #[arg(long)]
+    pub(crate) realtime: bool,
+
+    /// Print the final table only
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum DetectorName {
+    /// Three random edge pixels, belonging against a threshold (the paper's)
+    Heuristic,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RewardName {
+    /// Eq. 5 and 6 with denominators of at least 1 and an absorbing goal
+    Mended,
+    /// Eq. 5 and 6 as printed
+    Literal,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum FormName {
+    /// Changes of y and r, linear in the joint moves, per elbow interval (the paper's)
+    Linear,
+    /// Changes of 1/r and y/r, 8 terms
+    Rigid8,
+    /// Changes of 1/r and y/r, 22 terms
+    Rigid22,
+}

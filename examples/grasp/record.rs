@@ -1,0 +1,95 @@
+//! Keeps what happens in the runs: a row an event, a picture a frame.
+
+use grasp_agent::{Event, EventKind, Outcome};
+use hough_heuristic::Features;
+use image::RgbImage;
+use image::imageops::{FilterType, resize};
+use puma_val2::{JointDelta, Joints};
+
+use crate::overlay::Overlay;
+
+/// Everything that was recorded of one run.
+pub(crate) struct RunRecord {
+    /// The ball's centre, millimetres in the arm's world frame.
+    pub(crate) ball_mm: [f64; 3],
+    pub(crate) rows: Vec<Row>,
+    pub(crate) outcome: Option<Outcome>,
+    pub(crate) grasped: bool,
+    /// From the gripper to the ball's centre when the jaws closed, millimetres.
+    pub(crate) miss_mm: Option<f64>,
+}
+
+/// One event.
+pub(crate) struct Row {
+    pub(crate) step: usize,
+    pub(crate) event: &'static str,
+    pub(crate) features: Option<Features>,
+    pub(crate) joints: Joints,
+    pub(crate) action: Option<JointDelta>,
+}
+
+/// A frame with what was found in it drawn in, at half size.
+pub(crate) struct Picture {
+    pub(crate) run: usize,
+    pub(crate) number: usize,
+    pub(crate) image: RgbImage,
+}
+
+impl RunRecord {
+    pub(crate) fn new(ball_mm: [f64; 3]) -> Self {
+        Self {
+            ball_mm,
+            rows: Vec::new(),
+            outcome: None,
+            grasped: false,
+            miss_mm: None,
+        }
+    }
+
+    /// Takes down an event; returns the picture of its frame, if it has one.
+    pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
+        let (features, action) = match event.kind {
+            EventKind::Seen(sighting) => (Some(sighting.features), None),
+            EventKind::Moved(delta) => (None, Some(delta)),
+            _ => (None, None),
+        };
+        let number = self.rows.len();
+        self.rows.push(Row {
+            step: event.cycle,
+            event: event.kind.word(),
+            features,
+            joints: event.joints,
+            action,
+        });
+
+        let mut overlay = Overlay::new(event.frame?);
+        if let EventKind::Seen(sighting) = event.kind {
+            overlay.circle(&sighting.detection.circle);
+            let f = sighting.features;
+            overlay.caption(&format!(
+                "run {run} step {}   x {:.1} y {:.1} r {:.1}",
+                event.cycle, f.x, f.y, f.r
+            ));
+        } else {
+            overlay.caption(&format!("run {run} step {}   no ball", event.cycle));
+        }
+        let full = overlay.into_image();
+        let image = resize(&full, full.width() / 2, full.height() / 2, FilterType::Triangle);
+        Some(Picture { run, number, image })
+    }
+
+    /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.
+    pub(crate) fn track(&self) -> Vec<(usize, Features)> {
+        let mut track: Vec<(usize, Features)> = Vec::new();
+        for row in &self.rows {
+            if let Some(features) = row.features {
+                // A ball seen twice without a move between counts as last seen.
+                if track.last().is_some_and(|(step, _)| *step == row.step) {
+                    track.pop();
+                }
+                track.push((row.step, features));
+            }
+        }
+        track
+    }
+}

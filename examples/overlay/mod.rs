@@ -1,0 +1,76 @@
+//! Circles and words drawn over a frame.
+
+use embedded_graphics::mono_font::MonoTextStyle;
+use embedded_graphics::mono_font::iso_8859_1::FONT_10X20;
+use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
+use embedded_graphics::prelude::*;
+use embedded_graphics::primitives::{Circle as Ring, Line, PrimitiveStyle, Rectangle};
+use embedded_graphics::text::{Baseline, Text};
+use hough_heuristic::Circle;
+use image::{DynamicImage, GrayImage, Rgb, RgbImage};
+
+/// A frame to draw on.
+pub(crate) struct Overlay(RgbImage);
+
+impl Overlay {
+    pub(crate) fn new(frame: &GrayImage) -> Self {
+        Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
+    }
+
+    /// Draws on a picture that is in colour already.
+    #[allow(dead_code, reason = "not every example that draws begins with such a picture")]
+    pub(crate) fn over(picture: RgbImage) -> Self {
+        Self(picture)
+    }
+
+    /// A found circle: its outline and its centre. Parts outside the frame are cut off.
+    pub(crate) fn circle(&mut self, circle: &Circle) {
+        let green = Rgb888::new(60, 255, 60);
+        let centre = Point::new(circle.x.round() as i32, circle.y.round() as i32);
+        let diameter = (2.0 * circle.radius).round().max(1.0) as u32;
+        let outline = Ring::with_center(centre, diameter).into_styled(PrimitiveStyle::with_stroke(green, 3));
+        let Ok(()) = outline.draw(self);
+        let arm = ((circle.radius * 0.15) as i32).clamp(3, 12);
+        for along in [Point::new(arm, 0), Point::new(0, arm)] {
+            let Ok(()) = Line::new(centre - along, centre + along)
+                .into_styled(PrimitiveStyle::with_stroke(green, 1))
+                .draw(self);
+        }
+    }
+
+    /// Words on a dark bar at the top of the frame.
+    pub(crate) fn caption(&mut self, words: &str) {
+        let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), 24));
+        let Ok(()) = bar
+            .into_styled(PrimitiveStyle::with_fill(Rgb888::new(20, 20, 40)))
+            .draw(self);
+        let style = MonoTextStyle::new(&FONT_10X20, Rgb888::YELLOW);
+        let Ok(_) = Text::with_baseline(words, Point::new(6, 2), style, Baseline::Top).draw(self);
+    }
+
+    pub(crate) fn into_image(self) -> RgbImage {
+        self.0
+    }
+}
+
+impl OriginDimensions for Overlay {
+    fn size(&self) -> Size {
+        Size::new(self.0.width(), self.0.height())
+    }
+}
+
+impl DrawTarget for Overlay {
+    type Color = Rgb888;
+    type Error = std::convert::Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Self::Error> {
+        for Pixel(at, colour) in pixels {
+            if let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y))
+                && let Some(pixel) = self.0.get_pixel_mut_checked(x, y)
+            {
+                *pixel = Rgb([colour.r(), colour.g(), colour.b()]);
+            }
+        }
+        Ok(())
+    }
+}

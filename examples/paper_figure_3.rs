@@ -1,0 +1,187 @@
+//! Draws figure 3 of the paper for a rendered scene: the original, its edges, the structure D with a draw of three pixels and
+//! the circle they estimate, and the circle that is found.
+//!
+//! ```text
+//! cargo run --release --example paper_figure_3 -- out/figure_3.png
+//! ```
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use clap::Parser;
+use hough_heuristic::image::{GenericImage, GrayImage, Luma, Rgb, RgbImage};
+use hough_heuristic::{
+    Circle, CircleDetector, Curve, EdgeMap, EdgePixel, Features, Heuristic, HeuristicConfig,
+};
+use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+use files::{writable_folder, write_png};
+use overlay::Overlay;
+
+mod files;
+mod overlay;
+
+/// Draw original, edges, structure D and the found circle of a rendered scene.
+#[derive(Parser, Debug)]
+struct Options {
+    /// Where to write the picture, PNG
+    #[arg(value_name = "FILE", default_value = "figure_3.png")]
+    picture: PathBuf,
+
+    /// Seed of the scene and of the draws
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::parse();
+    let frame = render(options.seed)?;
+    let mut detector = Heuristic::with_canny(HeuristicConfig {
+        seed: options.seed,
+        ..HeuristicConfig::default()
+    })?;
+    let found = detector.detect(&frame);
+
+    let mut original = Overlay::new(&frame);
+    original.caption("Original");
+    let edges = detector.edges();
+    let mut edge_picture = Overlay::new(edges.image());
+    edge_picture.caption(&format!("Canny edges: {} pixels", edges.pixels().len()));
+    let mut result = Overlay::new(&frame);
+    for detection in &found {
+        result.circle(&detection.circle);
+    }
+    result.caption(&found.first().map_or("No circle".into(), |best| {
+        let Features { x, y, r } = Features::from_circle(&best.circle, frame.width());
+        format!(
+            "Found: beta {:.2}, x {x:.1}  y {y:.1}  r {r:.1} units",
+            best.score
+        )
+    }));
+    let panels = [
+        original.into_image(),
+        edge_picture.into_image(),
+        structure(&frame, edges, options.seed),
+        result.into_image(),
+    ];
+
+    if let Some(folder) = options
+        .picture
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+    {
+        writable_folder(folder)?;
+    }
+    write_png(&options.picture, &sheet(&panels)?)?;
+    println!("{}", options.picture.display());
+    Ok(())
+}
+
+/// What the camera sees from the first of the search poses that has the ball in full view.
+fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
+    let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
+    let inside = |circle: &Circle| {
+        let room = circle.radius + 5.0;
+        (room..768.0 - room).contains(&circle.x) && (room..576.0 - room).contains(&circle.y)
+    };
+    let poses = Workspace::paper().search_poses();
+    let pose = poses
+        .iter()
+        .find(|pose| cell.circle(pose).as_ref().is_some_and(inside));
+    let pose = pose.ok_or("the ball is in view from none of the search poses")?;
+    Ok(Renderer::new(&Scene::laboratory(), seed)
+        .render(&cell, pose)
+        .clone())
+}
+
+/// `D` over a dark ground, and one draw of three pixels that is not hopeless, with its circle.
+fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
+    let ground = GrayImage::from_fn(frame.width(), frame.height(), |x, y| {
+        Luma([frame.get_pixel(x, y).0[0] / 4])
+    });
+    let mut picture = Overlay::new(&ground).into_image();
+    for pixel in edges.pixels() {
+        picture.put_pixel(pixel.x, pixel.y, Rgb([255, 255, 255]));
+    }
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let draws = std::iter::repeat_with(|| {
+        let pixels: [EdgePixel; 3] =
+            std::array::from_fn(|_| edges.pixels()[rng.random_range(0..edges.pixels().len())]);
+        Circle::through(&pixels)
+            .filter(|circle| (20.0..250.0).contains(&circle.radius))
+            .map(|circle| (pixels, circle))
+    });
+    let drawn = if edges.pixels().is_empty() {
+        None
+    } else {
+        draws.take(10_000).flatten().next()
+    };
+    let Some((pixels, circle)) = drawn else {
+        return picture;
+    };
+    let mut plot = |x: i32, y: i32, colour| {
+        if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
+            && let Some(pixel) = picture.get_pixel_mut_checked(x, y)
+        {
+            *pixel = Rgb(colour);
+        }
+    };
+    circle.outline(frame.width(), frame.height(), |x, y| {
+        plot(x, y, [255, 140, 0]);
+        plot(x + 1, y, [255, 140, 0]);
+        true
+    });
+    for pixel in pixels {
+        for (dx, dy) in (-5..=5).flat_map(|dy| (-5..=5).map(move |dx| (dx, dy))) {
+            plot(pixel.x as i32 + dx, pixel.y as i32 + dy, [255, 60, 60]);
+        }
+    }
+    let beta = matched(edges, &circle);
+    captioned(
+        picture,
+        &format!("D, three of its pixels, their circle: beta {beta:.2}"),
+    )
+}
+
+/// The belonging of a circle, counted pixel by pixel.
+fn matched(edges: &EdgeMap, circle: &Circle) -> f64 {
+    let lit = |x: i32, y: i32| {
+        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else {
+            return false;
+        };
+        edges
+            .image()
+            .get_pixel_checked(x, y)
+            .is_some_and(|pixel| pixel.0[0] != 0)
+    };
+    let (mut pixels, mut matched) = (0u32, 0u32);
+    circle.outline(edges.width(), edges.height(), |x, y| {
+        pixels += 1;
+        matched += u32::from(
+            [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]
+                .iter()
+                .any(|(dx, dy)| lit(x + dx, y + dy)),
+        );
+        true
+    });
+    f64::from(matched) / f64::from(pixels)
+}
+
+fn captioned(picture: RgbImage, words: &str) -> RgbImage {
+    let mut overlay = Overlay::over(picture);
+    overlay.caption(words);
+    overlay.into_image()
+}
+
+/// Four panels of one size, two by two.
+fn sheet(panels: &[RgbImage; 4]) -> Result<RgbImage, Box<dyn Error>> {
+    const GAP: u32 = 6;
+    let (width, height) = panels[0].dimensions();
+    let mut sheet = RgbImage::from_pixel(2 * width + GAP, 2 * height + GAP, Rgb([255, 255, 255]));
+    for (place, panel) in (0..).zip(panels) {
+        sheet.copy_from(panel, (place % 2) * (width + GAP), (place / 2) * (height + GAP))?;
+    }
+    Ok(sheet)
+}
