@@ -248,7 +248,11 @@ impl CachedBoltzmann {
             }
         }
         // Rounding may lead past the last weight.
-        if action < last * GROUP { Action(action) } else { self.best(state) }
+        if action < last * GROUP {
+            Action(action)
+        } else {
+            self.best(state)
+        }
     }
 
     /// Writes the probability of each action into `probabilities`, one entry for each.
