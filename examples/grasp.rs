@@ -310,7 +310,7 @@ fn write_results(
     }
     write_png(
         &out.join("contact_sheet.png"),
-        &results::contact_sheet(pictures, 8),
+        &results::contact_sheet(pictures, 12),
     )?;
     write_whole(
         &out.join("features.svg"),

@@ -97,9 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         milliseconds.sort_by(f64::total_cmp);
         if let (Some(least), Some(median)) = (milliseconds.first(), milliseconds.get(milliseconds.len() / 2))
         {
-            bar.println(format!(
-                "{kind:12} CPU {least:.1} ms a frame at best, {median:.1} ms median"
-            ));
+            bar.suspend(|| println!("{kind:12} CPU {least:.1} ms a frame at best, {median:.1} ms median"));
         }
     }
     save(&options.out.join("truth.csv"), truth.as_bytes())?;

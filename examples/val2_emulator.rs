@@ -23,7 +23,7 @@ use puma_val2::{Emulator, Event, Profile, PumaParams, ServeConfig, TcpServer, ch
 
 /// An emulated VAL II controller with a PUMA 560.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(version)]
 struct Arguments {
     /// Serve on this address (127.0.0.1:5600, or port 0 for any free one) instead of a pseudo-terminal.
     #[arg(long, value_name = "ADDR", conflicts_with = "pty")]
@@ -93,7 +93,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         realtime: arguments.realtime || arguments.baud.is_some(),
         link: arguments.link.clone(),
         transcript: match &arguments.transcript {
-            Some(path) => Some(Box::new(File::create(path).map_err(|e| format!("{}: {e}", path.display()))?)),
+            Some(path) => Some(Box::new(
+                File::create(path).map_err(|e| format!("{}: {e}", path.display()))?,
+            )),
             None => None,
         },
     };
@@ -122,7 +124,10 @@ fn insert_floppy(emulator: &mut Emulator, folder: &Path) -> Result<(), Box<dyn E
     fs::create_dir_all(folder)?;
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        if let (true, Some(name)) = (path.extension().is_some_and(|e| e == "v2"), path.file_stem().and_then(|n| n.to_str())) {
+        if let (true, Some(name)) = (
+            path.extension().is_some_and(|e| e == "v2"),
+            path.file_stem().and_then(|n| n.to_str()),
+        ) {
             emulator.insert_file(name, fs::read_to_string(&path)?);
         }
     }
@@ -132,7 +137,13 @@ fn insert_floppy(emulator: &mut Emulator, folder: &Path) -> Result<(), Box<dyn E
 /// Follows the panel's lines and the disk until told to quit. Without a panel (input closed) it serves until it is killed.
 fn attend(server: &Server, floppy: Option<&Path>) -> Result<(), Box<dyn Error>> {
     let (sender, lines) = mpsc::channel();
-    std::thread::spawn(move || io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    std::thread::spawn(move || {
+        io::stdin()
+            .lock()
+            .lines()
+            .map_while(Result::ok)
+            .try_for_each(|line| sender.send(line))
+    });
     loop {
         match lines.recv_timeout(Duration::from_millis(200)) {
             Ok(line) if line.trim() == "quit" => return Ok(()),
@@ -171,9 +182,15 @@ fn panel(server: &Server, line: &str) -> Result<(), String> {
         ["signal", number, word] => {
             let number: u16 = number.parse().map_err(|_| format!("`{number}` is no signal"))?;
             let on = state(word)?;
-            server.with(|e| e.set_signal(number, on)).map_err(|fault| fault.to_string())?;
+            server
+                .with(|e| e.set_signal(number, on))
+                .map_err(|fault| fault.to_string())?;
         }
-        ["joints"] => println!("{} {:?}", server.with(|e| e.joints()), server.with(|e| e.gripper())),
+        ["joints"] => println!(
+            "{} {:?}",
+            server.with(|e| e.joints()),
+            server.with(|e| e.gripper())
+        ),
         ["restart"] => server.with(Emulator::restart),
         _ => return Err("power on|off, signal NUMBER on|off, joints, restart, quit".into()),
     }

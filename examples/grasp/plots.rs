@@ -141,12 +141,22 @@ fn panel(
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 17).into_font().color(&INK))
         .margin(12)
+        .margin_right(28)
         .x_label_area_size(38)
         .y_label_area_size(52)
         .build_cartesian_2d(x.clone(), y)?;
     chart
         .configure_mesh()
         .x_desc(x_label)
+        .x_labels(7)
+        .x_label_formatter(&|value| {
+            if *value >= 1000.0 {
+                format!("{:.0}k", value / 1000.0)
+            } else {
+                format!("{value:.0}")
+            }
+        })
+        .y_label_formatter(&|value| format!("{value:.0}"))
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(230, 230, 235))
         .draw()?;

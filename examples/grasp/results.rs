@@ -6,6 +6,7 @@ use image::imageops::{FilterType, replace, resize};
 use image::{Rgb, RgbImage};
 use serde::Serialize;
 
+use crate::overlay::Overlay;
 use crate::record::{Picture, RunRecord};
 
 /// What `summary.json` holds.
@@ -163,26 +164,29 @@ pub(crate) fn features_csv(records: &[RunRecord]) -> String {
     csv
 }
 
-/// Every picture of every run on one sheet, in rows of `columns`; a run begins a new row.
+/// The frames in which the ball was seen, run after run, in rows of `columns`; a run begins a new row.
 pub(crate) fn contact_sheet(pictures: &[Picture], columns: u32) -> RgbImage {
-    const TILE: (u32, u32) = (192, 144);
-    let mut places = Vec::new();
-    let (mut row, mut column) = (0, 0);
-    for (index, picture) in pictures.iter().enumerate() {
-        let new_run = index > 0 && pictures[index - 1].run != picture.run;
-        if column == columns || new_run {
-            (row, column) = (row + 1, 0);
-        }
-        places.push((row, column));
-        column += 1;
+    const TILE: (u32, u32) = (160, 120);
+    let mut places: Vec<(&Picture, u32, u32)> = Vec::new();
+    for picture in pictures.iter().filter(|picture| picture.seen) {
+        let (row, column) = match places.last() {
+            None => (0, 0),
+            Some((before, row, column)) if before.run == picture.run && column + 1 < columns => {
+                (*row, column + 1)
+            }
+            Some((_, row, _)) => (row + 1, 0),
+        };
+        places.push((picture, row, column));
     }
-    let rows = places.last().map_or(1, |(row, _)| row + 1);
+    let rows = places.last().map_or(1, |(_, row, _)| row + 1);
     let mut sheet = RgbImage::from_pixel(columns * TILE.0, rows * TILE.1, Rgb([245, 245, 248]));
-    for (picture, (row, column)) in pictures.iter().zip(places) {
-        let tile = resize(&picture.image, TILE.0 - 4, TILE.1 - 4, FilterType::Triangle);
+    for (picture, row, column) in places {
+        let small = resize(&picture.image, TILE.0 - 4, TILE.1 - 4, FilterType::Triangle);
+        let mut tile = Overlay::from(small);
+        tile.caption(&format!("run {} step {}", picture.run, picture.step));
         replace(
             &mut sheet,
-            &tile,
+            &tile.into_image(),
             i64::from(column * TILE.0 + 2),
             i64::from(row * TILE.1 + 2),
         );

@@ -1,11 +1,9 @@
 //! Finds circles in an edge image by sampling three pixels and checking the image itself, with no accumulator.
 //!
-//! A frame passes two stages, each behind a trait of one method. An [`EdgeDetector`] turns the [`GrayImage`] into an
-//! [`EdgeMap`]: the edge image, and the list of its lighted pixels that the literature calls the structure `D`. A
-//! [`CircleDetector`] turns the frame into [`Detection`]s, best first, each a [`Circle`] with a score between 0 and 1.
-//!
-//! [`Heuristic`] is the detector of the paper this project follows: a random search that needs no memory but the edges
-//! themselves. [`Canny`] is its edge operator.
+//! A frame passes two stages, each behind a trait with one principal method. An [`EdgeDetector`] turns the
+//! [`GrayImage`](image::GrayImage) into an [`EdgeMap`]: the edge image, the list of its lighted pixels that the literature
+//! calls the structure `D`, and where it is known the gradient of each. A [`CircleDetector`] turns the frame into
+//! [`Detection`]s, best first, each a [`Circle`] with a score between 0 and 1 that means the same at every radius.
 //!
 //! ```
 //! use hough_heuristic::image::{GrayImage, Luma};
@@ -24,12 +22,39 @@
 //! # Ok::<(), hough_heuristic::ConfigError>(())
 //! ```
 //!
-//! Coordinates are pixels with `(0, 0)` at the *centre* of the top-left pixel, x to the right and y down. A detector owns
-//! its buffers, so use one detector for many frames; what it finds in a frame does not depend on the frames before.
+//! # Detectors
 //!
-//! Frames come from a [`FrameSource`]: `ImageFiles` reads files and folders (feature `files`, on by default).
+//! * [`Heuristic`]: a random search that needs no memory but the edges themselves. The detector of the paper this project
+//!   follows (section 2.1), and the one to use.
+//! * [`RandomizedHough`] and [`StandardHough`]: the two transforms the paper compares it with. They accept circles by the
+//!   same rules ([`Acceptance`]), so that what differs is the search.
+//! * [`CurveSearch`]: the paper's algorithm as it stands there, for any [`Curve`] given by n pixels, such as [`Line`] and
+//!   [`Ellipse`].
 //!
-//! [`GrayImage`]: image::GrayImage
+//! # Edges
+//!
+//! [`Canny`] is the crate's own operator, fast enough to be unnoticed at 50 frames a second, with sub-pixel positions and thresholds
+//! that rise with the frame's noise; [`ImageprocCanny`] is that of the crate `imageproc`. [`EdgeMap::from_image`] takes
+//! the edges of any other.
+//!
+//! # Frames
+//!
+//! A [`FrameSource`] delivers them: `ImageFiles` from files and folders (feature `files`, on by default), [`Y4mFrames`] and
+//! [`RawFrames`] from any reader, so also from a camera through a pipe. [`GrayView`] takes a frame from a caller's memory.
+//!
+//! # Conventions
+//!
+//! Coordinates are pixels with `(0, 0)` at the *centre* of the top-left pixel, x to the right and y down; [`Features`] are
+//! units that do not depend on the resolution. A detector owns its buffers, so use one detector for many frames: after the
+//! first it allocates nothing. What it finds depends on its configuration (seed included) and the frame, never on the
+//! frames before, and is the same on every machine whose square roots are IEEE's; only [`StandardHough`] goes through sines and
+//! arc tangents, whose last bits differ between platforms.
+//!
+//! # Limitations
+//!
+//! β asks whether pixels of the circle are edges, not whether those edges run along it. Where edges cover more than a tenth
+//! of the picture, as in grass or gravel, chance alone lifts β above any useful θ, and what is found there means little. A sphere
+//! far off the optical axis projects to an ellipse; a larger `tolerance` forgives a little of that.
 
 mod belonging;
 mod circle;

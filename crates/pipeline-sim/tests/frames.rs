@@ -1,4 +1,5 @@
 //! Rendered frames against the exact truth, and the effects of lens, motion, fields and occluders.
+#![allow(clippy::print_stdout)] // Measured errors, shown with --nocapture.
 
 use hough_heuristic::image::GrayImage;
 use nalgebra::Point2;

@@ -188,7 +188,7 @@ impl CachedBoltzmann {
             head.best = action.0 as u32;
         } else if head.best == action.0 as u32 && value < old {
             self.find_best(state);
-        } else if value == head.max && (action.0 as u32) < head.best {
+        } else if value >= head.max && (action.0 as u32) < head.best {
             head.best = action.0 as u32;
         }
         let head = &self.heads[state.0];
@@ -248,7 +248,11 @@ impl CachedBoltzmann {
             }
         }
         // Rounding may lead past the last weight.
-        if action < last * GROUP { Action(action) } else { self.best(state) }
+        if action < last * GROUP {
+            Action(action)
+        } else {
+            self.best(state)
+        }
     }
 
     /// Writes the probability of each action into `probabilities`, one entry for each.

@@ -299,6 +299,13 @@ impl Studio<'_> {
         let along = Vector3::new(cos, sin, 0.0);
         let across = Vector3::new(-sin, cos, 0.0);
         let middle = Point3::new(thing.x, thing.y, self.table);
+        let half = 0.5 * thing.shape.height();
+        if self.view.misses(
+            &(middle + Vector3::z() * half),
+            thing.shape.footprint().hypot(half),
+        ) {
+            return;
+        }
         let (look, albedo) = (&thing.look, thing.look.albedo);
         let quad = |at: Point3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
             [at - u - v, at + u - v, at + u + v, at - u + v]
@@ -356,10 +363,8 @@ impl Studio<'_> {
             }
             Shape::Print { length, width, lines } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                if self.in_frame(canvas, &corners) {
-                    self.face(canvas, &corners, &along, &across, look, albedo);
-                    self.print(canvas, thing, (length, width), lines);
-                }
+                self.face(canvas, &corners, &along, &across, look, albedo);
+                self.print(canvas, thing, (length, width), lines);
             }
         }
     }
@@ -384,17 +389,6 @@ impl Studio<'_> {
             let share = 1.0 / (LAYERS - k) as f32;
             canvas.blend(&corners, light as f32, share);
         }
-    }
-
-    /// Whether a polygon's surrounding box touches the frame.
-    fn in_frame(&self, canvas: &Canvas, corners: &[Point3<f64>]) -> bool {
-        let mut polygon = Vec::with_capacity(corners.len() + 1);
-        self.view.polygon(corners, &mut polygon);
-        let (w, h) = (canvas.width as f64, canvas.height as f64);
-        polygon.iter().any(|p| p.x > -1.0)
-            && polygon.iter().any(|p| p.x < w)
-            && polygon.iter().any(|p| p.y > -1.0)
-            && polygon.iter().any(|p| p.y < h)
     }
 
     /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters from afar.

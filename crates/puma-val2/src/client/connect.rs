@@ -24,9 +24,7 @@ impl<T: Transport> Val2Client<T> {
             guard: None,
         };
         client.reach_monitor()?;
-        if client.config.speed_percent.is_some() || client.wire.echo.is_none() {
-            client.find_echo()?;
-        }
+        client.find_echo()?;
         if let Some(percent) = client.config.speed_percent {
             client.set_speed(percent)?;
         }
