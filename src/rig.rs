@@ -138,11 +138,24 @@ impl Rig {
         detector: &mut dyn CircleDetector,
         observe: &mut dyn FnMut(&Event<'_>),
     ) -> Result<Outcome, AgentError> {
+        self.run_and_learn(&mut agent.clone(), detector, observe)
+    }
+
+    /// As [`Rig::run`], keeping what the controller learns.
+    ///
+    /// # Errors
+    /// Those of [`Agent::run_and_learn`].
+    pub fn run_and_learn<C: Controller>(
+        &mut self,
+        agent: &mut Agent<C>,
+        detector: &mut dyn CircleDetector,
+        observe: &mut dyn FnMut(&Event<'_>),
+    ) -> Result<Outcome, AgentError> {
         let mut sensor = CellSensor {
             cell: self.cell.clone(),
             pose: Arc::clone(&self.pose),
         };
-        agent.run(
+        agent.run_and_learn(
             &mut CameraEye::new(&mut self.camera, detector),
             &mut *self.arm,
             &mut sensor,

@@ -68,7 +68,7 @@ pub struct Hybrid {
     boldness: f64,
     /// Losses since the last move that kept the ball in view.
     losses: usize,
-    /// Whether the last sighting cannot have been the ball where it was; it is looked for once more before that is believed.
+    /// Whether the last sighting was far from where the ball was; it is looked for once more before that is believed.
     doubt: bool,
     /// Sightings for which a ball that has just moved is taken to be still moving.
     moving: usize,
@@ -85,6 +85,8 @@ struct Estimate {
 
 /// A sighting so many standard deviations off, and at least so many units, means that the ball has moved.
 const MOVED: (f64, f64) = (5.0, 3.0);
+/// What is seen so many feature units off may be no ball at all.
+const FAR_OFF: f64 = 40.0;
 /// For so many sightings after it has moved, a ball that has moved again is believed at once.
 const STILL_MOVING: usize = 3;
 /// Room to the border of the frame, feature units, and the range of radii that a move may lead to.
@@ -155,24 +157,23 @@ impl Hybrid {
         })
     }
 
-    /// Whether what is seen cannot be the ball where it was.
-    fn has_moved(&self, seen: &Features) -> bool {
-        let Some(estimate) = &self.estimate else {
-            return false;
-        };
+    /// How far off the ball is seen, feature units, if it cannot be where it was.
+    fn surprise(&self, seen: &Features) -> Option<f64> {
+        let estimate = self.estimate.as_ref()?;
         if self.current.len() == 0 {
-            return false;
+            return None;
         }
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
             let links = self.current.links(numbers);
             corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
         };
         let Some((expected, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
-            return true;
+            return Some(f64::INFINITY);
         };
         let unsure = deviations(&by_all, &estimate.covariance);
         let off = Vector3::new(seen.x - expected.x, seen.y - expected.y, seen.r - expected.r);
-        (0..3).any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())))
+        let moved = (0..3).any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())));
+        moved.then(|| off.norm())
     }
 
     /// The longest way toward the goal after which the ball is in view for certain.
@@ -244,8 +245,9 @@ impl Controller for Hybrid {
     }
 
     fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        let odd = self.has_moved(&now.features);
-        if odd && !self.doubt && self.moving == 0 {
+        let off = self.surprise(&now.features);
+        let odd = off.is_some();
+        if off.is_some_and(|off| off > FAR_OFF) && !self.doubt && self.moving == 0 {
             // A circle that is not the ball, perhaps: the arm stays, and looks again.
             self.doubt = true;
             return Ok(JointDelta::default());
@@ -267,6 +269,12 @@ impl Controller for Hybrid {
         }
         self.current.saw(now.features);
         self.estimate = self.estimate();
+        if self.estimate.is_none() {
+            // What cannot be explained together is not explained; this sighting alone always is.
+            self.current.forget_sightings();
+            self.current.saw(now.features);
+            self.estimate = self.estimate();
+        }
         let estimate = self.estimate.as_ref().ok_or(GaveUp::NoMoveLeft)?;
         self.plan(estimate, now, limits).ok_or(GaveUp::NoMoveLeft)
     }
