@@ -115,15 +115,25 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 EventKind::Gripping(_) => miss = Some(shared.with(|cell| cell.grip_miss(&event.joints))),
                 EventKind::Seen(sighting) if !teaching => {
                     let (f, row) = (sighting.features, number - options.teach + 1);
-                    let _ = writeln!(csv, "{row},{},{:.2},{:.2},{:.2},{}", event.cycle, f.x, f.y, f.r, world.events);
+                    let _ = writeln!(
+                        csv,
+                        "{row},{},{:.2},{:.2},{:.2},{}",
+                        event.cycle, f.x, f.y, f.r, world.events
+                    );
                 }
                 _ => {}
             }
             if let (true, Some(frame)) = (number == options.teach, event.frame) {
-                film.push(resize(frame, frame.width() / 2, frame.height() / 2, FilterType::Triangle));
+                film.push(resize(
+                    frame,
+                    frame.width() / 2,
+                    frame.height() / 2,
+                    FilterType::Triangle,
+                ));
             }
         });
-        let success = matches!(&end, Ok(Outcome { gave_up: None, .. })) && miss.is_some_and(|miss| miss < 0.010);
+        let success =
+            matches!(&end, Ok(Outcome { gave_up: None, .. })) && miss.is_some_and(|miss| miss < 0.010);
         if teaching {
             end?;
             continue;
@@ -133,7 +143,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         if !success {
             let name = format!("failure-{:03}.json", number - options.teach + 1);
             write_whole(&options.out.join(name), &serde_json::to_vec_pretty(&log)?)?;
-            println!("run {}: not grasped: {end:?}, {miss:?} m from the ball", number - options.teach + 1);
+            println!(
+                "run {}: not grasped: {end:?}, {miss:?} m from the ball",
+                number - options.teach + 1
+            );
         }
     }
     write_whole(&options.out.join("track.csv"), csv.as_bytes())?;
@@ -161,7 +174,12 @@ struct World {
 
 impl World {
     fn new(fate: Fate, seed: u64) -> Self {
-        Self { fate, events: 0, heading: None, rng: Xoshiro256PlusPlus::seed_from_u64(seed) }
+        Self {
+            fate,
+            events: 0,
+            heading: None,
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+        }
     }
 
     /// The arm has moved to `joints`.
@@ -175,10 +193,16 @@ impl World {
             Fate::Jump if reached && self.events < 1 => {
                 // To a place where the search can find it again.
                 for _ in 0..100 {
-                    let Some(place) = workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng) else { return };
+                    let Some(place) = workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng) else {
+                        return;
+                    };
                     let mut there = *cell;
                     there.place_ball(place);
-                    if workspace.search_poses().iter().any(|pose| there.features(pose).is_some()) {
+                    if workspace
+                        .search_poses()
+                        .iter()
+                        .any(|pose| there.features(pose).is_some())
+                    {
                         *cell = there;
                         self.events = 1;
                         return;
@@ -215,14 +239,26 @@ fn at_goal(f: &Features) -> bool {
 fn scene() -> Scene {
     let mut scene = Scene::laboratory();
     (scene.table.albedo, scene.table.texture) = (0.20, 0.30);
-    scene.things.retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
+    scene
+        .things
+        .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
     scene.things.iter_mut().for_each(|thing| thing.look.albedo *= 0.5);
     scene
 }
 
 fn detector(seed: u64) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
-    let edges = CannyConfig { low: 20.0, high: 50.0, ..CannyConfig::default() };
-    let config = HeuristicConfig { theta: 0.6, min_radius: 20.0, max_radius: 272.0, seed, ..HeuristicConfig::default() };
+    let edges = CannyConfig {
+        low: 20.0,
+        high: 50.0,
+        ..CannyConfig::default()
+    };
+    let config = HeuristicConfig {
+        theta: 0.6,
+        min_radius: 20.0,
+        max_radius: 272.0,
+        seed,
+        ..HeuristicConfig::default()
+    };
     Ok(Box::new(Heuristic::new(config, Canny::new(edges)?)?))
 }
 

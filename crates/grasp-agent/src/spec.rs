@@ -133,6 +133,38 @@ impl BehaviourSpec {
         }
     }
 
+    /// The same behaviour with another goal interval of y: section 4 of the paper gives [74, 92] where its Eq. 6 has [74, 82].
+    ///
+    /// The interval replaces the goal bin in the state space too; edges that it swallows are dropped. Specifications without y stay as
+    /// they are.
+    ///
+    /// # Errors
+    /// Edges that do not increase: ends that are not finite or not in order.
+    pub fn with_y_goal(mut self, low: f64, high: f64) -> Result<Self, DiscretiseError> {
+        let mut axes = self.space.quantities().to_vec();
+        for (input, axis) in self.inputs.iter().zip(&mut axes) {
+            let Some(bounds) = axis.goal().and_then(|bin| axis.bounds(bin)) else {
+                continue;
+            };
+            if *input == Input::Y {
+                let others = axis
+                    .edges()
+                    .iter()
+                    .filter(|edge| **edge != bounds.0 && **edge != bounds.1);
+                let below = others.clone().filter(|edge| **edge < low).copied();
+                let above = others.filter(|edge| **edge > high).copied();
+                let edges: Vec<f64> = below.chain([low, high]).chain(above).collect();
+                let bin = edges.iter().position(|edge| *edge >= low).map_or(1, |i| i + 1);
+                *axis = Intervals::new(&edges)?.with_goal(bin)?;
+            }
+        }
+        self.space = Product::new(axes)?;
+        for interval in self.goal.iter_mut().filter(|interval| interval.input == Input::Y) {
+            (interval.low, interval.high) = (low, high);
+        }
+        Ok(self)
+    }
+
     /// The same behaviour taught by another reward.
     #[must_use]
     pub fn with_reward(self, reward: Reward) -> Self {
@@ -235,6 +267,19 @@ mod tests {
             assert_eq!(spec.at_goal(&p), at_goal, "x = {x}");
             assert_eq!(spec.state(&p).unwrap() == inside, at_goal, "x = {x}");
         }
+    }
+
+    #[test]
+    fn the_goal_of_y_can_be_that_of_section_4() {
+        let spec = BehaviourSpec::approaching().with_y_goal(74.0, 92.0).unwrap();
+        assert_eq!(spec.states(), 90);
+        assert!(
+            spec.at_goal(&percept(0.0, 91.0, 33.0, 10.0)) && !spec.at_goal(&percept(0.0, 93.0, 33.0, 10.0))
+        );
+        let inside = spec.state(&percept(0.0, 80.0, 33.0, 10.0)).unwrap();
+        assert!(spec.space.is_goal(inside));
+        assert_eq!(spec.state(&percept(0.0, 92.0, 33.0, 10.0)).unwrap(), inside);
+        assert!(BehaviourSpec::approaching().with_y_goal(92.0, 74.0).is_err());
     }
 
     #[test]

@@ -172,7 +172,8 @@ impl Hybrid {
         };
         let unsure = deviations(&by_all, &estimate.covariance);
         let off = Vector3::new(seen.x - expected.x, seen.y - expected.y, seen.r - expected.r);
-        let moved = (0..3).any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())));
+        let moved =
+            (0..3).any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())));
         moved.then(|| off.norm())
     }
 
