@@ -4,6 +4,8 @@
 //! cargo run --release --example compare_controllers -- --help
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for a terminal")]
+
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;

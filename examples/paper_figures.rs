@@ -5,6 +5,8 @@
 //! cargo run --release --example paper_figures -- --help
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for a terminal")]
+
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -208,9 +210,9 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                 }
             })?;
             if figure == 7 {
-                reach.push(path)
+                reach.push(path);
             } else {
-                track.push(path)
+                track.push(path);
             }
         }
     }

@@ -4,6 +4,8 @@
 //! cargo run --release --example track -- --help
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for a terminal")]
+
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;

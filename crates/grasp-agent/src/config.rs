@@ -10,6 +10,9 @@ use crate::{AgentError, GoalInterval, Input, JointLimits};
 pub struct AgentConfig {
     /// Poses to look around from, at least one (section 2.2 of the paper: six). They are tried nearest first.
     pub search_poses: Vec<Joints>,
+    /// When the ball is in view from none of them: displacements with which they are tried once more, in turn
+    /// [`J1` +12.5 with `J2` +6, then `J1` +12.5 with `J2` -6 degrees]. A ball at the border of one view is in the middle of another.
+    pub search_again: Vec<JointDelta>,
     /// Intervals that must hold together before the gripper moves [x 99..108, y 74..82, r 32..34].
     pub goal: Vec<GoalInterval>,
     /// From the goal pose to the grip [`J5` by -18.01 degrees]: the paper's "the fifth joint is activated".
@@ -64,6 +67,9 @@ impl AgentConfig {
         let turn = |joint, degrees: f64| JointDelta::of(joint, degrees.to_radians());
         Self {
             search_poses: search_poses.into(),
+            search_again: [6.0, -6.0]
+                .map(|j2| JointDelta::from_degrees([12.5, j2, 0.0, 0.0, 0.0, 0.0]))
+                .into(),
             goal: vec![
                 interval(Input::X, 99.0, 108.0),
                 interval(Input::Y, 74.0, 82.0),

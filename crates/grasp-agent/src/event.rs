@@ -28,7 +28,8 @@ pub struct Event<'a> {
 pub enum EventKind {
     /// The run begins with the arm here and the gripper open.
     Started,
-    /// The arm stands at the search pose with this index, and is about to look.
+    /// The arm stands at the search pose with this index, and is about to look. Indices go on counting when the poses are tried again
+    /// with a displacement.
     AtSearchPose(usize),
     /// The ball is in the frame.
     Seen(Sighting),

@@ -46,6 +46,8 @@ pub(crate) struct Run<'a> {
     /// The pose that the last look was taken from, and how many looks from different poses brought the same.
     looked_from: Joints,
     same: usize,
+    /// Moves in a row that were taken back.
+    taken_back: usize,
 }
 
 impl<'a> Run<'a> {
@@ -70,6 +72,7 @@ impl<'a> Run<'a> {
             last_seen: None,
             looked_from: Joints::default(),
             same: 0,
+            taken_back: 0,
         }
     }
 
@@ -111,15 +114,20 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Looks around from the search poses, the nearest pan angle first.
+    /// Looks around from the search poses, the nearest pan angle first; then from beside them.
     fn search(&mut self) -> Result<Phase, AgentError> {
-        for pose in nearest_first(&self.config.search_poses, &self.joints) {
-            let target = self.config.search_poses[pose];
-            if self.go_to(target, EventKind::AtSearchPose(pose))? == Went::Back {
-                continue;
-            }
-            if let Some(sighting) = self.look()? {
-                return Ok(Phase::Reach(sighting));
+        let config = self.config;
+        let rounds = std::iter::once(JointDelta::default()).chain(config.search_again.iter().copied());
+        for (round, beside) in rounds.enumerate() {
+            for pose in nearest_first(&config.search_poses, &self.joints) {
+                let target = config.limits.nearest(&(config.search_poses[pose] + beside));
+                let number = round * config.search_poses.len() + pose;
+                if self.go_to(target, EventKind::AtSearchPose(number))? == Went::Back {
+                    continue;
+                }
+                if let Some(sighting) = self.look()? {
+                    return Ok(Phase::Reach(sighting));
+                }
             }
         }
         Ok(Phase::End(Some(GaveUp::NotFound)))
@@ -146,11 +154,7 @@ impl<'a> Run<'a> {
 
         self.cycles += 1;
         if self.go_by(delta, EventKind::Moved(delta))? == Went::Back {
-            self.controller.judge(&Consequence::TakenBack);
-            return Ok(match self.look()? {
-                Some(sighting) => Phase::Reach(sighting),
-                None => self.lose(from),
-            });
+            return self.after_taking_back(from);
         }
         let Some(after) = self.look()? else {
             self.controller.judge(&Consequence::Lost);
@@ -162,16 +166,29 @@ impl<'a> Run<'a> {
             .exceeded(sighting.features.r, after.features.r)
         {
             self.tell(EventKind::TooFast, None);
-            self.controller.judge(&Consequence::TakenBack);
             self.take_back(from)?;
-            return Ok(match self.look()? {
-                Some(sighting) => Phase::Reach(sighting),
-                None => self.lose(from),
-            });
+            return self.after_taking_back(from);
         }
+        self.taken_back = 0;
         let then = self.situation(&after);
         self.controller.judge(&Consequence::Seen(then));
         Ok(Phase::Reach(after))
+    }
+
+    /// Looks again from where the last move began; where moves come to nothing again and again, whatever is seen is not to be had, and the
+    /// search begins anew.
+    fn after_taking_back(&mut self, from: Joints) -> Result<Phase, AgentError> {
+        const OFTEN: usize = 3;
+        self.controller.judge(&Consequence::TakenBack);
+        self.taken_back += 1;
+        if self.taken_back >= OFTEN {
+            self.taken_back = 0;
+            return Ok(Phase::Search);
+        }
+        Ok(match self.look()? {
+            Some(sighting) => Phase::Reach(sighting),
+            None => self.lose(from),
+        })
     }
 
     fn lose(&mut self, from: Joints) -> Phase {
@@ -311,7 +328,7 @@ impl<'a> Run<'a> {
     fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
         for _ in 0..self.config.looks {
             let Look { frame, ball } = self.eye.look()?;
-            let ball = ball.filter(|sighting| is_finite(sighting));
+            let ball = ball.filter(is_finite);
             if let Some(sighting) = ball {
                 self.tell(EventKind::Seen(sighting), frame.as_ref());
                 self.check_alive(&sighting)?;

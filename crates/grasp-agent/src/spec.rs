@@ -143,14 +143,15 @@ impl BehaviourSpec {
     pub fn with_y_goal(mut self, low: f64, high: f64) -> Result<Self, DiscretiseError> {
         let mut axes = self.space.quantities().to_vec();
         for (input, axis) in self.inputs.iter().zip(&mut axes) {
-            let Some(bounds) = axis.goal().and_then(|bin| axis.bounds(bin)) else {
+            let Some(bin) = axis.goal() else {
                 continue;
             };
             if *input == Input::Y {
-                let others = axis
-                    .edges()
-                    .iter()
-                    .filter(|edge| **edge != bounds.0 && **edge != bounds.1);
+                // All edges but the two of the goal.
+                let others = axis.edges().iter().enumerate();
+                let others = others
+                    .filter(|(i, _)| *i != bin && i + 1 != bin)
+                    .map(|(_, edge)| edge);
                 let below = others.clone().filter(|edge| **edge < low).copied();
                 let above = others.filter(|edge| **edge > high).copied();
                 let edges: Vec<f64> = below.chain([low, high]).chain(above).collect();

@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
+#[cfg(feature = "serde")]
+use crate::BehaviourError;
 use crate::CameraModel;
 
 /// How many numbers are learned.
@@ -143,6 +145,42 @@ impl Belief {
     pub(crate) fn information_matrix(&self) -> Information {
         let values = self.information.iter().copied().chain(std::iter::repeat(0.0));
         Information::from_iterator(values.take(LEARNED * LEARNED))
+    }
+}
+
+#[cfg(feature = "serde")]
+impl Belief {
+    const FILE_KIND: &str = "grasp-agent belief/1";
+
+    /// Writes the belief to `path`, whole or not at all.
+    ///
+    /// # Errors
+    /// What kept the file from being written.
+    pub fn save(&self, path: &std::path::Path) -> Result<(), BehaviourError> {
+        Ok(qtable::save(path, Self::FILE_KIND, self)?)
+    }
+
+    /// Reads a belief that [`Belief::save`] wrote.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged or is none of ours; numbers that are too few, too many or not finite.
+    pub fn load(path: &std::path::Path) -> Result<Self, BehaviourError> {
+        let belief: Self = qtable::load(path, Self::FILE_KIND)?;
+        let numbers = belief.mean.iter().chain(&belief.information);
+        let sound = belief.mean.len() == LEARNED
+            && belief.information.len() == LEARNED * LEARNED
+            && numbers.chain([&belief.noise]).all(|v| v.is_finite())
+            && belief.noise > 0.0;
+        if sound {
+            Ok(belief)
+        } else {
+            Err(BehaviourError::Text {
+                what: format!(
+                    "{}: not thirteen finite numbers and what is known of them",
+                    path.display()
+                ),
+            })
+        }
     }
 }
 

@@ -2,6 +2,8 @@
 
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use grasp_agent::{Agent, CameraModel, EventLog, Hybrid, HybridSettings};
+#[cfg(feature = "serde")]
+use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
 
 use crate::cell::{Fault, Shared, config};
 
@@ -50,4 +52,17 @@ fn the_camera_is_learned_from_moves_alone() {
         off.rotation.angle() < 0.02 && off.translation.vector.norm() < 0.003,
         "{off}"
     );
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn a_saved_belief_comes_back_and_other_files_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("camera.belief");
+    let belief = Belief::new(&Prior::by_eye());
+    belief.save(&path).unwrap();
+    assert_eq!(Belief::load(&path).unwrap(), belief);
+    let refused = Behaviour::load(&path, &BehaviourSpec::centering()).unwrap_err();
+    assert!(refused.to_string().contains("belief"), "{refused}");
+    assert!(Belief::load(&folder.path().join("none")).is_err());
 }

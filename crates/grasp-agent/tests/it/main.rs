@@ -4,5 +4,6 @@
 mod cell;
 mod faults;
 mod hybrid;
+mod learned;
 mod log;
 mod rivals;

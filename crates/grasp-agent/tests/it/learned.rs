@@ -1,0 +1,59 @@
+//! Learning that goes on at work.
+
+use grasp_agent::qtable::QTable;
+use grasp_agent::{
+    Agent, Behaviour, BehaviourSpec, CameraModel, EventKind, EventLog, Learned, OnlineLearning,
+};
+
+use crate::cell::{Fault, Shared, config};
+
+fn blank(spec: BehaviourSpec) -> Behaviour {
+    let table = QTable::new(spec.states(), spec.actions()).unwrap();
+    Behaviour::new(spec, table).unwrap()
+}
+
+fn some_runs(agent: &mut Agent<Learned>, log: &mut EventLog) {
+    for run in 0..10 {
+        let ball = [0.6, 0.03 * f64::from(run) - 0.15, -0.1];
+        let cell = Shared::new(CameraModel::paper(), ball, Fault::None);
+        cell.run(agent, log).unwrap();
+    }
+}
+
+#[test]
+fn learning_goes_on_within_the_limits_until_it_is_frozen() {
+    let new = || {
+        Learned::new(
+            blank(BehaviourSpec::centering()),
+            blank(BehaviourSpec::approaching()),
+        )
+    };
+    let settings = OnlineLearning {
+        temperature: 10.0,
+        ..OnlineLearning::careful(5)
+    };
+    let mut agent = Agent::with_controller(config(), new().learning(settings)).unwrap();
+    let mut log = EventLog::default();
+    some_runs(&mut agent, &mut log);
+    let moved = |event: &&grasp_agent::LoggedEvent| matches!(event.kind, EventKind::Moved(_));
+    assert!(log.events.iter().filter(moved).count() > 100);
+    assert!(
+        log.events
+            .iter()
+            .filter(moved)
+            .all(|event| config().limits.admit(&event.joints))
+    );
+    let learned = agent.into_controller();
+    assert!(*learned.centering().table() != *new().centering().table());
+    assert!(*learned.approaching().table() != *new().approaching().table());
+
+    // The same seed learns the same.
+    let mut again = Agent::with_controller(config(), new().learning(settings)).unwrap();
+    some_runs(&mut again, &mut EventLog::default());
+    assert!(again.controller().approaching() == learned.approaching());
+
+    let before = learned.approaching().clone();
+    let mut frozen = Agent::with_controller(config(), learned.frozen()).unwrap();
+    some_runs(&mut frozen, &mut EventLog::default());
+    assert!(*frozen.controller().approaching() == before);
+}
