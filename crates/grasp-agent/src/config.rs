@@ -11,31 +11,31 @@ pub struct AgentConfig {
     /// Poses to look around from, at least one (section 2.2 of the paper: six). They are tried nearest first.
     pub search_poses: Vec<Joints>,
     /// When the ball is in view from none of them: displacements with which they are tried once more, in turn
-    /// [`J1` +12.5 with `J2` +6, then `J1` +12.5 with `J2` -6 degrees]. A ball at the border of one view is in the middle of another.
+    /// [`J1` +12.5 with `J2` +6, then `J1` +12.5 with `J2` -6 degrees\]. A ball at the border of one view is in the middle of another.
     pub search_again: Vec<JointDelta>,
-    /// Intervals that must hold together before the gripper moves [x 99..108, y 74..82, r 32..34].
+    /// Intervals that must hold together before the gripper moves \[x 99..108, y 74..82, r 32..34\].
     pub goal: Vec<GoalInterval>,
-    /// From the goal pose to the grip [`J5` by -18.01 degrees]: the paper's "the fifth joint is activated".
+    /// From the goal pose to the grip [`J5` by -18.01 degrees\]: the paper's "the fifth joint is activated".
     pub grip: JointDelta,
     /// Where the ball is looked for when it is lost, relative to the pose of the last sighting
-    /// [four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
-    /// +12]; tried in order, after that pose itself.
+    /// \[four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
+    /// +12\]; tried in order, after that pose itself.
     pub recovery: Vec<JointDelta>,
     /// The range that each joint is kept in [[`JointLimits::paper`]].
     pub limits: JointLimits,
-    /// Moves after the first sighting before the run is given up [60].
+    /// Moves after the first sighting before the run is given up \[60\].
     pub max_cycles: usize,
-    /// Frames to look at from one pose before the ball counts as not in view [2]. Sampling can miss a circle once.
+    /// Frames to look at from one pose before the ball counts as not in view \[2\]. Sampling can miss a circle once.
     pub looks: usize,
     /// How fast the hand may come nearer to the ball.
     pub approach: ApproachLimit,
-    /// After the jaws have closed: the move with which the arm lifts the ball, to look whether it is still where it was [none]. A ball
+    /// After the jaws have closed: the move with which the arm lifts the ball, to look whether it is still where it was \[none\]. A ball
     /// that is seen then is not in the jaws, and is reached for again.
     pub lift: Option<JointDelta>,
-    /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck [1 degree].
+    /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
     pub reach_tolerance: f64,
     /// Frames in a row, each from another pose, that may show the ball at exactly the same place before the camera counts as
-    /// frozen [2].
+    /// frozen \[2\].
     pub same_frames: usize,
 }
 
@@ -46,9 +46,9 @@ pub struct AgentConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ApproachLimit {
-    /// Radius up to which any approach is slow enough, feature units [62].
+    /// Radius up to which any approach is slow enough, feature units \[62\].
     pub radius: f64,
-    /// Greatest growth of the radius in one move beyond that [1.5].
+    /// Greatest growth of the radius in one move beyond that \[1.5\].
     pub growth: f64,
 }
 

@@ -21,7 +21,7 @@ pub struct Event<'a> {
 /// What can happen in a run.
 ///
 /// Every answer of arm, sensor and camera makes exactly one event, in the order of the answers, so that the events determine the
-/// run: see [`Replay`](crate::Replay).
+/// run: see [`EventLog::replay`](crate::EventLog::replay).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

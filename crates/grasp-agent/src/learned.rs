@@ -24,11 +24,11 @@ pub struct Learned {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OnlineLearning {
-    /// Discount factor [0.9], in 0..1.
+    /// Discount factor \[0.9\], in 0..1.
     pub gamma: f64,
-    /// Learning rate [0.1], in 0..=1.
+    /// Learning rate \[0.1\], in 0..=1.
     pub alpha: f64,
-    /// Boltzmann temperature in units of Q [0.3], above zero; the higher, the more is tried.
+    /// Boltzmann temperature in units of Q \[0.3\], above zero; the higher, the more is tried.
     pub temperature: f64,
     /// Seed of what is tried.
     pub seed: u64,

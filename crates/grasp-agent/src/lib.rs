@@ -8,8 +8,11 @@
 //! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. The paper's two are presets.
 //! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which [`qtable`] learns it.
 //! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked what to do.
-//! * An [`Agent`] runs both on an [`Eye`] ([`CameraEye`]: camera and circle detector) and a [`Manipulator`](puma_val2::Manipulator), and tells
-//!   every [`Event`] as it happens.
+//! * An [`Agent`] runs a [`Controller`] on an [`Eye`] ([`CameraEye`]: camera and circle detector) and a
+//!   [`Manipulator`](puma_val2::Manipulator), and tells every [`Event`] as it happens; an [`EventLog`] keeps them and replays the run.
+//! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those that the paper names as alternatives,
+//!   [`PositionBased`], [`ImageBased`], [`Fuzzy`] and [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins
+//!   with such a model and learns what is wrong with it.
 //!
 //! The crate knows no simulator, no renderer and no particular detector, arm or camera: they meet it through the traits of
 //! `hough-heuristic` and `puma-val2` and through plain closures.

@@ -10,17 +10,17 @@ use crate::{Input, Percept};
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reward {
-    /// For arriving at the goal [100].
+    /// For arriving at the goal \[100\].
     pub goal: f64,
-    /// For losing the ball [-100].
+    /// For losing the ball \[-100\].
     pub lost: f64,
     /// What pays for coming closer.
     pub terms: Vec<RewardTerm>,
-    /// Least denominator of a term, in the units of its input [1; literally 0].
+    /// Least denominator of a term, in the units of its input \[1; literally 0\].
     ///
     /// At 0 the reward grows without bound near a target, and is infinite on it.
     pub floor: f64,
-    /// Whether the goal, once reached, is kept [true; literally false].
+    /// Whether the goal, once reached, is kept \[true; literally false\].
     ///
     /// A goal that merely ends the episode is worth 100, and near it going away and coming back pays more than that for
     /// ever; a goal that is kept pays 100 at every step to come, 100 / (1 - gamma) in all.

@@ -24,9 +24,9 @@ pub use position_based::PositionBased;
 pub struct ServoSettings {
     /// The camera and the arm as they are believed to be.
     pub model: CameraModel,
-    /// Features of the ball where it should be [(103.5, 78, 33), the middle of the paper's goal intervals].
+    /// Features of the ball where it should be \[(103.5, 78, 33), the middle of the paper's goal intervals\].
     pub goal: Features,
-    /// Which part of the error is to be removed in one cycle [1], above 0.
+    /// Which part of the error is to be removed in one cycle \[1\], above 0.
     pub gain: f64,
     /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
     pub steps: StepLimits,

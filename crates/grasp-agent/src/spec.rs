@@ -55,13 +55,13 @@ impl GoalInterval {
     }
 }
 
-/// Edges of the radius, common to both behaviours; the goal is [32, 34].
+/// Edges of the radius, common to both behaviours; the goal is \[32, 34\].
 const R_EDGES: [f64; 5] = [14.0, 22.0, 32.0, 34.0, 47.0];
 
 impl BehaviourSpec {
     /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq. 5 with both mends.
     ///
-    /// The goal interval [99, 108] and the steps of 5 and 1 degrees are the paper's; it does not print the others.
+    /// The goal interval \[99, 108\] and the steps of 5 and 1 degrees are the paper's; it does not print the others.
     pub fn centering() -> Self {
         Self {
             name: "centering".into(),
@@ -83,7 +83,7 @@ impl BehaviourSpec {
     /// The paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90 states), 9 steps of J2 by 9 of J3
     /// (81 actions), Eq. 6 with both mends.
     ///
-    /// The goal (y in [74, 82], r in [32, 34]) and the steps of 20, 6 and 16, 5 degrees are the paper's; it does not print
+    /// The goal (y in \[74, 82\], r in \[32, 34\]) and the steps of 20, 6 and 16, 5 degrees are the paper's; it does not print
     /// the others.
     pub fn approaching() -> Self {
         Self {
@@ -133,7 +133,7 @@ impl BehaviourSpec {
         }
     }
 
-    /// The same behaviour with another goal interval of y: section 4 of the paper gives [74, 92] where its Eq. 6 has [74, 82].
+    /// The same behaviour with another goal interval of y: section 4 of the paper gives \[74, 92\] where its Eq. 6 has \[74, 82\].
     ///
     /// The interval replaces the goal bin in the state space too; edges that it swallows are dropped. Specifications without y stay as
     /// they are.

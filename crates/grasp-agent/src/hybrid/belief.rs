@@ -26,17 +26,17 @@ pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Prior {
-    /// Of the logarithm of the focal length [0.3].
+    /// Of the logarithm of the focal length \[0.3\].
     pub focal: f64,
-    /// Of the principal point, feature units [5].
+    /// Of the principal point, feature units \[5\].
     pub centre: f64,
-    /// Of roll, pitch and yaw of the camera, radians [0.17].
+    /// Of roll, pitch and yaw of the camera, radians \[0.17\].
     pub turn: f64,
-    /// Of the camera's place along each of its axes, metres [0.015].
+    /// Of the camera's place along each of its axes, metres \[0.015\].
     pub shift: f64,
-    /// Of the logarithm of the ball's radius [0.15].
+    /// Of the logarithm of the ball's radius \[0.15\].
     pub radius: f64,
-    /// Of the play in each of the first three joints, whole width, radians [0.015].
+    /// Of the play in each of the first three joints, whole width, radians \[0.015\].
     pub play: f64,
 }
 

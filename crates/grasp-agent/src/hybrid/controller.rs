@@ -16,18 +16,18 @@ pub struct HybridSettings {
     pub nominal: CameraModel,
     /// How wrong that may be.
     pub prior: Prior,
-    /// Features of the ball where it should be [(103.5, 78, 33)].
+    /// Features of the ball where it should be \[(103.5, 78, 33)\].
     pub goal: Features,
     /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
     pub steps: StepLimits,
-    /// A move is made only if the ball will still be in view when it is seen so many standard deviations off its expected place [2].
+    /// A move is made only if the ball will still be in view when it is seen so many standard deviations off its expected place \[2\].
     pub caution: f64,
-    /// Runs that are remembered, the latest ones [400].
+    /// Runs that are remembered, the latest ones \[400\].
     pub memory: usize,
-    /// How far `JT5` turns for the grip, radians [-18.01 degrees].
+    /// How far `JT5` turns for the grip, radians \[-18.01 degrees\].
     pub grip_turn: f64,
     /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and not left to the agent's settings
-    /// [0.008].
+    /// \[0.008\].
     pub grip_certainty: f64,
 }
 
