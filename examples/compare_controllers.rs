@@ -4,7 +4,11 @@
 //! cargo run --release --example compare_controllers -- --help
 //! ```
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for a terminal")]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for a terminal"
+)]
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -12,8 +16,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourSpec, Controller, Fuzzy, Hybrid, HybridSettings, ImageBased, JacobianAt,
-    Learned, LookAhead, PositionBased, ServoSettings,
+    Agent, AgentConfig, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
+    JacobianAt, Learned, LookAhead, PositionBased, ServoSettings,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{ExactPlane, Simulator, TrialCell, learn};
@@ -66,6 +70,10 @@ struct Options {
     /// Let the hand have its bodies: it can run into the ball, and success is the ball in the jaws
     #[arg(long)]
     grip: bool,
+
+    /// Write the event log of every run that fails to failures/ in the folder
+    #[arg(long)]
+    logs: bool,
 }
 
 fn main() -> ExitCode {
@@ -97,9 +105,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 let mut agent = Agent::with_controller(AgentConfig::paper(cell.search_poses()), made)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
-                    if let Some(result) = cell.run(&mut agent, seed, &mut |_, _| (), &mut |_| ())? {
+                    let mut log = EventLog::default();
+                    let result = cell.run(&mut agent, seed, &mut |_, _| (), &mut |event| log.note(event))?;
+                    if let Some(result) = result {
                         let success = if options.grip { result.held } else { result.reached };
                         tally.add(success, &result.outcome);
+                        if options.logs && !success {
+                            let folder = options.out.join("failures");
+                            writable_folder(&folder)?;
+                            let name = format!("{level} {} cell {draw} ball {start}.json", rival.name);
+                            write_whole(&folder.join(name), &serde_json::to_vec_pretty(&log)?)?;
+                        }
                     }
                 }
             }

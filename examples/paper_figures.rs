@@ -5,7 +5,11 @@
 //! cargo run --release --example paper_figures -- --help
 //! ```
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for a terminal")]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for a terminal"
+)]
 
 use std::error::Error;
 use std::fmt::Write as _;

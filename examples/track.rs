@@ -4,7 +4,11 @@
 //! cargo run --release --example track -- --help
 //! ```
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for a terminal")]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for a terminal"
+)]
 
 use std::error::Error;
 use std::fmt::Write as _;

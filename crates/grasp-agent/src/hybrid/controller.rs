@@ -89,9 +89,11 @@ const MOVED: (f64, f64) = (5.0, 3.0);
 const FAR_OFF: f64 = 40.0;
 /// For so many sightings after it has moved, a ball that has moved again is believed at once.
 const STILL_MOVING: usize = 3;
-/// Room to the border of the frame, feature units, and the range of radii that a move may lead to.
+/// Room to the border of the frame, feature units.
 const MARGIN: f64 = 4.0;
-const RADII: (f64, f64) = (5.5, 55.0);
+/// Radius up to which a ball is far enough to be seen, and the largest that a move may lead to, feature units.
+const FAR_ENOUGH: f64 = 5.5;
+const LARGEST: f64 = 55.0;
 /// Shares of the way that are tried, the whole way first.
 const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
 /// Least share of a way that is gone after any number of losses.
@@ -186,6 +188,8 @@ impl Hybrid {
         let goal = model.in_camera(&self.settings.goal)?;
         // On its line in the image at the distance it has: where to bring a ball that cannot be approached yet.
         let aside = Point3::from(goal.coords * (here.z / goal.z));
+        // A ball that is hardly large enough to be seen must not become smaller.
+        let least = model.outline(&here).map_or(FAR_ENOUGH, |f| f.r.min(FAR_ENOUGH));
         let ways = [goal, aside].map(|target| SHARES.map(|share| (target, share)));
         let mut last = None;
         for (target, share) in ways.into_iter().flatten() {
@@ -194,7 +198,7 @@ impl Hybrid {
             let motors = links.motors_for(&stand, &now.joints);
             let delta = self.cut(&motors, &now.joints, limits);
             last = Some(delta);
-            if self.stays_in_view(estimate, &(now.joints + delta)) {
+            if self.stays_in_view(estimate, &(now.joints + delta), least) {
                 break;
             }
         }
@@ -210,7 +214,8 @@ impl Hybrid {
         }))
     }
 
-    fn stays_in_view(&self, estimate: &Estimate, motors: &Joints) -> bool {
+    /// Whether the ball will be in view for all that is not known for certain, with a radius of at least `least` units.
+    fn stays_in_view(&self, estimate: &Estimate, motors: &Joints, least: f64) -> bool {
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
             let mut links: Links = self.current.links(numbers);
             links.follow(motors);
@@ -223,7 +228,8 @@ impl Hybrid {
         let inside = |v: f64, room: f64, low: f64, high: f64| v - room >= low && v + room <= high;
         inside(f.x, room[0], MARGIN, Features::WIDTH - MARGIN)
             && inside(f.y, room[1], MARGIN, Features::HEIGHT - MARGIN)
-            && inside(f.r, room[2], RADII.0, RADII.1)
+            && f.r >= least
+            && f.r + room[2] <= LARGEST
     }
 }
 
