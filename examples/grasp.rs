@@ -11,24 +11,21 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, Eye, Reward};
+use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, Reward};
 use hough_heuristic::{Canny, CannyConfig, CircleDetector, Heuristic, HeuristicConfig};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use pipeline_sim::{Ball, ReachForm, Workspace, sample_moves};
-use puma_grasp::{Lesson, Simulator, learn};
+use pipeline_sim::{Ball, Cell, ReachForm, Scene, Shape, Workspace, sample_moves};
+use puma_grasp::{Lesson, Rig, RigError, Simulator, learn};
 use qtable::TrainReport;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
 use files::{writable_folder, write_png, write_whole};
-use line::Line;
 use options::{DetectorName, FormName, Options, RewardName};
 use record::{Picture, RunRecord};
 use results::{Summary, TrainingSummary};
 
 mod files;
-#[path = "grasp/line.rs"]
-mod line;
 #[path = "grasp/options.rs"]
 mod options;
 mod overlay;
@@ -61,48 +58,82 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     // Whatever can be found wrong is found before the long work.
     writable_folder(&options.out)?;
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
-    let workspace = Workspace::paper();
+    let mut detector = detector(options)?;
+    let mut rig = open_rig(options)?;
+    say(
+        options,
+        &format!("connected to the VAL II controller on {}", rig.name()),
+    );
 
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let begin = Instant::now();
-    let lessons = match &options.policy {
+    let taught = match &options.policy {
         Some(folder) => Taught::load(folder, options.reward)?,
-        None => Taught::train(options, &workspace, &mut rng)?,
+        None => Taught::train(options, &rig.cell().get(), &mut rng)?,
     };
-    let seconds = begin.elapsed().as_secs_f64();
-    if let Some((centering, approaching)) = &lessons.reports {
+    let training = TrainingSummary {
+        trained: taught.reports.is_some(),
+        actions: taught
+            .reports
+            .iter()
+            .map(|(centering, approaching)| centering.actions + approaching.actions)
+            .sum(),
+        seconds: begin.elapsed().as_secs_f64(),
+        r2: taught.r2,
+    };
+    if let Some((centering, approaching)) = &taught.reports {
         let svg = plots::learning_curves(&[("centering", centering), ("approaching", approaching)])?;
         write_whole(&options.out.join("learning.svg"), svg.as_bytes())?;
     }
 
-    let mut line = Line::open(options, &mut rng)?;
-    say(options, &format!("connected to the controller on {}", line.name()));
+    let workspace = Workspace::paper();
     let config = AgentConfig::paper(workspace.search_poses());
-    let agent = Agent::new(config, lessons.centering, lessons.approaching)?;
-    let mut detector = detector(options)?;
+    let agent = Agent::new(config, taught.centering, taught.approaching)?;
     let mut records = Vec::new();
     let mut pictures = Vec::new();
     let bar = progress_bar(options, options.runs as u64, "balls");
     for run in 1..=options.runs {
-        let ball = workspace.sample_visible_ball(&mut rng);
-        let record = reach_for(&agent, &mut line, &mut *detector, ball, run, &mut pictures)?;
-        bar.println(format!("  {}", one_line(run, &record)));
+        let (ball, _) = workspace
+            .sample_seen_ball(&rig.cell().get(), &mut rng)
+            .ok_or("no place of the workspace is in view from a search pose")?;
+        let record = reach_for(&agent, &mut rig, &mut *detector, &ball, run, &mut pictures)?;
+        bar.suspend(|| say(options, &one_line(run, &record)));
         records.push(record);
         bar.inc(1);
     }
     bar.finish_and_clear();
 
-    let training = TrainingSummary {
-        trained: lessons.reports.is_some(),
-        actions: lessons.reports.iter().map(|(c, a)| c.actions + a.actions).sum(),
-        seconds,
-        r2: lessons.r2,
-    };
     let summary = Summary::new(options.seed, training, &records);
     write_results(&options.out, &summary, &records, &pictures)?;
     println!("{}", summary.table());
     say(options, &format!("results: {}", options.out.display()));
     Ok(())
+}
+
+/// The arm: an emulated controller of our own, or one that is there already.
+fn open_rig(options: &Options) -> Result<Rig, RigError> {
+    let (scene, seed) = (scene(), options.seed);
+    match (&options.port, &options.tcp) {
+        (Some(path), _) => Rig::on_port(path, &scene, seed),
+        (None, Some(address)) => Rig::on_socket(address, &scene, seed),
+        (None, None) => Rig::emulated(options.realtime, &scene, seed),
+    }
+}
+
+/// A bright ball over a dark wooden table with boxes and tape on it.
+///
+/// Nothing else in the scene is round: seen straight on, a disc on the table cannot be told from a ball by its outline.
+fn scene() -> Scene {
+    let mut scene = Scene::laboratory();
+    scene.table.albedo = 0.20;
+    scene.table.texture = 0.30;
+    scene
+        .things
+        .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
+    for thing in &mut scene.things {
+        thing.look.albedo *= 0.5;
+    }
+    scene
 }
 
 /// Two behaviours and how they came about.
@@ -116,24 +147,35 @@ struct Taught {
 
 impl Taught {
     /// Samples the cell, fits the regression simulator, learns both behaviours in it, and saves them.
-    fn train(options: &Options, workspace: &Workspace, rng: &mut dyn Rng) -> Result<Self, Box<dyn Error>> {
+    fn train(options: &Options, cell: &Cell, rng: &mut dyn Rng) -> Result<Self, Box<dyn Error>> {
         say(options, &format!("sampling {SAMPLES} moves in the cell"));
-        let samples = sample_moves(workspace, SAMPLES, FEATURE_NOISE, rng)?;
+        let (centring, reaching) = sample_moves(cell, SAMPLES, FEATURE_NOISE, rng);
         let form = match options.simulator {
             FormName::Linear => ReachForm::Linear,
             FormName::Rigid8 => ReachForm::Rigid8,
             FormName::Rigid22 => ReachForm::Rigid22,
         };
-        let simulator = Simulator::fit(&samples, form)?;
+        let simulator = Simulator::fit(&centring, &reaching, form)?;
         let mut r2 = BTreeMap::new();
         for quality in simulator.quality() {
-            say(options, &format!("  {:<16} R² {:.4}   rmse {:.2} units", quality.output, quality.r2, quality.rmse));
+            say(
+                options,
+                &format!(
+                    "  {:<16} R² {:.4}   rmse {:.2} units",
+                    quality.output, quality.r2, quality.rmse
+                ),
+            );
             r2.insert(quality.output, quality.r2);
         }
         let [centering, approaching] = specs(options.reward);
-        let Lesson { behaviour: centering, report: first } = teach(options, centering, &simulator, ACTIONS.0, rng)?;
-        let Lesson { behaviour: approaching, report: second } =
-            teach(options, approaching, &simulator, ACTIONS.1, rng)?;
+        let Lesson {
+            behaviour: centering,
+            report: first,
+        } = teach(options, centering, &simulator, ACTIONS.0, rng)?;
+        let Lesson {
+            behaviour: approaching,
+            report: second,
+        } = teach(options, approaching, &simulator, ACTIONS.1, rng)?;
 
         // What goes to work is what lies on the disk.
         for behaviour in [&centering, &approaching] {
@@ -141,14 +183,23 @@ impl Taught {
         }
         let saved = Self::load(&options.out, options.reward)?;
         say(options, &format!("policies saved to {}", options.out.display()));
-        Ok(Self { reports: Some((first, second)), r2, ..saved })
+        Ok(Self {
+            reports: Some((first, second)),
+            r2,
+            ..saved
+        })
     }
 
     /// Reads behaviours that were saved before.
     fn load(folder: &Path, reward: RewardName) -> Result<Self, Box<dyn Error>> {
         let [centering, approaching] =
             specs(reward).map(|spec| Behaviour::load(&policy_path(folder, &spec), &spec));
-        Ok(Self { centering: centering?, approaching: approaching?, reports: None, r2: BTreeMap::new() })
+        Ok(Self {
+            centering: centering?,
+            approaching: approaching?,
+            reports: None,
+            r2: BTreeMap::new(),
+        })
     }
 }
 
@@ -175,28 +226,44 @@ fn teach(
     rng: &mut dyn Rng,
 ) -> Result<Lesson, Box<dyn Error>> {
     let bar = progress_bar(options, actions, &format!("{} actions", spec.name));
-    let size = format!("{}: {} states x {} actions", spec.name, spec.states(), spec.actions());
-    let lesson = learn(spec, simulator, actions, rng, &mut |progress| bar.set_position(progress.actions))?;
+    let size = format!(
+        "{}: {} states x {} actions",
+        spec.name,
+        spec.states(),
+        spec.actions()
+    );
+    let lesson = learn(spec, simulator, actions, rng, &mut |progress| {
+        bar.set_position(progress.actions)
+    })?;
     bar.finish_and_clear();
     let success = lesson.report.curve.last().and_then(|record| record.success_share);
     let success = success.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
-    say(options, &format!("learned {size}, {actions} actions; goal reached in the last episodes: {success}"));
+    say(
+        options,
+        &format!("learned {size}, {actions} actions; goal reached in the last episodes: {success}"),
+    );
     Ok(lesson)
 }
 
 fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
     // The ball's outline measures 5 to 68 feature units: 20 to 272 pixels of the camera's frame.
     let radii = (20.0, 272.0);
+    // The shaded side of the ball is hardly brighter than the table: edges must be taken that are weaker than usual.
+    let edges = CannyConfig {
+        low: 20.0,
+        high: 50.0,
+        ..CannyConfig::default()
+    };
     Ok(match options.detector {
         DetectorName::Heuristic => {
             let config = HeuristicConfig {
+                theta: 0.6,
                 min_radius: radii.0,
                 max_radius: radii.1,
-                max_circles: 1,
                 seed: options.seed,
                 ..HeuristicConfig::default()
             };
-            Box::new(Heuristic::with_canny(config)?)
+            Box::new(Heuristic::new(config, Canny::new(edges)?)?)
         }
     })
 }
@@ -204,20 +271,19 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
 /// One run: places the ball, lets the agent go for it, and measures in the cell whether it has it.
 fn reach_for(
     agent: &Agent,
-    line: &mut Line,
+    rig: &mut Rig,
     detector: &mut dyn CircleDetector,
-    ball: Ball,
+    ball: &Ball,
     run: usize,
     pictures: &mut Vec<Picture>,
 ) -> Result<RunRecord, Box<dyn Error>> {
-    line.place(ball);
+    rig.place(ball);
     let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
-    let Line { arm, camera, sensor, .. } = line;
-    let outcome = agent.run(&mut Eye::new(camera, detector), &mut **arm, sensor, &mut |event| {
-        pictures.extend(record.note(run, event));
+    let outcome = rig.run(agent, detector, &mut |event| {
+        pictures.extend(record.note(run, event))
     })?;
     if outcome.gave_up.is_none() {
-        let miss = line.miss();
+        let miss = rig.grip_miss();
         record.miss_mm = Some(miss * 1000.0);
         record.grasped = miss <= GRASP_TOLERANCE;
     }
@@ -242,9 +308,18 @@ fn write_results(
         let name = format!("run{:03}-frame{:03}.png", picture.run, picture.number);
         write_png(&frames.join(name), &picture.image)?;
     }
-    write_png(&out.join("contact_sheet.png"), &results::contact_sheet(pictures, 8))?;
-    write_whole(&out.join("features.svg"), plots::features_per_step(records)?.as_bytes())?;
-    write_whole(&out.join("features.csv"), results::features_csv(records).as_bytes())?;
+    write_png(
+        &out.join("contact_sheet.png"),
+        &results::contact_sheet(pictures, 12),
+    )?;
+    write_whole(
+        &out.join("features.svg"),
+        plots::features_per_step(records)?.as_bytes(),
+    )?;
+    write_whole(
+        &out.join("features.csv"),
+        results::features_csv(records).as_bytes(),
+    )?;
     write_whole(&out.join("summary.json"), &serde_json::to_vec_pretty(summary)?)
 }
 
@@ -262,8 +337,14 @@ fn say(options: &Options, words: &str) {
 }
 
 fn progress_bar(options: &Options, length: u64, unit: &str) -> ProgressBar {
-    let target = if options.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let target = if options.quiet {
+        ProgressDrawTarget::hidden()
+    } else {
+        ProgressDrawTarget::stderr()
+    };
     let style = ProgressStyle::with_template("  {bar:40} {pos}/{len} {msg}  {elapsed} (still {eta})")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::with_draw_target(Some(length), target).with_style(style).with_message(unit.to_owned())
+    ProgressBar::with_draw_target(Some(length), target)
+        .with_style(style)
+        .with_message(unit.to_owned())
 }

@@ -8,9 +8,10 @@
 //! top-left pixel. Truth holds every outline that is round to 5 % (axis ratio), at least 60 % visible and at least 5 px in radius:
 //! the ball (`Target`) and whatever else is round, since a detector that finds the rim of a disc seen from above is right.
 
+#![allow(clippy::print_stdout)] // What it measured is what it prints.
+
 use std::error::Error;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
@@ -96,9 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         milliseconds.sort_by(f64::total_cmp);
         if let (Some(least), Some(median)) = (milliseconds.first(), milliseconds.get(milliseconds.len() / 2))
         {
-            bar.println(format!(
-                "{kind:12} CPU {least:.1} ms a frame at best, {median:.1} ms median"
-            ));
+            bar.suspend(|| println!("{kind:12} CPU {least:.1} ms a frame at best, {median:.1} ms median"));
         }
     }
     save(&options.out.join("truth.csv"), truth.as_bytes())?;
@@ -115,12 +114,10 @@ fn counts(sighting: &Sighting, visible: f64) -> bool {
 }
 
 /// Writes a file as a whole or not at all.
-fn save(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
+fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let unfinished = path.with_extension("part");
+    std::fs::write(&unfinished, bytes)?;
+    std::fs::rename(unfinished, path)
 }
 
 /// CPU time of this process.

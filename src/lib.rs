@@ -11,8 +11,8 @@
 //! | [`grasp_agent`] | circles into joint moves: learned behaviours, search, recovery, grip |
 //!
 //! They are re-exported here under their own names. What this package adds is the wiring between the two that do not know each other,
-//! the simulated cell and the controller: a [`Simulator`] is fitted to samples of the cell, and [`learn`] teaches a behaviour in
-//! it.
+//! the simulated cell and the controller: a [`Simulator`] is fitted to samples of the cell, [`learn`] teaches a behaviour in it,
+//! and a [`Rig`] is an arm behind a VAL II controller with the cell around it, in which an agent goes for a ball.
 //!
 //! ```
 //! use puma_grasp::grasp_agent::BehaviourSpec;
@@ -33,7 +33,10 @@
 //! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example `grasp`:
 //! `cargo run --release --example grasp`.
 
+mod plane;
+mod rig;
 mod training;
+mod trial;
 
 pub use grasp_agent;
 pub use hough_heuristic;
@@ -41,7 +44,10 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
-pub use training::{LearnError, Lesson, Simulator, learn};
+pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_starts};
+pub use rig::{Rig, RigError};
+pub use training::{LearnError, Lesson, Simulator, learn, schedule};
+pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

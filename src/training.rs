@@ -3,7 +3,7 @@
 use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Percept};
 use pipeline_sim::{CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample};
 use puma_val2::{Joint, JointDelta};
-use qtable::{Progress, QTable, TrainConfig, TrainReport, train};
+use qtable::{Progress, QTable, Schedule, TrainConfig, TrainReport, train};
 use rand::{Rng, RngExt};
 
 /// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted to samples.
@@ -100,7 +100,7 @@ pub fn learn(
     rng: &mut dyn Rng,
     on_progress: &mut dyn FnMut(&Progress),
 ) -> Result<Lesson, LearnError> {
-    let config = TrainConfig::paper(actions);
+    let config = schedule(actions)?;
     let mut table = QTable::new(spec.states(), spec.actions())?;
     let simulate = |percept: &Percept, delta: &JointDelta| simulator.predict(percept, delta);
     let mut task = BehaviourTask::new(&spec, config.gamma, simulate, |rng: &mut dyn Rng| {
@@ -110,6 +110,20 @@ pub fn learn(
     Ok(Lesson {
         behaviour: Behaviour::new(spec, table)?,
         report,
+    })
+}
+
+/// The paper's settings (section 4) for a number of actions, with the ends of the two courses, which it does not give, at 0.005 for alpha
+/// and 0.05 for the temperature: ends a quarter and a half of [`TrainConfig::paper`]'s, which leave less noise in the table.
+///
+/// # Errors
+/// No actions to learn by.
+pub fn schedule(actions: u64) -> Result<TrainConfig, LearnError> {
+    let exponential = |start, end| Schedule::exponential(start, end, actions).map_err(qtable::Error::from);
+    Ok(TrainConfig {
+        alpha: exponential(0.6, 0.005)?,
+        temperature: exponential(1000.0, 0.05)?,
+        ..TrainConfig::paper(actions)
     })
 }
 

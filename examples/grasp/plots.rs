@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use hough_heuristic::Features;
 use plotters::prelude::*;
-use qtable::TrainReport;
+use qtable::{Record, TrainReport};
 
 use crate::record::RunRecord;
 
@@ -23,7 +23,7 @@ pub(crate) fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
         for (area, (name, report)) in root.split_evenly((curves.len(), 1)).iter().zip(curves) {
             let columns = area.split_evenly((1, 2));
             let end = report.curve.last().map_or(1.0, |record| record.actions as f64);
-            let success = report.curve.iter().map(|record| (record.actions as f64, 100.0 * record.success));
+            let success = curve(report, |record| Some(100.0 * record.success_share?));
             panel(
                 &columns[0],
                 &format!("{name}: goal reached, % of episodes"),
@@ -31,10 +31,9 @@ pub(crate) fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
                 0.0..end,
                 0.0..100.0,
                 None,
-                &[(success.collect(), RGBColor(30, 90, 180))],
+                &[(success, RGBColor(30, 90, 180))],
             )?;
-            let errors: Vec<(f64, f64)> =
-                report.curve.iter().map(|record| (record.actions as f64, record.mean_td_error)).collect();
+            let errors = curve(report, |record| record.mean_td_error);
             let top = errors.iter().map(|(_, error)| *error).fold(1.0, f64::max);
             panel(
                 &columns[1],
@@ -51,18 +50,40 @@ pub(crate) fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
     Ok(svg)
 }
 
+/// One quantity of a learning curve over the actions made, where it is known.
+fn curve(report: &TrainReport, pick: impl Fn(&Record) -> Option<f64>) -> Vec<(f64, f64)> {
+    report
+        .curve
+        .iter()
+        .filter_map(|record| Some((record.actions as f64, pick(record)?)))
+        .collect()
+}
+
 /// x, y and r at every step of every run, with the goal interval shaded; three runs from far, middle and near stand out.
 pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
-    let mut tracks: Vec<Vec<(usize, Features)>> = runs.iter().map(RunRecord::track).filter(|t| !t.is_empty()).collect();
+    let mut tracks: Vec<Vec<(usize, Features)>> = runs
+        .iter()
+        .map(RunRecord::track)
+        .filter(|t| !t.is_empty())
+        .collect();
     tracks.sort_by(|a, b| a[0].1.r.total_cmp(&b[0].1.r));
-    let steps = tracks.iter().flat_map(|t| t.last()).map(|(step, _)| *step).max().unwrap_or(1).max(1) as f64;
+    let steps = tracks
+        .iter()
+        .flat_map(|t| t.last())
+        .map(|(step, _)| *step)
+        .max()
+        .unwrap_or(1)
+        .max(1) as f64;
     let distinct = [
         (0, RGBColor(30, 90, 180)),
         (tracks.len() / 2, RGBColor(180, 60, 40)),
         (tracks.len().saturating_sub(1), RGBColor(200, 140, 0)),
     ];
     let colour = |index: usize| {
-        distinct.iter().find(|(i, _)| *i == index).map_or(RGBColor(200, 200, 205), |(_, colour)| *colour)
+        distinct
+            .iter()
+            .find(|(i, _)| *i == index)
+            .map_or(RGBColor(200, 200, 205), |(_, colour)| *colour)
     };
     // Gray lines first, so that the coloured ones lie on top.
     let mut order: Vec<usize> = (0..tracks.len()).collect();
@@ -81,9 +102,25 @@ pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
         for (area, (name, range, goal, pick)) in root.split_evenly((3, 1)).iter().zip(panels) {
             let lines: Vec<Line> = order
                 .iter()
-                .map(|&i| (tracks[i].iter().map(|(step, f)| (*step as f64, pick(f))).collect(), colour(i)))
+                .map(|&i| {
+                    (
+                        tracks[i]
+                            .iter()
+                            .map(|(step, f)| (*step as f64, pick(f)))
+                            .collect(),
+                        colour(i),
+                    )
+                })
                 .collect();
-            panel(area, &format!("{name} (feature units)"), "step", 0.0..steps, range, Some(goal), &lines)?;
+            panel(
+                area,
+                &format!("{name} (feature units)"),
+                "step",
+                0.0..steps,
+                range,
+                Some(goal),
+                &lines,
+            )?;
         }
         root.present()?;
     }
@@ -104,10 +141,25 @@ fn panel(
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 17).into_font().color(&INK))
         .margin(12)
+        .margin_right(28)
         .x_label_area_size(38)
         .y_label_area_size(52)
         .build_cartesian_2d(x.clone(), y)?;
-    chart.configure_mesh().x_desc(x_label).light_line_style(WHITE).bold_line_style(RGBColor(230, 230, 235)).draw()?;
+    chart
+        .configure_mesh()
+        .x_desc(x_label)
+        .x_labels(7)
+        .x_label_formatter(&|value| {
+            if *value >= 1000.0 {
+                format!("{:.0}k", value / 1000.0)
+            } else {
+                format!("{value:.0}")
+            }
+        })
+        .y_label_formatter(&|value| format!("{value:.0}"))
+        .light_line_style(WHITE)
+        .bold_line_style(RGBColor(230, 230, 235))
+        .draw()?;
     if let Some(goal) = goal {
         let band = Rectangle::new([(x.start, goal.start), (x.end, goal.end)], GOAL.mix(0.5).filled());
         chart.draw_series([band])?;

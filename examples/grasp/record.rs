@@ -32,12 +32,21 @@ pub(crate) struct Row {
 pub(crate) struct Picture {
     pub(crate) run: usize,
     pub(crate) number: usize,
+    pub(crate) step: usize,
+    /// Whether the ball was found.
+    pub(crate) seen: bool,
     pub(crate) image: RgbImage,
 }
 
 impl RunRecord {
     pub(crate) fn new(ball_mm: [f64; 3]) -> Self {
-        Self { ball_mm, rows: Vec::new(), outcome: None, grasped: false, miss_mm: None }
+        Self {
+            ball_mm,
+            rows: Vec::new(),
+            outcome: None,
+            grasped: false,
+            miss_mm: None,
+        }
     }
 
     /// Takes down an event; returns the picture of its frame, if it has one.
@@ -48,19 +57,34 @@ impl RunRecord {
             _ => (None, None),
         };
         let number = self.rows.len();
-        self.rows.push(Row { step: event.cycle, event: event.kind.word(), features, joints: event.joints, action });
+        self.rows.push(Row {
+            step: event.cycle,
+            event: event.kind.word(),
+            features,
+            joints: event.joints,
+            action,
+        });
 
         let mut overlay = Overlay::new(event.frame?);
         if let EventKind::Seen(sighting) = event.kind {
             overlay.circle(&sighting.detection.circle);
-            let f = sighting.features;
-            overlay.caption(&format!("run {run} step {}   x {:.1} y {:.1} r {:.1}", event.cycle, f.x, f.y, f.r));
-        } else {
-            overlay.caption(&format!("run {run} step {}   no ball", event.cycle));
         }
         let full = overlay.into_image();
-        let image = resize(&full, full.width() / 2, full.height() / 2, FilterType::Triangle);
-        Some(Picture { run, number, image })
+        let half = resize(&full, full.width() / 2, full.height() / 2, FilterType::Triangle);
+        // The words go on after the frame has shrunk, so that they can be read.
+        let mut overlay = Overlay::from(half);
+        let found = features.map_or("no ball".into(), |f| {
+            format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r)
+        });
+        overlay.caption(&format!("run {run} step {}  {found}", event.cycle));
+        let (step, seen) = (event.cycle, features.is_some());
+        Some(Picture {
+            run,
+            number,
+            step,
+            seen,
+            image: overlay.into_image(),
+        })
     }
 
     /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.

@@ -6,6 +6,7 @@ use image::imageops::{FilterType, replace, resize};
 use image::{Rgb, RgbImage};
 use serde::Serialize;
 
+use crate::overlay::Overlay;
 use crate::record::{Picture, RunRecord};
 
 /// What `summary.json` holds.
@@ -51,7 +52,13 @@ impl Summary {
     pub(crate) fn new(seed: u64, training: TrainingSummary, records: &[RunRecord]) -> Self {
         let runs: Vec<RunSummary> = records.iter().map(RunSummary::new).collect();
         let grasped: Vec<&RunSummary> = runs.iter().filter(|run| run.grasped).collect();
-        let share = |part: usize, whole: usize| if whole == 0 { 0.0 } else { part as f64 / whole as f64 };
+        let share = |part: usize, whole: usize| {
+            if whole == 0 {
+                0.0
+            } else {
+                part as f64 / whole as f64
+            }
+        };
         let cycles: usize = grasped.iter().map(|run| run.cycles).sum();
         Self {
             seed,
@@ -70,7 +77,10 @@ impl Summary {
         for (index, run) in self.runs.iter().enumerate() {
             let [x, y, z] = run.ball_mm;
             let ball = format!("{x:6.0} {y:6.0} {z:6.0}");
-            let last = run.last_seen.as_ref().map_or("-".into(), |f| format!("{:6.1} {:6.1} {:6.1}", f.x, f.y, f.r));
+            let last = run
+                .last_seen
+                .as_ref()
+                .map_or("-".into(), |f| format!("{:6.1} {:6.1} {:6.1}", f.x, f.y, f.r));
             let miss = run.miss_mm.map_or("-".into(), |miss| format!("{miss:.1}"));
             let result = match (&run.reason, run.grasped) {
                 (_, true) => "grasped".into(),
@@ -93,7 +103,10 @@ impl Summary {
             100.0 * self.success_rate
         );
         if let Some(mean) = self.mean_cycles {
-            let _ = write!(table, ", {mean:.1} moves on average from the first sighting to the grip");
+            let _ = write!(
+                table,
+                ", {mean:.1} moves on average from the first sighting to the grip"
+            );
         }
         table
     }
@@ -110,7 +123,11 @@ impl RunSummary {
             losses: outcome.map_or(0, |o| o.losses),
             last_seen: outcome.and_then(|o| o.last_seen).map(|sighting| {
                 let f = sighting.features;
-                FinalFeatures { x: rounded(f.x), y: rounded(f.y), r: rounded(f.r) }
+                FinalFeatures {
+                    x: rounded(f.x),
+                    y: rounded(f.y),
+                    r: rounded(f.r),
+                }
             }),
             miss_mm: record.miss_mm.map(rounded),
             reason: outcome.and_then(|o| o.gave_up).map(|reason| reason.to_string()),
@@ -123,36 +140,56 @@ pub(crate) fn features_csv(records: &[RunRecord]) -> String {
     let mut csv = String::from("run,step,x,y,r,jt1,jt2,jt3,jt4,jt5,jt6,d1,d2,d3,event\n");
     for (run, record) in records.iter().enumerate() {
         for row in &record.rows {
-            let xyr = row.features.map_or(",,".into(), |f| format!("{:.3},{:.3},{:.3}", f.x, f.y, f.r));
-            let joints = row.joints.degrees().map(|degrees| format!("{degrees:.3}")).join(",");
+            let xyr = row
+                .features
+                .map_or(",,".into(), |f| format!("{:.3},{:.3},{:.3}", f.x, f.y, f.r));
+            let joints = row
+                .joints
+                .degrees()
+                .map(|degrees| format!("{degrees:.3}"))
+                .join(",");
             let action = row.action.map_or(",,".into(), |delta| {
                 let [d1, d2, d3, ..] = delta.degrees();
                 format!("{d1:.3},{d2:.3},{d3:.3}")
             });
-            let _ = writeln!(csv, "{},{},{xyr},{joints},{action},{}", run + 1, row.step, row.event);
+            let _ = writeln!(
+                csv,
+                "{},{},{xyr},{joints},{action},{}",
+                run + 1,
+                row.step,
+                row.event
+            );
         }
     }
     csv
 }
 
-/// Every picture of every run on one sheet, in rows of `columns`; a run begins a new row.
+/// The frames in which the ball was seen, run after run, in rows of `columns`; a run begins a new row.
 pub(crate) fn contact_sheet(pictures: &[Picture], columns: u32) -> RgbImage {
-    const TILE: (u32, u32) = (192, 144);
-    let mut places = Vec::new();
-    let (mut row, mut column) = (0, 0);
-    for (index, picture) in pictures.iter().enumerate() {
-        let new_run = index > 0 && pictures[index - 1].run != picture.run;
-        if column == columns || new_run {
-            (row, column) = (row + 1, 0);
-        }
-        places.push((row, column));
-        column += 1;
+    const TILE: (u32, u32) = (160, 120);
+    let mut places: Vec<(&Picture, u32, u32)> = Vec::new();
+    for picture in pictures.iter().filter(|picture| picture.seen) {
+        let (row, column) = match places.last() {
+            None => (0, 0),
+            Some((before, row, column)) if before.run == picture.run && column + 1 < columns => {
+                (*row, column + 1)
+            }
+            Some((_, row, _)) => (row + 1, 0),
+        };
+        places.push((picture, row, column));
     }
-    let rows = places.last().map_or(1, |(row, _)| row + 1);
+    let rows = places.last().map_or(1, |(_, row, _)| row + 1);
     let mut sheet = RgbImage::from_pixel(columns * TILE.0, rows * TILE.1, Rgb([245, 245, 248]));
-    for (picture, (row, column)) in pictures.iter().zip(places) {
-        let tile = resize(&picture.image, TILE.0 - 4, TILE.1 - 4, FilterType::Triangle);
-        replace(&mut sheet, &tile, i64::from(column * TILE.0 + 2), i64::from(row * TILE.1 + 2));
+    for (picture, row, column) in places {
+        let small = resize(&picture.image, TILE.0 - 4, TILE.1 - 4, FilterType::Triangle);
+        let mut tile = Overlay::from(small);
+        tile.caption(&format!("run {} step {}", picture.run, picture.step));
+        replace(
+            &mut sheet,
+            &tile.into_image(),
+            i64::from(column * TILE.0 + 2),
+            i64::from(row * TILE.1 + 2),
+        );
     }
     sheet
 }

@@ -12,6 +12,12 @@ use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 /// A frame to draw on.
 pub(crate) struct Overlay(RgbImage);
 
+impl From<RgbImage> for Overlay {
+    fn from(picture: RgbImage) -> Self {
+        Self(picture)
+    }
+}
+
 impl Overlay {
     pub(crate) fn new(frame: &GrayImage) -> Self {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
@@ -38,7 +44,7 @@ impl Overlay {
         }
     }
 
-    /// Words on a dark bar at the top of the frame.
+    /// Words on a dark bar at the top.
     pub(crate) fn caption(&mut self, words: &str) {
         let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), 24));
         let Ok(()) = bar

@@ -72,6 +72,47 @@ impl Behaviour {
         }
         best.map(|(action, _)| action)
     }
+
+    /// An action drawn from the Boltzmann distribution (the paper's Eq. 4) at `temperature`, over the Q after the loop breaker (see
+    /// [`Behaviour::choose`]) of the actions that `allowed` admits. `chance`, in 0..1, decides the draw. `None` when nothing is
+    /// allowed.
+    pub fn explore(
+        &self,
+        state: State,
+        episode: &Episode,
+        kappa: f64,
+        temperature: f64,
+        chance: f64,
+        mut allowed: impl FnMut(Action) -> bool,
+    ) -> Option<Action> {
+        let best = self.choose(state, episode, kappa, &mut allowed)?;
+        let row = self.table.row(state);
+        let worth = |action: Action| row[action.0] - kappa * f64::from(episode.weight(state, action));
+        let weights: Vec<f64> = (0..row.len())
+            .map(Action)
+            .map(|action| {
+                if allowed(action) {
+                    ((worth(action) - worth(best)) / temperature).exp()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let mut rest = chance * weights.iter().sum::<f64>();
+        let drawn = weights.iter().position(|weight| {
+            rest -= weight;
+            rest < 0.0
+        });
+        Some(drawn.map_or(best, Action))
+    }
+
+    /// Sets a value learned at work and counts the visit; what is not finite, or not in the table, changes nothing.
+    pub(crate) fn teach(&mut self, state: State, action: Action, value: f64) {
+        if self.table.set(state, action, value).is_ok() {
+            // The pair is in the table, or `set` would have refused it.
+            let _ = self.table.visit(state, action);
+        }
+    }
 }
 
 #[cfg(feature = "serde")]

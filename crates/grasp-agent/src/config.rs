@@ -2,7 +2,7 @@
 
 use puma_val2::{Joint, JointDelta, Joints};
 
-use crate::{AgentError, GoalInterval, Input};
+use crate::{AgentError, GoalInterval, Input, JointLimits};
 
 /// Settings of an [`Agent`](crate::Agent).
 #[derive(Clone, Debug, PartialEq)]
@@ -15,20 +15,45 @@ pub struct AgentConfig {
     /// From the goal pose to the grip [`J5` by -18.01 degrees]: the paper's "the fifth joint is activated".
     pub grip: JointDelta,
     /// Where the ball is looked for when it is lost, relative to the pose of the last sighting
-    /// [four moves: `J1` +10, -10, `J2` +8, -8 degrees]; tried in order, after that pose itself.
+    /// [four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
+    /// +12]; tried in order, after that pose itself.
     pub recovery: Vec<JointDelta>,
-    /// The range that the controller keeps each joint in, radians (low, high), `JT1` first
-    /// [-160..160, -150..-20, 120..215, -110..170, -100..100, -266..266 degrees].
-    pub limits: [(f64, f64); 6],
-    /// What choosing a centering action again in the same state costs, in units of Q [50]; see
-    /// [`Behaviour::choose`](crate::Behaviour::choose). 0 is the plain greedy policy.
-    pub centering_kappa: f64,
-    /// The same for approaching [20].
-    pub approaching_kappa: f64,
+    /// The range that each joint is kept in [[`JointLimits::paper`]].
+    pub limits: JointLimits,
     /// Moves after the first sighting before the run is given up [60].
     pub max_cycles: usize,
     /// Frames to look at from one pose before the ball counts as not in view [2]. Sampling can miss a circle once.
     pub looks: usize,
+    /// How fast the hand may come nearer to the ball.
+    pub approach: ApproachLimit,
+    /// After the jaws have closed: the move with which the arm lifts the ball, to look whether it is still where it was [none]. A ball
+    /// that is seen then is not in the jaws, and is reached for again.
+    pub lift: Option<JointDelta>,
+    /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck [1 degree].
+    pub reach_tolerance: f64,
+    /// Frames in a row, each from another pose, that may show the ball at exactly the same place before the camera counts as
+    /// frozen [2].
+    pub same_frames: usize,
+}
+
+/// What is too rapid an approach (section 2.2 of the paper: one "that could damage the camera").
+///
+/// Of a ball of known size the radius is a measure of the distance: the product of both is constant. A move that ends with the ball
+/// at a radius beyond `radius`, more than `growth` times what it was, is taken back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ApproachLimit {
+    /// Radius up to which any approach is slow enough, feature units [62].
+    pub radius: f64,
+    /// Greatest growth of the radius in one move beyond that [1.5].
+    pub growth: f64,
+}
+
+impl ApproachLimit {
+    /// Whether a move that took the radius from `before` to `after` units was too rapid.
+    pub fn exceeded(&self, before: f64, after: f64) -> bool {
+        after > self.radius && after > self.growth * before
+    }
 }
 
 impl AgentConfig {
@@ -45,34 +70,20 @@ impl AgentConfig {
                 interval(Input::R, 32.0, 34.0),
             ],
             grip: turn(Joint::J5, -18.01),
-            recovery: vec![
-                turn(Joint::J1, 10.0),
-                turn(Joint::J1, -10.0),
-                turn(Joint::J2, 8.0),
-                turn(Joint::J2, -8.0),
-            ],
-            limits: [
-                (-160.0_f64, 160.0_f64),
-                (-150.0, -20.0),
-                (120.0, 215.0),
-                (-110.0, 170.0),
-                (-100.0, 100.0),
-                (-266.0, 266.0),
-            ]
-            .map(|(low, high)| (low.to_radians(), high.to_radians())),
-            centering_kappa: 50.0,
-            approaching_kappa: 20.0,
+            recovery: [(0.0, -20.0), (15.0, -20.0), (-15.0, -20.0), (0.0, 12.0)]
+                .map(|(j1, j2)| JointDelta::from_degrees([j1, j2, 0.0, 0.0, 0.0, 0.0]))
+                .into(),
+            limits: JointLimits::paper(),
             max_cycles: 60,
             looks: 2,
+            approach: ApproachLimit {
+                radius: 62.0,
+                growth: 1.5,
+            },
+            lift: None,
+            reach_tolerance: 1_f64.to_radians(),
+            same_frames: 2,
         }
-    }
-
-    /// Whether every joint of `joints` is within the working limits.
-    pub fn admits(&self, joints: &Joints) -> bool {
-        self.limits
-            .iter()
-            .zip(joints.0)
-            .all(|(&(low, high), angle)| (low..=high).contains(&angle))
     }
 
     /// Checks what can be known before anything moves.
@@ -82,7 +93,7 @@ impl AgentConfig {
                 "there is no search pose; give at least one".into(),
             ));
         }
-        if let Some(pose) = self.search_poses.iter().find(|pose| !self.admits(pose)) {
+        if let Some(pose) = self.search_poses.iter().find(|pose| !self.limits.admit(pose)) {
             return Err(AgentError::Config(format!(
                 "the search pose {pose} lies outside the working limits"
             )));
@@ -92,15 +103,11 @@ impl AgentConfig {
                 "there is no goal; give at least one interval".into(),
             ));
         }
-        for (name, kappa) in [
-            ("centering_kappa", self.centering_kappa),
-            ("approaching_kappa", self.approaching_kappa),
-        ] {
-            if !kappa.is_finite() || kappa < 0.0 {
-                return Err(AgentError::Config(format!(
-                    "{name} is {kappa}; it must be finite and at least 0"
-                )));
-            }
+        if self.reach_tolerance.is_nan() || self.reach_tolerance <= 0.0 {
+            return Err(AgentError::Config(format!(
+                "reach_tolerance is {}; it must be above 0",
+                self.reach_tolerance
+            )));
         }
         if self.looks == 0 {
             return Err(AgentError::Config(

@@ -30,6 +30,12 @@ pub enum BehaviourError {
         /// The behaviour that was asked for.
         name: String,
     },
+    /// Text that is no behaviour, or none of the one asked for.
+    #[error("this text is no behaviour that can be used here: {what}")]
+    Text {
+        /// What is wrong, and where.
+        what: String,
+    },
     /// A file that cannot be written or read, or is damaged.
     #[cfg(feature = "serde")]
     #[error(transparent)]
@@ -46,6 +52,20 @@ pub enum AgentError {
     /// The arm, or the line to it, failed.
     #[error("the arm failed: {0}")]
     Arm(#[from] ArmError),
+    /// The camera delivers the same frame again and again while it is moved.
+    #[error(
+        "the camera seems to be frozen: {looks} frames in a row, each from another pose, show the ball at exactly the same place"
+    )]
+    FrozenCamera {
+        /// How many frames.
+        looks: usize,
+    },
+    /// A replayed run took another course than the logged one: another controller, another configuration, or other knowledge.
+    #[error("the replayed run differs from the log at event {event} (counted from 0)")]
+    Replay {
+        /// The first event that differs.
+        event: usize,
+    },
     /// A configuration that cannot work.
     #[error("agent configuration: {0}")]
     Config(String),

@@ -1,4 +1,4 @@
-//! The event log: everything that happens in a run, in order.
+//! The events of a run, as they happen.
 
 use hough_heuristic::image::GrayImage;
 use puma_val2::{JointDelta, Joints};
@@ -6,7 +6,7 @@ use puma_val2::{JointDelta, Joints};
 use crate::Sighting;
 
 /// One thing that happened.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Event<'a> {
     /// How many moves have been made since the ball was first seen.
     pub cycle: usize,
@@ -19,35 +19,54 @@ pub struct Event<'a> {
 }
 
 /// What can happen in a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// Every answer of arm, sensor and camera makes exactly one event, in the order of the answers, so that the events determine the
+/// run: see [`Replay`](crate::Replay).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum EventKind {
+    /// The run begins with the arm here and the gripper open.
+    Started,
     /// The arm stands at the search pose with this index, and is about to look.
     AtSearchPose(usize),
     /// The ball is in the frame.
     Seen(Sighting),
     /// No ball is in the frame.
     NotSeen,
-    /// The behaviours chose this move and the arm has made it.
+    /// The controller chose this move and the arm has made it.
     Moved(JointDelta),
     /// The ball has left the frame during the last move.
     Lost,
     /// The arm has gone back to the pose from which the ball was last seen (0), or made the recovery move with this number.
     Recovering(usize),
-    /// Something came too near to the hand; the arm has gone back by one move.
+    /// Something is too near to the hand; the arm has been stopped.
     TooNear,
+    /// The ball came nearer too fast.
+    TooFast,
+    /// The arm has gone back by one move.
+    TakenBack,
     /// Centre and radius are at the goal.
     AtGoal,
-    /// The gripper has been brought to the ball and closed.
+    /// The gripper has been brought to the ball by this move.
+    Gripping(JointDelta),
+    /// The gripper has closed.
     Gripped,
+    /// The arm has lifted what it gripped.
+    Lifted,
+    /// The ball was not in the jaws, which have opened again.
+    Missed,
     /// The run is over without a grip.
     GaveUp(GaveUp),
+    /// Arm or camera failed, for this reason; the arm has been told to stop.
+    Failed(String),
 }
 
 impl EventKind {
     /// One word for tables and logs.
     pub fn word(&self) -> &'static str {
         match self {
+            Self::Started => "started",
             Self::AtSearchPose(_) => "search",
             Self::Seen(_) => "seen",
             Self::NotSeen => "not-seen",
@@ -55,21 +74,28 @@ impl EventKind {
             Self::Lost => "lost",
             Self::Recovering(_) => "recover",
             Self::TooNear => "too-near",
+            Self::TooFast => "too-fast",
+            Self::TakenBack => "taken-back",
             Self::AtGoal => "at-goal",
+            Self::Gripping(_) => "gripping",
             Self::Gripped => "gripped",
+            Self::Lifted => "lifted",
+            Self::Missed => "missed",
             Self::GaveUp(_) => "gave-up",
+            Self::Failed(_) => "failed",
         }
     }
 }
 
 /// Why a run ended without a grip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GaveUp {
     /// The ball is in view from none of the search poses.
     NotFound,
     /// The goal was not reached within the allowed number of moves.
     OutOfCycles,
-    /// Every move that a behaviour could make leads out of the working limits.
+    /// Every move that the controller could make leads out of the working limits.
     NoMoveLeft,
     /// Something was too near to the hand on the way to the ball.
     Obstructed,

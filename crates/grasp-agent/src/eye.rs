@@ -23,6 +23,7 @@ pub struct Look {
 
 /// A ball in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sighting {
     /// The circle in pixels of the frame, with its score.
     pub detection: Detection,

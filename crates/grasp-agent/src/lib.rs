@@ -58,23 +58,43 @@
 
 mod agent;
 mod behaviour;
+mod camera_model;
 mod config;
+mod controller;
 mod error;
 mod event;
+#[cfg(feature = "serde")]
+mod export;
 mod eye;
+mod hybrid;
+mod learned;
+mod log;
 mod percept;
 mod reward;
+mod run;
+mod servo;
 mod spec;
 mod task;
 
+pub use hough_heuristic;
+pub use nalgebra;
+pub use puma_val2;
+pub use qtable;
+
 pub use agent::{Agent, Outcome};
 pub use behaviour::{Behaviour, Episode};
-pub use config::AgentConfig;
+pub use camera_model::CameraModel;
+pub use config::{AgentConfig, ApproachLimit};
+pub use controller::{Consequence, Controller, JointLimits, Situation, StepLimits};
 pub use error::{AgentError, BehaviourError};
 pub use event::{Event, EventKind, GaveUp};
 pub use eye::{CameraEye, Eye, Look, Sighting};
+pub use hybrid::{Belief, Hybrid, HybridSettings, Prior};
+pub use learned::{Learned, OnlineLearning};
+pub use log::{EventLog, LoggedEvent};
 pub use percept::{Input, Percept, theta3};
 pub use reward::{Reward, RewardTerm};
+pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSettings};
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
 pub use task::BehaviourTask;
 

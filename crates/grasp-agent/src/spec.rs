@@ -90,9 +90,9 @@ impl BehaviourSpec {
             name: "approaching".into(),
             inputs: vec![Input::Y, Input::R, Input::Theta3],
             space: product([
-                (&[50.0, 74.0, 82.0, 108.0], 2),
-                (&R_EDGES, 3),
-                (&[5.0, 20.0], NO_GOAL),
+                (&[43.0, 74.0, 82.0, 98.0], 2),
+                (&[15.0, 27.0, 32.0, 34.0, 50.0], 3),
+                (&[6.0, 27.0], NO_GOAL),
             ]),
             moves: vec![
                 JointSteps {
@@ -117,6 +117,19 @@ impl BehaviourSpec {
                 },
             ],
             reward: Reward::approaching_literal().mended(),
+        }
+    }
+
+    /// Approaching on 540 states: 9 intervals of y by 10 of r by 6 of theta 3, otherwise as [`BehaviourSpec::approaching`].
+    pub fn approaching_fine() -> Self {
+        Self {
+            name: "approaching_fine".into(),
+            space: product([
+                (&[20.0, 40.0, 60.0, 74.0, 82.0, 96.0, 114.0, 130.0], 4),
+                (&[9.5, 12.0, 16.0, 21.0, 27.0, 32.0, 34.0, 40.0, 50.0], 6),
+                (&[-3.0, 5.0, 15.0, 25.0, 33.0], NO_GOAL),
+            ]),
+            ..Self::approaching()
         }
     }
 

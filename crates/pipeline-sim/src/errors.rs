@@ -150,7 +150,7 @@ impl ErrorLevel {
 
 impl fmt::Display for ErrorLevel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+        f.pad(match self {
             Self::None => "none",
             Self::Moderate => "moderate",
             Self::Heavy => "heavy",

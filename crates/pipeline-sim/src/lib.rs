@@ -29,6 +29,7 @@ mod motion;
 mod mount;
 mod open_loop;
 mod optimum;
+mod overview;
 mod reach_model;
 mod render;
 mod samples;

@@ -183,7 +183,8 @@ pub struct Scene {
     pub table: Look,
     /// The ball's surface.
     pub ball: Look,
-    /// What else is on the table. No two things may overlap; one that stands where the holder stands is left out.
+    /// What else is on the table. No two standing things may overlap; one that stands where the
+    /// holder or a low ball is, is left out.
     pub things: Vec<Thing>,
     /// What hangs before the lens.
     pub occluders: Vec<Occluder>,

@@ -30,7 +30,12 @@ fn assert_at(client: &Val2Client<MemoryLine>, degrees: [f64; 6]) {
 
 #[test]
 fn every_profile_and_every_way_moves_the_arm_where_it_was_sent() {
-    for profile in Profile::all() {
+    let unblocked = Profile {
+        name: "does not block",
+        do_blocks: false,
+        ..Profile::val2()
+    };
+    for profile in Profile::all().into_iter().chain([unblocked]) {
         for way in [MoveWay::Automatic, MoveWay::Drive, MoveWay::Point] {
             let config = ClientConfig {
                 way,
@@ -172,4 +177,118 @@ fn silence_and_garbage_are_told_apart_in_time() {
             "{noise:?}: {garbled:?}"
         );
     }
+}
+
+#[test]
+fn the_hand_is_moved_by_its_pose_joints_interpolated_or_straight() {
+    let mut client = client(Profile::val2());
+    client
+        .move_to(Joints::from_degrees([0.0, -45.0, 180.0, 0.0, 45.0, 0.0]))
+        .unwrap();
+    let start = client.where_().unwrap();
+    for straight in [false, true] {
+        let mut there = start.hand;
+        there.x -= 0.05;
+        there.z += 0.08;
+        let reached = client.move_hand(&there, straight).unwrap();
+        assert!((reached.hand.z - there.z).abs() < 2e-5);
+        client.move_hand(&start.hand, straight).unwrap();
+    }
+    let mut far = start.hand;
+    far.x = 3.0;
+    assert!(
+        matches!(client.move_hand(&far, false), Err(ArmError::Refused { message, .. }) if message == "Location out of range")
+    );
+    far.x = f64::NAN;
+    assert!(matches!(
+        client.move_hand(&far, false),
+        Err(ArmError::Setting { .. })
+    ));
+}
+
+#[test]
+fn with_a_tool_the_position_is_read_twice_and_moves_are_made_as_ever() {
+    let mut client = client(Profile::val2());
+    client
+        .line_mut()
+        .emulator_mut()
+        .load_text(".PROGRAM T\n TOOL TRANS(0,0,120,90,-90,0)\n.END")
+        .unwrap();
+    client.execute("T").unwrap();
+    let location = client.where_().unwrap();
+    assert!((location.hand.z - 1.04112).abs() < 1e-5 && !location.agrees(&client.config().params));
+    client
+        .move_by(JointDelta::from_degrees([3.0, 4.0, -5.0, 0.0, 0.0, 0.0]))
+        .unwrap();
+    assert_at(&client, [3.0, -86.0, 85.0, 0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn programs_are_stored_run_and_aborted() {
+    let mut client = client(Profile::val2());
+    let steps = ["FOR I = 1 TO 2", "TYPE I", "END"].map(str::to_owned);
+    client.store_program("COUNT", &steps).unwrap();
+    let said = client.execute("COUNT").unwrap();
+    assert!(
+        said.contains(" 1") && said.contains(" 2") && said.contains("completed"),
+        "{said}"
+    );
+    assert!(matches!(client.execute("NOTHING"), Err(ArmError::Refused { .. })));
+    client
+        .store_program("COUNT", &["WAIT SIG(1001)".to_owned()])
+        .unwrap();
+    assert!(matches!(client.execute("COUNT"), Err(ArmError::Silence { .. })));
+    client.joints().unwrap();
+}
+
+#[test]
+fn a_running_program_is_aborted_at_connection_or_reported() {
+    let running = || {
+        let mut emulator = emulator(Profile::val2());
+        emulator
+            .load_text(".PROGRAM W\n 10 WAIT SIG(1001)\n GOTO 10\n.END")
+            .unwrap();
+        emulator.feed(b"N\rN\rEXECUTE W\r", Duration::ZERO);
+        MemoryLine::new(emulator)
+    };
+    let mut client = Val2Client::connect(running(), ClientConfig::default()).unwrap();
+    client.calibrate().unwrap();
+    let gentle = ClientConfig {
+        abort_running_program: false,
+        ..ClientConfig::default()
+    };
+    assert!(matches!(
+        Val2Client::connect(running(), gentle).map(drop),
+        Err(ArmError::Garbled { .. })
+    ));
+}
+
+#[test]
+fn any_dialogue_is_left_at_connection() {
+    for lines in [
+        "N\rN\rPOINT #A\r",
+        "N\rN\rEDIT P\rMOVE Q\r",
+        "N\rN\rZERO\r",
+        "N\r",
+        "",
+        "N\rN\rDO PROMPT A,B\r",
+    ] {
+        let mut emulator = emulator(Profile::val2());
+        emulator.feed(lines.as_bytes(), Duration::ZERO);
+        let mut client = Val2Client::connect(MemoryLine::new(emulator), ClientConfig::default())
+            .unwrap_or_else(|e| panic!("{lines:?}: {e}"));
+        client.joints().unwrap();
+    }
+}
+
+#[test]
+fn what_passes_is_written_down() {
+    let line = puma_val2::Recorded::new(MemoryLine::new(emulator(Profile::val2())), Vec::new());
+    let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
+    client.set_speed(30.0).unwrap();
+    let written = String::from_utf8(client.into_line().into_transcript()).unwrap();
+    assert!(
+        written.ends_with("< SPEED 30\n> SPEED 30\n< ^M\n> \n> ."),
+        "{written}"
+    );
 }

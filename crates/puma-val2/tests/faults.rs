@@ -390,6 +390,54 @@ fn noise_on_the_line() {
     );
 }
 
+#[test]
+fn damage_anywhere_in_a_move_of_the_resident_program() {
+    let mut tally = Tally::default();
+    for direction in [Way::ToController, Way::FromController] {
+        for damage in [
+            Damage::Lost,
+            Damage::Doubled,
+            Damage::Flipped(0),
+            Damage::Flipped(3),
+            Damage::Flipped(6),
+            Damage::Cut,
+        ] {
+            for at in 0.. {
+                let context = format!("resident {direction:?} {damage:?} at {at}");
+                let mut client = client(Profile::val2(), MoveWay::Automatic);
+                let start = truth(&client);
+                let mut resident = client.resident().unwrap();
+                resident.line_mut().struck = false;
+                resident.line_mut().strike(direction, at, damage);
+                let outcome = resident.move_by(STEP);
+                let struck = resident.line().struck;
+                resident.line_mut().heal();
+                drop(resident);
+                if !struck {
+                    outcome.unwrap();
+                    break;
+                }
+                tally.injected += 1;
+                if judge(&mut client, start, outcome, &context) {
+                    tally.recovered += 1;
+                } else {
+                    tally.reported += 1;
+                }
+                if client.joints().is_err() {
+                    client
+                        .reconnect()
+                        .unwrap_or_else(|e| panic!("{context}: does not come back: {e}"));
+                }
+                client
+                    .move_to(start)
+                    .unwrap_or_else(|e| panic!("{context}: does not go home: {e}"));
+            }
+        }
+    }
+    tally.show("resident program");
+    assert!(tally.injected > 300);
+}
+
 /// Runs a move during which something happens to the controller as soon as the arm has begun to move.
 fn disturbed(
     way: MoveWay,

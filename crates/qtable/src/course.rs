@@ -8,7 +8,7 @@ use crate::curve::{Record, Tally};
 use crate::error::check_setting;
 use crate::validated::validated;
 use crate::{
-    Action, ActionMask, Environment, Error, Experience, Learner, Policy, QTable, State, Status, Value,
+    Action, ActionMask, Environment, Error, Experience, Learner, Policy, QTable, State, Status, Step, Value,
 };
 
 /// Counters of a run, the episode that is going on, and what has not yet been recorded.
@@ -63,12 +63,10 @@ impl Course {
     ///
     /// After an error the episode is given up; the next action begins another.
     #[inline]
-    pub(crate) fn step<V: Value, E: Environment + ?Sized, L: Learner<V>, P: Policy<V>>(
+    pub(crate) fn step<E: Environment + ?Sized>(
         &mut self,
         environment: &mut E,
-        table: &mut QTable<V>,
-        learner: &mut L,
-        policy: &mut P,
+        actor: &mut impl Actor,
         rng: &mut dyn Rng,
     ) -> Result<Option<Record>, Error> {
         let Running {
@@ -79,7 +77,7 @@ impl Course {
         } = match self.running.take() {
             Some(running) => running,
             None => {
-                learner.begin_episode();
+                actor.begin_episode();
                 Running {
                     state: environment.reset(rng),
                     action: None,
@@ -88,28 +86,16 @@ impl Course {
                 }
             }
         };
-        table.check_state(state)?;
-        let action = action.unwrap_or_else(|| policy.choose(table, state, rng));
-        table.check(state, action)?;
+        let action = match action {
+            Some(action) => action,
+            None => actor.choose(state, rng)?,
+        };
         let mut step = environment.step(action, rng);
-        table.check_state(step.observation)?;
         let (steps, sum) = (steps + 1, sum + step.reward);
         if step.status == Status::Continuing && steps >= self.episode_limit {
             step.status = Status::Truncated;
         }
-        let next_action = (learner.on_policy() && step.status != Status::Terminated)
-            .then(|| policy.choose(table, step.observation, rng));
-        let td_error = learner.learn(
-            table,
-            &Experience {
-                state,
-                action,
-                step,
-                next_action,
-            },
-            policy,
-            rng,
-        )?;
+        let (td_error, next_action) = actor.learn(state, action, step, rng)?;
 
         self.actions += 1;
         self.tally.add_action(step.reward, td_error);
@@ -137,6 +123,69 @@ impl Course {
 }
 
 validated!(Course);
+
+/// Whoever acts and learns in a run.
+pub(crate) trait Actor {
+    fn begin_episode(&mut self) {}
+
+    /// An offered action for a state that may be out of range.
+    fn choose(&mut self, state: State, rng: &mut dyn Rng) -> Result<Action, Error>;
+
+    /// Learns from a step whose state and reward may be anything. Returns the error before the update, and the next
+    /// action if that was chosen already.
+    fn learn(
+        &mut self,
+        state: State,
+        action: Action,
+        step: Step,
+        rng: &mut dyn Rng,
+    ) -> Result<(f64, Option<Action>), Error>;
+}
+
+/// A policy that acts on a table, and a learner that improves it.
+pub(crate) struct Pair<'a, V: Value, L, P> {
+    pub(crate) table: &'a mut QTable<V>,
+    pub(crate) learner: &'a mut L,
+    pub(crate) policy: &'a mut P,
+}
+
+impl<V: Value, L: Learner<V>, P: Policy<V>> Actor for Pair<'_, V, L, P> {
+    fn begin_episode(&mut self) {
+        self.learner.begin_episode();
+    }
+
+    #[inline]
+    fn choose(&mut self, state: State, rng: &mut dyn Rng) -> Result<Action, Error> {
+        self.table.check_state(state)?;
+        let action = self.policy.choose(self.table, state, rng);
+        self.table.check(state, action).map(|()| action)
+    }
+
+    #[inline]
+    fn learn(
+        &mut self,
+        state: State,
+        action: Action,
+        step: Step,
+        rng: &mut dyn Rng,
+    ) -> Result<(f64, Option<Action>), Error> {
+        let goes_on = step.status != Status::Terminated;
+        let next_action = match self.learner.on_policy() && goes_on {
+            true => Some(self.choose(step.observation, rng)?),
+            false => None,
+        };
+        let experience = Experience {
+            state,
+            action,
+            step,
+            next_action,
+        };
+        Ok((
+            self.learner.learn(self.table, &experience, self.policy, rng)?,
+            next_action,
+        ))
+    }
+}
 
 /// Refuses a count of 0.
 pub(crate) fn check_count(name: &'static str, count: u64) -> Result<(), Error> {

@@ -11,46 +11,64 @@ const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
 /// `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the largest number infinite.
-#[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {
-    let clamped = x.clamp(-708.0, 709.0);
-    let shifted = clamped * LOG2_E + ROUND;
-    let exponent = shifted - ROUND;
-    let r = (clamped - exponent * LN_2_HIGH) - exponent * LN_2_LOW;
-    // Taylor series on |r| <= ln(2)/2; the first term left out is below 5e-18.
-    const C: [f64; 12] = [
-        1.0 / 6_227_020_800.0,
-        1.0 / 479_001_600.0,
-        1.0 / 39_916_800.0,
-        1.0 / 3_628_800.0,
-        1.0 / 362_880.0,
-        1.0 / 40_320.0,
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        0.5,
-    ];
-    let mut p = C[0];
-    for c in &C[1..] {
-        p = p * r + c;
+    match x {
+        x if x < LEAST => 0.0,
+        x if x > 710.0 => f64::INFINITY,
+        // The power of two alone would overflow.
+        x if x > MOST => exp_within(x - 1.0) * std::f64::consts::E,
+        x => exp_within(x),
     }
-    let mantissa = 1.0 + (r + r * r * p);
-    let scale = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
-    let value = mantissa * scale;
-    let value = if x < -708.0 { 0.0 } else { value };
-    if x > 709.0 { large(x) } else { value }
 }
 
-/// `e^x` for `x > 709`, where the power of two alone would overflow, or NaN for NaN.
-#[cold]
-fn large(x: f64) -> f64 {
-    if x > 710.0 {
-        f64::INFINITY
-    } else {
-        exp(x - 1.0) * std::f64::consts::E
-    }
+/// The exponents that [`exp_within`] takes; others are taken for the nearer end.
+const LEAST: f64 = -708.0;
+const MOST: f64 = 709.0;
+
+/// `e^x` to 2 units in the last place for `x` in -708..=709, without a branch.
+#[inline(always)]
+pub(crate) fn exp_within(x: f64) -> f64 {
+    let (r, scale) = reduce(x);
+    // Taylor series on |r| <= ln(2)/2; the first term left out is below 5e-18.
+    const C: [f64; 12] = [
+        0.5,
+        1.0 / 6.0,
+        1.0 / 24.0,
+        1.0 / 120.0,
+        1.0 / 720.0,
+        1.0 / 5_040.0,
+        1.0 / 40_320.0,
+        1.0 / 362_880.0,
+        1.0 / 3_628_800.0,
+        1.0 / 39_916_800.0,
+        1.0 / 479_001_600.0,
+        1.0 / 6_227_020_800.0,
+    ];
+    let (r2, c) = (r * r, |k: usize| C[k] + C[k + 1] * r);
+    let r4 = r2 * r2;
+    let series = (c(0) + c(2) * r2) + r4 * ((c(4) + c(6) * r2) + r4 * (c(8) + c(10) * r2));
+    (1.0 + (r + r2 * series)) * scale
+}
+
+/// `e^x` to a part in 10^8 for `x` in -708..=709, without a branch: as much as an `f32` holds.
+#[inline(always)]
+pub(crate) fn exp_single(x: f64) -> f32 {
+    let (r, scale) = reduce(x);
+    let r2 = r * r;
+    let low = 1.0 + r + r2 * (0.5 + r * (1.0 / 6.0));
+    let high = (1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0 + r * (1.0 / 5_040.0));
+    ((low + r2 * r2 * high) * scale) as f32
+}
+
+/// `x = r + n ln 2` with |r| <= ln(2)/2, as r and 2^n.
+#[inline(always)]
+fn reduce(x: f64) -> (f64, f64) {
+    let x = if x > LEAST { x } else { LEAST };
+    let x = if x < MOST { x } else { MOST };
+    let shifted = x * LOG2_E + ROUND;
+    let n = shifted - ROUND;
+    let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;
+    (r, f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52))
 }
 
 /// Natural logarithm of a positive, finite, normal `x`, to 2 units in the last place.
@@ -92,6 +110,14 @@ mod tests {
                     "exp({x}) = {ours}, not {theirs}"
                 );
             }
+        }
+        for i in -70_000..=30_000 {
+            let x = f64::from(i) * 0.001_234_5;
+            let (ours, theirs) = (f64::from(exp_single(x)), x.exp());
+            assert!(
+                (ours - theirs).abs() <= theirs * 7e-8 + 1e-38,
+                "exp({x}) = {ours}, not {theirs}"
+            );
         }
         assert_eq!(exp(0.0).to_bits(), 1.0f64.to_bits());
         assert_eq!(exp(f64::NEG_INFINITY).to_bits(), 0.0f64.to_bits());

@@ -122,7 +122,7 @@ impl Rates {
     }
 
     /// `r + γ next`, without the second term after termination.
-    #[inline]
+    #[inline(always)]
     fn target(&self, step: &Step, next: impl FnOnce() -> f64) -> f64 {
         match step.status {
             Status::Terminated => step.reward,
@@ -131,7 +131,7 @@ impl Rates {
     }
 
     /// Moves a checked pair toward a target by α, counts the visit and ticks the clock. Returns the error before.
-    #[inline]
+    #[inline(always)]
     fn learn<V: Value>(
         &mut self,
         table: &mut QTable<V>,
@@ -139,11 +139,12 @@ impl Rates {
         action: Action,
         target: f64,
     ) -> Result<f64, Error> {
-        let old = table.value(state, action).to_f64();
-        let error = target - old;
-        let alpha = self.alpha(table, state, action);
-        table.store(state, action, old + alpha * error)?;
-        table.count(state, action);
+        let entry = table.entry(state, action)?;
+        let (old, visits) = table.at(entry);
+        let error = target - old.to_f64();
+        let alpha = self.alpha.at_visit(self.updates, u64::from(visits));
+        table.store(state, action, old.to_f64() + alpha * error)?;
+        table.count(entry);
         self.updates += 1;
         Ok(error)
     }
@@ -152,7 +153,7 @@ impl Rates {
 validated!(Rates);
 
 /// Checks that an experience fits the table.
-#[inline]
+#[inline(always)]
 fn check<V: Value>(table: &QTable<V>, state: State, action: Action, step: &Step) -> Result<(), Error> {
     table.check(state, action)?;
     table.check_state(step.observation)?;

@@ -1,8 +1,29 @@
 //! Tabular reinforcement learning for problems with finitely many states and actions.
 //!
 //! An [`Environment`] is the problem, in Gymnasium's words. A [`QTable`] holds what is known of it, one number for
-//! each [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, a learner such as [`QLearning`]
-//! improves the table from each [`Step`], and [`train`] runs them against each other.
+//! each [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, and a [`Learner`] improves the table
+//! from each [`Step`]. Three drivers run them against each other:
+//!
+//! * [`Training`] takes any learner and any policy, and can be stopped, saved and continued;
+//! * [`train`] is one-step [`QLearning`] with a [`Boltzmann`] policy, in one call;
+//! * [`train_in_blocks`] is the same several times faster, on a [`CachedBoltzmann`].
+//!
+//! [`over_seeds`] repeats an experiment, and [`Estimate`] is the mean with its 95 % interval. States come from
+//! measured quantities by way of [`Intervals`] and their [`Product`]. Where the dynamics are known, a [`Model`] gives
+//! the optimum to compare with ([`ModelEnvironment::compare`]); a [`ModelEstimate`] is one learned from experience.
+//! [`save`] and [`load`] put anything of this on disk.
+//!
+//! # Rules that hold everywhere
+//!
+//! * All randomness comes from the generator handed in. The same seed gives the same result, bit for bit, on every
+//!   platform: where a function of the standard library may differ between platforms, the crate has its own.
+//! * Nothing is bootstrapped through a step that *terminated* an episode; through one that was *truncated* it is.
+//! * A table never holds a value that is not finite. What comes from outside and cannot be, a reward of NaN or a
+//!   state out of range, is refused with an error that says what and where. Methods that return no `Result` panic
+//!   outside a table, as a slice does; each says so.
+//! * Of equally good actions the one with the lowest index is taken, unless a policy was told to draw ([`Ties`]).
+//!
+//! # A problem of one's own
 //!
 //! ```
 //! use qtable::{Action, Environment, QTable, State, Status, Step, TrainConfig, train};
@@ -43,6 +64,14 @@
 //! # Ok::<(), qtable::Error>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod cached;
+mod check_env;
 mod course;
 mod curve;
 mod discretise;
@@ -58,7 +87,11 @@ mod model;
 mod persist;
 mod policy;
 mod schedule;
+mod scratch;
+mod seeds;
 mod table;
+mod text;
+mod time_limit;
 pub mod toys;
 mod train;
 mod training;
@@ -66,6 +99,8 @@ mod validated;
 
 pub use rand;
 
+pub use cached::CachedBoltzmann;
+pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
 pub use curve::Record;
 pub use discretise::{DiscretiseError, Intervals, Product};
 pub use environment::{Environment, Status, Step};
@@ -82,6 +117,9 @@ pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, 
 pub use persist::{PersistError, Problem, decode, encode, load, save};
 pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
 pub use schedule::{Schedule, ScheduleError};
+pub use seeds::{Estimate, over_seeds};
 pub use table::{QTable, Value};
-pub use train::{Progress, TrainConfig, TrainReport, train};
+pub use text::CsvError;
+pub use time_limit::TimeLimit;
+pub use train::{Progress, TrainConfig, TrainReport, train, train_in_blocks};
 pub use training::{Training, Until};

@@ -13,6 +13,8 @@ pub trait Value: Copy + PartialOrd + std::fmt::Debug + Send + Sync + sealed::Sea
     fn to_f64(self) -> f64;
     /// The nearest number of this type, infinite if there is none.
     fn from_f64(value: f64) -> Self;
+    /// Whether it is neither infinite nor NaN.
+    fn is_finite(self) -> bool;
 }
 
 mod sealed {
@@ -22,24 +24,32 @@ mod sealed {
 }
 
 impl Value for f32 {
-    #[inline]
+    #[inline(always)]
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
-    #[inline]
+    #[inline(always)]
     fn from_f64(value: f64) -> Self {
         value as f32
+    }
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
     }
 }
 
 impl Value for f64 {
-    #[inline]
+    #[inline(always)]
     fn to_f64(self) -> f64 {
         self
     }
-    #[inline]
+    #[inline(always)]
     fn from_f64(value: f64) -> Self {
         value
+    }
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        f64::is_finite(self)
     }
 }
 
@@ -71,9 +81,15 @@ pub struct QTable<V: Value = f64> {
     values: Vec<V>,
     visits: Vec<u32>,
     mask: Option<ActionMask>,
-    /// Index of the best action of each state.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    best: Vec<u32>,
+    /// The best action of each state.
+    #[cfg_attr(feature = "serde", serde(skip, default = "Vec::new"))]
+    best: Vec<Best<V>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Best<V> {
+    value: V,
+    action: u32,
 }
 
 impl QTable {
@@ -115,7 +131,7 @@ impl<V: Value> QTable<V> {
         best.try_reserve_exact(states).map_err(too_large)?;
         values.resize(entries, value);
         visits.resize(entries, 0);
-        best.resize(states, 0);
+        best.resize(states, Best { value, action: 0 });
         Ok(Self {
             actions,
             values,
@@ -153,8 +169,8 @@ impl<V: Value> QTable<V> {
     /// # Errors
     /// A state or action out of range.
     pub fn visit(&mut self, state: State, action: Action) -> Result<(), Error> {
-        self.check(state, action)?;
-        self.count(state, action);
+        let entry = self.entry(state, action)?;
+        self.count(entry);
         Ok(())
     }
 
@@ -186,15 +202,15 @@ impl<V: Value> QTable<V> {
     }
 
     /// The highest value among the actions that a state offers.
-    #[inline]
+    #[inline(always)]
     pub fn max(&self, state: State) -> V {
-        self.value(state, self.best(state))
+        self.best[state.0].value
     }
 
     /// The action of the highest value among those that a state offers; of equals the lowest index.
-    #[inline]
+    #[inline(always)]
     pub fn best(&self, state: State) -> Action {
-        Action(self.best[state.0] as usize)
+        Action(self.best[state.0].action as usize)
     }
 
     /// How often a pair was visited.
@@ -230,42 +246,31 @@ impl<V: Value> QTable<V> {
 
     /// The best action of every state.
     pub fn greedy(&self) -> Vec<Action> {
-        self.best.iter().map(|&action| Action(action as usize)).collect()
+        self.best
+            .iter()
+            .map(|best| Action(best.action as usize))
+            .collect()
     }
 
     /// Checks that a pair lies in the table and is offered.
     ///
     /// # Errors
     /// Out of range, or forbidden by the mask.
-    #[inline]
+    #[inline(always)]
     pub fn check(&self, state: State, action: Action) -> Result<(), Error> {
-        self.check_state(state)?;
-        if action.0 >= self.actions {
-            return Err(Error::ActionOutOfRange {
-                action,
-                actions: self.actions,
-            });
-        }
-        if self.allows(state, action) {
-            Ok(())
-        } else {
-            Err(Error::ActionNotAllowed { state, action })
-        }
+        self.entry(state, action).map(|_| ())
     }
 
     /// Checks that a state lies in the table.
     ///
     /// # Errors
     /// [`Error::StateOutOfRange`].
-    #[inline]
+    #[inline(always)]
     pub fn check_state(&self, state: State) -> Result<(), Error> {
         if state.0 < self.states() {
             Ok(())
         } else {
-            Err(Error::StateOutOfRange {
-                state,
-                states: self.states(),
-            })
+            Err(self.refuse(state, Action(0)))
         }
     }
 
@@ -286,18 +291,59 @@ impl<V: Value> QTable<V> {
         })
     }
 
-    /// Counts a visit of a checked pair.
-    #[inline]
-    pub(crate) fn count(&mut self, state: State, action: Action) {
-        let count = &mut self.visits[state.0 * self.actions + action.0];
+    /// Where a pair stands, after the checks of [`check`](QTable::check).
+    #[inline(always)]
+    pub(crate) fn entry(&self, state: State, action: Action) -> Result<usize, Error> {
+        let index = state.0.wrapping_mul(self.actions).wrapping_add(action.0);
+        let inside = state.0 < self.states() && action.0 < self.actions;
+        if inside && self.mask.as_ref().is_none_or(|mask| mask.row(state)[action.0]) {
+            Ok(index)
+        } else {
+            Err(self.refuse(state, action))
+        }
+    }
+
+    /// Why a pair is refused.
+    #[cold]
+    fn refuse(&self, state: State, action: Action) -> Error {
+        if state.0 >= self.states() {
+            Error::StateOutOfRange {
+                state,
+                states: self.states(),
+            }
+        } else if action.0 >= self.actions {
+            Error::ActionOutOfRange {
+                action,
+                actions: self.actions,
+            }
+        } else {
+            Error::ActionNotAllowed { state, action }
+        }
+    }
+
+    /// Value and visits of an entry.
+    #[inline(always)]
+    pub(crate) fn at(&self, entry: usize) -> (V, u32) {
+        (self.values[entry], self.visits[entry])
+    }
+
+    /// Counts a visit of an entry.
+    #[inline(always)]
+    pub(crate) fn count(&mut self, entry: usize) {
+        let count = &mut self.visits[entry];
         *count = count.saturating_add(1);
     }
 
+    /// Sets the count of a checked pair.
+    pub(crate) fn set_visits(&mut self, state: State, action: Action, visits: u32) {
+        self.visits[state.0 * self.actions + action.0] = visits;
+    }
+
     /// The value as it would be stored, or an error if that is not finite.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn check_value(&self, state: State, action: Action, value: f64) -> Result<V, Error> {
         let stored = V::from_f64(value);
-        if stored.to_f64().is_finite() {
+        if stored.is_finite() {
             Ok(stored)
         } else {
             Err(Error::ValueNotFinite { state, action, value })
@@ -305,32 +351,54 @@ impl<V: Value> QTable<V> {
     }
 
     /// Writes a value at a checked place, if it is finite, and keeps the best action.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn store(&mut self, state: State, action: Action, value: f64) -> Result<(), Error> {
         let value = self.check_value(state, action, value)?;
-        let index = state.0 * self.actions + action.0;
-        let old = std::mem::replace(&mut self.values[index], value);
-        let best = self.best(state);
-        if action == best {
+        let entry = state.0 * self.actions + action.0;
+        let old = std::mem::replace(&mut self.values[entry], value);
+        let best = &mut self.best[state.0];
+        let index = action.0 as u32;
+        if index == best.action {
+            best.value = value;
             if value < old {
                 self.find_best(state);
             }
-        } else if self.allows(state, action) {
-            let highest = self.max(state);
-            if value > highest || (value == highest && action < best) {
-                self.best[state.0] = action.0 as u32;
-            }
+        } else if (value > best.value || (value == best.value && index < best.action))
+            && self.mask.as_ref().is_none_or(|mask| mask.row(state)[action.0])
+        {
+            *best = Best { value, action: index };
         }
         Ok(())
     }
 
+    #[inline(never)]
     fn find_best(&mut self, state: State) {
-        let row = self.row(state);
-        let highest = |best: Action, action: Action| {
-            if row[action.0] > row[best.0] { action } else { best }
+        let row = &self.values[state.0 * self.actions..][..self.actions];
+        let best = match &self.mask {
+            None => {
+                // Lane by lane, so that it is done with vectors.
+                let (chunks, rest) = row.as_chunks::<8>();
+                let mut lanes = [row[0]; 8];
+                let higher = |a: V, b: V| if b > a { b } else { a };
+                for chunk in chunks {
+                    for (lane, &value) in lanes.iter_mut().zip(chunk) {
+                        *lane = higher(*lane, value);
+                    }
+                }
+                let highest = lanes.into_iter().chain(rest.iter().copied()).fold(row[0], higher);
+                row.iter().position(|&value| value >= highest).unwrap_or(0)
+            }
+            Some(mask) => {
+                let offered = (0..self.actions).filter(|&action| mask.row(state)[action]);
+                offered
+                    .reduce(|best, action| if row[action] > row[best] { action } else { best })
+                    .unwrap_or(0)
+            }
         };
-        let best = self.offered(state).reduce(highest).unwrap_or_default();
-        self.best[state.0] = best.0 as u32;
+        self.best[state.0] = Best {
+            value: row[best],
+            action: best as u32,
+        };
     }
 
     fn find_all_best(&mut self) {
@@ -361,7 +429,13 @@ impl<V: Value> QTable<V> {
                 value: self.values[index].to_f64(),
             });
         }
-        self.best = vec![0; states];
+        self.best = vec![
+            Best {
+                value: self.values[0],
+                action: 0
+            };
+            states
+        ];
         let mask = self.mask.take();
         self.set_mask(mask)?;
         Ok(self)

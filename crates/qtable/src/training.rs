@@ -6,7 +6,7 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::course::{Course, fit};
+use crate::course::{Course, Pair, fit};
 use crate::{Environment, Error, Learner, Policy, QTable, Record, Value};
 
 /// When [`Training::run`] stops: at a total since the training began, not since the call.
@@ -242,7 +242,15 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
                 course,
                 curve,
             } = self;
-            if let Some(record) = course.step(environment, table, learner, policy, rng)? {
+            if let Some(record) = course.step(
+                environment,
+                &mut Pair {
+                    table,
+                    learner,
+                    policy,
+                },
+                rng,
+            )? {
                 curve.push(record);
                 return Ok(Some(record));
             }

@@ -47,24 +47,45 @@ pub(super) fn plane_row(
     };
     let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
     let level = texture.level(footprint);
-    // Places are exact at multiples of the stride, so that what lies between is the same in all rows.
+    // A plane that does not recede along the row (the camera's x axis lies in it, as it does while the hand is not rolled) is walked in one
+    // go; otherwise places are exact at multiples of the stride, so that what lies between is the same in all rows.
     let length = row.len();
+    let even = (step.z * length as f64).abs() < 1e-7 * base.z.abs();
+    if even {
+        let (from, to) = (place(0), place(length));
+        let share = 1.0 / length as f64;
+        texture.walk(
+            level,
+            from,
+            ((to.0 - from.0) * share, (to.1 - from.1) * share),
+            strength,
+            row,
+        );
+    }
     let mut k = 0;
     let mut from = place(0);
     let mut from_light = light(x0);
     while k < length {
         let end = ((x0 + k + STRIDE) / STRIDE * STRIDE - x0).min(length);
-        let to = place(end);
-        let to_light = light(x0 + end);
         let chunk = &mut row[k..end];
-        let share = 1.0 / (end - k) as f64;
-        let step = ((to.0 - from.0) * share, (to.1 - from.1) * share);
-        texture.walk(level, from, step, strength, chunk);
-        let slope = (to_light - from_light) * share as f32;
+        if !even {
+            let to = place(end);
+            let share = 1.0 / (end - k) as f64;
+            texture.walk(
+                level,
+                from,
+                ((to.0 - from.0) * share, (to.1 - from.1) * share),
+                strength,
+                chunk,
+            );
+            from = to;
+        }
+        let to_light = light(x0 + end);
+        let slope = (to_light - from_light) / (end - k) as f32;
         for (i, value) in (0_i32..).zip(chunk) {
             *value *= from_light + slope * i as f32;
         }
-        (from, from_light, k) = (to, to_light, end);
+        (from_light, k) = (to_light, end);
     }
 }
 
@@ -278,6 +299,13 @@ impl Studio<'_> {
         let along = Vector3::new(cos, sin, 0.0);
         let across = Vector3::new(-sin, cos, 0.0);
         let middle = Point3::new(thing.x, thing.y, self.table);
+        let half = 0.5 * thing.shape.height();
+        if self.view.misses(
+            &(middle + Vector3::z() * half),
+            thing.shape.footprint().hypot(half),
+        ) {
+            return;
+        }
         let (look, albedo) = (&thing.look, thing.look.albedo);
         let quad = |at: Point3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
             [at - u - v, at + u - v, at + u + v, at - u + v]
@@ -335,10 +363,8 @@ impl Studio<'_> {
             }
             Shape::Print { length, width, lines } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                if self.in_frame(canvas, &corners) {
-                    self.face(canvas, &corners, &along, &across, look, albedo);
-                    self.print(canvas, thing, (length, width), lines);
-                }
+                self.face(canvas, &corners, &along, &across, look, albedo);
+                self.print(canvas, thing, (length, width), lines);
             }
         }
     }
@@ -363,17 +389,6 @@ impl Studio<'_> {
             let share = 1.0 / (LAYERS - k) as f32;
             canvas.blend(&corners, light as f32, share);
         }
-    }
-
-    /// Whether a polygon's surrounding box touches the frame.
-    fn in_frame(&self, canvas: &Canvas, corners: &[Point3<f64>]) -> bool {
-        let mut polygon = Vec::with_capacity(corners.len() + 1);
-        self.view.polygon(corners, &mut polygon);
-        let (w, h) = (canvas.width as f64, canvas.height as f64);
-        polygon.iter().any(|p| p.x > -1.0)
-            && polygon.iter().any(|p| p.x < w)
-            && polygon.iter().any(|p| p.y > -1.0)
-            && polygon.iter().any(|p| p.y < h)
     }
 
     /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters from afar.

@@ -76,6 +76,11 @@ impl Canvas {
         if polygon.len() < 3 {
             return None;
         }
+        let left = polygon.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
+        let right = polygon.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);
+        if left > self.width as f64 || right < -1.0 {
+            return None;
+        }
         let top = polygon.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
         let bottom = polygon.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
         let first = (top + 0.5).floor().max(0.0);

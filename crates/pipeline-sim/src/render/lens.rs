@@ -78,6 +78,38 @@ impl Warp {
     }
 }
 
+/// Blurs the whole canvas as the sensor's own pass does ([`crate::Sensor::blur`]): three taps along each axis. For fields, which
+/// must be blurred before they are woven.
+pub(super) fn soften(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
+    let (side, middle) = three_taps(sigma);
+    let (w, h) = (canvas.width, canvas.height);
+    if w == 0 || h == 0 {
+        return;
+    }
+    spare.clear();
+    spare.extend_from_slice(&canvas.light);
+    for y in 0..h {
+        let line = |k: usize| &spare[k * w..(k + 1) * w];
+        let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(h - 1)));
+        let out = &mut canvas.light[y * w..(y + 1) * w];
+        for (((o, a), c), b) in out.iter_mut().zip(above).zip(here).zip(below) {
+            *o = middle * c + side * (a + b);
+        }
+        let mut left = out[0];
+        for x in 0..w {
+            let (here, right) = (out[x], out[(x + 1).min(w - 1)]);
+            out[x] = middle * here + side * (left + right);
+            left = here;
+        }
+    }
+}
+
+/// Side and middle weight of the three-tap kernel whose variance is sigma², up to the widest that three taps give.
+pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
+    let side = (0.5 * sigma * sigma).clamp(0.0, 0.333) as f32;
+    (side, 1.0 - 2.0 * side)
+}
+
 /// Blurs the whole canvas by a Gaussian of standard deviation `sigma` pixels.
 pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
     let reach = (2.5 * sigma).ceil().min(40.0) as usize;

@@ -17,7 +17,7 @@ use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::{Cell, Look, Scene};
+use crate::{Cell, Look, Scene, Thing};
 use bodies::{Studio, plane_row};
 use canvas::Canvas;
 use lens::{Warp, defocus};
@@ -118,6 +118,7 @@ impl Renderer {
     /// Joints or places that are not finite give a frame of noise without content.
     pub fn render(&mut self, cell: &Cell, joints: &Joints) -> &GrayImage {
         self.illuminate(cell, joints);
+        self.exposure.blurred = false;
         self.develop(cell)
     }
 
@@ -218,17 +219,19 @@ impl Renderer {
         let eye = view.eye();
         let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
         let ball = cell.ball.centre;
-        let (foot, clear) = cell
-            .holder
-            .map_or((ball.xy(), 0.0), |h| (h.foot, cell.ball.radius));
+        let foot = cell.holder.map_or(ball.xy(), |h| h.foot);
+        // A thing where the holder stands, or in a ball that lies or is carried low, is left out.
+        let in_the_way = |t: &Thing| {
+            let low = cell.holder.is_some() || ball.z - cell.ball.radius < cell.table + t.shape.height();
+            low && (t.x - foot.x).hypot(t.y - foot.y) <= t.shape.footprint() + cell.ball.radius
+        };
         let things = || self.scene.things.iter().enumerate();
         let mut items: Vec<Item> = things()
             .filter(|(_, t)| t.shape.is_flat())
             .map(|(i, _)| Item::Thing(i))
             .collect();
         let mut standing: Vec<(f64, Item)> = things()
-            .filter(|(_, t)| !t.shape.is_flat())
-            .filter(|(_, t)| (t.x - foot.x).hypot(t.y - foot.y) > t.shape.footprint() + clear)
+            .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t))
             .map(|(i, t)| (power(t.x, t.y, t.shape.footprint()), Item::Thing(i)))
             .collect();
         standing.push((power(ball.x, ball.y, cell.ball.radius), Item::Ball));

@@ -5,6 +5,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::render::canvas::Canvas;
+use crate::render::lens::three_taps;
 use crate::{Camera, Sensor};
 
 const NOISES: usize = 1 << 16;
@@ -14,6 +15,8 @@ const LEVELS: usize = 4096;
 #[derive(Clone, Debug)]
 pub(super) struct Exposure {
     sensor: Sensor,
+    /// Whether the light comes already blurred.
+    pub(super) blurred: bool,
     /// Standard normal numbers; every row of every frame starts at another place.
     noise: Vec<f32>,
     /// Grey level of a linear value, in steps of 1 / 4095.
@@ -31,6 +34,7 @@ impl Exposure {
         let curve = Box::new(std::array::from_fn(level));
         Self {
             sensor,
+            blurred: false,
             noise,
             curve,
             mixed: Vec::new(),
@@ -48,8 +52,11 @@ impl Exposure {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let s = self.sensor;
         let (principal, focal) = (camera.principal_point(), camera.focal_px());
-        let (side, middle) = kernel(s.blur);
-        let (read, shot) = ((s.read_noise / 255.0) as f32, (s.shot_noise / 255.0) as f32);
+        let (side, middle) = three_taps(if self.blurred { 0.0 } else { s.blur });
+        let (read2, shot2) = (
+            ((s.read_noise / 255.0) as f32).powi(2),
+            ((s.shot_noise / 255.0) as f32).powi(2),
+        );
         let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
         self.mixed.resize(width + 2, 0.0);
         self.row.resize(width, 0.0);
@@ -85,7 +92,7 @@ impl Exposure {
             let noise = &self.noise[start..start + run];
             for part in self.row.chunks_mut(run) {
                 for (value, n) in part.iter_mut().zip(noise) {
-                    let light = *value + (read + shot * value.max(0.0).sqrt()) * n;
+                    let light = *value + (read2 + shot2 * value.max(0.0)).sqrt() * n;
                     // The sum with 2^23 rounds to a whole number and leaves it in the low bits.
                     *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + 8_388_608.0;
                 }
@@ -96,10 +103,4 @@ impl Exposure {
             }
         }
     }
-}
-
-/// Side and middle weight of the three-tap kernel whose variance is sigma², up to the widest that three taps give.
-fn kernel(sigma: f64) -> (f32, f32) {
-    let side = (0.5 * sigma * sigma).clamp(0.0, 0.333) as f32;
-    (side, 1.0 - 2.0 * side)
 }

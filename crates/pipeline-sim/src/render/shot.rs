@@ -3,6 +3,7 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::Joints;
 
+use crate::render::lens::soften;
 use crate::{Cell, Renderer};
 
 /// How a frame is taken while things move.
@@ -74,6 +75,12 @@ impl Renderer {
             }
             let share = 1.0 / count as f32;
             total.iter_mut().for_each(|sum| *sum *= share);
+            if shot.interlace.is_some() && total.len() == self.canvas.light.len() {
+                // Lens and sensor blur what they see of each field; only then are the rows woven.
+                std::mem::swap(&mut self.canvas.light, &mut total);
+                soften(&mut self.canvas, self.scene.sensor.blur, &mut self.spare);
+                std::mem::swap(&mut self.canvas.light, &mut total);
+            }
             if field == 0 {
                 std::mem::swap(&mut woven, &mut total);
             } else {
@@ -89,6 +96,7 @@ impl Renderer {
         }
         (self.exposed, self.woven) = (total, woven);
         let (cell, _) = moment(shot.interlace.unwrap_or(0.0));
+        self.exposure.blurred = shot.interlace.is_some();
         self.develop(&cell)
     }
 }

@@ -125,7 +125,7 @@ impl Renderer {
                         found.extend(ring(Round::Disc, at(0.0), inner));
                     }
                     Shape::Cylinder { radius, height } if above => {
-                        found.extend(ring(Round::Top, at(height), radius))
+                        found.extend(ring(Round::Top, at(height), radius));
                     }
                     _ => {}
                 }

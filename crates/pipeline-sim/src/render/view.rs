@@ -56,6 +56,23 @@ impl View {
         Point3::from(self.pose.translation.vector)
     }
 
+    /// Whether no part of a sphere, given in the world, can be in the frame.
+    pub(super) fn misses(&self, centre: &Point3<f64>, radius: f64) -> bool {
+        let c = self.seen(centre);
+        let (left, top) = (self.principal.x + 1.0, self.principal.y + 1.0);
+        let (right, bottom) = (
+            self.width as f64 - self.principal.x,
+            self.height as f64 - self.principal.y,
+        );
+        // How far the centre lies beyond the plane through the eye and one border of the frame.
+        let beyond =
+            |across: f64, border: f64| (across * self.focal - border * c.z) / self.focal.hypot(border);
+        c.z < -radius
+            || [(c.x, right), (-c.x, left), (c.y, bottom), (-c.y, top)]
+                .iter()
+                .any(|(a, b)| beyond(*a, *b) > radius)
+    }
+
     /// Projects a convex polygon given in the world, cut at the near plane. Empty if nothing is left.
     pub(super) fn polygon(&self, corners: &[Point3<f64>], out: &mut Vec<Point2<f64>>) {
         out.clear();

@@ -24,9 +24,7 @@ impl<T: Transport> Val2Client<T> {
             guard: None,
         };
         client.reach_monitor()?;
-        if client.config.speed_percent.is_some() || client.wire.echo.is_none() {
-            client.find_echo()?;
-        }
+        client.find_echo()?;
         if let Some(percent) = client.config.speed_percent {
             client.set_speed(percent)?;
         }
@@ -89,6 +87,7 @@ impl<T: Transport> Val2Client<T> {
                     };
                     if yes { b"Y\r" } else { b"N\r" }
                 }
+                Ending::Question if questions % 2 == 0 && !last_line(&reply.text).contains("Y/N") => b"\r",
                 Ending::Question => refusal(&reply.text),
             };
             questions += 1;

@@ -5,6 +5,7 @@ mod connect;
 mod motion;
 mod proximity;
 mod reader;
+mod resident;
 mod whereabouts;
 mod wire;
 
@@ -12,6 +13,7 @@ use std::time::Duration;
 
 pub use config::{ClientConfig, MoveWay};
 pub use reader::{Ending, ReplyReader};
+pub use resident::Resident;
 pub use whereabouts::Location;
 
 use crate::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, Transport};

@@ -295,7 +295,7 @@ impl<T: Transport> Val2Client<T> {
     }
 
     /// The arm's position cannot be read after a motion was commanded: it is told to stop, in case it hears.
-    fn lost(&mut self, cause: ArmError) -> ArmError {
+    pub(super) fn lost(&mut self, cause: ArmError) -> ArmError {
         if matches!(cause, ArmError::Restarted { .. }) {
             // A controller that starts has no arm power.
             self.last_known = None;
@@ -371,7 +371,7 @@ fn names_no_place(error: &ArmError) -> bool {
 }
 
 /// The joint that is furthest off, and by how many radians.
-fn furthest(a: &Joints, b: &Joints) -> (Joint, f64) {
+pub(super) fn furthest(a: &Joints, b: &Joints) -> (Joint, f64) {
     Joint::ALL
         .into_iter()
         .map(|joint| (joint, (a[joint] - b[joint]).abs()))
@@ -382,7 +382,7 @@ fn furthest(a: &Joints, b: &Joints) -> (Joint, f64) {
 }
 
 /// The numbers of a line that holds exactly six, each with what rounding to its decimals can have changed.
-fn shown_values(line: &str) -> Option<[(f64, f64); 6]> {
+pub(super) fn shown_values(line: &str) -> Option<[(f64, f64); 6]> {
     let numbers: Vec<(f64, f64)> = line
         .split_whitespace()
         .map(|word| {

@@ -130,10 +130,7 @@ impl<T: Transport> Val2Client<T> {
     /// What the line said.
     pub fn abort(&mut self) -> Result<(), ArmError> {
         let patience = self.config.motion_timeout;
-        match self.wire.exchange("ABORT", patience, &self.config) {
-            Ok(reply) if reply.ending == Ending::Running => {
-                self.wire.read_idle("ABORT", patience, &self.config).map(drop)
-            }
+        match self.wire.exchange_to_end("ABORT", patience, &self.config) {
             Ok(_) => Ok(()),
             Err(failed) => Err(failed.error),
         }
@@ -145,27 +142,24 @@ impl<T: Transport> Val2Client<T> {
             error,
             maybe_done: true,
         };
-        let reply = self.wire.exchange(line, patience, &self.config)?;
-        self.without_message(line, &reply)?;
-        let mut text = reply.text.clone();
-        if reply.ending == Ending::Running {
-            let rest = self.wire.read_idle(line, patience, &self.config);
-            if matches!(rest, Err(ArmError::Silence { .. })) {
+        let reply = match self.wire.exchange_to_end(line, patience, &self.config) {
+            Err(failed) if failed.maybe_done && matches!(failed.error, ArmError::Silence { .. }) => {
                 self.abort().map_err(after)?;
+                return Err(failed);
             }
-            let rest = rest.map_err(after)?;
-            self.without_message(line, &rest)?;
-            text.push_str(&rest.text);
-        } else if reply.ending == Ending::Question {
+            reply => reply?,
+        };
+        self.without_message(line, &reply)?;
+        if reply.ending == Ending::Question {
             self.abort().map_err(after)?;
-            let heard = shortened(&text);
+            let heard = shortened(&reply.text);
             return Err(after(self.wire.garbled(
                 line,
                 "a program that asks for nothing",
                 &heard,
             )));
         }
-        Ok(text)
+        Ok(reply.text)
     }
 
     /// A motion under guard of a program: the point is defined already.

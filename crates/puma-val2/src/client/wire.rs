@@ -221,28 +221,26 @@ impl<T: Transport> Wire<T> {
         }
     }
 
-    /// Reads until the idle prompt, over as many run prompts as come before.
-    pub(super) fn read_idle(
+    /// As [`Wire::exchange`], for lines after which a program runs: until it ends or asks.
+    pub(super) fn exchange_to_end(
         &mut self,
-        sent: &str,
+        line: &str,
         timeout: Duration,
         config: &ClientConfig,
-    ) -> Result<Reply, ArmError> {
+    ) -> Result<Reply, Failed> {
         let until = self.line.clock().saturating_add(timeout);
-        let mut text = String::new();
-        loop {
+        let mut reply = self.exchange(line, timeout, config)?;
+        while reply.ending == Ending::Running && reply.text.len() <= config.reply_limit {
             let left = until.saturating_sub(self.line.clock());
-            let reply = self.read_reply(sent, left, config)?;
-            text.push_str(&reply.text);
-            if reply.ending != Ending::Running || text.len() > config.reply_limit {
-                let ending = reply.ending;
-                return Ok(Reply { text, ending });
-            }
+            let more = self.read_reply(line, left, config).map_err(Failed::after)?;
+            reply.text.push_str(&more.text);
+            reply.ending = more.ending;
         }
+        Ok(reply)
     }
 
     /// Makes a half-typed line harmless and reads what the controller says to it.
-    fn spoil(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
+    pub(super) fn spoil(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
         while self.receive(config.quiet, "clearing the line")?.is_some() {}
         self.send(SPOIL, "clearing the line")?;
         let reply = self.read_reply("an empty line", config.reply_timeout * 4, config)?;
@@ -258,7 +256,7 @@ impl<T: Transport> Wire<T> {
     /// Gets back to the monitor's prompt from whatever dialogue the line is in, saying no to everything.
     pub(super) fn settle(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
         let mut ending = self.spoil(config)?;
-        for _ in 0..8 {
+        for _ in 0..4 {
             if ending != Ending::Question {
                 return Ok(ending);
             }
@@ -312,10 +310,14 @@ pub(super) fn refusal(text: &str) -> &'static [u8] {
     let words = question.trim_end_matches(['?', ' ']);
     if words.trim_end_matches('.').trim().parse::<u32>().is_ok() {
         b"E\r"
+    } else if question.starts_with("GO?") {
+        // Our own resident program.
+        b"9\r"
     } else if question.contains("Y/N") {
         b"N\r"
     } else {
-        b"\r"
+        // An empty line has been tried.
+        b"\x03\r"
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::editor::Editing;
 use super::expr::Variable;
-use super::interpreter::Job;
+use super::job::Job;
 use super::lexer::{Cursor, Token, tokens};
 use super::place::Place;
 use super::{Emulator, Event, Fault, Message, display};

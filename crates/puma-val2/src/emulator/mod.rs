@@ -1,6 +1,7 @@
 //! The emulated controller: a VAL II monitor, its programs and its arm, without threads and without a clock of its own.
 
 mod arm;
+mod control;
 mod dialogue;
 mod display;
 mod editor;
@@ -8,6 +9,7 @@ mod expr;
 mod files;
 mod instruction;
 mod interpreter;
+mod job;
 mod lexer;
 mod listing;
 mod memory;
@@ -17,6 +19,7 @@ mod motion;
 mod place;
 mod profile;
 mod program;
+mod reaction;
 mod scope;
 mod signals;
 mod terminal;
@@ -33,8 +36,9 @@ pub use profile::{BootQuestion, Profile, StartPower, WhereLayout, char_time};
 use crate::{Gripper, Joints, PumaParams};
 use arm::Arm;
 use dialogue::Mode;
-use interpreter::{Job, Reaction};
+use job::Job;
 use memory::Memory;
+use reaction::Reaction;
 use scope::Scope;
 use signals::Signals;
 use terminal::{Terminal, Typed};

@@ -3,7 +3,7 @@
 use super::dialogue::{Confirm, Kind};
 use super::expr::{Expr, whole};
 use super::instruction::Instruction;
-use super::interpreter::Job;
+use super::job::Job;
 use super::lexer::{Cursor, Token, keyword, tokens};
 use super::place::{Place, PlaceExpr, PlaceName, arguments, values};
 use super::scope::check_name;

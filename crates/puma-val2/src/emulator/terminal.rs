@@ -23,6 +23,9 @@ pub(super) enum Typed {
 /// Most characters that may wait to be sent; a reply that is never read does not grow beyond it.
 const OUTPUT_LIMIT: usize = 1 << 20;
 
+/// Most characters on their way in; what is sent faster than the line takes it is lost beyond it.
+const INPUT_LIMIT: usize = 1 << 16;
+
 #[derive(Debug)]
 pub(super) struct Terminal {
     arriving: VecDeque<(Duration, u8)>,
@@ -56,6 +59,9 @@ impl Terminal {
     /// Takes bytes off the wire; each is complete a character's time after the one before.
     pub(super) fn arrive(&mut self, bytes: &[u8], now: Duration, profile: &Profile) {
         for &byte in bytes {
+            if self.arriving.len() >= INPUT_LIMIT {
+                return;
+            }
             let at = match profile.char_time {
                 Some(time) => self.line_busy_until.max(now).saturating_add(time),
                 None => now,

@@ -156,7 +156,7 @@ impl PumaParams {
         let distance2 = forward * forward + p.z * p.z;
         let k = (distance2 - self.a2 * self.a2 - forearm * forearm) / (2.0 * self.a2);
         let lever2 = forearm * forearm - k * k;
-        if lever2 < 0.0 {
+        if lever2.is_nan() || lever2 < 0.0 {
             let distance = distance2.sqrt();
             let by = (distance - (self.a2 + forearm)).max((self.a2 - forearm).abs() - distance);
             return Err(Unreachable::TooFar { by: by.max(0.0) });

@@ -82,7 +82,7 @@ impl<V: Value> Learner<V> for DoubleQLearning<V> {
             .each_ref()
             .map(|one| 0.5 * one.value(state, action).to_f64());
         table.store(state, action, mean[0] + mean[1])?;
-        table.count(state, action);
+        table.visit(state, action)?;
         self.rates.updates += 1;
         Ok(error)
     }

@@ -5,6 +5,7 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::{Experience, Learner, Rates, check, next_value};
+use crate::scratch::Scratch;
 use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Step, Value};
 
 /// One-step Q-learning (Watkins and Dayan 1992; the paper's Eq. 3):
@@ -36,7 +37,7 @@ impl QLearning {
     /// # Errors
     /// A state or action out of range or forbidden, a reward that is not finite, or a value that would not be.
     /// The table is unchanged then.
-    #[inline]
+    #[inline(always)]
     pub fn update<V: Value>(
         &mut self,
         table: &mut QTable<V>,
@@ -44,9 +45,17 @@ impl QLearning {
         action: Action,
         step: &Step,
     ) -> Result<f64, Error> {
-        check(table, state, action, step)?;
+        table.check_state(step.observation)?;
         let target = self.rates.target(step, || table.max(step.observation).to_f64());
-        self.rates.learn(table, state, action, target)
+        // A reward that is not finite makes a value that is not, which is refused; only its name is to be found.
+        match self.rates.learn(table, state, action, target) {
+            Err(Error::ValueNotFinite { .. }) if !step.reward.is_finite() => Err(Error::RewardNotFinite {
+                state,
+                action,
+                reward: step.reward,
+            }),
+            learned => learned,
+        }
     }
 
     /// Learns from a step that did not really happen: no visit is counted, and the clock stands still.
@@ -146,7 +155,7 @@ impl<V: Value> Learner<V> for Sarsa {
 pub struct ExpectedSarsa {
     rates: Rates,
     #[cfg_attr(feature = "serde", serde(skip))]
-    probabilities: Vec<f64>,
+    probabilities: Scratch,
 }
 
 impl ExpectedSarsa {
@@ -157,7 +166,7 @@ impl ExpectedSarsa {
     pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
         Ok(Self {
             rates: Rates::new(alpha, gamma)?,
-            probabilities: Vec::new(),
+            probabilities: Scratch::default(),
         })
     }
 
@@ -167,14 +176,13 @@ impl ExpectedSarsa {
         state: State,
         policy: &dyn Policy<V>,
     ) -> Result<f64, Error> {
-        self.probabilities.resize(table.actions(), 0.0);
-        if !policy.probabilities(table, state, &mut self.probabilities) {
+        let probabilities = self.probabilities.of_length(table.actions());
+        if !policy.probabilities(table, state, probabilities) {
             return Err(Error::NoProbabilities);
         }
         let row = table.row(state);
         // Forbidden actions have probability 0 and, being finite, no part in the sum.
-        Ok(self
-            .probabilities
+        Ok(probabilities
             .iter()
             .zip(row)
             .map(|(p, value)| p * value.to_f64())

@@ -106,13 +106,16 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
             Status::Continuing | Status::Truncated => table.max(step.observation).to_f64(),
         };
         let error = step.reward + self.gamma * next - table.value(state, action).to_f64();
+        if let Some(model) = &self.model {
+            table.check_shape("the model", model.states(), model.actions())?;
+        }
         let mut model = match self.model.take() {
             Some(model) => model,
             None => ModelEstimate::new(table.states(), table.actions())?,
         };
-        table.check_shape("the model", model.states(), model.actions())?;
+        // The experience fits the table, and the table the model: from here on only a backup can fail.
         model.observe(state, action, &step)?;
-        table.count(state, action);
+        table.visit(state, action)?;
 
         let change = |table: &QTable<V>, state, action| {
             model

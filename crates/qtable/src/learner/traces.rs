@@ -47,9 +47,8 @@ impl Traces {
         Ok(self)
     }
 
-    fn visit(&mut self, state: State, action: Action) {
+    fn forget(&mut self, state: State, action: Action) {
         self.recent.retain(|&(s, a, _)| (s, a) != (state, action));
-        self.recent.push((state, action, 1.0));
     }
 
     /// Moves every pair by `amount` times its trace: all of them, or none and an error.
@@ -77,22 +76,28 @@ impl Traces {
 
 validated!(Traces);
 
-/// One update of a trace learner: the error toward `target` goes to every pair with a trace.
+/// One update of a trace learner: the present pair moves toward `target`, earlier ones by how far the target is from
+/// what was `expected` of the state.
 fn learn_along<V: Value>(
     rates: &mut Rates,
     traces: &mut Traces,
     table: &mut QTable<V>,
     experience: &Experience,
     target: f64,
+    expected: f64,
 ) -> Result<f64, Error> {
     let Experience {
         state, action, step, ..
     } = *experience;
-    let error = target - table.value(state, action).to_f64();
+    let old = table.value(state, action).to_f64();
+    let error = target - old;
     let alpha = rates.alpha(table, state, action);
-    traces.visit(state, action);
-    traces.spread(table, alpha * error)?;
-    table.count(state, action);
+    table.check_value(state, action, old + alpha * error)?;
+    traces.forget(state, action);
+    traces.spread(table, alpha * (target - expected))?;
+    table.store(state, action, old + alpha * error)?;
+    traces.recent.push((state, action, 1.0));
+    table.visit(state, action)?;
     rates.updates += 1;
     match step.status {
         Status::Continuing => traces.decay(rates.gamma),
@@ -105,8 +110,11 @@ fn learn_along<V: Value>(
 /// on the way by `α δ e`, where the trace e is 1 for the present pair and decays by γλ with each step.
 ///
 /// After Watkins (1989): an exploratory action cuts all traces, because what follows it is not what the greedy
-/// policy would have met. [`uncut`](QLambda::uncut) leaves them (the naive Q(λ) of Sutton and Barto 1998): quicker
-/// while much is explored, biased as long as it is. Default: λ = 0.8, cut. Traces below 1e-6 are dropped.
+/// policy would have met. [`uncut`](QLambda::uncut) is the form of Peng and Williams (1996), quicker while much is
+/// explored, with a bias toward the policy that acts. Default: λ = 0.8, cut. Traces below 1e-6 are dropped.
+///
+/// (The "naive" form, Watkins's without the cut, is not offered: on the cliff problem its values grow without
+/// bound.)
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct QLambda {
@@ -139,7 +147,9 @@ impl QLambda {
         })
     }
 
-    /// Lets the traces live through exploratory actions.
+    /// Lets the traces live through exploratory actions, after Peng and Williams: earlier pairs are moved by the
+    /// error from the state's best value, `r + γ max over b of Q(s',b) - max over b of Q(s,b)`, and only the present
+    /// pair by δ, so that the price of exploring is charged to the action that explored.
     pub fn uncut(self) -> Self {
         Self { cut: false, ..self }
     }
@@ -161,11 +171,19 @@ impl<V: Value> Learner<V> for QLambda {
             state, action, step, ..
         } = experience;
         check(table, *state, *action, step)?;
+        let target = self.rates.target(step, || table.max(step.observation).to_f64());
         if self.cut && !is_greedy(table, *state, *action) {
             self.traces.recent.clear();
         }
-        let target = self.rates.target(step, || table.max(step.observation).to_f64());
-        learn_along(&mut self.rates, &mut self.traces, table, experience, target)
+        let expected = table.max(*state).to_f64();
+        learn_along(
+            &mut self.rates,
+            &mut self.traces,
+            table,
+            experience,
+            target,
+            expected,
+        )
     }
 }
 
@@ -223,6 +241,14 @@ impl<V: Value> Learner<V> for SarsaLambda {
         check(table, experience.state, experience.action, &experience.step)?;
         let next = next_value(table, experience)?;
         let target = self.rates.target(&experience.step, || next);
-        learn_along(&mut self.rates, &mut self.traces, table, experience, target)
+        let expected = table.value(experience.state, experience.action).to_f64();
+        learn_along(
+            &mut self.rates,
+            &mut self.traces,
+            table,
+            experience,
+            target,
+            expected,
+        )
     }
 }

@@ -87,11 +87,9 @@ impl ModelEstimate {
         let same = |seen: &&mut Seen| seen.next == step.observation && seen.terminated == terminated;
         if let Some(seen) = outcomes.iter_mut().find(same) {
             seen.count = seen.count.saturating_add(1);
-            let share = 1.0 / f64::from(seen.count);
-            // Two products, so that no difference of finite rewards overflows.
-            if step.reward != seen.mean_reward {
-                seen.mean_reward = seen.mean_reward * (1.0 - share) + step.reward * share;
-            }
+            // Halved, so that no difference of finite rewards overflows.
+            let half = step.reward / 2.0 - seen.mean_reward / 2.0;
+            seen.mean_reward += half / f64::from(seen.count) * 2.0;
         } else {
             outcomes.push(Seen {
                 next: step.observation,

@@ -5,7 +5,8 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::Policy;
-use crate::elementary::exp;
+use crate::elementary::exp_within;
+use crate::scratch::Scratch;
 use crate::validated::validated;
 use crate::{Action, Error, QTable, Schedule, State, Value};
 
@@ -20,7 +21,7 @@ pub struct Boltzmann {
     temperature: Schedule,
     choices: u64,
     #[cfg_attr(feature = "serde", serde(skip))]
-    weights: Vec<f64>,
+    weights: Scratch,
 }
 
 impl Boltzmann {
@@ -37,7 +38,7 @@ impl Boltzmann {
         Self {
             temperature,
             choices: 0,
-            weights: Vec::new(),
+            weights: Scratch::default(),
         }
         .restore()
     }
@@ -64,10 +65,10 @@ impl<V: Value> Policy<V> for Boltzmann {
     fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action {
         let temperature = self.temperature();
         self.choices += 1;
-        self.weights.resize(table.actions(), 0.0);
-        let sum = boltzmann_weights(table, state, temperature, &mut self.weights);
+        let weights = self.weights.of_length(table.actions());
+        let sum = boltzmann_weights(table, state, temperature, weights);
         let mut rest = rng.random::<f64>() * sum;
-        for (action, &weight) in self.weights.iter().enumerate() {
+        for (action, &weight) in weights.iter().enumerate() {
             rest -= weight;
             if rest < 0.0 {
                 return Action(action);
@@ -86,7 +87,7 @@ impl<V: Value> Policy<V> for Boltzmann {
     }
 }
 
-/// Writes `exp((Q - max Q) / T)` for each action, 0 for forbidden ones, and returns the sum.
+/// Writes `exp((Q - max Q) / T)` for each action (0 below `exp(-700)`), 0 for forbidden ones, and returns the sum.
 fn boltzmann_weights<V: Value>(
     table: &QTable<V>,
     state: State,
@@ -95,7 +96,13 @@ fn boltzmann_weights<V: Value>(
 ) -> f64 {
     let highest = table.max(state).to_f64();
     for (weight, value) in weights.iter_mut().zip(table.row(state)) {
-        *weight = exp((value.to_f64() - highest) / temperature);
+        let exponent = (value.to_f64() - highest) / temperature;
+        // Below this an ordinary number cannot hold it; not a branch, but a choice of two values.
+        *weight = if exponent < -700.0 {
+            0.0
+        } else {
+            exp_within(exponent)
+        };
     }
     if let Some(mask) = table.mask() {
         for (weight, &allowed) in weights.iter_mut().zip(mask.row(state)) {

@@ -1,4 +1,4 @@
-//! Taxi-v3.
+//! Taxi-v4.
 
 use crate::{Action, Error, Model, ModelEnvironment, Outcome, State};
 
@@ -17,7 +17,7 @@ const OPEN_TO_THE_EAST: [[bool; 4]; 5] = [
     [false, true, false, true],
 ];
 
-/// Taxi-v3: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with walls.
+/// Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with walls.
 ///
 /// States are numbered by [`taxi_state`]. Actions: 0 south, 1 north, 2 east, 3 west, 4 pick up, 5 drop off; a move
 /// into a wall stays. Every action pays -1, an impossible pick-up or drop-off -10, the drop-off at the destination

@@ -1,0 +1,194 @@
+//! The door of everything that decides how the arm moves while the ball is in view.
+
+use hough_heuristic::Features;
+use puma_val2::{JointDelta, Joints};
+
+use crate::{GaveUp, Percept};
+
+/// What a [`Controller`] decides by: the ball in the image, and the pose it is seen from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Situation {
+    /// Centre and radius of the ball's outline, feature units (192x144).
+    pub features: Features,
+    /// The joint angles that the arm reports.
+    pub joints: Joints,
+}
+
+impl Situation {
+    /// The part of it that the paper's behaviours look at.
+    pub fn percept(&self) -> Percept {
+        Percept::new(self.features, &self.joints)
+    }
+}
+
+/// What came of a move that a [`Controller`] decided on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Consequence {
+    /// The ball is in view, here.
+    Seen(Situation),
+    /// The ball has left the view.
+    Lost,
+    /// Supervision has taken the arm back to where it was: something was too near, or the approach too fast.
+    TakenBack,
+}
+
+/// Decides, from one sighting of the ball to the next, how the arm moves.
+///
+/// [`Agent`](crate::Agent) calls [`decide`](Controller::decide) whenever the ball is in view and not yet at the goal; searching,
+/// recovering a lost ball, gripping and supervision are the agent's. The other methods tell what happens in between and may be left
+/// out.
+pub trait Controller {
+    /// What it is called, in tables and logs.
+    fn name(&self) -> &str;
+
+    /// How the arm should move now. The move must stay within `limits`, and it may be none.
+    ///
+    /// # Errors
+    /// The reason for giving up, [`GaveUp::NoMoveLeft`] in particular.
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp>;
+
+    /// What came of the move decided on last.
+    fn judge(&mut self, consequence: &Consequence) {
+        let _ = consequence;
+    }
+
+    /// The arm stands at `joints`: at the beginning of a run, and after each move, whoever ordered it.
+    fn arm_at(&mut self, joints: &Joints) {
+        let _ = joints;
+    }
+
+    /// The move that brings the gripper to the ball, seen at the goal; `None` to leave it to the agent's settings.
+    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        let _ = (now, limits);
+        None
+    }
+
+    /// A run begins: whatever was remembered of the last one's ball is void.
+    fn begin(&mut self) {}
+
+    /// The run is over.
+    fn end(&mut self) {}
+}
+
+impl<C: Controller + ?Sized> Controller for Box<C> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        (**self).decide(now, limits)
+    }
+
+    fn judge(&mut self, consequence: &Consequence) {
+        (**self).judge(consequence);
+    }
+
+    fn arm_at(&mut self, joints: &Joints) {
+        (**self).arm_at(joints);
+    }
+
+    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        (**self).grip(now, limits)
+    }
+
+    fn begin(&mut self) {
+        (**self).begin();
+    }
+
+    fn end(&mut self) {
+        (**self).end();
+    }
+}
+
+/// The range that a task keeps each joint in, radians (low, high), `JT1` first; closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct JointLimits(pub [(f64, f64); 6]);
+
+impl JointLimits {
+    /// The reaching task's: -160..160, -150..-20, 120..215, -110..170, -100..100, -266..266 degrees.
+    pub fn paper() -> Self {
+        Self(
+            [
+                (-160.0_f64, 160.0_f64),
+                (-150.0, -20.0),
+                (120.0, 215.0),
+                (-110.0, 170.0),
+                (-100.0, 100.0),
+                (-266.0, 266.0),
+            ]
+            .map(|(low, high)| (low.to_radians(), high.to_radians())),
+        )
+    }
+
+    /// Whether every joint is in its range, to a millionth of a degree.
+    pub fn admit(&self, joints: &Joints) -> bool {
+        const SLACK: f64 = 2e-8;
+        self.0
+            .iter()
+            .zip(joints.0)
+            .all(|(&(low, high), angle)| (low - SLACK..=high + SLACK).contains(&angle))
+    }
+
+    /// The pose nearest to `joints` in which every joint is in its range.
+    pub fn nearest(&self, joints: &Joints) -> Joints {
+        Joints(std::array::from_fn(|i| {
+            let (low, high) = self.0[i];
+            // Not `clamp`, which panics on a range that is none.
+            joints.0[i].min(high).max(low)
+        }))
+    }
+}
+
+/// The farthest that a continuous controller turns each joint in one cycle, radians, `JT1` first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct StepLimits(pub [f64; 3]);
+
+impl StepLimits {
+    /// The largest steps of the paper's behaviours (section 3.1): 5, 20 and 16 degrees.
+    pub fn paper() -> Self {
+        Self([5.0_f64, 20.0, 16.0].map(f64::to_radians))
+    }
+
+    /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that, in which no joint turns farther
+    /// than it may; joints that would leave `limits` stop there. No move for what is not finite.
+    pub fn apply(&self, wanted: [f64; 3], joints: &Joints, limits: &JointLimits) -> JointDelta {
+        let shares = wanted
+            .iter()
+            .zip(self.0)
+            .map(|(wanted, most)| most / wanted.abs());
+        let share = shares.fold(1.0, f64::min);
+        let mut target = *joints;
+        for (i, wanted) in wanted.into_iter().enumerate() {
+            if wanted.is_finite() {
+                target.0[i] += share * wanted;
+            }
+        }
+        let reached = limits.nearest(&target);
+        JointDelta(std::array::from_fn(|i| {
+            if i < 3 { reached.0[i] - joints.0[i] } else { 0.0 }
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_keep_their_direction_and_end_within_the_limits() {
+        let at = Joints::from_degrees([0.0, -26.0, 180.0, 0.0, 45.0, 0.0]);
+        let wanted = [10.0_f64, 16.0, -3.0].map(f64::to_radians);
+        let delta = StepLimits::paper()
+            .apply(wanted, &at, &JointLimits::paper())
+            .degrees();
+        let expected = [5.0, 6.0, -1.5, 0.0, 0.0, 0.0];
+        assert!(
+            delta.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{delta:?}"
+        );
+        let none = StepLimits::paper().apply([f64::NAN; 3], &at, &JointLimits::paper());
+        assert_eq!(none, JointDelta::default());
+    }
+}

@@ -1,0 +1,163 @@
+//! What is believed of camera, ball and gears: thirteen numbers and how sure they are.
+
+use nalgebra::{Isometry3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
+
+use crate::CameraModel;
+
+/// How many numbers are learned.
+pub(crate) const LEARNED: usize = 13;
+
+/// Position of each number in the vector.
+pub(crate) mod at {
+    pub(crate) const FOCAL: usize = 0;
+    pub(crate) const CENTRE: usize = 1;
+    pub(crate) const TURN: usize = 3;
+    pub(crate) const SHIFT: usize = 6;
+    pub(crate) const RADIUS: usize = 9;
+    pub(crate) const PLAY: usize = 10;
+}
+
+pub(crate) type Numbers = SVector<f64, LEARNED>;
+pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
+
+/// How wrong a cell may be before anything is known of it: standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Prior {
+    /// Of the logarithm of the focal length [0.3].
+    pub focal: f64,
+    /// Of the principal point, feature units [5].
+    pub centre: f64,
+    /// Of roll, pitch and yaw of the camera, radians [0.17].
+    pub turn: f64,
+    /// Of the camera's place along each of its axes, metres [0.015].
+    pub shift: f64,
+    /// Of the logarithm of the ball's radius [0.15].
+    pub radius: f64,
+    /// Of the play in each of the first three joints, whole width, radians [0.015].
+    pub play: f64,
+}
+
+impl Prior {
+    /// A cell that was set up by eye: the values in the brackets of the fields.
+    pub fn by_eye() -> Self {
+        Self {
+            focal: 0.3,
+            centre: 5.0,
+            turn: 0.17,
+            shift: 0.015,
+            radius: 0.15,
+            play: 0.015,
+        }
+    }
+
+    fn deviations(&self) -> Numbers {
+        let Self {
+            focal,
+            centre,
+            turn,
+            shift,
+            radius,
+            play,
+        } = *self;
+        Numbers::from_column_slice(&[
+            focal, centre, centre, turn, turn, turn, shift, shift, shift, radius, play, play, play,
+        ])
+    }
+}
+
+/// A normal distribution over what is wrong with the nominal model.
+///
+/// Thirteen numbers: logarithm of the focal length over the nominal one; shift of the principal point (units); turn of the camera about
+/// its x, y and z axes (radians) and shift along them (metres); logarithm of the ball's radius over the nominal one; play in `JT1`, `JT2`
+/// and `JT3` (whole width, radians).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Belief {
+    mean: Vec<f64>,
+    /// Inverse of the covariance, by columns.
+    information: Vec<f64>,
+    /// Standard deviation of what is seen about what is expected, feature units.
+    noise: f64,
+}
+
+/// Noise assumed before anything is known, feature units.
+const FIRST_NOISE: f64 = 1.0;
+
+impl Belief {
+    /// Nothing is known but the prior.
+    pub fn new(prior: &Prior) -> Self {
+        let precisions = prior.deviations().map(|s| 1.0 / (s * s).max(1e-18));
+        Self::of(
+            Numbers::zeros(),
+            Information::from_diagonal(&precisions),
+            FIRST_NOISE,
+        )
+    }
+
+    pub(crate) fn of(mean: Numbers, information: Information, noise: f64) -> Self {
+        Self {
+            mean: mean.as_slice().to_vec(),
+            information: information.as_slice().to_vec(),
+            noise,
+        }
+    }
+
+    /// The thirteen numbers as they are believed.
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// The standard deviation of each of them.
+    pub fn deviations(&self) -> Vec<f64> {
+        let covariance = self.information_matrix().try_inverse();
+        (0..LEARNED)
+            .map(|i| covariance.map_or(f64::INFINITY, |c| c[(i, i)].max(0.0).sqrt()))
+            .collect()
+    }
+
+    /// Standard deviation of what is seen about what is expected, feature units.
+    pub fn noise(&self) -> f64 {
+        self.noise
+    }
+
+    pub(crate) fn with_noise(self, noise: f64) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// `nominal`, put right by what is believed.
+    pub fn corrected(&self, nominal: &CameraModel) -> CameraModel {
+        corrected(nominal, &self.numbers())
+    }
+
+    pub(crate) fn numbers(&self) -> Numbers {
+        Numbers::from_iterator(
+            self.mean
+                .iter()
+                .copied()
+                .chain(std::iter::repeat(0.0))
+                .take(LEARNED),
+        )
+    }
+
+    pub(crate) fn information_matrix(&self) -> Information {
+        let values = self.information.iter().copied().chain(std::iter::repeat(0.0));
+        Information::from_iterator(values.take(LEARNED * LEARNED))
+    }
+}
+
+/// `nominal` with the camera and the ball as `numbers` say; the play of the joints is not part of a model.
+pub(crate) fn corrected(nominal: &CameraModel, numbers: &Numbers) -> CameraModel {
+    let three = |i: usize| Vector3::new(numbers[i], numbers[i + 1], numbers[i + 2]);
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_scaled_axis(three(at::TURN)));
+    CameraModel {
+        focal: nominal.focal * numbers[at::FOCAL].exp(),
+        centre: [
+            nominal.centre[0] + numbers[at::CENTRE],
+            nominal.centre[1] + numbers[at::CENTRE + 1],
+        ],
+        mount: nominal.mount * Isometry3::from_parts(Translation3::from(three(at::SHIFT)), turn),
+        ball_radius: nominal.ball_radius * numbers[at::RADIUS].exp(),
+        ..*nominal
+    }
+}

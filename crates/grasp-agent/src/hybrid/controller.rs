@@ -1,0 +1,311 @@
+//! The controller: estimate, plan, move, and learn from what was seen.
+
+use hough_heuristic::Features;
+use nalgebra::{Point3, SMatrix, Vector3};
+use puma_val2::{Joint, JointDelta, Joints};
+
+use super::belief::{Belief, Numbers, Prior, corrected};
+use super::evidence::{Evidence, Links};
+use super::fit::{Fit, WITH_BALL, deviations, sensitivity};
+use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits};
+
+/// What a [`Hybrid`] is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HybridSettings {
+    /// The camera and the arm as they should be.
+    pub nominal: CameraModel,
+    /// How wrong that may be.
+    pub prior: Prior,
+    /// Features of the ball where it should be [(103.5, 78, 33)].
+    pub goal: Features,
+    /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
+    pub steps: StepLimits,
+    /// A move is made only if the ball will still be in view when it is seen so many standard deviations off its expected place [2].
+    pub caution: f64,
+    /// Runs that are remembered, the latest ones [400].
+    pub memory: usize,
+    /// How far `JT5` turns for the grip, radians [-18.01 degrees].
+    pub grip_turn: f64,
+    /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and not left to the agent's settings
+    /// [0.008].
+    pub grip_certainty: f64,
+}
+
+impl HybridSettings {
+    /// The settings in the brackets of the fields.
+    pub fn paper() -> Self {
+        Self {
+            nominal: CameraModel::paper(),
+            prior: Prior::by_eye(),
+            goal: Features {
+                x: 103.5,
+                y: 78.0,
+                r: 33.0,
+            },
+            steps: StepLimits::paper(),
+            caution: 2.0,
+            memory: 400,
+            grip_turn: -18.01_f64.to_radians(),
+            grip_certainty: 0.008,
+        }
+    }
+}
+
+/// Servoing by a model of the camera that is put right by what is seen.
+///
+/// In every cycle the ball's place and the thirteen numbers of a [`Belief`] are estimated together from all sightings of the run (least
+/// squares with the belief as prior, outliers weighing less). The arm then moves as far toward the pose in which the ball would stand at
+/// the goal as leaves the ball in view for all that is not known for certain. While it learns, every run becomes evidence for
+/// the next.
+#[derive(Clone, Debug)]
+pub struct Hybrid {
+    settings: HybridSettings,
+    belief: Belief,
+    remembered: Vec<Evidence>,
+    current: Evidence,
+    estimate: Option<Estimate>,
+    learning: bool,
+    boldness: f64,
+    /// Losses since the last move that kept the ball in view.
+    losses: usize,
+    /// Whether the last sighting cannot have been the ball where it was; it is looked for once more before that is believed.
+    doubt: bool,
+    /// Sightings for which a ball that has just moved is taken to be still moving.
+    moving: usize,
+}
+
+/// The ball and the camera as they are taken to be at the moment.
+#[derive(Clone, Debug)]
+struct Estimate {
+    numbers: Numbers,
+    model: CameraModel,
+    ball: Point3<f64>,
+    covariance: SMatrix<f64, WITH_BALL, WITH_BALL>,
+}
+
+/// A sighting so many standard deviations off, and at least so many units, means that the ball has moved.
+const MOVED: (f64, f64) = (5.0, 3.0);
+/// For so many sightings after it has moved, a ball that has moved again is believed at once.
+const STILL_MOVING: usize = 3;
+/// Room to the border of the frame, feature units, and the range of radii that a move may lead to.
+const MARGIN: f64 = 4.0;
+const RADII: (f64, f64) = (5.5, 55.0);
+/// Shares of the way that are tried, the whole way first.
+const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
+/// Least share of a way that is gone after any number of losses.
+const LEAST_BOLDNESS: f64 = 1.0 / 64.0;
+
+impl Hybrid {
+    /// A controller that knows nothing but `settings`, and learns.
+    pub fn new(settings: HybridSettings) -> Self {
+        Self::with_belief(settings, Belief::new(&settings.prior))
+    }
+
+    /// A controller that has learned before.
+    pub fn with_belief(settings: HybridSettings, belief: Belief) -> Self {
+        Self {
+            settings,
+            belief,
+            remembered: Vec::new(),
+            current: Evidence::default(),
+            estimate: None,
+            learning: true,
+            boldness: 1.0,
+            losses: 0,
+            doubt: false,
+            moving: 0,
+        }
+    }
+
+    /// The same, learning nothing from one run to the next any more.
+    #[must_use]
+    pub fn frozen(mut self) -> Self {
+        self.learning = false;
+        self
+    }
+
+    /// What is believed of the camera, the ball and the gears.
+    pub fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// Takes what was seen of one ball in one place as evidence for the runs to come.
+    fn remember(&mut self) {
+        // One sighting says where the ball is, and nothing of the camera.
+        if self.learning && self.current.len() >= 2 {
+            self.remembered.push(self.current.clone());
+            let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
+            self.remembered.drain(..forgotten);
+        }
+    }
+
+    /// Where camera and ball are, from everything seen in this run.
+    fn estimate(&mut self) -> Option<Estimate> {
+        let start = self
+            .estimate
+            .as_ref()
+            .map_or_else(|| self.belief.numbers(), |e| e.numbers);
+        let fit = Fit::of(&self.belief, &start, &self.settings.nominal, &[&self.current])?;
+        let ball = fit.balls.last().copied().flatten()?;
+        Some(Estimate {
+            model: corrected(&self.settings.nominal, &fit.numbers),
+            numbers: fit.numbers,
+            covariance: fit.with_last_ball.try_inverse()?,
+            ball,
+        })
+    }
+
+    /// Whether what is seen cannot be the ball where it was.
+    fn has_moved(&self, seen: &Features) -> bool {
+        let Some(estimate) = &self.estimate else {
+            return false;
+        };
+        if self.current.len() == 0 {
+            return false;
+        }
+        let view = |numbers: &Numbers, ball: &Point3<f64>| {
+            let links = self.current.links(numbers);
+            corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
+        };
+        let Some((expected, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
+            return true;
+        };
+        let unsure = deviations(&by_all, &estimate.covariance);
+        let off = Vector3::new(seen.x - expected.x, seen.y - expected.y, seen.r - expected.r);
+        (0..3).any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())))
+    }
+
+    /// The longest way toward the goal after which the ball is in view for certain.
+    fn plan(&self, estimate: &Estimate, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        let model = &estimate.model;
+        let links = self.current.links(&estimate.numbers);
+        let camera = model.arm.wrist(links.stand()) * model.mount;
+        let here = camera.inverse_transform_point(&estimate.ball);
+        let goal = model.in_camera(&self.settings.goal)?;
+        // On its line in the image at the distance it has: where to bring a ball that cannot be approached yet.
+        let aside = Point3::from(goal.coords * (here.z / goal.z));
+        let ways = [goal, aside].map(|target| SHARES.map(|share| (target, share)));
+        let mut last = None;
+        for (target, share) in ways.into_iter().flatten() {
+            let wanted = here + (target - here) * (share * self.boldness);
+            let (stand, _) = model.pose_placing(&estimate.ball, &wanted, links.stand());
+            let motors = links.motors_for(&stand, &now.joints);
+            let delta = self.cut(&motors, &now.joints, limits);
+            last = Some(delta);
+            if self.stays_in_view(estimate, &(now.joints + delta)) {
+                break;
+            }
+        }
+        last
+    }
+
+    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits.
+    fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
+        let target = limits.nearest(motors);
+        JointDelta(std::array::from_fn(|i| match self.settings.steps.0.get(i) {
+            Some(most) => (target.0[i] - from.0[i]).min(*most).max(-most),
+            None => 0.0,
+        }))
+    }
+
+    fn stays_in_view(&self, estimate: &Estimate, motors: &Joints) -> bool {
+        let view = |numbers: &Numbers, ball: &Point3<f64>| {
+            let mut links: Links = self.current.links(numbers);
+            links.follow(motors);
+            corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
+        };
+        let Some((f, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
+            return false;
+        };
+        let room = deviations(&by_all, &estimate.covariance) * self.settings.caution;
+        let inside = |v: f64, room: f64, low: f64, high: f64| v - room >= low && v + room <= high;
+        inside(f.x, room[0], MARGIN, Features::WIDTH - MARGIN)
+            && inside(f.y, room[1], MARGIN, Features::HEIGHT - MARGIN)
+            && inside(f.r, room[2], RADII.0, RADII.1)
+    }
+}
+
+impl Controller for Hybrid {
+    fn name(&self) -> &str {
+        "hybrid"
+    }
+
+    fn begin(&mut self) {
+        self.current = Evidence::default();
+        self.estimate = None;
+        self.boldness = 1.0;
+        self.losses = 0;
+        self.doubt = false;
+        self.moving = 0;
+    }
+
+    fn arm_at(&mut self, joints: &Joints) {
+        self.current.arm_at(joints);
+    }
+
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        let odd = self.has_moved(&now.features);
+        if odd && !self.doubt && self.moving == 0 {
+            // A circle that is not the ball, perhaps: the arm stays, and looks again.
+            self.doubt = true;
+            return Ok(JointDelta::default());
+        }
+        self.doubt = false;
+        self.moving = if odd {
+            STILL_MOVING
+        } else {
+            self.moving.saturating_sub(1)
+        };
+        // A ball that was lost twice, though it should have stayed in view for certain, is not where it was taken to be.
+        let mistaken = self.losses >= 2;
+        if odd || mistaken {
+            if !mistaken {
+                self.remember();
+            }
+            self.current.forget_sightings();
+            self.estimate = None;
+        }
+        self.current.saw(now.features);
+        self.estimate = self.estimate();
+        let estimate = self.estimate.as_ref().ok_or(GaveUp::NoMoveLeft)?;
+        self.plan(estimate, now, limits).ok_or(GaveUp::NoMoveLeft)
+    }
+
+    fn judge(&mut self, consequence: &Consequence) {
+        (self.boldness, self.losses) = match consequence {
+            Consequence::Seen(_) => ((1.5 * self.boldness).min(1.0), 0),
+            Consequence::Lost => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses + 1),
+            Consequence::TakenBack => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses),
+        };
+    }
+
+    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        self.current.saw(now.features);
+        self.estimate = self.estimate();
+        let estimate = self.estimate.as_ref()?;
+        let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
+            .map(|i| estimate.covariance[(i, i)])
+            .sum();
+        if uncertainty.sqrt() > self.settings.grip_certainty {
+            return None;
+        }
+        let links = self.current.links(&estimate.numbers);
+        let mut from = *links.stand();
+        from.0[Joint::J5.index()] += self.settings.grip_turn;
+        let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
+        let motors = links.motors_for(&stand, &now.joints);
+        limits.admit(&motors).then(|| motors - now.joints)
+    }
+
+    fn end(&mut self) {
+        self.remember();
+        if !self.learning || self.remembered.is_empty() {
+            return;
+        }
+        let all: Vec<&Evidence> = self.remembered.iter().collect();
+        let prior = Belief::new(&self.settings.prior).with_noise(self.belief.noise());
+        if let Some(fit) = Fit::of(&prior, &self.belief.numbers(), &self.settings.nominal, &all) {
+            self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
+        }
+    }
+}

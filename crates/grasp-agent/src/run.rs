@@ -1,0 +1,382 @@
+//! A run under way: the phases of the state machine and how one leads to the next.
+
+use hough_heuristic::image::GrayImage;
+use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
+
+use crate::{
+    AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, Look, Outcome, Percept,
+    Sighting, Situation,
+};
+
+/// Where the state machine stands.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// Looking around from the search poses.
+    Search,
+    /// The ball is in view.
+    Reach(Sighting),
+    /// The ball was in view from this pose and is not any more.
+    Recover(Joints),
+    /// The ball is where it should be.
+    Grip(Sighting),
+    /// Over, without a grip where there is a reason.
+    End(Option<GaveUp>),
+}
+
+/// What an order to move came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Went {
+    /// The arm stands where it should.
+    There,
+    /// Something was too near; the arm has gone back to where it came from.
+    Back,
+}
+
+pub(crate) struct Run<'a> {
+    config: &'a AgentConfig,
+    controller: &'a mut dyn Controller,
+    eye: &'a mut dyn Eye,
+    arm: &'a mut dyn Manipulator,
+    proximity: &'a mut dyn ProximitySensor,
+    observe: &'a mut dyn FnMut(&Event<'_>),
+    joints: Joints,
+    cycles: usize,
+    losses: usize,
+    last_seen: Option<Sighting>,
+    /// The pose that the last look was taken from, and how many looks from different poses brought the same.
+    looked_from: Joints,
+    same: usize,
+}
+
+impl<'a> Run<'a> {
+    pub(crate) fn new(
+        config: &'a AgentConfig,
+        controller: &'a mut dyn Controller,
+        eye: &'a mut dyn Eye,
+        arm: &'a mut dyn Manipulator,
+        proximity: &'a mut dyn ProximitySensor,
+        observe: &'a mut dyn FnMut(&Event<'_>),
+    ) -> Self {
+        Self {
+            config,
+            controller,
+            eye,
+            arm,
+            proximity,
+            observe,
+            joints: Joints::default(),
+            cycles: 0,
+            losses: 0,
+            last_seen: None,
+            looked_from: Joints::default(),
+            same: 0,
+        }
+    }
+
+    pub(crate) fn until_done(mut self) -> Result<Outcome, AgentError> {
+        let result = self.phases();
+        if let Err(error) = &result {
+            // The first error is the one to report; stopping is all that can still be done.
+            let _ = self.arm.stop();
+            self.tell(EventKind::Failed(error.to_string()), None);
+        }
+        result
+    }
+
+    fn phases(&mut self) -> Result<Outcome, AgentError> {
+        let joints = self.arm.joints()?;
+        self.stand_at(joints);
+        self.arm.set_gripper(Gripper::Open)?;
+        self.tell(EventKind::Started, None);
+        let mut phase = Phase::Search;
+        loop {
+            phase = match phase {
+                Phase::Search => self.search()?,
+                Phase::Reach(sighting) => self.reach(sighting)?,
+                Phase::Recover(last) => self.recover(last)?,
+                Phase::Grip(sighting) => self.grip(sighting)?,
+                Phase::End(gave_up) => {
+                    if let Some(reason) = gave_up {
+                        self.tell(EventKind::GaveUp(reason), None);
+                    }
+                    return Ok(Outcome {
+                        gave_up,
+                        cycles: self.cycles,
+                        losses: self.losses,
+                        last_seen: self.last_seen,
+                        joints: self.joints,
+                    });
+                }
+            };
+        }
+    }
+
+    /// Looks around from the search poses, the nearest pan angle first.
+    fn search(&mut self) -> Result<Phase, AgentError> {
+        for pose in nearest_first(&self.config.search_poses, &self.joints) {
+            let target = self.config.search_poses[pose];
+            if self.go_to(target, EventKind::AtSearchPose(pose))? == Went::Back {
+                continue;
+            }
+            if let Some(sighting) = self.look()? {
+                return Ok(Phase::Reach(sighting));
+            }
+        }
+        Ok(Phase::End(Some(GaveUp::NotFound)))
+    }
+
+    /// One control cycle: sighting, decision, one joint move, next sighting.
+    fn reach(&mut self, sighting: Sighting) -> Result<Phase, AgentError> {
+        let now = self.situation(&sighting);
+        let percept = Percept::new(sighting.features, &self.joints);
+        if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
+            self.tell(EventKind::AtGoal, None);
+            return Ok(Phase::Grip(sighting));
+        }
+        if self.cycles >= self.config.max_cycles {
+            return Ok(Phase::End(Some(GaveUp::OutOfCycles)));
+        }
+        let (limits, from) = (&self.config.limits, self.joints);
+        let delta = match self.controller.decide(&now, limits) {
+            // A controller may be anyone's: what leads out of the limits is not done.
+            Ok(delta) if limits.admit(&(from + delta)) => delta,
+            Ok(_) => return Ok(Phase::End(Some(GaveUp::NoMoveLeft))),
+            Err(reason) => return Ok(Phase::End(Some(reason))),
+        };
+
+        self.cycles += 1;
+        if self.go_by(delta, EventKind::Moved(delta))? == Went::Back {
+            self.controller.judge(&Consequence::TakenBack);
+            return Ok(match self.look()? {
+                Some(sighting) => Phase::Reach(sighting),
+                None => self.lose(from),
+            });
+        }
+        let Some(after) = self.look()? else {
+            self.controller.judge(&Consequence::Lost);
+            return Ok(self.lose(from));
+        };
+        if self
+            .config
+            .approach
+            .exceeded(sighting.features.r, after.features.r)
+        {
+            self.tell(EventKind::TooFast, None);
+            self.controller.judge(&Consequence::TakenBack);
+            self.take_back(from)?;
+            return Ok(match self.look()? {
+                Some(sighting) => Phase::Reach(sighting),
+                None => self.lose(from),
+            });
+        }
+        let then = self.situation(&after);
+        self.controller.judge(&Consequence::Seen(then));
+        Ok(Phase::Reach(after))
+    }
+
+    fn lose(&mut self, from: Joints) -> Phase {
+        self.losses += 1;
+        self.tell(EventKind::Lost, None);
+        Phase::Recover(from)
+    }
+
+    /// Back to where the ball was last seen, then the recovery moves around that pose, then a new search.
+    fn recover(&mut self, last: Joints) -> Result<Phase, AgentError> {
+        let config = self.config;
+        let around = config.recovery.iter().map(|delta| last + *delta);
+        for (attempt, pose) in std::iter::once(last).chain(around).enumerate() {
+            if self.cycles >= config.max_cycles {
+                return Ok(Phase::End(Some(GaveUp::OutOfCycles)));
+            }
+            let pose = config.limits.nearest(&pose);
+            self.cycles += 1;
+            let went = self.go_to(pose, EventKind::Recovering(attempt))?;
+            if went == Went::There
+                && let Some(sighting) = self.look()?
+            {
+                return Ok(Phase::Reach(sighting));
+            }
+        }
+        Ok(Phase::Search)
+    }
+
+    /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind.
+    fn grip(&mut self, sighting: Sighting) -> Result<Phase, AgentError> {
+        let (config, from) = (self.config, self.joints);
+        let now = self.situation(&sighting);
+        let own = self.controller.grip(&now, &config.limits);
+        let delta = own
+            .filter(|delta| config.limits.admit(&(from + *delta)))
+            .unwrap_or(config.grip);
+        if self.go_by(delta, EventKind::Gripping(delta))? == Went::Back {
+            return Ok(Phase::End(Some(GaveUp::Obstructed)));
+        }
+        self.arm.set_gripper(Gripper::Closed)?;
+        self.tell(EventKind::Gripped, None);
+        let Some(lift) = config.lift else {
+            return Ok(Phase::End(None));
+        };
+        let lifted = config.limits.nearest(&(self.joints + lift));
+        if self.go_to(lifted, EventKind::Lifted)? == Went::Back || self.look()?.is_none() {
+            return Ok(Phase::End(None));
+        }
+        self.arm.set_gripper(Gripper::Open)?;
+        self.tell(EventKind::Missed, None);
+        self.cycles += 1;
+        Ok(Phase::Recover(from))
+    }
+
+    fn situation(&self, sighting: &Sighting) -> Situation {
+        Situation {
+            features: sighting.features,
+            joints: self.joints,
+        }
+    }
+
+    /// Moves to `target` and tells `done`; goes back if something is too near there.
+    fn go_to(&mut self, target: Joints, done: EventKind) -> Result<Went, AgentError> {
+        let ordered = self.arm.move_to(target);
+        self.arrive(target, ordered, done)
+    }
+
+    /// The same for a relative move.
+    fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError> {
+        let target = self.joints + delta;
+        let ordered = self.arm.move_by(delta);
+        self.arrive(target, ordered, done)
+    }
+
+    fn arrive(
+        &mut self,
+        target: Joints,
+        ordered: Result<Joints, ArmError>,
+        done: EventKind,
+    ) -> Result<Went, AgentError> {
+        let from = self.joints;
+        let stopped_short = matches!(ordered, Err(ArmError::NotReached { .. }));
+        let reached = match ordered {
+            Ok(joints) => joints,
+            // An arm that its sensors have stopped stands somewhere on the way.
+            Err(ArmError::NotReached { .. }) => self.arm.joints()?,
+            Err(error) => return Err(error.into()),
+        };
+        self.stand_at(reached);
+        self.tell(done, None);
+        let near = self.proximity.object_near()?;
+        if !near {
+            if let (true, Err(error)) = (stopped_short, ordered) {
+                return Err(error.into());
+            }
+            self.check_reached(&target)?;
+            return Ok(Went::There);
+        }
+        self.arm.stop()?;
+        self.tell(EventKind::TooNear, None);
+        self.take_back(from)?;
+        Ok(Went::Back)
+    }
+
+    /// Goes back the way the arm came.
+    fn take_back(&mut self, from: Joints) -> Result<(), AgentError> {
+        let reached = self.arm.move_to(from)?;
+        self.stand_at(reached);
+        self.tell(EventKind::TakenBack, None);
+        self.check_reached(&from)
+    }
+
+    fn stand_at(&mut self, joints: Joints) {
+        self.joints = joints;
+        self.controller.arm_at(&joints);
+    }
+
+    /// Whether the arm is where it was sent; an arm that says it has moved and has not is stuck.
+    fn check_reached(&self, target: &Joints) -> Result<(), AgentError> {
+        let off = |joint: Joint| (self.joints[joint] - target[joint]).abs();
+        let stuck = Joint::ALL
+            .into_iter()
+            .find(|joint| off(*joint).is_nan() || off(*joint) > self.config.reach_tolerance);
+        match stuck {
+            None => Ok(()),
+            Some(joint) => Err(ArmError::NotReached {
+                port: "the arm".into(),
+                joint,
+                wanted_degrees: target[joint].to_degrees(),
+                reported_degrees: self.joints[joint].to_degrees(),
+            }
+            .into()),
+        }
+    }
+
+    /// Looks, a few times if need be, for the ball from where the arm stands.
+    fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
+        for _ in 0..self.config.looks {
+            let Look { frame, ball } = self.eye.look()?;
+            let ball = ball.filter(|sighting| is_finite(sighting));
+            if let Some(sighting) = ball {
+                self.tell(EventKind::Seen(sighting), frame.as_ref());
+                self.check_alive(&sighting)?;
+                self.last_seen = Some(sighting);
+                return Ok(Some(sighting));
+            }
+            self.tell(EventKind::NotSeen, frame.as_ref());
+        }
+        Ok(None)
+    }
+
+    /// A ball that stays at exactly the same place while the camera moves is an old frame.
+    fn check_alive(&mut self, sighting: &Sighting) -> Result<(), AgentError> {
+        const A_MOVE: f64 = 0.002;
+        let moved = (0..3).any(|i| (self.joints.0[i] - self.looked_from.0[i]).abs() > A_MOVE);
+        if !moved {
+            return Ok(());
+        }
+        self.looked_from = self.joints;
+        let same = self
+            .last_seen
+            .is_some_and(|last| last.features == sighting.features);
+        self.same = if same { self.same + 1 } else { 0 };
+        if self.same >= self.config.same_frames {
+            return Err(AgentError::FrozenCamera { looks: self.same + 1 });
+        }
+        Ok(())
+    }
+
+    fn tell(&mut self, kind: EventKind, frame: Option<&GrayImage>) {
+        (self.observe)(&Event {
+            cycle: self.cycles,
+            kind,
+            joints: self.joints,
+            frame,
+        });
+    }
+}
+
+/// A detector may be anyone's: what is not a number is no ball.
+fn is_finite(sighting: &Sighting) -> bool {
+    let f = sighting.features;
+    f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0
+}
+
+/// Indices of `poses`, the one whose first joint is nearest to that of `joints` first.
+fn nearest_first(poses: &[Joints], joints: &Joints) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..poses.len()).collect();
+    order.sort_by(|&a, &b| {
+        let pan = |pose: usize| (poses[pose].0[0] - joints.0[0]).abs();
+        pan(a).total_cmp(&pan(b))
+    });
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn search_begins_at_the_nearest_pan_angle() {
+        let poses: Vec<Joints> = [-75.0, -50.0, -25.0, 0.0, 25.0, 50.0]
+            .map(|p| Joints::from_degrees([p, 0.0, 0.0, 0.0, 0.0, 0.0]))
+            .into();
+        let at = Joints::from_degrees([20.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(nearest_first(&poses, &at), [4, 3, 5, 2, 1, 0]);
+    }
+}

@@ -1,0 +1,130 @@
+//! Bad input and faults: the arm stops, the cause is in the log and in a typed error, what was learned is kept.
+
+use grasp_agent::puma_val2::ArmError;
+use grasp_agent::{
+    Agent, AgentError, CameraModel, EventKind, EventLog, GaveUp, Hybrid, HybridSettings, PositionBased,
+    ServoSettings,
+};
+
+use crate::cell::{Fault, Shared, config};
+
+fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, Shared) {
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], fault);
+    let mut agent = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut log = EventLog::default();
+    (cell.run(&mut agent, &mut log), log, cell)
+}
+
+#[test]
+fn without_a_fault_the_ball_is_gripped() {
+    let (end, log, cell) = end_of(Fault::None);
+    assert_eq!(end.unwrap().gave_up, None);
+    assert_eq!(log.events.last().unwrap().kind, EventKind::Gripped);
+    assert!(cell.0.borrow().closed && cell.miss() < 0.003, "{}", cell.miss());
+}
+
+#[test]
+fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
+    type Check = fn(&AgentError) -> bool;
+    let cases: [(Fault, Check); 4] = [
+        (Fault::NoFrame(3), |e| matches!(e, AgentError::Camera(_))),
+        (Fault::FrozenFrame(3), |e| {
+            matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        (Fault::ArmStuck(3), |e| {
+            matches!(e, AgentError::Arm(ArmError::NotReached { .. }))
+        }),
+        (Fault::LineDead(4), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
+        }),
+    ];
+    for (fault, expected) in cases {
+        let (end, log, cell) = end_of(fault);
+        let error = end.unwrap_err();
+        assert!(expected(&error), "{fault:?}: {error}");
+        assert_eq!(
+            log.events.last().unwrap().kind,
+            EventKind::Failed(error.to_string()),
+            "{fault:?}"
+        );
+        assert!(cell.0.borrow().stops > 0 && !cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn what_is_no_number_is_no_ball() {
+    let (end, ..) = end_of(Fault::Garbage);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
+}
+
+#[test]
+fn something_near_stops_the_arm_and_takes_it_back() {
+    let (end, log, cell) = end_of(Fault::Near(3));
+    assert_eq!(end.unwrap().gave_up, None);
+    let near = log
+        .events
+        .iter()
+        .position(|event| event.kind == EventKind::TooNear)
+        .unwrap();
+    assert_eq!(log.events[near + 1].kind, EventKind::TakenBack);
+    // The move before the last one led to where it is taken back to.
+    assert_eq!(
+        log.events[near + 1].joints,
+        log.events[..near - 1].iter().last().unwrap().joints
+    );
+    assert!(cell.0.borrow().stops > 0);
+}
+
+#[test]
+fn a_ball_that_is_not_gripped_is_reached_for_again() {
+    let mut with_lift = config();
+    with_lift.lift = Some(puma_val2::JointDelta::from_degrees([
+        0.0, -15.0, 0.0, 0.0, 18.01, 0.0,
+    ]));
+    with_lift.max_cycles = 12;
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut agent = Agent::with_controller(with_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut log = EventLog::default();
+    let outcome = cell.run(&mut agent, &mut log).unwrap();
+    // In this cell nothing ever holds the ball, so every grip is a miss.
+    let missed = log
+        .events
+        .iter()
+        .filter(|event| event.kind == EventKind::Missed)
+        .count();
+    assert!(
+        missed > 1 && outcome.gave_up == Some(GaveUp::OutOfCycles),
+        "{missed} {outcome:?}"
+    );
+    assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn false_circles_neither_mislead_the_hybrid_for_long_nor_what_it_learns() {
+    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let mut reached = 0;
+    for run in 0..20 {
+        let cell = Shared::new(
+            CameraModel::paper(),
+            [0.6, 0.02 * f64::from(run) - 0.2, -0.1],
+            Fault::FalseCircle,
+        );
+        let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
+        reached += usize::from(outcome.gave_up.is_none());
+    }
+    assert!(reached >= 18, "{reached}");
+    let mean = agent.controller().belief().mean();
+    assert!(
+        mean[0].abs() < 0.02 && mean[3..6].iter().all(|turn| turn.abs() < 0.02),
+        "{mean:?}"
+    );
+}
+
+#[test]
+fn what_was_learned_before_the_line_died_is_kept() {
+    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let untaught = agent.controller().belief().clone();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::LineDead(3));
+    assert!(cell.run(&mut agent, &mut EventLog::default()).is_err());
+    assert_ne!(*agent.controller().belief(), untaught);
+}

@@ -1,0 +1,48 @@
+//! The log of a run replays to the same run.
+
+use grasp_agent::{
+    Agent, AgentError, CameraModel, Controller, EventLog, Hybrid, HybridSettings, ImageBased, JacobianAt,
+    PositionBased, ServoSettings,
+};
+
+use crate::cell::{Fault, Shared, config};
+
+fn replays<C: Controller + Clone>(controller: C, fault: Fault) {
+    let agent = Agent::with_controller(config(), controller).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
+    let mut log = EventLog::default();
+    let end = cell.run(&mut agent.clone(), &mut log);
+    match (end, log.replay(&agent)) {
+        (Ok(then), Ok((now, again))) => {
+            assert_eq!(then, now);
+            assert_eq!(log, again);
+        }
+        (Err(_), Err(now)) => assert!(!matches!(now, AgentError::Replay { .. }), "{now}"),
+        (then, now) => panic!("{then:?} and {now:?}"),
+    }
+}
+
+#[test]
+fn logs_replay_to_the_same_run() {
+    let servo = ServoSettings::paper();
+    for fault in [Fault::None, Fault::Near(4), Fault::FalseCircle] {
+        replays(PositionBased::new(servo), fault);
+        replays(ImageBased::new(servo, JacobianAt::Goal), fault);
+        replays(Hybrid::new(HybridSettings::paper()), fault);
+    }
+}
+
+#[test]
+fn another_controller_is_told_apart() {
+    let servo = ServoSettings::paper();
+    let agent = Agent::with_controller(config(), PositionBased::new(servo)).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], Fault::None);
+    let mut log = EventLog::default();
+    cell.run(&mut agent.clone(), &mut log).unwrap();
+    let other = Agent::with_controller(config(), PositionBased::new(servo.with_gain(0.5))).unwrap();
+    assert!(matches!(log.replay(&other), Err(AgentError::Replay { .. })));
+    let cut = EventLog {
+        events: log.events[..log.events.len() / 2].to_vec(),
+    };
+    assert!(matches!(cut.replay(&agent), Err(AgentError::Replay { .. })));
+}

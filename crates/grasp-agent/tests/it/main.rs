@@ -1,0 +1,8 @@
+//! The agent on a small simulated cell of its own, made of the camera model and the arm's kinematics.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod cell;
+mod faults;
+mod hybrid;
+mod log;
+mod rivals;

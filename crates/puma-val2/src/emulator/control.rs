@@ -1,0 +1,131 @@
+//! Branches and loops of a program.
+
+use std::sync::Arc;
+
+use super::expr::is_true;
+use super::instruction::Instruction;
+use super::job::{Flow, Job, Loop};
+use super::program::Program;
+use super::{Emulator, Fault, Message};
+
+impl Emulator {
+    /// `GOTO`, `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their parts. The frame's step already points behind the instruction.
+    pub(super) fn control(&mut self, instruction: &Instruction, job: &mut Job) -> Result<Flow, Fault> {
+        let frame = job.frames.last_mut().ok_or(Message::IllegalInstruction)?;
+        let program = Arc::clone(&frame.program);
+        let at = frame.step - 1;
+        let scope = self.scope();
+        Ok(match instruction {
+            Instruction::Goto(label) => Flow::Jump(program.labelled(*label)?),
+            Instruction::IfGoto(condition, label) => {
+                if is_true(condition.value(&scope)?) {
+                    Flow::Jump(program.labelled(*label)?)
+                } else {
+                    Flow::Next
+                }
+            }
+            Instruction::IfThen(condition) => {
+                if is_true(condition.value(&scope)?) {
+                    Flow::Next
+                } else {
+                    Flow::Jump(program.next_part(at)? + 1)
+                }
+            }
+            Instruction::Else => Flow::Jump(program.end_of(at)? + 1),
+            Instruction::While(condition) => {
+                if is_true(condition.value(&scope)?) {
+                    Flow::Next
+                } else {
+                    Flow::Jump(program.end_of(at)? + 1)
+                }
+            }
+            Instruction::Do => Flow::Next,
+            Instruction::Until(condition) => {
+                if is_true(condition.value(&scope)?) {
+                    Flow::Next
+                } else {
+                    Flow::Jump(program.head_of(at)? + 1)
+                }
+            }
+            Instruction::Case(of) => {
+                let of = of.value(&scope)?;
+                Flow::Jump(self.branch(&program, at, of)?)
+            }
+            Instruction::Value(_) | Instruction::Any => Flow::Jump(program.end_of(at)? + 1),
+            Instruction::For {
+                variable,
+                from,
+                to,
+                step,
+            } => {
+                let key = variable.key(&scope)?;
+                let (from, to) = (from.value(&scope)?, to.value(&scope)?);
+                let step = step.as_ref().map_or(Ok(1.0), |s| s.value(&scope))?;
+                if step == 0.0 {
+                    return Err(Message::InvalidArgument.into());
+                }
+                frame.loops.retain(|l| l.head != at);
+                let end = program.end_of(at)?;
+                let empty = if step > 0.0 { from > to } else { from < to };
+                self.memory.set_real(key.clone(), from, &self.profile)?;
+                if empty {
+                    Flow::Jump(end + 1)
+                } else {
+                    frame.loops.push(Loop {
+                        head: at,
+                        key,
+                        to,
+                        step,
+                    });
+                    Flow::Next
+                }
+            }
+            Instruction::End => {
+                let head = program.head_of(at)?;
+                match program.steps[head].instruction {
+                    Instruction::While(_) => Flow::Jump(head),
+                    Instruction::For { .. } => {
+                        let Some(index) = frame.loops.iter().position(|l| l.head == head) else {
+                            return Ok(Flow::Next);
+                        };
+                        let turn = &frame.loops[index];
+                        let next = scope.real(&turn.key)? + turn.step;
+                        let key = turn.key.clone();
+                        let over = if turn.step > 0.0 {
+                            next > turn.to
+                        } else {
+                            next < turn.to
+                        };
+                        if over {
+                            frame.loops.remove(index);
+                        }
+                        self.memory.set_real(key, next, &self.profile)?;
+                        if over { Flow::Next } else { Flow::Jump(head + 1) }
+                    }
+                    _ => Flow::Next,
+                }
+            }
+            _ => return Err(Message::IllegalInstruction.into()),
+        })
+    }
+
+    /// The step of a `CASE` to go on with: behind the first `VALUE` that fits, behind `ANY`, or behind the `END`.
+    #[allow(clippy::float_cmp)] // `VALUE` compares as the controller does.
+    fn branch(&self, program: &Program, case: usize, of: f64) -> Result<usize, Fault> {
+        let scope = self.scope();
+        let mut at = program.next_part(case)?;
+        loop {
+            match &program.steps[at].instruction {
+                Instruction::Value(values) => {
+                    for value in values {
+                        if value.value(&scope)? == of {
+                            return Ok(at + 1);
+                        }
+                    }
+                }
+                _ => return Ok(at + 1),
+            }
+            at = program.next_part(at)?;
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! What is being carried out: a program step by step, one instruction for `DO`, or a calibration.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::arm::Speed;
+use super::dialogue::Mode;
+use super::expr::{Expr, is_true};
+use super::instruction::Instruction;
+use super::program::Program;
+use super::{Emulator, Event, Fault, Message};
+
+/// Deepest nesting of `CALL`.
+pub(super) const CALL_DEPTH: usize = 16;
+
+/// Something that is being carried out.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) kind: JobKind,
+    /// The program and those that called it, innermost last. Empty for `DO`.
+    pub(super) frames: Vec<Frame>,
+    pub(super) wait: Wait,
+    pub(super) next_step: Duration,
+    /// Cycles left after this one; `None` for ever.
+    pub(super) cycles_left: Option<u32>,
+    /// How it ends as soon as the arm stands.
+    pub(super) ending: Option<Message>,
+    /// What `DO` carries out as soon as the motion before it has ended.
+    pub(super) pending: Option<Instruction>,
+    /// Stop after one step, for `NEXT`.
+    pub(super) single: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum JobKind {
+    Program,
+    Do,
+    Calibration,
+}
+
+#[derive(Debug)]
+pub(super) struct Frame {
+    pub(super) name: String,
+    pub(super) program: Arc<Program>,
+    pub(super) step: usize,
+    pub(super) loops: Vec<Loop>,
+}
+
+/// A `FOR` under way.
+#[derive(Debug)]
+pub(super) struct Loop {
+    pub(super) head: usize,
+    pub(super) key: String,
+    pub(super) to: f64,
+    pub(super) step: f64,
+}
+
+#[derive(Debug, PartialEq)]
+pub(super) enum Wait {
+    Nothing,
+    /// Until the arm stands.
+    Motion,
+    Until(Duration),
+    Condition(Expr),
+    /// Until the terminal has answered.
+    Answer,
+}
+
+/// What carrying out an instruction leads to.
+pub(super) enum Flow {
+    /// On to the next step.
+    Next,
+    /// The same step again when the arm stands.
+    WhenStanding,
+    /// To this step.
+    Jump(usize),
+    /// Wait, then on to the next step.
+    Wait(Wait),
+    /// Into a program.
+    Call(String),
+    Return,
+    /// The present cycle is over.
+    EndOfCycle,
+    Pause,
+    Halt,
+}
+
+impl Job {
+    fn new(kind: JobKind, now: Duration) -> Self {
+        Self {
+            kind,
+            frames: Vec::new(),
+            wait: Wait::Nothing,
+            next_step: now,
+            cycles_left: Some(0),
+            ending: None,
+            pending: None,
+            single: false,
+        }
+    }
+
+    pub(super) fn is_program(&self) -> bool {
+        self.kind == JobKind::Program
+    }
+
+    /// Name and step (from 1) of the innermost program.
+    pub(super) fn at(&self) -> Option<(&str, usize)> {
+        self.frames.last().map(|f| (f.name.as_str(), f.step + 1))
+    }
+
+    pub(super) fn cycles_left(&self) -> Option<u32> {
+        self.cycles_left
+    }
+
+    /// The signal that a `WAIT` waits for may come; show what it waits for.
+    pub(super) fn waits(&self) -> bool {
+        matches!(self.wait, Wait::Condition(_) | Wait::Answer)
+    }
+}
+
+impl Emulator {
+    fn step_time(&self) -> Duration {
+        self.profile.step_time.max(Duration::from_micros(100))
+    }
+
+    /// When the job goes on of itself.
+    pub(super) fn job_due(&self, job: &Job) -> Option<Duration> {
+        if job.ending.is_some() {
+            return (!self.arm.moving()).then_some(self.now);
+        }
+        match &job.wait {
+            Wait::Nothing => Some(job.next_step),
+            Wait::Motion => (!self.arm.moving()).then_some(job.next_step),
+            Wait::Until(at) => Some(*at),
+            Wait::Condition(condition) => {
+                let met = condition.value(&self.scope()).map_or(true, is_true);
+                met.then_some(job.next_step)
+            }
+            Wait::Answer => None,
+        }
+    }
+
+    /// Starts a program.
+    pub(super) fn start_program(
+        &mut self,
+        name: &str,
+        cycles: Option<u32>,
+        step: usize,
+        single: bool,
+    ) -> Result<(), Fault> {
+        let frame = self.frame(name, step)?;
+        self.arm.forget_words();
+        self.arm.program_speed = Speed::FULL;
+        self.reactions.clear();
+        let mut job = Job::new(JobKind::Program, self.now + self.step_time());
+        job.frames.push(frame);
+        job.cycles_left = cycles.map(|n| n.saturating_sub(1));
+        job.single = single;
+        self.job = Some(job);
+        self.paused = None;
+        self.note(Event::ProgramStarted(name.to_owned()));
+        Ok(())
+    }
+
+    pub(super) fn frame(&self, name: &str, step: usize) -> Result<Frame, Fault> {
+        let program = self
+            .memory
+            .programs
+            .get(name)
+            .ok_or(Message::UndefinedProgram)?
+            .clone();
+        program.check().map_err(|_| Message::ControlStructure)?;
+        if step > program.steps.len() {
+            return Err(Message::InvalidArgument.into());
+        }
+        Ok(Frame {
+            name: name.to_owned(),
+            program,
+            step,
+            loops: Vec::new(),
+        })
+    }
+
+    /// Goes on with a program that was paused, aborted or refused, at its next step or (`again`) at the one it stopped in.
+    pub(super) fn resume_program(&mut self, again: bool, single: bool) -> Result<(), Fault> {
+        let mut job = self.paused.take().ok_or(Message::NotRunning)?;
+        if again && let Some(frame) = job.frames.last_mut() {
+            frame.step = frame.step.saturating_sub(1);
+        }
+        job.ending = None;
+        job.wait = Wait::Nothing;
+        job.next_step = self.now + self.step_time();
+        job.single = single;
+        self.job = Some(job);
+        Ok(())
+    }
+
+    /// Carries out one instruction for `DO`; the prompt comes when it is done.
+    pub(super) fn do_instruction(&mut self, instruction: &Instruction) -> Result<(), Fault> {
+        if instruction.needs_program() {
+            return Err(Message::IllegalInstruction.into());
+        }
+        if matches!(instruction, Instruction::React { .. }) && !self.profile.react_at_monitor {
+            return Err(Message::IllegalInstruction.into());
+        }
+        if let Instruction::Call(name) = instruction {
+            return self
+                .start_program(name, Some(1), 0, false)
+                .map(|()| self.prompt());
+        }
+        let mut job = Job::new(JobKind::Do, self.now);
+        match self.carry_out(instruction, &mut job)? {
+            Flow::WhenStanding => {
+                job.pending = Some(instruction.clone());
+                job.wait = Wait::Motion;
+            }
+            Flow::Wait(wait) => job.wait = wait,
+            _ => {}
+        }
+        if job.wait == Wait::Nothing && self.arm.moving() {
+            if !self.profile.do_blocks {
+                self.prompt();
+                return Ok(());
+            }
+            job.wait = Wait::Motion;
+        }
+        if job.wait == Wait::Nothing {
+            self.prompt();
+            return Ok(());
+        }
+        if !matches!(self.mode, Mode::Answer(_)) {
+            self.mode = Mode::Busy;
+        }
+        self.job = Some(job);
+        Ok(())
+    }
+
+    pub(super) fn start_calibration_job(&mut self) {
+        let mut job = Job::new(JobKind::Calibration, self.now);
+        job.wait = Wait::Motion;
+        self.job = Some(job);
+        self.mode = Mode::Busy;
+    }
+
+    /// The arm has come to a stand.
+    pub(super) fn motion_ended(&mut self, outcome: Result<(), Fault>) {
+        self.sense();
+        self.note(Event::MotionEnded);
+        if let Err(fault) = outcome {
+            self.fail_job(fault);
+        }
+    }
+
+    /// Stops the arm and ends the job; `PROCEED` can go on with a program.
+    pub(super) fn stop_job(&mut self, how: Message) {
+        if self.arm.moving() {
+            self.note(Event::MotionBrokenOff);
+        }
+        self.arm.break_off(self.now, self.profile.stop_time);
+        if let Some(job) = &mut self.job {
+            job.ending = Some(how);
+        }
+    }
+
+    /// Ends the job with a message in asterisks; without a job the message comes unasked.
+    pub(super) fn fail_job(&mut self, fault: Fault) {
+        let job = self.job.take();
+        self.refuse(fault);
+        match job {
+            Some(job) => self.end_job(job, Message::Aborted),
+            None => {
+                if matches!(self.mode, Mode::Monitor) {
+                    self.prompt();
+                }
+            }
+        }
+    }
+
+    /// The terminal has answered a `PROMPT`.
+    pub(super) fn answered(&mut self) {
+        match self.job.as_mut() {
+            Some(job) => {
+                job.wait = Wait::Nothing;
+                job.next_step = self.now;
+                if job.kind == JobKind::Program {
+                    self.prompt();
+                }
+            }
+            None => self.prompt(),
+        }
+    }
+
+    /// Lets the job go on if it can.
+    pub(super) fn run_job(&mut self) {
+        let due = |emulator: &Self| emulator.job.as_ref().and_then(|job| emulator.job_due(job));
+        if due(self).is_none_or(|at| at > self.now) {
+            return;
+        }
+        let Some(mut job) = self.job.take() else { return };
+        if let Some(how) = job.ending {
+            return self.end_job(job, how);
+        }
+        if let Wait::Condition(condition) = &job.wait
+            && let Err(fault) = condition.value(&self.scope())
+        {
+            self.refuse(fault);
+            return self.end_job(job, Message::Aborted);
+        }
+        job.wait = Wait::Nothing;
+        if let Some(instruction) = job.pending.take() {
+            self.mode = Mode::Monitor;
+            if let Err(fault) = self.do_instruction(&instruction) {
+                self.refuse(fault);
+                self.prompt();
+            }
+            return;
+        }
+        if job.kind != JobKind::Program {
+            return self.end_job(job, Message::Completed);
+        }
+        self.sense();
+        job.next_step = self.now + self.step_time();
+        match self.program_step(&mut job) {
+            Ok(None) => {
+                self.job = Some(job);
+                self.check_reactions();
+            }
+            Ok(Some(how)) if self.arm.moving() => {
+                job.ending = Some(how);
+                self.job = Some(job);
+            }
+            Ok(Some(how)) => self.end_job(job, how),
+            Err(fault) => {
+                self.refuse(fault);
+                self.arm.break_off(self.now, self.profile.stop_time);
+                self.end_job(job, Message::Aborted);
+            }
+        }
+    }
+
+    fn end_job(&mut self, job: Job, how: Message) {
+        match job.kind {
+            JobKind::Calibration => {
+                if how == Message::Completed {
+                    self.calibration_done();
+                }
+            }
+            JobKind::Do => {}
+            JobKind::Program => {
+                let text = self.profile.text(how).to_owned();
+                let line = match job.at() {
+                    Some((name, step)) if how != Message::Completed => {
+                        format!("{text} at {name}, step {step}")
+                    }
+                    _ => text,
+                };
+                self.print_line(&line);
+                self.note(Event::ProgramEnded(how));
+                self.reactions.clear();
+                if how != Message::Completed {
+                    self.paused = Some(job);
+                }
+                if !matches!(self.mode, Mode::Monitor | Mode::Busy | Mode::Answer(_)) {
+                    // The terminal is in another dialogue, which goes on.
+                    return;
+                }
+            }
+        }
+        self.prompt();
+    }
+
+    /// One step of a program. `Some` says how the program ends.
+    fn program_step(&mut self, job: &mut Job) -> Result<Option<Message>, Fault> {
+        let Some(frame) = job.frames.last_mut() else {
+            return Ok(Some(Message::Completed));
+        };
+        let program = Arc::clone(&frame.program);
+        let at = frame.step;
+        let flow = match program.steps.get(at) {
+            Some(step) => {
+                frame.step = at + 1;
+                self.carry_out(&step.instruction, job)?
+            }
+            None => Flow::Return,
+        };
+        let Some(frame) = job.frames.last_mut() else {
+            return Ok(Some(Message::Completed));
+        };
+        match flow {
+            Flow::Next => {}
+            Flow::WhenStanding => {
+                frame.step = at;
+                job.wait = Wait::Motion;
+                return Ok(None);
+            }
+            Flow::Jump(to) => frame.step = to,
+            Flow::Wait(wait) => job.wait = wait,
+            Flow::Call(name) => {
+                if job.frames.len() >= CALL_DEPTH {
+                    return Err(Message::OutOfMemory.into());
+                }
+                job.frames.push(self.frame(&name, 0)?);
+            }
+            Flow::Return if job.frames.len() > 1 => {
+                job.frames.pop();
+            }
+            Flow::Return | Flow::EndOfCycle => {
+                job.frames.truncate(1);
+                match &mut job.cycles_left {
+                    Some(0) => return Ok(Some(Message::Completed)),
+                    Some(left) => *left -= 1,
+                    None => {}
+                }
+                job.frames[0].step = 0;
+                job.frames[0].loops.clear();
+            }
+            Flow::Pause => return Ok(Some(Message::Paused)),
+            Flow::Halt => return Ok(Some(Message::Halted)),
+        }
+        Ok(job.single.then_some(Message::Paused))
+    }
+}

@@ -1,0 +1,61 @@
+//! `REACT` and `REACTI`: what happens when a signal comes.
+
+use super::job::{CALL_DEPTH, JobKind, Wait};
+use super::{Emulator, Event, Message};
+
+/// An armed `REACT` or `REACTI`.
+#[derive(Clone, Debug)]
+pub(super) struct Reaction {
+    /// Negative: reacts when the signal is off.
+    pub(super) signal: f64,
+    pub(super) program: Option<String>,
+    pub(super) at_once: bool,
+}
+
+impl Emulator {
+    /// Looks whether a signal has come that somebody waits for.
+    pub(super) fn check_reactions(&mut self) {
+        let due = |r: &Reaction| self.scope().signal(r.signal).unwrap_or(false);
+        let Some(index) = self.reactions.iter().position(due) else {
+            return;
+        };
+        let runs_program = self
+            .job
+            .as_ref()
+            .is_some_and(|job| job.kind == JobKind::Program && job.ending.is_none());
+        let moves = self.arm.moving();
+        if !runs_program && !moves {
+            return;
+        }
+        let reaction = self.reactions.remove(index);
+        if reaction.at_once && moves {
+            self.arm.break_off(self.now, self.profile.stop_time);
+            self.note(Event::MotionBrokenOff);
+        }
+        let Some(name) = reaction.program else { return };
+        let called = self.frame(&name, 0);
+        match (&mut self.job, called) {
+            (Some(job), Ok(frame)) if job.kind == JobKind::Program && job.frames.len() < CALL_DEPTH => {
+                if matches!(job.wait, Wait::Until(_) | Wait::Condition(_)) {
+                    // What was waited for is waited for again after the reaction.
+                    if let Some(waiting) = job.frames.last_mut() {
+                        waiting.step = waiting.step.saturating_sub(1);
+                    }
+                }
+                job.frames.push(frame);
+                if reaction.at_once || !matches!(job.wait, Wait::Motion) {
+                    job.wait = if moves && reaction.at_once {
+                        Wait::Motion
+                    } else {
+                        Wait::Nothing
+                    };
+                }
+                job.next_step = self.now;
+            }
+            (Some(job), Ok(_)) if job.kind == JobKind::Program => self.fail_job(Message::OutOfMemory.into()),
+            (Some(_), Ok(_)) => {}
+            (None, Ok(_)) => {}
+            (_, Err(fault)) => self.fail_job(fault),
+        }
+    }
+}

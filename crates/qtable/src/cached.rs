@@ -1,0 +1,410 @@
+//! Boltzmann exploration at the speed of the cache.
+
+use rand::Rng;
+
+use crate::elementary::exp_single;
+use crate::error::check_setting;
+use crate::{Action, Boltzmann, Error, QTable, State, Status, Step, Value};
+
+/// Actions that lie together, and blocks that a row is divided into: what is compared at once.
+const GROUP: usize = 16;
+const BLOCKS: usize = 8;
+/// A row's offset follows its maximum once they are this many temperatures apart. The largest weight of a row lies
+/// within `exp(±30)`, where even the sum of a million of them is far from the ends of `f32`.
+const DRIFT: f64 = 30.0;
+
+/// A table of `f32` for Q-learning with Boltzmann exploration at one temperature, which computes one exponential for
+/// each *update* instead of one for each action of each choice.
+///
+/// The weights `exp((Q - c) / T)` are kept beside the values, with one offset c for each state and running sums over
+/// the eight blocks of a row and within each block. A choice compares them with one random number, which needs no branch and no
+/// sum; an update writes one weight and sums its block anew, so that nothing drifts. While T stands still this is the
+/// distribution of [`Boltzmann`] to the rounding of `f32`: no probability is off by more than 1e-6. The draws are not the
+/// same ones. A change of the temperature rebuilds all weights, so it is made in blocks of many actions:
+/// [`train_in_blocks`](crate::train_in_blocks).
+///
+/// [`Boltzmann`] with [`QLearning`](crate::QLearning) is the readable form of the same thing.
+#[derive(Clone, Debug)]
+pub struct CachedBoltzmann {
+    actions: usize,
+    /// Groups of a row.
+    groups_per_row: usize,
+    /// Groups of a block, as a power of two: 0 for up to 128 actions.
+    block_shift: u32,
+    temperature: f64,
+    /// 1 / T.
+    inverse: f64,
+    heads: Vec<Head>,
+    groups: Vec<Group>,
+}
+
+/// What there is once for each state. Here and below the alignment is that of a cache line, so that no vector lies
+/// across two of them.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Head {
+    /// The offset c.
+    offset: f64,
+    max: f32,
+    best: u32,
+    /// The sum of the weights of each block.
+    sums: [f32; BLOCKS],
+    /// The sum of the weights up to the end of each block; the last is the sum of all.
+    ends: [f32; BLOCKS],
+}
+
+/// What there is for each action, 16 of them.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Group {
+    /// Values; negative infinity for the padding of a row and for forbidden actions.
+    values: [f32; GROUP],
+    /// Weights; 0 for the padding and for forbidden actions.
+    weights: [f32; GROUP],
+    /// The sum of the weights of the block up to and with each.
+    running: [f32; GROUP],
+    visits: [u32; GROUP],
+}
+
+const NO_ACTIONS: Group = Group {
+    values: [f32::NEG_INFINITY; GROUP],
+    weights: [0.0; GROUP],
+    running: [0.0; GROUP],
+    visits: [0; GROUP],
+};
+
+impl CachedBoltzmann {
+    /// A copy of a table (values, visits and mask) with the weights for a temperature, in units of the values.
+    ///
+    /// # Errors
+    /// A temperature outside `1e-6..=1e6`, or a value too large for `f32`.
+    pub fn new<V: Value>(table: &QTable<V>, temperature: f64) -> Result<Self, Error> {
+        let (states, actions) = (table.states(), table.actions());
+        let groups_per_row = actions.div_ceil(GROUP);
+        let block_shift = groups_per_row
+            .div_ceil(BLOCKS)
+            .next_power_of_two()
+            .trailing_zeros();
+        let head = Head {
+            offset: 0.0,
+            max: 0.0,
+            best: 0,
+            sums: [0.0; BLOCKS],
+            ends: [0.0; BLOCKS],
+        };
+        let mut cached = Self {
+            actions,
+            groups_per_row,
+            block_shift,
+            temperature: 1.0,
+            inverse: 1.0,
+            heads: vec![head; states],
+            groups: vec![NO_ACTIONS; states * groups_per_row],
+        };
+        for state in (0..states).map(State) {
+            for action in table.offered(state) {
+                let value = table.value(state, action).to_f64();
+                let group = &mut cached.groups[state.0 * groups_per_row + action.0 / GROUP];
+                group.values[action.0 % GROUP] = finite(state, action, value)?;
+                group.visits[action.0 % GROUP] = table.visits(state, action);
+            }
+            cached.find_best(state);
+        }
+        cached.set_temperature(temperature)?;
+        Ok(cached)
+    }
+
+    /// Changes the temperature and rebuilds all weights.
+    ///
+    /// # Errors
+    /// A temperature outside `1e-6..=1e6`.
+    pub fn set_temperature(&mut self, temperature: f64) -> Result<(), Error> {
+        let valid = (Boltzmann::COLDEST..=Boltzmann::HOTTEST).contains(&temperature);
+        check_setting("the temperature", temperature, valid, "in 1e-6..=1e6")?;
+        self.temperature = temperature;
+        self.inverse = 1.0 / temperature;
+        for state in 0..self.heads.len() {
+            self.rebuild(State(state));
+        }
+        Ok(())
+    }
+
+    /// One step of Q-learning (Eq. 3) with a given α: `action` taken in `state` led to `step`. Counts the visit and
+    /// returns the error before the update. Nothing is bootstrapped through a step that terminated the episode.
+    ///
+    /// # Errors
+    /// A state or action out of range or forbidden, a reward that is not finite, or a value that would not be. α and
+    /// γ are not checked.
+    #[inline(always)]
+    pub fn update(
+        &mut self,
+        state: State,
+        action: Action,
+        step: &Step,
+        alpha: f64,
+        gamma: f64,
+    ) -> Result<f64, Error> {
+        let states = self.heads.len();
+        if state.0 >= states || step.observation.0 >= states {
+            let state = if state.0 >= states {
+                state
+            } else {
+                step.observation
+            };
+            return Err(Error::StateOutOfRange { state, states });
+        }
+        if action.0 >= self.actions {
+            return Err(Error::ActionOutOfRange {
+                action,
+                actions: self.actions,
+            });
+        }
+        let group = &mut self.groups[state.0 * self.groups_per_row + action.0 / GROUP];
+        let lane = action.0 % GROUP;
+        let old = group.values[lane];
+        if old == f32::NEG_INFINITY {
+            return Err(Error::ActionNotAllowed { state, action });
+        }
+        if !step.reward.is_finite() {
+            return Err(Error::RewardNotFinite {
+                state,
+                action,
+                reward: step.reward,
+            });
+        }
+        let next = match step.status {
+            Status::Terminated => 0.0,
+            Status::Continuing | Status::Truncated => gamma * f64::from(self.heads[step.observation.0].max),
+        };
+        let error = step.reward + next - f64::from(old);
+        let value = finite(state, action, f64::from(old) + alpha * error)?;
+        group.values[lane] = value;
+        group.visits[lane] = group.visits[lane].saturating_add(1);
+        let head = &mut self.heads[state.0];
+        group.weights[lane] = exp_single((f64::from(value) - head.offset) * self.inverse);
+
+        if value > head.max {
+            head.max = value;
+            head.best = action.0 as u32;
+        } else if head.best == action.0 as u32 && value < old {
+            self.find_best(state);
+        } else if value >= head.max && (action.0 as u32) < head.best {
+            head.best = action.0 as u32;
+        }
+        let head = &self.heads[state.0];
+        if (f64::from(head.max) - head.offset).abs() > DRIFT * self.temperature {
+            self.rebuild(state);
+        } else {
+            self.sum_block(state, (action.0 / GROUP) >> self.block_shift);
+        }
+        Ok(error)
+    }
+
+    /// Writes values and visits back into a table of the same shape and mask.
+    ///
+    /// # Errors
+    /// [`Error::ShapeMismatch`], or a table that forbids an action that was allowed here.
+    pub fn write_to<V: Value>(&self, table: &mut QTable<V>) -> Result<(), Error> {
+        table.check_shape("the cached table", self.heads.len(), self.actions)?;
+        for state in (0..self.heads.len()).map(State) {
+            for action in (0..self.actions).map(Action) {
+                let group = &self.groups[state.0 * self.groups_per_row + action.0 / GROUP];
+                let (value, visits) = (group.values[action.0 % GROUP], group.visits[action.0 % GROUP]);
+                if value > f32::NEG_INFINITY {
+                    table.set(state, action, V::from_f64(f64::from(value)))?;
+                    table.set_visits(state, action, visits);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws an action with its probability by Boltzmann.
+    ///
+    /// # Panics
+    /// As a slice does if the state is out of range.
+    #[inline(always)]
+    pub fn choose<R: Rng + ?Sized>(&self, state: State, rng: &mut R) -> Action {
+        // As many random bits as an f32 holds; all that is drawn is below the total.
+        let uniform = (rng.next_u64() >> 40) as u32 as i32 as f32 * (1.0 / (1u32 << 24) as f32);
+        let head = &self.heads[state.0];
+        let drawn = uniform * head.ends[BLOCKS - 1];
+        let block = count_up_to(&head.ends, drawn);
+        let rest = drawn
+            - if block == 0 {
+                0.0
+            } else {
+                head.ends[(block - 1) % BLOCKS]
+            };
+        let (first, last) = self.groups_of(block);
+        let start = state.0 * self.groups_per_row;
+        let mut action = first * GROUP;
+        if self.block_shift == 0 {
+            // The usual case in a straight line: it is the latency of this that limits the speed.
+            action += count_up_to(&self.groups[start + first].running, rest);
+        } else {
+            for group in &self.groups[start + first..start + last] {
+                action += count_up_to(&group.running, rest);
+            }
+        }
+        // Rounding may lead past the last weight.
+        if action < last * GROUP {
+            Action(action)
+        } else {
+            self.best(state)
+        }
+    }
+
+    /// Writes the probability of each action into `probabilities`, one entry for each.
+    ///
+    /// # Panics
+    /// As a slice does if the state is out of range.
+    pub fn probabilities(&self, state: State, probabilities: &mut [f64]) {
+        let weights = || {
+            self.row(state)
+                .iter()
+                .flat_map(|group| group.weights)
+                .map(f64::from)
+        };
+        let sum: f64 = weights().sum();
+        for (p, weight) in probabilities.iter_mut().zip(weights()) {
+            *p = weight / sum;
+        }
+    }
+
+    /// The value of a pair; negative infinity for a forbidden one.
+    ///
+    /// # Panics
+    /// As a slice does if the pair is out of range.
+    pub fn value(&self, state: State, action: Action) -> f32 {
+        self.row(state)[action.0 / GROUP].values[action.0 % GROUP]
+    }
+
+    /// How often a pair was visited.
+    ///
+    /// # Panics
+    /// As a slice does if the pair is out of range.
+    #[inline]
+    pub fn visits(&self, state: State, action: Action) -> u32 {
+        self.row(state)[action.0 / GROUP].visits[action.0 % GROUP]
+    }
+
+    /// The highest value of a state.
+    ///
+    /// # Panics
+    /// As a slice does if the state is out of range.
+    #[inline(always)]
+    pub fn max(&self, state: State) -> f32 {
+        self.heads[state.0].max
+    }
+
+    /// The action of the highest value; of equals the lowest index.
+    ///
+    /// # Panics
+    /// As a slice does if the state is out of range.
+    #[inline(always)]
+    pub fn best(&self, state: State) -> Action {
+        Action(self.heads[state.0].best as usize)
+    }
+
+    /// The temperature.
+    pub fn temperature(&self) -> f64 {
+        self.temperature
+    }
+
+    /// Checks that a state lies in the table.
+    #[inline(always)]
+    pub(crate) fn check_state(&self, state: State) -> Result<(), Error> {
+        let states = self.heads.len();
+        if state.0 < states {
+            Ok(())
+        } else {
+            Err(Error::StateOutOfRange { state, states })
+        }
+    }
+
+    /// The first group of a block, and the one after its last; the row's last group for a block beyond the row.
+    #[inline(always)]
+    fn groups_of(&self, block: usize) -> (usize, usize) {
+        let first = (block << self.block_shift).min(self.groups_per_row - 1);
+        (first, (first + (1 << self.block_shift)).min(self.groups_per_row))
+    }
+
+    fn row(&self, state: State) -> &[Group] {
+        &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row]
+    }
+
+    #[inline(never)]
+    fn find_best(&mut self, state: State) {
+        let row = &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row];
+        // Lane by lane, so that it is done with vectors.
+        let mut lanes = [f32::NEG_INFINITY; GROUP];
+        for group in row {
+            for (lane, value) in lanes.iter_mut().zip(group.values) {
+                *lane = if value > *lane { value } else { *lane };
+            }
+        }
+        let max = lanes.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        let head = &mut self.heads[state.0];
+        head.max = max;
+        for (start, group) in row.iter().enumerate() {
+            if let Some(lane) = group.values.iter().position(|&value| value >= max) {
+                head.best = (start * GROUP + lane) as u32;
+                break;
+            }
+        }
+    }
+
+    /// Moves the offset to the maximum and computes the whole row.
+    #[cold]
+    fn rebuild(&mut self, state: State) {
+        let head = &mut self.heads[state.0];
+        head.offset = f64::from(head.max);
+        for group in &mut self.groups[state.0 * self.groups_per_row..][..self.groups_per_row] {
+            for (weight, value) in group.weights.iter_mut().zip(group.values) {
+                *weight = exp_single((f64::from(value) - head.offset) * self.inverse);
+            }
+        }
+        for block in 0..self.groups_per_row.div_ceil(1 << self.block_shift) {
+            self.sum_block(state, block);
+        }
+    }
+
+    /// Sums a block anew, and the ends of all blocks of the row. Nothing is added to an old sum, so no error builds up.
+    #[inline(always)]
+    fn sum_block(&mut self, state: State, block: usize) {
+        let (first, last) = self.groups_of(block);
+        let start = state.0 * self.groups_per_row;
+        let mut sum = 0.0;
+        for group in &mut self.groups[start + first..start + last] {
+            for (running, weight) in group.running.iter_mut().zip(group.weights) {
+                sum += weight;
+                *running = sum;
+            }
+        }
+        let head = &mut self.heads[state.0];
+        head.sums[block % BLOCKS] = sum;
+        let mut total = 0.0;
+        for (end, sum) in head.ends.iter_mut().zip(head.sums) {
+            total += sum;
+            *end = total;
+        }
+    }
+}
+
+/// How many of ascending sums are not beyond a point.
+#[inline(always)]
+fn count_up_to<const N: usize>(sums: &[f32; N], point: f32) -> usize {
+    sums.iter().map(|&sum| u32::from(sum <= point)).sum::<u32>() as usize
+}
+
+/// A value as `f32`, if that is finite.
+#[inline(always)]
+fn finite(state: State, action: Action, value: f64) -> Result<f32, Error> {
+    let stored = value as f32;
+    if stored.is_finite() {
+        Ok(stored)
+    } else {
+        Err(Error::ValueNotFinite { state, action, value })
+    }
+}

@@ -1,0 +1,150 @@
+//! The same experiment with many seeds: means with their intervals, never one run.
+
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+use crate::Record;
+
+/// Runs an experiment once for every seed and returns the results in the order of the seeds.
+///
+/// With the feature `parallel` the runs are spread over all processor cores; the results are the same to the bit,
+/// because a run sees nothing but its seed.
+///
+/// ```
+/// use qtable::{Estimate, QTable, TrainConfig, over_seeds, toys, train};
+/// use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+///
+/// let values = over_seeds(0..10, |seed| {
+///     let mut chain = toys::chain(4)?;
+///     let mut table = QTable::new(4, 2)?;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+///     train(&mut chain, &mut table, &TrainConfig::paper(2_000), &mut rng, &mut |_| {})?;
+///     Ok::<_, qtable::Error>(table.max(qtable::State(0)))
+/// })?;
+/// let value = Estimate::of(&values);
+/// assert!((value.mean - 0.81).abs() < 0.01);
+/// # Ok::<(), qtable::Error>(())
+/// ```
+///
+/// # Errors
+/// The error of the first seed, in their order, whose run failed.
+pub fn over_seeds<T: Send, E: Send>(
+    seeds: impl IntoIterator<Item = u64>,
+    run: impl Fn(u64) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
+    let seeds: Vec<u64> = seeds.into_iter().collect();
+    #[cfg(feature = "parallel")]
+    let results: Vec<Result<T, E>> = {
+        use rayon::iter::{IntoParallelIterator, ParallelIterator};
+        seeds.into_par_iter().map(&run).collect()
+    };
+    #[cfg(not(feature = "parallel"))]
+    let results: Vec<Result<T, E>> = seeds.into_iter().map(run).collect();
+    results.into_iter().collect()
+}
+
+/// A mean and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct Estimate {
+    /// The mean; NaN of no values.
+    pub mean: f64,
+    /// Half the width of the 95 % interval of the mean, by Student's t: the mean lies within `mean ± half_width`.
+    /// Infinite for fewer than two values.
+    pub half_width: f64,
+    /// Number of values.
+    pub count: usize,
+}
+
+impl Estimate {
+    /// Of independent values, one a run.
+    pub fn of(values: &[f64]) -> Self {
+        let count = values.len();
+        let mean = values.iter().sum::<f64>() / count as f64;
+        if count < 2 {
+            return Self {
+                mean,
+                half_width: f64::INFINITY,
+                count,
+            };
+        }
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let deviation = (squares / (count - 1) as f64).sqrt();
+        Self {
+            mean,
+            half_width: student_t(count - 1) * deviation / (count as f64).sqrt(),
+            count,
+        }
+    }
+
+    /// Of a quantity at each point of several learning curves; runs in which it is `None` are left out at that
+    /// point. As long as the shortest curve.
+    pub fn of_curves(curves: &[Vec<Record>], quantity: impl Fn(&Record) -> Option<f64>) -> Vec<Self> {
+        let points = curves.iter().map(Vec::len).min().unwrap_or(0);
+        (0..points)
+            .map(|point| {
+                let values: Vec<f64> = curves
+                    .iter()
+                    .filter_map(|curve| quantity(&curve[point]))
+                    .collect();
+                Self::of(&values)
+            })
+            .collect()
+    }
+}
+
+impl std::fmt::Display for Estimate {
+    /// `mean ± half width`, with the precision asked for (3 unless given).
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let precision = f.precision().unwrap_or(3);
+        write!(f, "{:.precision$} ± {:.precision$}", self.mean, self.half_width)
+    }
+}
+
+/// The 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher and Cornish from six
+/// degrees of freedom on).
+fn student_t(degrees: usize) -> f64 {
+    const FEW: [f64; 5] = [12.706_2, 4.302_65, 3.182_45, 2.776_45, 2.570_58];
+    if let Some(&t) = degrees.checked_sub(1).and_then(|index| FEW.get(index)) {
+        return t;
+    }
+    let z: f64 = 1.959_964;
+    let n = degrees as f64;
+    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+    z + (z3 + z) / (4.0 * n)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n * n * n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        for (degrees, wanted) in [
+            (1, 12.706),
+            (5, 2.571),
+            (6, 2.447),
+            (9, 2.262),
+            (30, 2.042),
+            (120, 1.980),
+        ] {
+            assert!(
+                (student_t(degrees) / wanted - 1.0).abs() < 1e-3,
+                "{degrees}: {}",
+                student_t(degrees)
+            );
+        }
+    }
+
+    #[test]
+    fn the_interval_of_a_mean_is_that_of_the_textbook() {
+        // Ten values of mean 5.5 and deviation 3.0277: 2.262 * 3.0277 / sqrt(10).
+        let values: Vec<f64> = (1..=10).map(f64::from).collect();
+        let estimate = Estimate::of(&values);
+        assert!((estimate.mean - 5.5).abs() < 1e-12 && (estimate.half_width - 2.1659).abs() < 1e-3);
+        assert_eq!(estimate.to_string(), "5.500 ± 2.166");
+        assert!(Estimate::of(&[1.0]).half_width.is_infinite() && Estimate::of(&[]).mean.is_nan());
+    }
+}

@@ -1,0 +1,272 @@
+//! The fast form of Boltzmann exploration against the plain one.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
+
+use qtable::{
+    Action, ActionMask, Boltzmann, CachedBoltzmann, Environment, Error, Policy, QLearning, QTable, Schedule,
+    State, Status, Step, TrainConfig, over_seeds, toys, train, train_in_blocks,
+};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+fn constant(value: f64) -> Schedule {
+    Schedule::constant(value).unwrap()
+}
+
+fn plain_probabilities(table: &QTable<f32>, temperature: f64, state: State) -> Vec<f64> {
+    let mut p = vec![0.0; table.actions()];
+    Boltzmann::new(constant(temperature))
+        .unwrap()
+        .probabilities(table, state, &mut p);
+    p
+}
+
+/// After many updates of both forms: the same values, the same best actions, the same probabilities. Rows of all
+/// lengths around the sizes of groups and blocks; jumps far beyond what the offset follows.
+#[test]
+fn the_cached_table_stays_equal_to_the_plain_one() {
+    for (actions, temperature, spread) in [
+        (1, 1.0, 5.0),
+        (7, 0.01, 1.0),
+        (16, 3.0, 9.0),
+        (17, 1e-6, 1.0),
+        (81, 2.0, 200.0),
+        (81, 1e6, 1e3),
+        (128, 1.0, 3.0),
+        (129, 0.5, 3.0),
+        (300, 1.0, 50.0),
+        (1000, 10.0, 100.0),
+    ] {
+        let mut rng = rng(actions as u64);
+        let mut table = QTable::<f32>::filled(3, actions, 0.0).unwrap();
+        let mask = ActionMask::new(3, actions, |s, a| s != State(1) || a.0 % 3 == 0).unwrap();
+        table.set_mask(Some(mask)).unwrap();
+        let mut cached = CachedBoltzmann::new(&table, temperature).unwrap();
+        let mut learner = QLearning::new(constant(0.5), 0.9).unwrap();
+        for _ in 0..3_000 {
+            let state = State(rng.random_range(0..3));
+            let action = cached.choose(state, &mut rng);
+            assert!(table.allows(state, action));
+            let step = Step {
+                observation: State(rng.random_range(0..3)),
+                reward: rng.random_range(-spread..spread),
+                status: [Status::Continuing, Status::Terminated, Status::Truncated][rng.random_range(0..3)],
+            };
+            let here = learner.update(&mut table, state, action, &step).unwrap();
+            let there = cached.update(state, action, &step, 0.5, 0.9).unwrap();
+            assert_eq!(here.to_bits(), there.to_bits());
+            assert_eq!(cached.best(state), table.best(state));
+        }
+        for state in (0..3).map(State) {
+            let mut p = vec![f64::NAN; actions];
+            cached.probabilities(state, &mut p);
+            for (action, wanted) in plain_probabilities(&table, temperature, state)
+                .into_iter()
+                .enumerate()
+            {
+                assert!(
+                    (p[action] - wanted).abs() < 1e-6,
+                    "{actions} actions: {} is not {wanted}",
+                    p[action]
+                );
+            }
+        }
+        let mut back = table.clone();
+        for state in (0..3).map(State) {
+            for action in table.offered(state) {
+                back.set(state, action, -1.0).unwrap();
+            }
+        }
+        cached.write_to(&mut back).unwrap();
+        assert_eq!(back, table);
+    }
+}
+
+/// Pearson's chi-square of a million choices against the plain softmax. The bounds are the 99.99 % quantiles by the
+/// approximation of Wilson and Hilferty; with the fixed seed the test is repeatable.
+#[test]
+fn choices_have_the_distribution_of_the_plain_softmax() {
+    for (seed, temperature) in [(1, 0.3), (2, 1.0), (3, 5.0), (4, 1000.0)] {
+        let mut rng = rng(seed);
+        let mut table = QTable::<f32>::filled(2, 81, 0.0).unwrap();
+        let mut cached = CachedBoltzmann::new(&table, temperature).unwrap();
+        // Learned values, not fresh ones: through as many updates as an entry sees.
+        let mut learner = QLearning::new(constant(0.3), 0.5).unwrap();
+        for _ in 0..5_000 {
+            let (state, action) = (State(rng.random_range(0..2)), Action(rng.random_range(0..81)));
+            let reward = (action.0 % 9) as f64 * 0.3 + rng.random_range(-1.0..1.0);
+            let step = Step {
+                observation: State(0),
+                reward,
+                status: Status::Terminated,
+            };
+            learner.update(&mut table, state, action, &step).unwrap();
+            cached.update(state, action, &step, 0.3, 0.5).unwrap();
+        }
+        let draws = 1_000_000;
+        let mut counts = [0u32; 81];
+        for _ in 0..draws {
+            counts[cached.choose(State(1), &mut rng).0] += 1;
+        }
+        let expected = plain_probabilities(&table, temperature, State(1))
+            .into_iter()
+            .map(|p| p * f64::from(draws));
+        // Cells in which fewer than ten are expected are taken together.
+        let (mut chi_square, mut cells, mut rest) = (0.0, 0.0, (0.0, 0.0));
+        for (&count, expected) in counts.iter().zip(expected) {
+            if expected < 10.0 {
+                rest = (rest.0 + f64::from(count), rest.1 + expected);
+            } else {
+                chi_square += (f64::from(count) - expected).powi(2) / expected;
+                cells += 1.0;
+            }
+        }
+        if rest.1 > 0.0 {
+            chi_square += (rest.0 - rest.1).powi(2) / rest.1;
+            cells += 1.0;
+        }
+        let n: f64 = cells - 1.0;
+        let bound = n * (1.0 - 2.0 / (9.0 * n) + 3.719 * (2.0 / (9.0 * n)).sqrt()).powi(3);
+        assert!(
+            chi_square < bound,
+            "T = {temperature}: {chi_square} with {n} degrees of freedom"
+        );
+        assert!(n > 8.0, "T = {temperature} leaves too few cells to tell: {cells}");
+    }
+}
+
+/// The same learning, by result: mean return of the last tenth of the run over seeds.
+#[test]
+fn training_in_blocks_learns_what_plain_training_learns() {
+    let toy = toys::cliff_walking().unwrap();
+    let config = TrainConfig {
+        gamma: 0.99,
+        alpha: Schedule::exponential(0.6, 0.05, 60_000).unwrap(),
+        temperature: Schedule::exponential(50.0, 0.05, 60_000).unwrap(),
+        episode_limit: 200,
+        record_every: 6_000,
+        ..TrainConfig::paper(60_000)
+    };
+    let outcomes = over_seeds(0..8, |seed| {
+        let mut plain = QTable::<f32>::filled(48, 4, 0.0)?;
+        let mut fast = plain.clone();
+        let told = train(&mut toy.clone(), &mut plain, &config, &mut rng(seed), &mut |_| {})?;
+        let in_blocks = train_in_blocks(
+            &mut toy.clone(),
+            &mut fast,
+            &config,
+            500,
+            &mut rng(seed + 100),
+            &mut |_| {},
+        )?;
+        assert_eq!(
+            (told.actions, in_blocks.actions, in_blocks.curve.len()),
+            (60_000, 60_000, 10)
+        );
+        let visits: u32 = (0..48).flat_map(|s| fast.visit_row(State(s)).to_vec()).sum();
+        assert_eq!(visits, 60_000);
+        let middle = |report: &qtable::TrainReport| report.curve[4].mean_return.unwrap();
+        let steps = |table: &QTable<f32>| toy.assess(&table.greedy(), 0.99, 200).map(|found| found.steps);
+        Ok::<_, Error>((middle(&told), middle(&in_blocks), steps(&plain)?, steps(&fast)?))
+    })
+    .unwrap();
+    let mean = |of: fn(&(f64, f64, f64, f64)) -> f64| outcomes.iter().map(of).sum::<f64>() / 8.0;
+    let (plain, fast) = (mean(|o| o.0), mean(|o| o.1));
+    assert!(
+        (plain - fast).abs() < 0.15 * plain.abs(),
+        "half-way returns {plain} and {fast}"
+    );
+    assert!(
+        (mean(|o| o.2) - 13.0).abs() < 1e-9 && (mean(|o| o.3) - 13.0).abs() < 1e-9,
+        "{outcomes:?}"
+    );
+}
+
+#[test]
+fn faults_are_refused_and_what_was_learned_stays() {
+    let mut table = QTable::<f32>::filled(2, 3, 0.0).unwrap();
+    table
+        .set_mask(Some(
+            ActionMask::new(2, 3, |_, action| action != Action(1)).unwrap(),
+        ))
+        .unwrap();
+    let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();
+    let step = |observation, reward| Step {
+        observation: State(observation),
+        reward,
+        status: Status::Continuing,
+    };
+    let mut update = |state, action, step: &Step| cached.update(State(state), Action(action), step, 1.0, 1.0);
+    assert!(matches!(
+        update(2, 0, &step(0, 0.0)),
+        Err(Error::StateOutOfRange { state: State(2), .. })
+    ));
+    assert!(matches!(
+        update(0, 0, &step(7, 0.0)),
+        Err(Error::StateOutOfRange { state: State(7), .. })
+    ));
+    assert!(matches!(
+        update(0, 3, &step(0, 0.0)),
+        Err(Error::ActionOutOfRange { .. })
+    ));
+    assert!(matches!(
+        update(0, 1, &step(0, 0.0)),
+        Err(Error::ActionNotAllowed { .. })
+    ));
+    assert!(matches!(
+        update(0, 0, &step(0, f64::NAN)),
+        Err(Error::RewardNotFinite { .. })
+    ));
+    assert!(matches!(
+        update(0, 0, &step(0, 1e39)),
+        Err(Error::ValueNotFinite { .. })
+    ));
+    let mut same = table.clone();
+    cached.write_to(&mut same).unwrap();
+    assert_eq!(same, table);
+    for temperature in [0.0, -1.0, 1e-7, 1e7, f64::NAN] {
+        assert!(CachedBoltzmann::new(&table, temperature).is_err());
+        assert!(cached.set_temperature(temperature).is_err());
+    }
+    assert!(cached.write_to(&mut QTable::new(3, 3).unwrap()).is_err());
+    let huge = QTable::filled(1, 1, 1e300f64).unwrap();
+    assert!(matches!(
+        CachedBoltzmann::new(&huge, 1.0),
+        Err(Error::ValueNotFinite { .. })
+    ));
+
+    /// Pays well twice, then breaks.
+    struct Breaks(u32);
+    impl Environment for Breaks {
+        fn states(&self) -> usize {
+            1
+        }
+        fn actions(&self) -> usize {
+            1
+        }
+        fn reset(&mut self, _rng: &mut dyn rand::Rng) -> State {
+            State(0)
+        }
+        fn step(&mut self, _action: Action, _rng: &mut dyn rand::Rng) -> Step {
+            self.0 += 1;
+            let reward = if self.0 > 2 { f64::INFINITY } else { 8.0 };
+            Step {
+                observation: State(0),
+                reward,
+                status: Status::Terminated,
+            }
+        }
+    }
+    let mut table = QTable::new(1, 1).unwrap();
+    let config = TrainConfig {
+        alpha: constant(0.5),
+        ..TrainConfig::paper(10)
+    };
+    let outcome = train_in_blocks(&mut Breaks(0), &mut table, &config, 5, &mut rng(0), &mut |_| {});
+    assert!(matches!(outcome, Err(Error::RewardNotFinite { .. })));
+    assert!((table.max(State(0)) - 6.0).abs() < 1e-6 && table.visits(State(0), Action(0)) == 2);
+    assert!(train_in_blocks(&mut Breaks(0), &mut table, &config, 0, &mut rng(0), &mut |_| {}).is_err());
+}

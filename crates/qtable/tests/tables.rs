@@ -1,0 +1,367 @@
+//! Tables, policies, discretisation and text, by properties and by hand.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
+
+use proptest::prelude::*;
+use qtable::{
+    Action, ActionMask, Boltzmann, CsvError, DiscretiseError, EpsilonGreedy, Error, Greedy, Intervals,
+    Policy, Product, QTable, Schedule, State, Ties, Ucb,
+};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+fn row(values: &[f64]) -> QTable {
+    let mut table = QTable::new(1, values.len()).unwrap();
+    for (action, &value) in values.iter().enumerate() {
+        table.set(State(0), Action(action), value).unwrap();
+    }
+    table
+}
+
+fn constant(value: f64) -> Schedule {
+    Schedule::constant(value).unwrap()
+}
+
+#[test]
+fn impossible_tables_are_refused() {
+    assert!(matches!(QTable::new(0, 3), Err(Error::EmptyShape { .. })));
+    assert!(matches!(QTable::new(3, 0), Err(Error::EmptyShape { .. })));
+    assert!(matches!(QTable::new(usize::MAX, 2), Err(Error::TooLarge { .. })));
+    assert!(matches!(
+        QTable::new(1 << 40, 1 << 10),
+        Err(Error::TooLarge { .. })
+    ));
+    assert!(matches!(
+        QTable::filled(2, 2, f64::NAN),
+        Err(Error::ValueNotFinite { .. })
+    ));
+    assert!(matches!(
+        QTable::<f32>::filled(2, 2, f32::INFINITY),
+        Err(Error::ValueNotFinite { .. })
+    ));
+    let mut table = QTable::new(2, 2).unwrap();
+    assert!(matches!(
+        table.set(State(2), Action(0), 0.0),
+        Err(Error::StateOutOfRange { .. })
+    ));
+    assert!(matches!(
+        table.set(State(0), Action(2), 0.0),
+        Err(Error::ActionOutOfRange { .. })
+    ));
+    assert!(matches!(
+        table.visit(State(2), Action(0)),
+        Err(Error::StateOutOfRange { .. })
+    ));
+    assert_eq!(
+        (table.get(State(0), Action(5)), table.get(State(1), Action(1))),
+        (None, Some(0.0))
+    );
+    let mask = ActionMask::new(3, 2, |_, _| true).unwrap();
+    assert!(matches!(
+        table.set_mask(Some(mask)),
+        Err(Error::ShapeMismatch { .. })
+    ));
+}
+
+proptest! {
+    #[test]
+    fn the_kept_maximum_is_the_maximum(
+        writes in prop::collection::vec((0usize..3, 0usize..5, -3i8..4), 1..200),
+        forbidden in prop::collection::vec(any::<bool>(), 15),
+    ) {
+        let mask = ActionMask::new(3, 5, |s, a| a.0 == s.0 || !forbidden[s.0 * 5 + a.0]).unwrap();
+        for mask in [None, Some(mask)] {
+            let mut table = QTable::new(3, 5).unwrap();
+            table.set_mask(mask).unwrap();
+            for &(state, action, value) in &writes {
+                let (state, action) = (State(state), Action(action));
+                let allowed = table.allows(state, action);
+                prop_assert_eq!(table.set(state, action, f64::from(value)).is_ok(), allowed);
+                let best = table.offered(state).fold(None, |best: Option<Action>, action| match best {
+                    Some(best) if table.value(state, best) >= table.value(state, action) => Some(best),
+                    _ => Some(action),
+                });
+                prop_assert_eq!(Some(table.best(state)), best);
+            }
+        }
+    }
+
+    #[test]
+    fn csv_comes_back_to_the_bit(
+        values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO | prop::num::f64::SUBNORMAL, 12),
+        visits in prop::collection::vec(0u8..3, 12),
+        masked in any::<bool>(),
+    ) {
+        let mut table = QTable::new(4, 3).unwrap();
+        for (index, &value) in values.iter().enumerate() {
+            let (state, action) = (State(index / 3), Action(index % 3));
+            table.set(state, action, value).unwrap();
+            for _ in 0..visits[index] {
+                table.visit(state, action).unwrap();
+            }
+        }
+        if masked {
+            let mask = ActionMask::new(4, 3, |state, action| (state.0 + action.0) % 2 == 0 || action.0 == 1);
+            table.set_mask(Some(mask.unwrap())).unwrap();
+        }
+        // A table with a mask refuses to write what it forbids, so such values come back as 0.
+        let back = QTable::from_csv(&table.to_csv()).unwrap();
+        prop_assert_eq!(back.to_csv(), table.to_csv());
+        prop_assert_eq!(back, table);
+    }
+
+    #[test]
+    fn random_text_is_no_table(text in "\\PC{0,80}", lines in prop::collection::vec("[0-9,.eE-]{0,12}", 0..6)) {
+        prop_assert!(QTable::<f64>::from_csv(&text).is_err());
+        let with_header = format!("state,action,value,visits,offered\n{}", lines.join("\n"));
+        // Whatever comes of it, it is no panic.
+        let _ = QTable::<f64>::from_csv(&with_header);
+    }
+
+    #[test]
+    fn boltzmann_is_a_distribution_at_every_temperature(
+        values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 1..30),
+        exponent in -6.0f64..6.0,
+        seed in any::<u64>(),
+    ) {
+        let table = row(&values);
+        let mut policy = Boltzmann::new(constant(10f64.powf(exponent).clamp(1e-6, 1e6))).unwrap();
+        let mut p = vec![0.0; values.len()];
+        prop_assert!(policy.probabilities(&table, State(0), &mut p));
+        prop_assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        prop_assert!(p.iter().all(|p| (0.0..=1.0).contains(p)));
+        let best = table.best(State(0)).0;
+        prop_assert!(p.iter().all(|&other| other <= p[best]));
+        let chosen = policy.choose(&table, State(0), &mut rng(seed));
+        prop_assert!(p[chosen.0] > 0.0);
+    }
+
+    #[test]
+    fn every_value_has_its_bin_and_every_state_its_bins(
+        mut edges in prop::collection::vec(-1e6f64..1e6, 0..8),
+        value in prop::num::f64::ANY,
+        goal in any::<prop::sample::Index>(),
+    ) {
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        let goal = goal.index(edges.len() + 1);
+        let intervals = Intervals::new(&edges).unwrap().with_goal(goal).unwrap();
+        if value.is_nan() {
+            prop_assert_eq!(intervals.index(value), Err(DiscretiseError::NotANumber { quantity: 0 }));
+        } else {
+            let bin = intervals.index(value).unwrap();
+            let (low, high) = intervals.bounds(bin).unwrap();
+            prop_assert!(low <= value && value <= high);
+            prop_assert!(value < high || bin == goal || value.is_infinite());
+        }
+        for (bin, &edge) in edges.iter().enumerate() {
+            prop_assert_eq!(intervals.index(edge).unwrap(), if bin == goal { goal } else { bin + 1 });
+        }
+        let product = Product::new(vec![intervals.clone(), Intervals::new(&[0.0]).unwrap(), intervals]).unwrap();
+        for state in (0..product.len()).map(State) {
+            let bins = product.bins(state);
+            prop_assert_eq!(product.state(&bins).unwrap(), state);
+            let inside: Vec<f64> = bins.iter().zip(product.quantities()).map(|(&bin, of)| {
+                match of.bounds(bin).unwrap() {
+                    (low, high) if low.is_finite() && high.is_finite() => low + (high - low) / 2.0,
+                    (low, _) if low.is_finite() => low + 1.0,
+                    (_, high) if high.is_finite() => high - 1.0,
+                    _ => 0.0,
+                }
+            }).collect();
+            prop_assert_eq!(product.index(&inside).unwrap(), state);
+        }
+    }
+}
+
+#[test]
+fn impossible_discretisations_are_refused() {
+    assert_eq!(
+        Intervals::new(&[1.0, 1.0]),
+        Err(DiscretiseError::EdgesNotIncreasing {
+            index: 1,
+            value: 1.0,
+            before: 1.0
+        })
+    );
+    assert!(matches!(
+        Intervals::new(&[1.0, f64::NAN]),
+        Err(DiscretiseError::EdgeNotFinite { index: 1, .. })
+    ));
+    assert!(matches!(
+        Intervals::new(&[f64::INFINITY]),
+        Err(DiscretiseError::EdgeNotFinite { .. })
+    ));
+    let two = Intervals::new(&[1.0]).unwrap();
+    assert_eq!(
+        two.clone().with_goal(2),
+        Err(DiscretiseError::BinOutOfRange { bin: 2, bins: 2 })
+    );
+    let product = Product::new(vec![two.clone(), two.clone()]).unwrap();
+    assert_eq!(
+        product.index(&[0.0]),
+        Err(DiscretiseError::WrongCount { needed: 2, found: 1 })
+    );
+    assert_eq!(
+        product.index(&[0.0, f64::NAN]),
+        Err(DiscretiseError::NotANumber { quantity: 1 })
+    );
+    assert_eq!(
+        product.state(&[0, 2]),
+        Err(DiscretiseError::BinOutOfRange { bin: 2, bins: 2 })
+    );
+    assert_eq!(Product::new(vec![two; 64]), Err(DiscretiseError::TooManyStates));
+}
+
+/// Shares of each action in many choices.
+fn shares(policy: &mut dyn Policy, table: &QTable, choices: u32) -> Vec<f64> {
+    let mut counts = vec![0u32; table.actions()];
+    let mut rng = rng(17);
+    for _ in 0..choices {
+        counts[policy.choose(table, State(0), &mut rng).0] += 1;
+    }
+    counts
+        .iter()
+        .map(|&count| f64::from(count) / f64::from(choices))
+        .collect()
+}
+
+#[test]
+fn every_policy_chooses_as_often_as_it_says() {
+    let mut table = row(&[1.0, 3.0, -2.0, 3.0, 9.0, 2.5]);
+    table
+        .set_mask(Some(
+            ActionMask::new(1, 6, |_, action| action != Action(4)).unwrap(),
+        ))
+        .unwrap();
+    for _ in 0..10 {
+        for action in [0, 1, 2, 3, 5] {
+            table.visit(State(0), Action(action)).unwrap();
+        }
+    }
+    let policies: Vec<Box<dyn Policy>> = vec![
+        Box::new(Greedy),
+        Box::new(EpsilonGreedy::new(constant(0.4)).unwrap()),
+        Box::new(EpsilonGreedy::new(constant(0.4)).unwrap().with_ties(Ties::Random)),
+        Box::new(Boltzmann::new(constant(1.5)).unwrap()),
+        Box::new(Ucb::new(1.0).unwrap()),
+        Box::new(Ucb::new(1.0).unwrap().with_ties(Ties::Random)),
+    ];
+    for (index, mut policy) in policies.into_iter().enumerate() {
+        let mut p = vec![f64::NAN; 6];
+        assert!(policy.probabilities(&table, State(0), &mut p));
+        assert!(
+            (p.iter().sum::<f64>() - 1.0).abs() < 1e-12,
+            "policy {index}: {p:?}"
+        );
+        for (action, share) in shares(&mut *policy, &table, 100_000).into_iter().enumerate() {
+            // Five standard deviations.
+            let off = 5.0 * (p[action] * (1.0 - p[action]) / 100_000.0).sqrt() + 1e-12;
+            assert!(
+                (share - p[action]).abs() < off,
+                "policy {index}, action {action}: {share}, not {}",
+                p[action]
+            );
+        }
+        assert!(p[4].abs() < 1e-300, "policy {index} would take what is forbidden");
+    }
+}
+
+#[test]
+fn boltzmann_has_the_probabilities_of_equation_4() {
+    let table = row(&[1.0, 2.0, 4.0]);
+    let mut p = [0.0; 3];
+    Boltzmann::new(constant(2.0))
+        .unwrap()
+        .probabilities(&table, State(0), &mut p);
+    let e = [0.5f64, 1.0, 2.0].map(f64::exp);
+    for (found, weight) in p.iter().zip(e) {
+        assert!((found - weight / e.iter().sum::<f64>()).abs() < 1e-15);
+    }
+    // The extremes: a hair's breadth decides when cold, nothing does when hot.
+    let near = row(&[0.0, 1e-4, f64::MIN]);
+    Boltzmann::new(constant(1e-6))
+        .unwrap()
+        .probabilities(&near, State(0), &mut p);
+    assert!(p[1] > 1.0 - 1e-15 && p[0] < 1e-40 && p[2].abs() < 1e-300, "{p:?}");
+    Boltzmann::new(constant(1e6))
+        .unwrap()
+        .probabilities(&row(&[0.0, 1.0, -1.0]), State(0), &mut p);
+    assert!(p.iter().all(|p| (p - 1.0 / 3.0).abs() < 1e-6));
+    let huge = row(&[f64::MAX, f64::MIN, f64::MAX]);
+    Boltzmann::new(constant(1e6))
+        .unwrap()
+        .probabilities(&huge, State(0), &mut p);
+    assert!((p[0] - 0.5).abs() < 1e-15 && (p[2] - 0.5).abs() < 1e-15);
+}
+
+#[test]
+fn ucb_tries_everything_once_and_then_by_its_bound() {
+    let mut table = row(&[0.0, 5.0, 0.0]);
+    let mut ucb = Ucb::new(2.0).unwrap();
+    for expected in [0, 1, 2] {
+        let action = ucb.choose(&table, State(0), &mut rng(0));
+        assert_eq!(action, Action(expected));
+        table.visit(State(0), action).unwrap();
+    }
+    assert_eq!(ucb.choose(&table, State(0), &mut rng(0)), Action(1));
+    for _ in 0..1000 {
+        table.visit(State(0), Action(1)).unwrap();
+    }
+    // 5 + 2 sqrt(ln 1003 / 1001) = 5.17 and 2 sqrt(ln 1003 / 1) = 5.26.
+    assert_eq!(ucb.choose(&table, State(0), &mut rng(0)), Action(0));
+    assert!(Ucb::new(-1.0).is_err() && Ucb::new(f64::NAN).is_err());
+}
+
+#[test]
+fn markdown_shows_the_best_and_the_forbidden() {
+    let mut table = QTable::<f32>::filled(2, 2, 0.0).unwrap();
+    table.set(State(1), Action(1), 0.25).unwrap();
+    let mask = ActionMask::new(2, 2, |state, action| state == State(1) || action == Action(0)).unwrap();
+    table.set_mask(Some(mask)).unwrap();
+    let expected = "| state | 0 | 1 |\n|---:|---:|---:|\n| 0 | **0.00** | – |\n| 1 | 0.00 | **0.25** |\n";
+    assert_eq!(table.to_markdown(2), expected);
+}
+
+#[test]
+fn damaged_csv_is_refused_with_its_line() {
+    let read = |body: &str| QTable::<f64>::from_csv(&format!("state,action,value,visits,offered\n{body}"));
+    assert!(read("0,0,1.5,3,1\r\n0,1,-2,0,1\r\n\r\n").is_ok());
+    assert_eq!(
+        QTable::<f64>::from_csv("0,0,1,1,1").unwrap_err(),
+        CsvError::Header
+    );
+    let field = |body| match read(body) {
+        Err(CsvError::Field { line, field, .. }) => (line, field),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(field("0,0,one,0,1"), (2, "value"));
+    assert_eq!(field("0,0,1,0,1\n0,1,1,-1,1"), (3, "visits"));
+    assert_eq!(field("0,0,1,0"), (2, "offered"));
+    assert_eq!(field("0,0,1,0,1,7"), (2, "the line"));
+    assert_eq!(field("99999999999999999999,0,1,0,1"), (2, "state"));
+    assert!(matches!(
+        read("0,0,1,0,1\n0,2,1,0,1"),
+        Err(CsvError::Order { line: 3, .. })
+    ));
+    assert!(matches!(
+        read("0,0,1,0,1\n0,1,1,0,1\n1,0,1,0,1"),
+        Err(CsvError::Order { line: 4, .. })
+    ));
+    assert!(matches!(
+        read("1000000000000,0,1,0,1"),
+        Err(CsvError::Table(_) | CsvError::Order { .. })
+    ));
+    assert!(matches!(
+        read("0,0,NaN,0,1"),
+        Err(CsvError::Table(Error::ValueNotFinite { .. }))
+    ));
+    assert!(matches!(
+        read("0,0,1,0,0"),
+        Err(CsvError::Table(Error::NoActionAllowed { .. }))
+    ));
+    assert!(matches!(read(""), Err(CsvError::Table(Error::EmptyShape { .. }))));
+}

@@ -1,0 +1,430 @@
+//! The drivers: what they report, when they stop, and what they refuse.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
+
+use std::ops::ControlFlow;
+
+use qtable::{
+    Action, ActionMask, Environment, EnvironmentFault, EpsilonGreedy, Error, Estimate, Greedy, Policy,
+    QLearning, QTable, Schedule, State, Status, Step, TimeLimit, TrainConfig, Training, Until, check_env,
+    evaluate, over_seeds, toys, train,
+};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
+
+fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+/// An environment with one state less a fault of one's choice.
+struct Odd<F: FnMut(u64) -> Step> {
+    steps: u64,
+    answer: F,
+}
+
+impl<F: FnMut(u64) -> Step> Environment for Odd<F> {
+    fn states(&self) -> usize {
+        3
+    }
+    fn actions(&self) -> usize {
+        2
+    }
+    fn reset(&mut self, _rng: &mut dyn Rng) -> State {
+        State(0)
+    }
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Step {
+        self.steps += 1;
+        (self.answer)(self.steps)
+    }
+}
+
+fn odd(answer: impl FnMut(u64) -> Step) -> Odd<impl FnMut(u64) -> Step> {
+    Odd { steps: 0, answer }
+}
+
+fn step(observation: usize, reward: f64, status: Status) -> Step {
+    Step {
+        observation: State(observation),
+        reward,
+        status,
+    }
+}
+
+fn trained(environment: &mut dyn Environment, config: &TrainConfig) -> Result<QTable, Error> {
+    let mut table = QTable::new(environment.states(), environment.actions())?;
+    train(environment, &mut table, config, &mut rng(0), &mut |_| {})?;
+    Ok(table)
+}
+
+#[test]
+fn the_learning_curve_counts_what_happened() {
+    // Episodes of 3 steps that pay 1, 1 and 4, and end in success every other time.
+    let mut environment = odd(|n| match n % 6 {
+        3 => step(2, 4.0, Status::Terminated),
+        0 => step(2, 4.0, Status::Truncated),
+        _ => step(1, 1.0, Status::Continuing),
+    });
+    let mut table = QTable::new(3, 2).unwrap();
+    let config = TrainConfig {
+        record_every: 12,
+        ..TrainConfig::paper(30)
+    };
+    let mut told = Vec::new();
+    let report = train(
+        &mut environment,
+        &mut table,
+        &config,
+        &mut rng(1),
+        &mut |progress| {
+            told.push((progress.actions, progress.of, progress.latest));
+        },
+    )
+    .unwrap();
+    assert_eq!((report.actions, report.episodes, report.curve.len()), (30, 10, 3));
+    assert_eq!(
+        told.iter().map(|t| (t.0, t.1)).collect::<Vec<_>>(),
+        [(12, 30), (24, 30), (30, 30)]
+    );
+    assert_eq!(told.iter().map(|t| t.2).collect::<Vec<_>>(), report.curve);
+    let first = report.curve[0];
+    assert_eq!((first.actions, first.episodes), (12, 4));
+    for (found, wanted) in [
+        (first.success_share, 0.5),
+        (first.mean_reward, 2.0),
+        (first.mean_return, 6.0),
+        (first.mean_steps, 3.0),
+    ] {
+        assert!((found.unwrap() - wanted).abs() < 1e-12, "{first:?}");
+    }
+    assert!(first.mean_td_error.unwrap() > 0.0);
+    let visits: u32 = (0..3).flat_map(|s| table.visit_row(State(s)).to_vec()).sum();
+    assert_eq!(visits, 30);
+}
+
+#[test]
+fn the_episode_limit_truncates_and_the_value_goes_on() {
+    // One action forever, 1 a step: worth 1 / (1 - 0.9), whatever the limit.
+    let mut environment = odd(|_| step(0, 1.0, Status::Continuing));
+    let config = TrainConfig {
+        episode_limit: 5,
+        ..TrainConfig::paper(20_000)
+    };
+    let table = trained(&mut environment, &config).unwrap();
+    assert!(
+        (table.max(State(0)) - 10.0).abs() < 1e-3,
+        "{}",
+        table.max(State(0))
+    );
+    let mut ends = odd(|n| {
+        step(
+            0,
+            1.0,
+            if n % 5 == 0 {
+                Status::Terminated
+            } else {
+                Status::Continuing
+            },
+        )
+    });
+    assert!(trained(&mut ends, &config).unwrap().max(State(0)) < 5.0);
+}
+
+#[test]
+fn faults_of_the_environment_are_named() {
+    let config = TrainConfig::paper(100);
+    for reward in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut faulty = odd(|n| step(1, if n == 7 { reward } else { 1.0 }, Status::Continuing));
+        let error = trained(&mut faulty, &config).unwrap_err();
+        assert!(matches!(error, Error::RewardNotFinite { .. }), "{error}");
+        assert!(matches!(
+            check_env(&mut faulty, 100, 1).unwrap_err(),
+            EnvironmentFault::Endless { .. } | EnvironmentFault::Invalid { .. }
+        ));
+    }
+    let mut outside = odd(|_| step(3, 0.0, Status::Continuing));
+    assert_eq!(
+        trained(&mut outside, &config).unwrap_err(),
+        Error::StateOutOfRange {
+            state: State(3),
+            states: 3
+        }
+    );
+    let mut small = QTable::new(2, 2).unwrap();
+    let wrong = train(&mut outside, &mut small, &config, &mut rng(0), &mut |_| {}).unwrap_err();
+    assert!(matches!(
+        wrong,
+        Error::ShapeMismatch {
+            found_states: 3,
+            states: 2,
+            ..
+        }
+    ));
+    for config in [
+        TrainConfig {
+            actions: 0,
+            ..config.clone()
+        },
+        TrainConfig {
+            episode_limit: 0,
+            ..config.clone()
+        },
+        TrainConfig {
+            record_every: 0,
+            ..config.clone()
+        },
+        TrainConfig {
+            gamma: -0.1,
+            ..config.clone()
+        },
+        TrainConfig {
+            alpha: Schedule::constant(2.0).unwrap(),
+            ..config.clone()
+        },
+        TrainConfig {
+            temperature: Schedule::constant(0.0).unwrap(),
+            ..config.clone()
+        },
+    ] {
+        let error = trained(&mut odd(|_| step(0, 0.0, Status::Continuing)), &config).unwrap_err();
+        assert!(
+            matches!(error, Error::Setting { .. } | Error::ScheduleRange { .. }),
+            "{error}"
+        );
+    }
+}
+
+/// A policy that chooses what is not there.
+struct Wild;
+
+impl Policy for Wild {
+    fn choose(&mut self, _table: &QTable, _state: State, _rng: &mut dyn Rng) -> Action {
+        Action(9)
+    }
+}
+
+#[test]
+fn a_policy_that_chooses_outside_the_table_is_refused_before_the_environment_sees_it() {
+    let mut chain = toys::chain(4).unwrap();
+    let learner = QLearning::new(Schedule::constant(0.5).unwrap(), 0.9).unwrap();
+    let mut training = Training::new(&chain, QTable::new(4, 2).unwrap(), learner, Wild).unwrap();
+    let refused = training.run(&mut chain, Until::Actions(5), &mut rng(0));
+    assert_eq!(
+        refused,
+        Err(Error::ActionOutOfRange {
+            action: Action(9),
+            actions: 2
+        })
+    );
+    let table = QTable::new(4, 2).unwrap();
+    assert!(evaluate(&mut chain, &table, &mut Wild, 1, 10, &mut rng(0)).is_err());
+}
+
+#[test]
+fn a_run_stops_where_it_is_told() {
+    let mut chain = toys::chain(5).unwrap();
+    let learner = QLearning::new(Schedule::constant(0.5).unwrap(), 0.9).unwrap();
+    let policy = EpsilonGreedy::new(Schedule::constant(0.3).unwrap()).unwrap();
+    let table = QTable::new(5, 2).unwrap();
+    let mut training = Training::new(&chain, table, learner, policy)
+        .unwrap()
+        .with_record_every(10)
+        .unwrap();
+    let mut rng = rng(3);
+    training.run(&mut chain, Until::Episodes(7), &mut rng).unwrap();
+    assert_eq!((training.episodes(), training.is_in_episode()), (7, false));
+    let so_far = training.actions();
+    training
+        .run(&mut chain, Until::Actions(so_far), &mut rng)
+        .unwrap();
+    assert_eq!(training.actions(), so_far);
+    let stopped = training
+        .run_with(&mut chain, Until::Actions(100_000), &mut rng, |record, table| {
+            assert_eq!(table.actions(), 2);
+            if record.actions >= so_far + 500 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .unwrap();
+    let reached = training.actions();
+    assert!(stopped && reached.is_multiple_of(10) && (so_far + 500..so_far + 510).contains(&reached));
+    assert_eq!(training.curve().len() as u64, reached / 10);
+    let more: Vec<_> = training
+        .records(&mut chain, Until::Actions(reached + 45), &mut rng)
+        .collect();
+    assert_eq!((more.len(), training.actions()), (4, reached + 45));
+    assert!(more.iter().all(Result::is_ok));
+}
+
+#[test]
+fn a_mask_keeps_its_actions_out_of_everything() {
+    // Action 1 of state 0 would be the best by far, and is forbidden.
+    struct Masked(odd_env::Plain);
+    mod odd_env {
+        pub(super) struct Plain;
+    }
+    impl Environment for Masked {
+        fn states(&self) -> usize {
+            2
+        }
+        fn actions(&self) -> usize {
+            3
+        }
+        fn reset(&mut self, _rng: &mut dyn Rng) -> State {
+            let _ = &self.0;
+            State(0)
+        }
+        fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
+            assert_ne!(action, Action(1), "a forbidden action was taken");
+            step(1, action.0 as f64, Status::Terminated)
+        }
+        fn allows(&self, state: State, action: Action) -> bool {
+            state == State(1) || action != Action(1)
+        }
+    }
+    let mut environment = Masked(odd_env::Plain);
+    let mut table = QTable::filled(2, 3, 50.0f64).unwrap();
+    let config = TrainConfig {
+        alpha: Schedule::constant(0.5).unwrap(),
+        ..TrainConfig::paper(500)
+    };
+    train(&mut environment, &mut table, &config, &mut rng(5), &mut |_| {}).unwrap();
+    assert_eq!(table.best(State(0)), Action(2));
+    assert_eq!(table.visits(State(0), Action(1)), 0);
+    assert!((table.value(State(0), Action(1)) - 50.0).abs() < 1e-12 && table.max(State(0)) < 50.0);
+    let forbidden = Error::ActionNotAllowed {
+        state: State(0),
+        action: Action(1),
+    };
+    assert_eq!(table.set(State(0), Action(1), 0.0), Err(forbidden));
+    assert!(check_env(&mut environment, 100, 0).is_ok());
+    let empty = ActionMask::new(2, 2, |state, _| state == State(1));
+    assert_eq!(empty, Err(Error::NoActionAllowed { state: State(0) }));
+}
+
+#[test]
+fn check_env_tells_what_is_wrong() {
+    let report = check_env(
+        &mut TimeLimit::new(toys::taxi().unwrap(), 200).unwrap(),
+        20_000,
+        3,
+    )
+    .unwrap();
+    assert!(
+        report.steps == 20_000 && report.truncated > 50 && report.states_met > 300,
+        "{report:?}"
+    );
+    let endless = check_env(&mut odd(|_| step(0, 0.0, Status::Continuing)), 500, 1).unwrap_err();
+    assert_eq!(endless, EnvironmentFault::Endless { steps: 500 });
+    // What it answers depends on all the steps it ever took.
+    let forgetful = odd(|n| {
+        step(
+            (n % 3) as usize,
+            0.0,
+            if n % 7 == 0 {
+                Status::Terminated
+            } else {
+                Status::Continuing
+            },
+        )
+    });
+    let fault = check_env(&mut { forgetful }, 500, 1).unwrap_err();
+    assert!(
+        matches!(fault, EnvironmentFault::NotReproducible { .. }),
+        "{fault}"
+    );
+}
+
+#[test]
+fn a_time_limit_truncates() {
+    let mut limited = TimeLimit::new(toys::chain(9).unwrap(), 3).unwrap();
+    let mut rng = rng(0);
+    for _ in 0..2 {
+        limited.reset(&mut rng);
+        let ends: Vec<Status> = (0..3).map(|_| limited.step(Action(0), &mut rng).status).collect();
+        assert_eq!(ends, [Status::Continuing, Status::Continuing, Status::Truncated]);
+    }
+    assert!(matches!(
+        TimeLimit::new(toys::chain(9).unwrap(), 0),
+        Err(Error::Setting { .. })
+    ));
+}
+
+#[test]
+fn trying_a_policy_agrees_with_its_exact_assessment() {
+    let mut lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
+    let table = lake.model().value_iteration(0.99, 1e-10).unwrap().table;
+    let exact = lake.assess(&table.greedy(), 0.99, 100).unwrap();
+    let tried = evaluate(&mut lake, &table, &mut Greedy, 40_000, 100, &mut rng(9)).unwrap();
+    assert!(
+        (tried.success_share - exact.success).abs() < 0.01,
+        "{tried:?} {exact:?}"
+    );
+    assert!((tried.mean_steps - exact.steps).abs() < 0.5);
+    assert!((tried.mean_steps_to_success.unwrap() - exact.steps_to_success.unwrap()).abs() < 0.5);
+    assert!((tried.mean_return - exact.total_reward).abs() < 0.01);
+}
+
+#[test]
+fn a_model_estimated_from_experience_gives_the_optimal_policy() {
+    let mut lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
+    let mut estimate = qtable::ModelEstimate::new(16, 4).unwrap();
+    let mut rng = rng(4);
+    let table = QTable::new(16, 4).unwrap();
+    let mut explorer = EpsilonGreedy::new(Schedule::constant(1.0).unwrap()).unwrap();
+    for _ in 0..20_000 {
+        let mut state = lake.reset(&mut rng);
+        loop {
+            let action = explorer.choose(&table, state, &mut rng);
+            let step = lake.step(action, &mut rng);
+            estimate.observe(state, action, &step).unwrap();
+            if step.status != Status::Continuing {
+                break;
+            }
+            state = step.observation;
+        }
+    }
+    let plan = estimate
+        .to_model(0.0)
+        .unwrap()
+        .value_iteration(0.95, 1e-10)
+        .unwrap();
+    let both = lake.compare(&plan.table, 0.95, 1_000).unwrap();
+    assert!(both.learned.value > 0.99 * both.optimal.value, "{both:?}");
+    let curious = estimate
+        .to_model(5.0)
+        .unwrap()
+        .value_iteration(0.95, 1e-10)
+        .unwrap();
+    assert!(
+        (curious.table.max(State(5)) - 5.0).abs() < 1e-12,
+        "a hole was never left: untried"
+    );
+    assert!(estimate.to_model(f64::NAN).is_err());
+}
+
+#[test]
+fn seeds_come_back_in_order_and_the_first_failure_is_told() {
+    let run = |seed: u64| -> Result<String, Error> {
+        let mut chain = toys::chain(6)?;
+        let mut table = QTable::new(6, 2)?;
+        train(
+            &mut chain,
+            &mut table,
+            &TrainConfig::paper(300),
+            &mut rng(seed),
+            &mut |_| {},
+        )?;
+        Ok(table.to_csv())
+    };
+    let all = over_seeds(0..24, run).unwrap();
+    let one_by_one: Vec<String> = (0..24).map(|seed| run(seed).unwrap()).collect();
+    assert_eq!(all, one_by_one);
+    assert_ne!(all[0], all[1]);
+    assert_eq!(
+        over_seeds(0..24, |seed| if seed % 10 == 7 { Err(seed) } else { Ok(()) }),
+        Err(7)
+    );
+    let estimate = Estimate::of(&[1.0, 2.0, 3.0]);
+    assert!((estimate.mean - 2.0).abs() < 1e-12 && (estimate.half_width - 2.484).abs() < 1e-3);
+}

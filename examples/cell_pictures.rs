@@ -1,0 +1,127 @@
+//! Draws the simulated cell: an overview as SVG, and a reach as the camera on the hand sees it, as an animated PNG and as video.
+//!
+//! ```text
+//! cargo run --release --example cell_pictures -- --out out/pictures
+//! ```
+//!
+//! writes `overview.svg`, `search.png`, `goal.png`, `run.png` (animated) and `run.y4m`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+use image::imageops::{FilterType, resize};
+use image::{GrayImage, ImageFormat};
+use pipeline_sim::{Cell, Renderer, Scene, Sensor, Workspace, Y4mWriter};
+use puma_val2::{Joint, Joints};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+/// Draws the simulated cell.
+#[derive(Parser)]
+struct Options {
+    /// Folder to write to; made if it is not there.
+    #[arg(long, default_value = "out/pictures")]
+    out: PathBuf,
+    /// Seed of the ball's place and of the textures.
+    #[arg(long, default_value_t = 3)]
+    seed: u64,
+    /// Frames of the run.
+    #[arg(long, default_value_t = 40)]
+    frames: u32,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::parse();
+    std::fs::create_dir_all(&options.out)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
+    let workspace = Workspace::paper();
+    let nominal = Cell::paper(pipeline_sim::Ball::at(0.6, 0.0, -0.1));
+    let (ball, start) = workspace
+        .sample_seen_ball(&nominal, &mut rng)
+        .ok_or("no search pose sees the workspace")?;
+    let cell = Cell::paper(ball);
+    let goal = cell
+        .goal_pose(Cell::REACHING_JT5_DEGREES)
+        .ok_or("the ball is out of reach")?;
+    let path = reach(&cell, &start, &goal, options.frames.max(4));
+
+    let overview = cell.overview_svg(&workspace, &path[..=path.len() * 3 / 4]);
+    save(&options.out.join("overview.svg"), overview.as_bytes())?;
+    let mut renderer = Renderer::new(&Scene::laboratory(), options.seed);
+    for (name, pose) in [("search.png", &start), ("goal.png", &goal)] {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        renderer
+            .render(&cell, pose)
+            .write_to(&mut bytes, ImageFormat::Png)?;
+        save(&options.out.join(name), bytes.get_ref())?;
+    }
+    let mut video = Y4mWriter::new(Vec::new(), 12, 1)?;
+    for pose in &path {
+        video.write(renderer.render(&cell, pose))?;
+    }
+    save(&options.out.join("run.y4m"), &video.finish()?)?;
+    // Noise cannot be compressed; the animated picture goes without.
+    let quiet = Sensor {
+        read_noise: 0.0,
+        shot_noise: 0.0,
+        ..Sensor::default()
+    };
+    let mut renderer = Renderer::new(
+        &Scene {
+            sensor: quiet,
+            ..Scene::laboratory()
+        },
+        options.seed,
+    );
+    let frames: Vec<GrayImage> = path
+        .iter()
+        .map(|pose| resize(renderer.render(&cell, pose), 384, 288, FilterType::Triangle))
+        .collect();
+    save(&options.out.join("run.png"), &animated(&frames)?)?;
+    Ok(())
+}
+
+/// From the search pose to the goal, slowing down, then the turn of the wrist that brings the gripper to the ball.
+fn reach(cell: &Cell, start: &Joints, goal: &Joints, frames: u32) -> Vec<Joints> {
+    let mut grip = *goal;
+    grip.0[Joint::J5.index()] = cell.grip_angle(goal);
+    let between =
+        |a: &Joints, b: &Joints, t: f64| Joints(std::array::from_fn(|i| a.0[i] + t * (b.0[i] - a.0[i])));
+    let swing = frames / 4;
+    let approach = (0..frames - swing).map(|i| {
+        let left = 1.0 - f64::from(i) / f64::from(frames - swing - 1);
+        between(start, goal, 1.0 - left * left)
+    });
+    approach
+        .chain((1..=swing).map(|i| between(goal, &grip, f64::from(i) / f64::from(swing))))
+        .collect()
+}
+
+/// An animated PNG of equally large frames, twelve a second, the last one shown longer.
+fn animated(frames: &[GrayImage]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let first = frames.first().ok_or("no frames")?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, first.width(), first.height());
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_animated(u32::try_from(frames.len())?, 0)?;
+    encoder.set_frame_delay(1, 12)?;
+    let mut writer = encoder.write_header()?;
+    for (i, frame) in frames.iter().enumerate() {
+        if i + 1 == frames.len() {
+            writer.set_frame_delay(3, 2)?;
+        }
+        writer.write_image_data(frame.as_raw())?;
+    }
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Writes a file as a whole or not at all.
+fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let unfinished = path.with_extension("part");
+    std::fs::write(&unfinished, bytes)?;
+    std::fs::rename(unfinished, path)
+}

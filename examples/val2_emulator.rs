@@ -1,0 +1,198 @@
+//! A PUMA 560 controller to talk to with any terminal program.
+//!
+//! ```text
+//! cargo run --example val2_emulator -- --link /tmp/puma
+//! screen /tmp/puma 9600
+//! ```
+//!
+//! The first line printed is `listening on PATH`. Lines typed here are the controller's panel: `power on`, `power off`, `signal 1001 on`,
+//! `joints`, `restart`, `quit`.
+#![allow(clippy::print_stdout, clippy::print_stderr)] // A program's output.
+
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::{self, BufRead, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
+
+use clap::Parser;
+#[cfg(unix)]
+use puma_val2::PtyServer;
+use puma_val2::{Emulator, Event, Profile, PumaParams, ServeConfig, TcpServer, char_time};
+
+/// An emulated VAL II controller with a PUMA 560.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    /// Serve on this address (127.0.0.1:5600, or port 0 for any free one) instead of a pseudo-terminal.
+    #[arg(long, value_name = "ADDR", conflicts_with = "pty")]
+    tcp: Option<String>,
+    /// Serve on a pseudo-terminal (the default).
+    #[arg(long)]
+    pty: bool,
+    /// Make this symbolic link to the pseudo-terminal.
+    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
+    link: Option<PathBuf>,
+    /// What the controller is like: val2, val2_strict_miz, val2_hardware.
+    #[arg(long, value_name = "NAME", default_value = "val2")]
+    profile: String,
+    /// Let motions take their time. Otherwise the controller's clock jumps ahead whenever it waits for nothing else.
+    #[arg(long)]
+    realtime: bool,
+    /// Pace characters as a line of this speed does; implies --realtime.
+    #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(50..))]
+    baud: Option<u32>,
+    /// Write what passes on the line to this file.
+    #[arg(long, value_name = "FILE")]
+    transcript: Option<PathBuf>,
+    /// The floppy disk: text files of this folder can be loaded, stored files are written to it.
+    #[arg(long, value_name = "FOLDER")]
+    floppy: Option<PathBuf>,
+}
+
+/// Either way of serving.
+enum Server {
+    #[cfg(unix)]
+    Pty(PtyServer),
+    Tcp(TcpServer),
+}
+
+impl Server {
+    fn place(&self) -> String {
+        match self {
+            #[cfg(unix)]
+            Self::Pty(server) => server.path().display().to_string(),
+            Self::Tcp(server) => server.address().to_string(),
+        }
+    }
+
+    fn with<R>(&self, f: impl FnOnce(&mut Emulator) -> R) -> R {
+        match self {
+            #[cfg(unix)]
+            Self::Pty(server) => server.with_emulator(f),
+            Self::Tcp(server) => server.with_emulator(f),
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments = Arguments::parse();
+    let mut profile = Profile::named(&arguments.profile).ok_or_else(|| {
+        let names = Profile::all().map(|p| p.name).join(", ");
+        format!("no profile `{}`: there are {names}", arguments.profile)
+    })?;
+    if let Some(baud) = arguments.baud {
+        profile.char_time = Some(char_time(baud));
+    }
+    let mut emulator = Emulator::new(PumaParams::unimation(), profile);
+    if let Some(folder) = &arguments.floppy {
+        insert_floppy(&mut emulator, folder)?;
+    }
+    let config = ServeConfig {
+        realtime: arguments.realtime || arguments.baud.is_some(),
+        link: arguments.link.clone(),
+        transcript: match &arguments.transcript {
+            Some(path) => Some(Box::new(
+                File::create(path).map_err(|e| format!("{}: {e}", path.display()))?,
+            )),
+            None => None,
+        },
+    };
+    let server = serve(&arguments, emulator, config)?;
+    println!("listening on {}", server.place());
+    io::stdout().flush()?;
+    attend(&server, arguments.floppy.as_deref())
+}
+
+#[cfg(unix)]
+fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> io::Result<Server> {
+    match &arguments.tcp {
+        Some(address) => TcpServer::spawn(address.as_str(), emulator, config).map(Server::Tcp),
+        None => PtyServer::spawn(emulator, config).map(Server::Pty),
+    }
+}
+
+#[cfg(not(unix))]
+fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> io::Result<Server> {
+    let address = arguments.tcp.as_deref().unwrap_or("127.0.0.1:5600");
+    TcpServer::spawn(address, emulator, config).map(Server::Tcp)
+}
+
+/// Puts the text files of a folder on the disk, each under its name without ending.
+fn insert_floppy(emulator: &mut Emulator, folder: &Path) -> Result<(), Box<dyn Error>> {
+    fs::create_dir_all(folder)?;
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if let (true, Some(name)) = (
+            path.extension().is_some_and(|e| e == "v2"),
+            path.file_stem().and_then(|n| n.to_str()),
+        ) {
+            emulator.insert_file(name, fs::read_to_string(&path)?);
+        }
+    }
+    Ok(())
+}
+
+/// Follows the panel's lines and the disk until told to quit. Without a panel (input closed) it serves until it is killed.
+fn attend(server: &Server, floppy: Option<&Path>) -> Result<(), Box<dyn Error>> {
+    let (sender, lines) = mpsc::channel();
+    std::thread::spawn(move || {
+        io::stdin()
+            .lock()
+            .lines()
+            .map_while(Result::ok)
+            .try_for_each(|line| sender.send(line))
+    });
+    loop {
+        match lines.recv_timeout(Duration::from_millis(200)) {
+            Ok(line) if line.trim() == "quit" => return Ok(()),
+            Ok(line) => {
+                if let Err(problem) = panel(server, &line) {
+                    println!("{problem}");
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => std::thread::sleep(Duration::from_millis(200)),
+        }
+        for event in server.with(Emulator::take_events) {
+            if let (Event::FileStored(name), Some(folder)) = (&event, floppy) {
+                let text = server.with(|e| e.floppy().get(name).cloned()).unwrap_or_default();
+                let mut file = tempfile::NamedTempFile::new_in(folder)?;
+                file.write_all(text.as_bytes())?;
+                file.persist(folder.join(name).with_extension("v2"))?;
+            }
+        }
+    }
+}
+
+fn panel(server: &Server, line: &str) -> Result<(), String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let state = |word: &str| match word {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("`{word}` is neither on nor off")),
+    };
+    match words[..] {
+        [] => {}
+        ["power", word] => {
+            let on = state(word)?;
+            server.with(|e| e.set_arm_power(on));
+        }
+        ["signal", number, word] => {
+            let number: u16 = number.parse().map_err(|_| format!("`{number}` is no signal"))?;
+            let on = state(word)?;
+            server
+                .with(|e| e.set_signal(number, on))
+                .map_err(|fault| fault.to_string())?;
+        }
+        ["joints"] => println!(
+            "{} {:?}",
+            server.with(|e| e.joints()),
+            server.with(|e| e.gripper())
+        ),
+        ["restart"] => server.with(Emulator::restart),
+        _ => return Err("power on|off, signal NUMBER on|off, joints, restart, quit".into()),
+    }
+    Ok(())
+}

@@ -1,0 +1,228 @@
+//! The arm's plane: approaching alone, with the exact geometry instead of a regression, and the breadth-first optimum as yardstick.
+//!
+//! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything, and (y, r, theta 3) is the whole state:
+//! turning arm and ball together about the shoulder changes nothing. Centering has nothing to do here.
+
+use std::collections::VecDeque;
+
+use grasp_agent::{Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
+use hough_heuristic::Features;
+use pipeline_sim::{Ball, Cell, SightRule, Workspace, exploring_start};
+use puma_val2::{Joint, JointDelta, Joints};
+use qtable::{Action, Progress, QTable, TrainConfig, train};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, RngExt, SeedableRng};
+
+use crate::{LearnError, Lesson, schedule};
+
+/// A simulator of approaching that makes no errors, and the starts to learn from.
+#[derive(Clone, Debug)]
+pub struct ExactPlane {
+    model: CameraModel,
+    sight: SightRule,
+    starts: Vec<Percept>,
+}
+
+/// What one policy achieved from a set of starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneScore {
+    /// Starts from which the goal was reached.
+    pub reached: usize,
+    /// Starts in all.
+    pub starts: usize,
+    /// Steps of the successful runs, on average.
+    pub steps: f64,
+    /// The same steps over the breadth-first optimum from the same starts.
+    pub over_optimum: f64,
+}
+
+/// A start before a search pose's view: the ball in the arm's plane.
+#[derive(Clone, Debug)]
+pub struct PlaneStart {
+    cell: Cell,
+    joints: Joints,
+    /// The fewest steps of the paper's 81 actions to the goal.
+    pub optimum: usize,
+}
+
+/// Most steps of a run.
+const MOST_STEPS: usize = 60;
+
+/// From the camera sideways to the arm's plane, in radii of the ball: 4.5 of 20 mm.
+const CAMERA_BESIDE: f64 = 0.225;
+
+impl ExactPlane {
+    /// With `starts` exploring starts drawn from `rng`.
+    pub fn new(starts: usize, rng: &mut dyn Rng) -> Self {
+        let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+        let drawn = (0..starts).filter_map(|_| {
+            let (cell, joints) = exploring_start(&cell, rng)?;
+            let mut features = cell.features(&joints)?;
+            // Into the arm's plane: the camera sits this many ball radii beside it.
+            features.x = 0.5 * Features::WIDTH + CAMERA_BESIDE * features.r;
+            Some(Percept::new(features, &joints))
+        });
+        Self {
+            model: CameraModel::paper(),
+            sight: SightRule::default(),
+            starts: drawn.collect(),
+        }
+    }
+
+    /// What is perceived after the move, `None` when the ball is lost.
+    pub fn after(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
+        self.model
+            .after(percept, delta, &JointLimits::paper())
+            .filter(|after| self.sight.sees_features(&after.features))
+    }
+
+    /// Learns `spec` here with the paper's settings.
+    ///
+    /// # Errors
+    /// As for [`learn`](crate::learn).
+    pub fn learn(
+        &self,
+        spec: BehaviourSpec,
+        actions: u64,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Lesson, LearnError> {
+        self.learn_with(spec, &schedule(actions)?, rng, on_progress)
+    }
+
+    /// Learns `spec` here.
+    ///
+    /// # Errors
+    /// As for [`learn`](crate::learn).
+    pub fn learn_with(
+        &self,
+        spec: BehaviourSpec,
+        config: &TrainConfig,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Lesson, LearnError> {
+        let mut table = QTable::new(spec.states(), spec.actions())?;
+        let simulate = |percept: &Percept, delta: &JointDelta| self.after(percept, delta);
+        let start = |rng: &mut dyn Rng| self.starts[rng.random_range(0..self.starts.len())];
+        let mut task = grasp_agent::BehaviourTask::new(&spec, config.gamma, simulate, start);
+        let report = train(&mut task, &mut table, config, rng, on_progress)?;
+        Ok(Lesson {
+            behaviour: Behaviour::new(spec, table)?,
+            report,
+        })
+    }
+}
+
+/// `count` balls as the search finds them, turned into the arm's plane, with the optimum from each.
+pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let workspace = Workspace::paper();
+    let spec = BehaviourSpec::approaching();
+    let elbow = workspace.search_poses()[0];
+    let starts = std::iter::repeat_with(|| {
+        let cell = Cell::paper(workspace.sample_ball(&mut rng));
+        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
+        let mut joints = elbow;
+        joints.0[0] = goal.0[0];
+        cell.features(&joints)?;
+        let optimum = optimum(&cell, &joints, &spec)?;
+        Some(PlaneStart {
+            cell,
+            joints,
+            optimum,
+        })
+    });
+    starts.flatten().take(count).collect()
+}
+
+/// How a policy does from `starts`: greedy, with the loop breaker at `kappa`.
+pub fn score(behaviour: &Behaviour, kappa: f64, starts: &[PlaneStart]) -> PlaneScore {
+    let (mut reached, mut steps, mut optimum) = (0, 0, 0);
+    for start in starts {
+        if let Some(needed) = steps_to_goal(behaviour, kappa, start) {
+            reached += 1;
+            steps += needed;
+            optimum += start.optimum;
+        }
+    }
+    PlaneScore {
+        reached,
+        starts: starts.len(),
+        steps: steps as f64 / reached as f64,
+        over_optimum: steps as f64 / optimum as f64,
+    }
+}
+
+fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Option<usize> {
+    let spec = behaviour.spec();
+    let mut episode = Episode::new(behaviour);
+    let mut joints = start.joints;
+    for step in 0..=MOST_STEPS {
+        let percept = Percept::new(start.cell.features(&joints)?, &joints);
+        if spec.at_goal(&percept) {
+            return Some(step);
+        }
+        let state = spec.state(&percept).ok()?;
+        let admitted = |action: Action| start.cell.within_limits(&(joints + spec.delta(action)));
+        let action = behaviour.choose(state, &episode, kappa, admitted)?;
+        episode.chose(state, action);
+        joints = joints + spec.delta(action);
+    }
+    None
+}
+
+/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after each; `None` if there is no way.
+///
+/// The joints can only stand on a lattice around the start, because all steps are multiples of 0.2 and 0.1 degrees.
+pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
+    /// What a place of the lattice is known to be.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Place {
+        Unknown,
+        Closed,
+        Open,
+    }
+    const GRID: [f64; 2] = [0.2, 0.1];
+    let [from2, from3] = [joints[Joint::J2].to_degrees(), joints[Joint::J3].to_degrees()];
+    let span = |from: f64, (low, high): (f64, f64), grid: f64| {
+        let below = ((from - low) / grid).floor() as i64;
+        (below, below + 1 + ((high - from) / grid).floor() as i64)
+    };
+    let (below2, size2) = span(from2, (-150.0, -20.0), GRID[0]);
+    let (below3, size3) = span(from3, (120.0, 215.0), GRID[1]);
+    let mut moves: Vec<(i64, i64)> = (0..spec.actions())
+        .map(|action| {
+            let d = spec.delta(Action(action)).degrees();
+            ((d[1] / GRID[0]).round() as i64, (d[2] / GRID[1]).round() as i64)
+        })
+        .collect();
+    moves.sort_unstable();
+    moves.dedup();
+    let mut places = vec![Place::Unknown; (size2 * size3).max(1) as usize];
+    let index = |(i, j): (i64, i64)| ((i + below2) * size3 + j + below3) as usize;
+    let mut queue = VecDeque::from([((0, 0), 0)]);
+    places[index((0, 0))] = Place::Closed;
+    while let Some(((i, j), steps)) = queue.pop_front() {
+        for (di, dj) in &moves {
+            let next = (i + di, j + dj);
+            let inside =
+                (-below2..size2 - below2).contains(&next.0) && (-below3..size3 - below3).contains(&next.1);
+            if !inside || places[index(next)] != Place::Unknown {
+                continue;
+            }
+            let mut pose = *joints;
+            pose.0[1] = (from2 + GRID[0] * next.0 as f64).to_radians();
+            pose.0[2] = (from3 + GRID[1] * next.1 as f64).to_radians();
+            let Some(features) = cell.features(&pose) else {
+                places[index(next)] = Place::Closed;
+                continue;
+            };
+            if spec.at_goal(&Percept::new(Features { ..features }, &pose)) {
+                return Some(steps + 1);
+            }
+            places[index(next)] = Place::Open;
+            queue.push_back((next, steps + 1));
+        }
+    }
+    None
+}

@@ -1,0 +1,221 @@
+//! Trials on the feature shortcut: one ball in a cell that may be wrong, and an agent that goes for it, without rendering.
+
+use grasp_agent::{Agent, AgentError, Controller, Event, Eye, Look, Outcome, Sighting};
+use hough_heuristic::{Detection, Features, FrameError};
+use pipeline_sim::{
+    Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Grasp, Hand, SharedCell, SimulatedArm,
+    Workspace,
+};
+use puma_val2::{ArmError, Joints, Manipulator, ProximitySensor};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+/// [`FeatureCamera`] as an [`Eye`].
+#[derive(Debug)]
+pub struct FeatureEye<P>(pub FeatureCamera<P>);
+
+impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
+    fn look(&mut self) -> Result<Look, FrameError> {
+        /// Width that the circle of a sighting is given for: that of the paper's frame.
+        const FRAME: u32 = 768;
+        let ball = self.0.look().map(|features| Sighting {
+            features,
+            detection: Detection {
+                circle: features.to_circle(FRAME),
+                score: 1.0,
+            },
+        });
+        Ok(Look { frame: None, ball })
+    }
+}
+
+/// A cell with drawn errors, in which balls can be placed and gone for.
+#[derive(Clone, Debug)]
+pub struct TrialCell {
+    /// What is wrong with it.
+    pub errors: Errors,
+    cell: Cell,
+    workspace: Workspace,
+    bodies: bool,
+}
+
+/// What came of a trial.
+#[derive(Clone, Debug)]
+pub struct TrialResult {
+    /// What the agent says.
+    pub outcome: Outcome,
+    /// Whether the ball stood at the goal.
+    pub reached: bool,
+    /// Whether the jaws hold the ball.
+    pub held: bool,
+    /// From the point between the finger pads to the ball's centre when the jaws closed, metres; `None` if they did not.
+    pub miss: Option<f64>,
+    /// How often something came too near to the hand.
+    pub near: usize,
+}
+
+impl TrialCell {
+    /// The paper's cell with errors of `level`, drawn from `seed`.
+    ///
+    /// # Errors
+    /// None of the levels makes an impossible camera; the type says that others could.
+    pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, CameraError> {
+        let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+        Ok(Self {
+            cell: errors.apply(&nominal)?,
+            errors,
+            workspace: Workspace::paper(),
+            bodies: true,
+        })
+    }
+
+    /// The same cell with a hand that touches nothing: whether the ball is *reached* does not depend then on what stands in the
+    /// way.
+    #[must_use]
+    pub fn without_bodies(mut self) -> Self {
+        // Everything of the hand at the wrist centre, where no ball can be.
+        let at_the_wrist = -self.cell.params.d6;
+        self.cell.hand = Hand {
+            tool: at_the_wrist,
+            beyond_tool: 0.0,
+            finger_radius: 0.0,
+            half_opening: 0.0,
+            palm_radius: 0.0,
+            finger_length: 0.0,
+            camera_radius: 0.0,
+            ..self.cell.hand
+        };
+        self.bodies = false;
+        self
+    }
+
+    /// A ball that the arm, as it really stands in the search poses, sees from one of them.
+    fn sample_seen_ball(&self, rng: &mut Xoshiro256PlusPlus) -> Result<Option<Ball>, ArmError> {
+        let shared = SharedCell::new(self.cell);
+        let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
+        let mut pose = arm.pose();
+        let mut stands = Vec::new();
+        for search_pose in self.search_poses() {
+            arm.move_to(search_pose)?;
+            stands.push(pose());
+        }
+        Ok((0..10_000).find_map(|_| {
+            let ball = self.workspace.sample_ball(rng);
+            let ball = Ball {
+                radius: self.cell.ball.radius,
+                ..ball
+            };
+            let cell = Cell { ball, ..self.cell };
+            // Something to spare, for joints whose play is taken up from the other side.
+            let seen = |joints: &Joints| cell.features(joints).is_some_and(|f| well_inside(&f));
+            stands.iter().any(seen).then_some(ball)
+        }))
+    }
+
+    /// The poses from which balls are looked for.
+    pub fn search_poses(&self) -> [Joints; 6] {
+        self.workspace.search_poses()
+    }
+
+    /// Lets `agent` go for the ball that `seed` places among those that can be seen from the search poses. `world` is called after each look,
+    /// before it is answered, with the cell and the joints as they are: it may move the ball. `None` if no ball can be seen.
+    ///
+    /// # Errors
+    /// What the agent reports.
+    pub fn run<C: Controller>(
+        &self,
+        agent: &mut Agent<C>,
+        seed: u64,
+        world: &mut dyn FnMut(&mut Cell, &Joints),
+        observe: &mut dyn FnMut(&Event<'_>),
+    ) -> Result<Option<TrialResult>, AgentError> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let Some(ball) = self.sample_seen_ball(&mut rng)? else {
+            return Ok(None);
+        };
+        let mut cell = self.cell;
+        cell.place_ball(ball.centre);
+        let shared = SharedCell::new(cell);
+        let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
+        let noise = self.errors.feature_noise;
+        let camera = FeatureCamera::new(shared.clone(), arm.pose(), noise, rng.random());
+        let mut eye = ChangingWorld {
+            eye: FeatureEye(camera),
+            cell: shared.clone(),
+            pose: arm.pose(),
+            world,
+        };
+        let (mut sensor, mut near, mut miss, mut reached) = (arm.clone(), 0, None, false);
+        let mut pose = arm.pose();
+        let outcome = agent.run_and_learn(
+            &mut eye,
+            &mut arm,
+            &mut Sensor {
+                arm: self.bodies.then_some(&mut sensor),
+                near: &mut near,
+            },
+            &mut |event| {
+                reached |= event.kind == grasp_agent::EventKind::AtGoal;
+                if let grasp_agent::EventKind::Gripping(_) = event.kind {
+                    miss = Some(shared.with(|cell| cell.grip_miss(&pose())));
+                }
+                observe(event);
+            },
+        )?;
+        let held = arm.grasp() == Some(Grasp::Held);
+        Ok(Some(TrialResult {
+            outcome,
+            reached,
+            held,
+            miss,
+            near,
+        }))
+    }
+}
+
+/// An eye in a world that moves on with every look.
+struct ChangingWorld<'a, E, P> {
+    eye: E,
+    cell: SharedCell,
+    pose: P,
+    world: &'a mut dyn FnMut(&mut Cell, &Joints),
+}
+
+impl<E: Eye, P: FnMut() -> Joints> Eye for ChangingWorld<'_, E, P> {
+    fn look(&mut self) -> Result<Look, FrameError> {
+        let joints = (self.pose)();
+        self.cell.with(|cell| (self.world)(cell, &joints));
+        self.eye.look()
+    }
+}
+
+/// A proximity sensor that is counted; without an arm, one that never senses anything.
+struct Sensor<'a> {
+    arm: Option<&'a mut SimulatedArm>,
+    near: &'a mut usize,
+}
+
+impl ProximitySensor for Sensor<'_> {
+    fn object_near(&mut self) -> Result<bool, ArmError> {
+        let near = match &mut self.arm {
+            Some(arm) => arm.object_near()?,
+            None => false,
+        };
+        *self.near += usize::from(near);
+        Ok(near)
+    }
+}
+
+/// Whether a ball that shows like this still does from a pose that differs by the play of the joints.
+fn well_inside(f: &Features) -> bool {
+    const MARGIN: f64 = 8.0;
+    f.r > 5.5
+        && (MARGIN..Features::WIDTH - MARGIN).contains(&f.x)
+        && (MARGIN..Features::HEIGHT - MARGIN).contains(&f.y)
+}
+
+/// Where the arm stands before a trial: VAL's READY pose.
+fn home() -> Joints {
+    Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+}

@@ -1,0 +1,140 @@
+//! The examples as their users meet them: what bad input gets.
+//!
+//! `cargo test` builds the examples beside the tests; where one is not there, its test says so and is skipped.
+
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn example(name: &str) -> Option<Command> {
+    let tests = std::env::current_exe().ok()?;
+    let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+    let path: PathBuf = tests.parent()?.parent()?.join("examples").join(file);
+    if !path.exists() {
+        println!("skipped: the example {name} has not been built");
+        return None;
+    }
+    Some(Command::new(path))
+}
+
+fn output(command: &mut Command) -> (Output, String) {
+    let output = command.output().expect("the example starts");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!errors.contains("panicked"), "{errors}");
+    (output, errors)
+}
+
+/// Runs `grasp` with arguments that must make it fail, and gives what it says.
+fn grasp_fails(folder: &Path, arguments: &[&str]) -> Option<String> {
+    let mut command = example("grasp")?;
+    command
+        .args(["--quiet", "--runs", "1", "--out"])
+        .arg(folder.join("out"))
+        .args(arguments);
+    let (output, errors) = output(&mut command);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.starts_with("error: "), "{errors}");
+    Some(errors)
+}
+
+#[test]
+fn grasp_names_a_port_that_does_not_exist() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(errors) = grasp_fails(folder.path(), &["--port", "/dev/no-such-port"]) else {
+        return;
+    };
+    assert!(errors.contains("/dev/no-such-port"), "{errors}");
+}
+
+#[test]
+fn grasp_names_a_socket_that_is_silent_or_talks_nonsense() {
+    for nonsense in [&b""[..], b"\x00\xff220 mail ready\r\n"] {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a socket");
+        let address = listener.local_addr().expect("its address").to_string();
+        let server = std::thread::spawn(move || {
+            let Ok((mut stream, _)) = listener.accept() else {
+                return;
+            };
+            let mut heard = [0; 256];
+            while stream.read(&mut heard).is_ok_and(|count| count > 0) {
+                if stream.write_all(nonsense).is_err() {
+                    break;
+                }
+            }
+        });
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let Some(errors) = grasp_fails(folder.path(), &["--tcp", &address]) else {
+            return;
+        };
+        assert!(
+            errors.contains(&address) && errors.contains("expected"),
+            "{errors}"
+        );
+        server.join().expect("the server ends with the connection");
+    }
+}
+
+#[test]
+fn grasp_refuses_an_output_folder_that_is_a_file() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(folder.path().join("out"), b"in the way").expect("a file");
+    let Some(errors) = grasp_fails(folder.path(), &[]) else {
+        return;
+    };
+    assert!(errors.contains("cannot be written"), "{errors}");
+}
+
+#[test]
+fn grasp_refuses_missing_and_corrupt_policies() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let policies = folder.path().join("policies");
+    std::fs::create_dir(&policies).expect("a folder");
+    let argument = policies.to_str().expect("a plain path").to_owned();
+    let Some(errors) = grasp_fails(folder.path(), &["--policy", &argument]) else {
+        return;
+    };
+    assert!(errors.contains("centering.policy"), "{errors}");
+    for name in ["centering.policy", "approaching.policy"] {
+        std::fs::write(policies.join(name), b"this is no policy at all").expect("a file");
+    }
+    let Some(errors) = grasp_fails(folder.path(), &["--policy", &argument]) else {
+        return;
+    };
+    assert!(errors.contains("centering.policy"), "{errors}");
+}
+
+#[test]
+fn detect_circles_names_what_it_cannot_read_and_goes_on() {
+    let Some(mut command) = example("detect_circles") else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let images = folder.path().join("images");
+    std::fs::create_dir(&images).expect("a folder");
+    std::fs::write(images.join("a_broken.png"), b"\x89PNG\r\n\x1a\nnothing").expect("a file");
+    std::fs::write(images.join("b_empty.pgm"), b"P5\n0 0\n255\n").expect("a file");
+    let bright = |x: u32, y: u32| (f64::from(x) - 90.0).hypot(f64::from(y) - 80.0) < 40.0;
+    image::GrayImage::from_fn(200, 160, |x, y| {
+        image::Luma([if bright(x, y) { 220 } else { 40 }])
+    })
+    .save(images.join("c_ball.png"))
+    .expect("a file");
+    let csv = folder.path().join("circles.csv");
+    let missing = folder.path().join("missing.png");
+    let (output, errors) = output(command.arg("--csv").arg(&csv).arg(&missing).arg(&images));
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    for name in ["missing.png", "a_broken.png", "b_empty.pgm"] {
+        assert!(errors.contains(name), "{name} is not named in: {errors}");
+    }
+    let rows = std::fs::read_to_string(csv).expect("the CSV is written all the same");
+    let mut rows = rows.lines();
+    assert_eq!(rows.next(), Some("file,cx,cy,r,score"));
+    let ball: Vec<&str> = rows.next().expect("the ball is found").split(',').collect();
+    assert!(ball[0].ends_with("c_ball.png"));
+    let near = |field: &str, value: f64| (field.parse::<f64>().expect("a number") - value).abs() < 1.0;
+    assert!(
+        near(ball[1], 90.0) && near(ball[2], 80.0) && near(ball[3], 40.0),
+        "{ball:?}"
+    );
+}

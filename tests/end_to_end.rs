@@ -1,0 +1,103 @@
+//! The whole chain on its real parts: samples, regression, learning, policies on disk, the emulated controller on a
+//! pseudo-terminal (a socket where the system has none), rendered frames, the paper's detector, and the grip.
+
+use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp};
+use hough_heuristic::{Canny, CannyConfig, Heuristic, HeuristicConfig};
+use pipeline_sim::{Ball, ReachForm, Scene, Workspace, sample_moves};
+use puma_grasp::{Rig, Simulator, learn};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+fn scene() -> Scene {
+    let mut scene = Scene::plain();
+    scene.table.albedo = 0.2;
+    scene
+}
+
+fn detector() -> Heuristic<Canny> {
+    let edges = CannyConfig {
+        low: 20.0,
+        high: 50.0,
+        ..CannyConfig::default()
+    };
+    let config = HeuristicConfig {
+        theta: 0.6,
+        min_radius: 20.0,
+        max_radius: 272.0,
+        ..HeuristicConfig::default()
+    };
+    Heuristic::new(config, Canny::new(edges).expect("valid thresholds")).expect("valid settings")
+}
+
+/// Learns both behaviours in a simulator fitted to `rig`'s cell; they pass through files on the way.
+fn agent(rig: &Rig, seed: u64) -> Agent {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (centring, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, &mut rng);
+    let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
+    assert!(
+        simulator.quality().iter().all(|quality| quality.r2 > 0.9),
+        "{:?}",
+        simulator.quality()
+    );
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut taught = |spec: BehaviourSpec, actions| {
+        let lesson = learn(spec, &simulator, actions, &mut rng, &mut |_| {}).expect("learns");
+        let path = folder.path().join("behaviour.policy");
+        lesson.behaviour.save(&path).expect("saves");
+        let loaded = Behaviour::load(&path, lesson.behaviour.spec()).expect("loads");
+        assert_eq!(loaded, lesson.behaviour);
+        loaded
+    };
+    let centering = taught(BehaviourSpec::centering(), 60_000);
+    let approaching = taught(BehaviourSpec::approaching(), 300_000);
+    let config = AgentConfig::paper(Workspace::paper().search_poses());
+    Agent::new(config, centering, approaching).expect("valid settings")
+}
+
+#[test]
+fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
+    let run = || {
+        let mut rig = Rig::emulated(false, &scene(), 3).expect("an emulated controller");
+        let agent = agent(&rig, 2000);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        let mut log = Vec::new();
+        let mut grasped = 0;
+        for _ in 0..4 {
+            let cell = rig.cell().get();
+            let (ball, _) = Workspace::paper()
+                .sample_seen_ball(&cell, &mut rng)
+                .expect("a ball in view");
+            rig.place(&ball);
+            let outcome = rig
+                .run(&agent, &mut detector(), &mut |event| {
+                    log.push((event.kind, event.joints))
+                })
+                .expect("the line holds");
+            grasped += usize::from(outcome.gave_up.is_none() && rig.grip_miss() < 0.010);
+        }
+        (grasped, log)
+    };
+    let (grasped, log) = run();
+    assert!(grasped >= 3, "only {grasped} of 4 grasped");
+    assert!(log.iter().any(|(kind, _)| *kind == EventKind::Gripped));
+    assert!(log == run().1, "the same seed gave another run");
+}
+
+#[test]
+fn a_ball_out_of_view_is_reported_and_not_gripped() {
+    let mut rig = Rig::emulated(false, &scene(), 3).expect("an emulated controller");
+    let agent = agent(&rig, 1);
+    // Behind the arm.
+    rig.place(&Ball::at(-0.6, 0.0, -0.1));
+    let mut searched = Vec::new();
+    let outcome = rig
+        .run(&agent, &mut detector(), &mut |event| {
+            if let EventKind::AtSearchPose(pose) = event.kind {
+                searched.push(pose);
+            }
+        })
+        .expect("the line holds");
+    assert_eq!(outcome.gave_up, Some(GaveUp::NotFound));
+    searched.sort_unstable();
+    assert_eq!(searched, [0, 1, 2, 3, 4, 5]);
+}
