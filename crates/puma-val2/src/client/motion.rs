@@ -138,9 +138,7 @@ impl<T: Transport> Val2Client<T> {
             if off <= self.config.tolerance {
                 return Ok(stands);
             }
-            if let Err(stopped) = self.stopped_by_guard(stands) {
-                return Err(stopped);
-            }
+            self.stopped_by_guard(stands)?;
             match doubt {
                 Some(_) if tries < self.config.retries && !overdue => {
                     tries += 1;
