@@ -1,7 +1,7 @@
 //! Agreement with tables computed elsewhere: the Robotics Toolbox for Python, and an independent inverse.
 //!
 //! The tables are looked for in the folder `oracles` of `PUMA_GRASP_SHARED`; without them these tests print that they are skipped.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::f64::consts::{PI, TAU};
 
