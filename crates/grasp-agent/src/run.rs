@@ -311,7 +311,7 @@ impl<'a> Run<'a> {
     fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
         for _ in 0..self.config.looks {
             let Look { frame, ball } = self.eye.look()?;
-            let ball = ball.filter(|sighting| is_finite(sighting));
+            let ball = ball.filter(is_finite);
             if let Some(sighting) = ball {
                 self.tell(EventKind::Seen(sighting), frame.as_ref());
                 self.check_alive(&sighting)?;
