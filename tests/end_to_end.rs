@@ -70,7 +70,7 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
             rig.place(&ball);
             let outcome = rig
                 .run(&agent, &mut detector(), &mut |event| {
-                    log.push((event.kind, event.joints))
+                    log.push((event.kind.clone(), event.joints));
                 })
                 .expect("the line holds");
             grasped += usize::from(outcome.gave_up.is_none() && rig.grip_miss() < 0.010);

@@ -14,10 +14,8 @@ pub enum ConfigError {
         /// The values that are accepted.
         expected: &'static str,
     },
-    /// The radius range is empty, negative or not finite.
-    #[error(
-        "the radius range {min}..={max} px is not usable: both ends must be finite, at least 1, and in order"
-    )]
+    /// The radius range is empty, negative, or reaches beyond any frame.
+    #[error("the radius range {min}..={max} px is not usable: both ends must lie in 1..=100000, in order")]
     RadiusRange {
         /// The smallest radius, pixels.
         min: f64,
@@ -88,7 +86,7 @@ pub(crate) fn require(
 
 /// Checks a radius range.
 pub(crate) fn require_radii(min: f64, max: f64) -> Result<(), ConfigError> {
-    if min.is_finite() && max.is_finite() && min >= 1.0 && max >= min {
+    if min >= 1.0 && max >= min && max <= 1e5 {
         Ok(())
     } else {
         Err(ConfigError::RadiusRange { min, max })

@@ -19,7 +19,7 @@ pub struct Acceptance {
     /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1, corners and
     /// texture begin to pass for circles.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 300; at least min_radius). If it equals `min_radius` the radius is known: two
+    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the radius is known: two
     /// pixels then determine a circle, and only the centre is fitted.
     pub max_radius: f64,
     /// How many circles to look for (default 1; at least 1).

@@ -45,7 +45,7 @@ pub struct HeuristicConfig {
     /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1, corners and
     /// texture begin to pass for circles.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 300; at least min_radius). If it equals `min_radius` the radius is known: draws
+    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the radius is known: draws
     /// are of two pixels, and only the centre is fitted.
     pub max_radius: f64,
     /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than

@@ -112,12 +112,8 @@ impl<E: EdgeDetector> StandardHough<E> {
             min_votes > 0.0 && min_votes < 1.0,
         )?;
         let evidence = Evidence::new(accept)?;
-        require(
-            "max_radius",
-            accept.max_radius,
-            "at most 20000 px",
-            accept.max_radius <= 2e4,
-        )?;
+        let layered = accept.max_radius <= 1000.0 * cell;
+        require("max_radius", accept.max_radius, "at most 1000 cells", layered)?;
         let layers = ((accept.max_radius - accept.min_radius) / cell).floor() as u32 + 1;
         Ok(Self {
             rings: (0..layers)
@@ -163,8 +159,17 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             ..
         } = self.config;
         self.evidence.fill(edges);
+        // No circle through a pixel of the frame has its centre in the frame and a larger radius.
+        let (w, h) = (f64::from(edges.width()), f64::from(edges.height()));
+        let diagonal = (w * w + h * h).sqrt();
+        let fitting = self
+            .rings
+            .iter()
+            .take_while(|ring| ring.radius <= diagonal + cell)
+            .count();
+        let rings = &self.rings[..fitting];
         self.accumulator
-            .clear(edges.width(), edges.height(), cell, self.rings.len());
+            .clear(edges.width(), edges.height(), cell, rings.len());
         self.turns.clear();
         if gradient {
             self.turns.extend(edges.gradients().iter().map(|gradient| {
@@ -172,7 +177,7 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
                 gy.atan2(gx) / std::f64::consts::TAU
             }));
         }
-        for (layer, ring) in self.rings.iter().enumerate() {
+        for (layer, ring) in rings.iter().enumerate() {
             for (index, pixel) in edges.pixels().iter().enumerate() {
                 let (x, y) = (
                     (f64::from(pixel.x) / cell) as i32,
@@ -186,7 +191,7 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             }
         }
         self.accumulator
-            .find_peaks(&self.rings, min_votes, cell, &mut self.peaks);
+            .find_peaks(rings, min_votes, cell, &mut self.peaks);
 
         let reach = (1.5 * cell).max(2.0 * accept.tolerance + 1.0);
         for peak in &self.peaks {

@@ -22,10 +22,10 @@ fn frames(c: &mut Criterion) {
     let mut renderer = Renderer::new(&Scene::laboratory(), 1);
     let mut group = c.benchmark_group("frame");
     group.bench_function("laboratory, search pose", |b| {
-        b.iter(|| renderer.render(&cell, black_box(&search)).len())
+        b.iter(|| renderer.render(&cell, black_box(&search)).len());
     });
     group.bench_function("laboratory, goal pose", |b| {
-        b.iter(|| renderer.render(&cell, black_box(&goal)).len())
+        b.iter(|| renderer.render(&cell, black_box(&goal)).len());
     });
     for kind in [
         SceneKind::Clutter,
@@ -37,7 +37,7 @@ fn frames(c: &mut Criterion) {
         let mut renderer = Renderer::new(&Scene::generate(kind, &mut rng), 1);
         let snapshot = Snapshot::draw(kind, &mut rng);
         group.bench_function(kind.to_string(), |b| {
-            b.iter(|| black_box(&snapshot).take(&mut renderer).len())
+            b.iter(|| black_box(&snapshot).take(&mut renderer).len());
         });
     }
     group.finish();

@@ -2,7 +2,12 @@
 //!
 //! What must hold each time: a call that succeeds leaves the arm where it was sent; a call that fails is a typed error, the arm stands, and no
 //! joint has gone beyond where it was sent.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::needless_pass_by_value
+)] // Functions that serve tests may fail as tests do.
 
 use std::io;
 use std::time::Duration;
@@ -31,6 +36,9 @@ enum Way {
     FromController,
 }
 
+/// Something that happens to a controller.
+type Disturbance = Box<dyn FnOnce(&mut Emulator)>;
+
 /// A line that damages characters.
 struct FaultyLine {
     inner: MemoryLine,
@@ -43,7 +51,7 @@ struct FaultyLine {
     cut: bool,
     struck: bool,
     /// Done once, as soon as the arm is seen moving.
-    disturb: Option<Box<dyn FnOnce(&mut Emulator)>>,
+    disturb: Option<Disturbance>,
 }
 
 impl FaultyLine {
@@ -141,7 +149,7 @@ impl Transport for FaultyLine {
                 }
                 return Ok(None);
             };
-            let passed = self.pass(&buffer[..count].to_vec(), Way::FromController);
+            let passed = self.pass(&buffer[..count], Way::FromController);
             if self.closed {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }

@@ -1,7 +1,7 @@
 //! Agreement with tables computed elsewhere: the Robotics Toolbox for Python, and an independent inverse.
 //!
 //! The tables are looked for in the folder `oracles` of `PUMA_GRASP_SHARED`; without them these tests print that they are skipped.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::f64::consts::{PI, TAU};
 
@@ -202,7 +202,7 @@ fn an_independent_inverse_finds_the_same_solutions() {
     });
     let mut random = Xoshiro256PlusPlus::seed_from_u64(560);
     let (mut worst, mut lost, mut compared) = (0.0_f64, 0, 0);
-    for _ in 0..10_000 {
+    while compared < 10_000 {
         let q: [f64; 6] = std::array::from_fn(|i| {
             let range = arm.ranges[i];
             random.random_range(range.min..range.max)
@@ -234,6 +234,6 @@ fn an_independent_inverse_finds_the_same_solutions() {
     println!(
         "rs-opw-kinematics: {compared} poses, greatest difference {worst:.1e} rad, {lost} with another count"
     );
-    assert!(compared > 9000 && worst < 1e-6, "{worst}");
+    assert!(worst < 1e-9, "{worst}");
     assert_eq!(lost, 0);
 }

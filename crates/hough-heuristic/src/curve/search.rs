@@ -128,6 +128,8 @@ impl CurveSearch {
     }
 
     /// The curves of an edge image for which `admits` is true, in the order in which they were found.
+    ///
+    /// Checking a curve takes as long as its outline is, so let `admits` turn away those much larger than the image.
     pub fn find<C: Curve>(&mut self, edges: &EdgeMap, admits: impl Fn(&C) -> bool) -> Vec<FoundCurve<C>> {
         let (width, height) = (edges.width(), edges.height());
         self.structure.fill(width, height, edges.pixels());

@@ -6,7 +6,7 @@ use super::canny::check_thresholds;
 use super::{EdgeDetector, EdgeMap};
 use crate::ConfigError;
 
-/// Canny's operator of the crate `imageproc`: an independent second opinion, some fifty times as slow as [`Canny`].
+/// Canny's operator of the crate `imageproc`: an independent second opinion, some thirty times as slow as [`Canny`].
 ///
 /// Smooths with a Gaussian of 1.4 px. Allocates its planes anew for every frame, and knows no gradients.
 ///

@@ -121,9 +121,10 @@ impl<T: Transport> Val2Client<T> {
                 Err(failed) if is_doubt(&failed.error) => Some(failed),
                 Err(failed) => return Err(self.given_up(failed)),
             };
-            if let Some(failed) = &doubt {
-                let timed_out = matches!(failed.error, ArmError::Silence { waited, .. } if waited >= self.config.motion_timeout);
-                if timed_out {
+            let is_overdue = |failed: &Failed| matches!(failed.error, ArmError::Silence { waited, .. } if waited >= self.config.motion_timeout);
+            let overdue = doubt.as_ref().is_some_and(is_overdue);
+            if doubt.is_some() {
+                if overdue {
                     let _ = self.panic_stop();
                 } else if let Err(error) = self.wire.settle(&self.config) {
                     return Err(self.lost(error));
@@ -137,11 +138,9 @@ impl<T: Transport> Val2Client<T> {
             if off <= self.config.tolerance {
                 return Ok(stands);
             }
-            if let Err(stopped) = self.stopped_by_guard(stands) {
-                return Err(stopped);
-            }
+            self.stopped_by_guard(stands)?;
             match doubt {
-                Some(_) if tries < self.config.retries => {
+                Some(_) if tries < self.config.retries && !overdue => {
                     tries += 1;
                     from = stands;
                 }

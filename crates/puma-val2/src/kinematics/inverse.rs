@@ -144,52 +144,64 @@ impl PumaParams {
         if !(p.iter().chain(r.iter()).all(|v| v.is_finite())) {
             return Err(Unreachable::NotFinite);
         }
-        let radius = p.x.hypot(p.y);
-        if radius < self.d2.abs() {
+        let radius2 = p.x * p.x + p.y * p.y;
+        let forward2 = radius2 - self.d2 * self.d2;
+        if forward2 < 0.0 {
             return Err(Unreachable::TooClose {
-                by: self.d2.abs() - radius,
+                by: self.d2.abs() - radius2.sqrt(),
             });
         }
-        let forward = (radius * radius - self.d2 * self.d2).sqrt();
-        // x' = a2 c2 + a3 c23 + d4 s23 and z' = p.z span the arm's plane; k = a3 c3 + d4 s3.
-        let forearm = self.a3.hypot(self.d4);
-        let distance2 = forward * forward + p.z * p.z;
-        let k = (distance2 - self.a2 * self.a2 - forearm * forearm) / (2.0 * self.a2);
-        let lever2 = forearm * forearm - k * k;
+        let forward = forward2.sqrt();
+        // x' = a2 c2 + a3 c23 + d4 s23 and z' = p.z span the arm's plane; k = a3 c3 + d4 s3, n = d4 c3 - a3 s3.
+        let forearm2 = self.a3 * self.a3 + self.d4 * self.d4;
+        let distance2 = forward2 + p.z * p.z;
+        let k = (distance2 - self.a2 * self.a2 - forearm2) / (2.0 * self.a2);
+        let lever2 = forearm2 - k * k;
         if lever2.is_nan() || lever2 < 0.0 {
-            let distance = distance2.sqrt();
+            let (distance, forearm) = (distance2.sqrt(), forearm2.sqrt());
             let by = (distance - (self.a2 + forearm)).max((self.a2 - forearm).abs() - distance);
             return Err(Unreachable::TooFar { by: by.max(0.0) });
         }
         let lever = lever2.sqrt();
-        let elbow_offset = self.a3.atan2(self.d4);
+        // One arc tangent each serves all postures: they differ in signs and by half a turn. Sines and cosines are had without any.
         let azimuth = p.y.atan2(p.x);
+        let lateral = self.d2.atan2(forward);
+        let elevation = (-p.z).atan2(forward);
+        let elbow_offset = self.a3.atan2(self.d4);
+        let bend_above = k.atan2(lever);
+        let raised = lever.atan2(self.a2 + k);
         let mut found = Solutions {
             items: [EMPTY; 8],
             len: 0,
         };
         for side in [ArmSide::Righty, ArmSide::Lefty] {
-            let (sign, x) = match side {
-                ArmSide::Righty => (1.0, -forward),
-                ArmSide::Lefty => (-1.0, forward),
+            let (sign, x, t1, ahead) = match side {
+                ArmSide::Righty => (1.0, -forward, azimuth + lateral - PI, PI - elevation),
+                ArmSide::Lefty => (-1.0, forward, azimuth - lateral, elevation),
             };
-            let t1 = azimuth - self.d2.atan2(x);
-            let (s1, c1) = t1.sin_cos();
-            let elevation = (-p.z).atan2(x);
+            let c1 = (p.x * x + p.y * self.d2) / radius2;
+            let s1 = (p.y * x - p.x * self.d2) / radius2;
             for elbow in [Elbow::Above, Elbow::Below] {
-                let n = match elbow {
-                    Elbow::Above => sign * lever,
-                    Elbow::Below => -sign * lever,
+                let up = match elbow {
+                    Elbow::Above => sign,
+                    Elbow::Below => -sign,
                 };
-                let t3 = k.atan2(n) - elbow_offset;
-                let t2 = elevation + n.atan2(self.a2 + k);
-                let (s23, c23) = (t2 + t3).sin_cos();
+                let n = up * lever;
+                let t3 = if up > 0.0 { bend_above } else { PI - bend_above } - elbow_offset;
+                let t2 = ahead + up * raised;
+                let m = self.a2 + k;
+                let (c2, s2) = ((m * x + n * p.z) / distance2, (n * x - m * p.z) / distance2);
+                let (c3, s3) = (
+                    (n * self.d4 + k * self.a3) / forearm2,
+                    (k * self.d4 - n * self.a3) / forearm2,
+                );
+                let (s23, c23) = (s2 * c3 + c2 * s3, c2 * c3 - s2 * s3);
                 // Ry(-t23) Rz(-t1) R, of which the last column and the last row are needed.
                 let along = |i: usize| c1 * r[(0, i)] + s1 * r[(1, i)];
                 let w02 = c23 * along(2) - s23 * r[(2, 2)];
                 let w12 = -s1 * r[(0, 2)] + c1 * r[(1, 2)];
                 let w22 = s23 * along(2) + c23 * r[(2, 2)];
-                let bend = w02.hypot(w12);
+                let bend = (w02 * w02 + w12 * w12).sqrt();
                 let [(t4, t5, t6), flipped] = if bend > 1e-12 {
                     let w20 = s23 * along(0) + c23 * r[(2, 0)];
                     let w21 = s23 * along(1) + c23 * r[(2, 1)];
