@@ -6,6 +6,12 @@
 //!
 //! writes `overview.svg`, `search.png`, `goal.png`, `run.png` (animated) and `run.y4m`.
 
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for the terminal"
+)]
+
 use std::error::Error;
 use std::path::{Path, PathBuf};
 

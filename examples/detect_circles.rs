@@ -4,6 +4,12 @@
 //! cargo run --release --example detect_circles -- --csv - --overlay out/circles photo.jpg folder/
 //! ```
 
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for the terminal"
+)]
+
 use std::collections::HashSet;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -124,7 +130,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
                     all_read = false;
                 }
                 Ok(frame) => {
-                    results.add(files.last_path().unwrap_or(path), &frame, &mut *detector, options)?
+                    results.add(files.last_path().unwrap_or(path), &frame, &mut *detector, options)?;
                 }
                 Err(FrameError::End) => break,
                 Err(error) => {

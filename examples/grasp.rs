@@ -4,6 +4,12 @@
 //! cargo run --release --example grasp -- --help
 //! ```
 
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for the terminal"
+)]
+
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -233,7 +239,7 @@ fn teach(
         spec.actions()
     );
     let lesson = learn(spec, simulator, actions, rng, &mut |progress| {
-        bar.set_position(progress.actions)
+        bar.set_position(progress.actions);
     })?;
     bar.finish_and_clear();
     let success = lesson.report.curve.last().and_then(|record| record.success_share);
@@ -280,7 +286,7 @@ fn reach_for(
     rig.place(ball);
     let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
     let outcome = rig.run(agent, detector, &mut |event| {
-        pictures.extend(record.note(run, event))
+        pictures.extend(record.note(run, event));
     })?;
     if outcome.gave_up.is_none() {
         let miss = rig.grip_miss();

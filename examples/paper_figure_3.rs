@@ -5,6 +5,12 @@
 //! cargo run --release --example paper_figure_3 -- out/figure_3.png
 //! ```
 
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for the terminal"
+)]
+
 use std::error::Error;
 use std::path::PathBuf;
 
