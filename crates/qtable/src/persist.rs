@@ -235,12 +235,14 @@ pub fn decode<T: DeserializeOwned>(kind: &str, bytes: &[u8]) -> Result<T, Proble
             found,
         });
     }
-    let (value, used) = match payload.len() {
-        0..=SMALL => decode_within::<T, { widest(SMALL) }>(payload),
-        0..=MEDIUM => decode_within::<T, { widest(MEDIUM) }>(payload),
-        _ => decode_within::<T, { widest(LIMIT) }>(payload),
-    }
-    .map_err(|error| Problem::Contents(error.to_string()))?;
+    let decoded = if payload.len() <= SMALL {
+        decode_within::<T, { widest(SMALL) }>(payload)
+    } else if payload.len() <= MEDIUM {
+        decode_within::<T, { widest(MEDIUM) }>(payload)
+    } else {
+        decode_within::<T, { widest(LIMIT) }>(payload)
+    };
+    let (value, used) = decoded.map_err(|error| Problem::Contents(error.to_string()))?;
     match payload.len() - used {
         0 => Ok(value),
         extra => Err(Problem::TrailingBytes { extra: extra as u64 }),
