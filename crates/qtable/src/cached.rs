@@ -277,6 +277,12 @@ impl CachedBoltzmann {
     /// # Panics
     /// As a slice does if the pair is out of range.
     pub fn value(&self, state: State, action: Action) -> f32 {
+        assert!(
+            action.0 < self.actions,
+            "action {} is outside 0..{}",
+            action.0,
+            self.actions
+        );
         self.row(state)[action.0 / GROUP].values[action.0 % GROUP]
     }
 
@@ -286,6 +292,12 @@ impl CachedBoltzmann {
     /// As a slice does if the pair is out of range.
     #[inline]
     pub fn visits(&self, state: State, action: Action) -> u32 {
+        assert!(
+            action.0 < self.actions,
+            "action {} is outside 0..{}",
+            action.0,
+            self.actions
+        );
         self.row(state)[action.0 / GROUP].visits[action.0 % GROUP]
     }
 

@@ -11,7 +11,7 @@ use crate::{
     Action, ActionMask, Environment, Error, Experience, Learner, Policy, QTable, State, Status, Step, Value,
 };
 
-/// Counters of a run, the episode that is going on, and what has not yet been recorded.
+/// Counters of a run, which stop at their largest number, the episode that is going on, and what has not yet been recorded.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
 pub(crate) struct Course {
@@ -46,6 +46,20 @@ impl Course {
             tally,
         }
         .restore()
+    }
+
+    /// The same course with another limit.
+    pub(crate) fn with_episode_limit(self, episode_limit: u64) -> Result<Self, Error> {
+        Self {
+            episode_limit,
+            ..self
+        }
+        .restore()
+    }
+
+    /// The same course with records further apart or closer together.
+    pub(crate) fn with_record_every(self, record_every: u64) -> Result<Self, Error> {
+        Self { record_every, ..self }.restore()
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -86,18 +100,15 @@ impl Course {
                 }
             }
         };
-        let action = match action {
-            Some(action) => action,
-            None => actor.choose(state, rng)?,
-        };
+        let action = actor.choose(state, action, rng)?;
         let mut step = environment.step(action, rng);
-        let (steps, sum) = (steps + 1, sum + step.reward);
+        let (steps, sum) = (steps.saturating_add(1), sum + step.reward);
         if step.status == Status::Continuing && steps >= self.episode_limit {
             step.status = Status::Truncated;
         }
         let (td_error, next_action) = actor.learn(state, action, step, rng)?;
 
-        self.actions += 1;
+        self.actions = self.actions.saturating_add(1);
         self.tally.add_action(step.reward, td_error);
         if step.status == Status::Continuing {
             self.running = Some(Running {
@@ -107,7 +118,7 @@ impl Course {
                 sum,
             });
         } else {
-            self.episodes += 1;
+            self.episodes = self.episodes.saturating_add(1);
             self.tally.add_episode(steps, sum, environment.succeeded(&step));
         }
         Ok(self
@@ -128,8 +139,9 @@ validated!(Course);
 pub(crate) trait Actor {
     fn begin_episode(&mut self) {}
 
-    /// An offered action for a state that may be out of range.
-    fn choose(&mut self, state: State, rng: &mut dyn Rng) -> Result<Action, Error>;
+    /// An offered action for a state that may be out of range: the one chosen before, which may come from a file and is
+    /// checked, or a new one.
+    fn choose(&mut self, state: State, before: Option<Action>, rng: &mut dyn Rng) -> Result<Action, Error>;
 
     /// Learns from a step whose state and reward may be anything. Returns the error before the update, and the next
     /// action if that was chosen already.
@@ -155,9 +167,12 @@ impl<V: Value, L: Learner<V>, P: Policy<V>> Actor for Pair<'_, V, L, P> {
     }
 
     #[inline]
-    fn choose(&mut self, state: State, rng: &mut dyn Rng) -> Result<Action, Error> {
+    fn choose(&mut self, state: State, before: Option<Action>, rng: &mut dyn Rng) -> Result<Action, Error> {
         self.table.check_state(state)?;
-        let action = self.policy.choose(self.table, state, rng);
+        let action = match before {
+            Some(action) => action,
+            None => self.policy.choose(self.table, state, rng),
+        };
         self.table.check(state, action).map(|()| action)
     }
 
@@ -171,7 +186,7 @@ impl<V: Value, L: Learner<V>, P: Policy<V>> Actor for Pair<'_, V, L, P> {
     ) -> Result<(f64, Option<Action>), Error> {
         let goes_on = step.status != Status::Terminated;
         let next_action = match self.learner.on_policy() && goes_on {
-            true => Some(self.choose(step.observation, rng)?),
+            true => Some(self.choose(step.observation, None, rng)?),
             false => None,
         };
         let experience = Experience {

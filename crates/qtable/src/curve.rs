@@ -40,16 +40,16 @@ pub(crate) struct Tally {
 
 impl Tally {
     pub(crate) fn add_action(&mut self, reward: f64, td_error: f64) {
-        self.actions += 1;
+        self.actions = self.actions.saturating_add(1);
         self.reward += reward;
         self.td_error += td_error.abs();
     }
 
     pub(crate) fn add_episode(&mut self, steps: u64, sum: f64, success: bool) {
-        self.episodes += 1;
-        self.episode_steps += steps;
+        self.episodes = self.episodes.saturating_add(1);
+        self.episode_steps = self.episode_steps.saturating_add(steps);
         self.episode_returns += sum;
-        self.successes += u64::from(success);
+        self.successes = self.successes.saturating_add(u64::from(success));
     }
 
     /// The record of what was added, at the totals given.

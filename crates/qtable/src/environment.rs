@@ -59,3 +59,37 @@ pub trait Environment {
         last.status == Status::Terminated && last.reward > 0.0
     }
 }
+
+/// Lends an environment to whatever takes one by value.
+macro_rules! forwarded {
+    ($holder:ty) => {
+        impl<E: Environment + ?Sized> Environment for $holder {
+            fn states(&self) -> usize {
+                (**self).states()
+            }
+
+            fn actions(&self) -> usize {
+                (**self).actions()
+            }
+
+            fn reset(&mut self, rng: &mut dyn Rng) -> State {
+                (**self).reset(rng)
+            }
+
+            fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step {
+                (**self).step(action, rng)
+            }
+
+            fn allows(&self, state: State, action: Action) -> bool {
+                (**self).allows(state, action)
+            }
+
+            fn succeeded(&self, last: &Step) -> bool {
+                (**self).succeeded(last)
+            }
+        }
+    };
+}
+
+forwarded!(&mut E);
+forwarded!(Box<E>);

@@ -154,6 +154,16 @@ pub enum Error {
         /// Largest change of the last one.
         change: f64,
     },
+    /// A letter in the map of a frozen lake that stands for nothing.
+    #[error("row {row}, column {column} of the map is {letter:?}: it must be S, F, H or G")]
+    MapLetter {
+        /// The letter.
+        letter: char,
+        /// Its row, counted from 0.
+        row: usize,
+        /// Its column, counted from 0.
+        column: usize,
+    },
     /// A schedule that is not valid in itself.
     #[error(transparent)]
     Schedule(#[from] ScheduleError),

@@ -145,8 +145,14 @@ impl Rates {
         let alpha = self.alpha.at_visit(self.updates, u64::from(visits));
         table.store(state, action, old.to_f64() + alpha * error)?;
         table.count(entry);
-        self.updates += 1;
+        self.tick();
         Ok(error)
+    }
+
+    /// Counts an update.
+    #[inline(always)]
+    fn tick(&mut self) {
+        self.updates = self.updates.saturating_add(1);
     }
 }
 

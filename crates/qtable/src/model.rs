@@ -132,8 +132,8 @@ impl Model {
     /// # Panics
     /// As a slice does if the pair is out of range.
     pub fn outcomes(&self, state: State, action: Action) -> &[Outcome] {
-        let pair = state.0 * self.actions + action.0;
-        &self.outcomes[self.starts[pair]..self.starts[pair + 1]]
+        let row = &self.starts[state.0 * self.actions..][..=self.actions];
+        &self.outcomes[row[action.0]..row[action.0 + 1]]
     }
 
     /// The actions that each state offers, or `None` if all are offered everywhere.

@@ -18,6 +18,9 @@ const HEADER: usize = 8 + 4 + 4 + 8;
 const CHECKSUM: usize = 4;
 /// Largest payload, in bytes, that is written or read.
 const LIMIT: usize = 1 << 30;
+/// Payloads up to these lengths, in bytes, are held to smaller claims.
+const SMALL: usize = 1 << 16;
+const MEDIUM: usize = 1 << 23;
 const KIND_LIMIT: usize = 255;
 
 /// A file that could not be written or read.
@@ -232,13 +235,32 @@ pub fn decode<T: DeserializeOwned>(kind: &str, bytes: &[u8]) -> Result<T, Proble
             found,
         });
     }
-    let config = bincode::config::standard().with_limit::<LIMIT>();
-    let (value, used) = bincode::serde::decode_from_slice(payload, config)
-        .map_err(|error| Problem::Contents(error.to_string()))?;
+    let decoded = if payload.len() <= SMALL {
+        decode_within::<T, { widest(SMALL) }>(payload)
+    } else if payload.len() <= MEDIUM {
+        decode_within::<T, { widest(MEDIUM) }>(payload)
+    } else {
+        decode_within::<T, { widest(LIMIT) }>(payload)
+    };
+    let (value, used) = decoded.map_err(|error| Problem::Contents(error.to_string()))?;
     match payload.len() - used {
         0 => Ok(value),
         extra => Err(Problem::TrailingBytes { extra: extra as u64 }),
     }
+}
+
+/// The most that bincode counts for a payload of a length: it counts numbers by their width in memory, up to 16 bytes
+/// for each byte read.
+const fn widest(length: usize) -> usize {
+    length.saturating_mul(16)
+}
+
+/// The value at the beginning of a payload, and how much of that it took. bincode makes room for a text before it looks
+/// for its end, hence the bound on what a payload may claim.
+fn decode_within<T: DeserializeOwned, const BOUND: usize>(
+    payload: &[u8],
+) -> Result<(T, usize), bincode::error::DecodeError> {
+    bincode::serde::decode_from_slice(payload, bincode::config::standard().with_limit::<BOUND>())
 }
 
 fn read_bounded(path: &Path) -> Result<Vec<u8>, Problem> {

@@ -170,7 +170,8 @@ impl Schedule {
             Self::Constant { value } => *value,
             Self::Linear { start, end, steps } => between(*start, *end, step, *steps),
             Self::Exponential { start, end, steps } if step < *steps => {
-                start * exp((ln(*end) - ln(*start)) * (step as f64 / *steps as f64))
+                let value = start * exp((ln(*end) - ln(*start)) * (step as f64 / *steps as f64));
+                held_between(*start, *end, value)
             }
             Self::Exponential { end, .. } => *end,
             Self::InverseVisits { start, scale } => start / (1.0 + step as f64 / scale),
@@ -283,7 +284,12 @@ fn between(start: f64, end: f64, step: u64, steps: u64) -> f64 {
         return end;
     }
     let t = step as f64 / steps as f64;
-    start * (1.0 - t) + end * t
+    held_between(start, end, start * (1.0 - t) + end * t)
+}
+
+/// A value between two others, where rounding may have led out of their range.
+fn held_between(start: f64, end: f64, value: f64) -> f64 {
+    value.max(start.min(end)).min(start.max(end))
 }
 
 validated!(Schedule);
@@ -326,6 +332,29 @@ mod tests {
             Schedule::inverse_visits(1.0, 0.0),
             Err(ScheduleError::Scale { .. })
         ));
+    }
+
+    #[test]
+    fn rounding_never_leads_out_of_the_range() {
+        for level in [1e-6, 0.1, 0.6, 1.0 / 3.0, 1.0, 1e6] {
+            for steps in [3, 10, 49, 1_000] {
+                let near = level * (1.0 + f64::EPSILON);
+                for (start, end) in [(level, level), (level, near), (near, level)] {
+                    for schedule in [
+                        Schedule::linear(start, end, steps),
+                        Schedule::exponential(start, end, steps),
+                        Schedule::piecewise(&[(0, start), (steps, end)]),
+                    ] {
+                        let schedule = schedule.unwrap();
+                        let (low, high) = schedule.range();
+                        for step in 0..=steps {
+                            let value = schedule.at(step);
+                            assert!((low..=high).contains(&value), "{schedule:?} at {step}: {value:e}");
+                        }
+                    }
+                }
+            }
+        }
     }
 
     #[test]

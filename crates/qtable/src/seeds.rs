@@ -68,7 +68,7 @@ impl Estimate {
                 count,
             };
         }
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
         let deviation = (squares / (count - 1) as f64).sqrt();
         Self {
             mean,
@@ -110,7 +110,10 @@ fn student_t(degrees: usize) -> f64 {
     }
     let z: f64 = 1.959_964;
     let n = degrees as f64;
-    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+    let z2 = z * z;
+    let z3 = z2 * z;
+    let z5 = z3 * z2;
+    let z7 = z5 * z2;
     z + (z3 + z) / (4.0 * n)
         + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
         + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n * n * n)

@@ -134,7 +134,7 @@ fn parse_line<V: FromStr>(text: &str, line: usize) -> Result<Pair<V>, CsvError> 
         action: Action(parse(fields.next(), line, "action", "a whole number")?),
         value: parse(fields.next(), line, "value", "a number")?,
         visits: parse(fields.next(), line, "visits", "a whole number below 2^32")?,
-        offered: parse::<u8>(fields.next(), line, "offered", "0 or 1")? != 0,
+        offered: parse_offered(fields.next(), line)?,
     };
     match fields.next() {
         None => Ok(pair),
@@ -142,6 +142,18 @@ fn parse_line<V: FromStr>(text: &str, line: usize) -> Result<Pair<V>, CsvError> 
             line,
             field: "the line",
             expected: "five fields",
+        }),
+    }
+}
+
+fn parse_offered(text: Option<&str>, line: usize) -> Result<bool, CsvError> {
+    match text {
+        Some("0") => Ok(false),
+        Some("1") => Ok(true),
+        _ => Err(CsvError::Field {
+            line,
+            field: "offered",
+            expected: "0 or 1",
         }),
     }
 }

@@ -37,8 +37,17 @@ pub const FROZEN_LAKE_8X8: [&str; 8] = [
 /// 1, all else 0; goal and holes end the episode.
 ///
 /// # Errors
-/// A map without a cell, whose rows are not equally long, or without a start.
+/// A map without a cell, with a letter other than these four, whose rows are not equally long, or without a start.
 pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Error> {
+    for (row, cells) in map.iter().enumerate() {
+        if let Some((column, letter)) = cells
+            .chars()
+            .enumerate()
+            .find(|(_, cell)| !"SFHG".contains(*cell))
+        {
+            return Err(Error::MapLetter { letter, row, column });
+        }
+    }
     let (rows, columns) = (map.len(), map.first().map_or(0, |row| row.len()));
     if let Some(row) = map.iter().find(|row| row.len() != columns) {
         return Err(Error::WrongLength {

@@ -154,14 +154,13 @@ pub fn train_in_blocks<V: Value, E: Environment + ?Sized, R: Rng>(
         curve: Vec::new(),
         on_progress,
     };
+    // More blocks than actions would be empty ones.
+    let blocks = blocks.min(config.actions);
     let mut run = || {
         for block in 0..blocks {
             let edge =
                 |block: u64| (u128::from(config.actions) * u128::from(block) / u128::from(blocks)) as u64;
             let (from, to) = (edge(block), edge(block + 1));
-            if from == to {
-                continue;
-            }
             actor.alpha = config.alpha.at(from);
             actor.cached.set_temperature(config.temperature.at(from))?;
             while course.actions < to {
@@ -187,8 +186,9 @@ struct Blocked<'a> {
 }
 
 impl Actor for Blocked<'_> {
+    /// Draws anew: nothing is ever chosen before.
     #[inline]
-    fn choose(&mut self, state: State, rng: &mut dyn Rng) -> Result<Action, Error> {
+    fn choose(&mut self, state: State, _before: Option<Action>, rng: &mut dyn Rng) -> Result<Action, Error> {
         self.cached.check_state(state)?;
         Ok(self.cached.choose(state, rng))
     }

@@ -87,21 +87,22 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
         })
     }
 
-    /// Truncates an episode after a number of actions, at least 1.
+    /// Truncates an episode after a number of actions, at least 1. All else stays, also of a run that has begun.
     ///
     /// # Errors
     /// [`Error::Setting`].
     pub fn with_episode_limit(mut self, episode_limit: u64) -> Result<Self, Error> {
-        self.course = Course::new(episode_limit, self.course.record_every)?;
+        self.course = self.course.with_episode_limit(episode_limit)?;
         Ok(self)
     }
 
-    /// Makes a record every so many actions, at least 1.
+    /// Makes a record whenever the actions taken are a multiple of a number, at least 1. All else stays, also of a
+    /// run that has begun.
     ///
     /// # Errors
     /// [`Error::Setting`].
     pub fn with_record_every(mut self, actions: u64) -> Result<Self, Error> {
-        self.course = Course::new(self.course.episode_limit, actions)?;
+        self.course = self.course.with_record_every(actions)?;
         Ok(self)
     }
 

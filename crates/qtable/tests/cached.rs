@@ -270,3 +270,14 @@ fn faults_are_refused_and_what_was_learned_stays() {
     assert!((table.max(State(0)) - 6.0).abs() < 1e-6 && table.visits(State(0), Action(0)) == 2);
     assert!(train_in_blocks(&mut Breaks(0), &mut table, &config, 0, &mut rng(0), &mut |_| {}).is_err());
 }
+
+#[test]
+fn an_action_out_of_range_is_no_padding() {
+    let cached = CachedBoltzmann::new(&QTable::new(2, 5).unwrap(), 1.0).unwrap();
+    assert!(cached.value(State(1), Action(4)).abs() < 1e-30 && cached.visits(State(1), Action(4)) == 0);
+    for action in [5, 15, 16] {
+        let action = Action(action);
+        assert!(std::panic::catch_unwind(|| cached.value(State(0), action)).is_err());
+        assert!(std::panic::catch_unwind(|| cached.visits(State(0), action)).is_err());
+    }
+}

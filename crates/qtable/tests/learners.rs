@@ -7,7 +7,7 @@ use qtable::{
     SarsaLambda, Schedule, State, Status, Step, Training, Until, toys,
 };
 use rand::rngs::Xoshiro256PlusPlus;
-use rand::{Rng, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 
 /// Every learner of the crate with the same rates.
 fn learners(alpha: &Schedule, gamma: f64) -> Vec<(&'static str, Box<dyn Learner>)> {
@@ -121,12 +121,13 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
         let both = toy.compare(&table, gamma, 10_000).unwrap();
         let (found, best) = (both.learned.value, both.optimal.value);
         assert!(
-            found >= 0.9 * best,
+            found >= 0.999 * best,
             "{name}: the policy is worth {found} of {best}"
         );
         let start = table.max(State(0));
-        // Double Q, with half the updates for each table, comes from below; the others are nearer.
-        let near = 0.15;
+        // Double Q, with half the updates for each table, comes from below and is 9.5 % short here; of the others none
+        // is off by more than 2.4 %.
+        let near = if name == "double Q" { 0.12 } else { 0.03 };
         assert!(
             (start - best).abs() < near * best,
             "{name}: believes in {start} where {best} is true"
@@ -153,6 +154,36 @@ fn uncut_learners_are_unbiased_once_exploration_has_faded() {
             table.max(State(0))
         );
     }
+}
+
+#[test]
+fn double_q_counts_the_visits_of_the_table_that_learns() {
+    // With α = 1/n each table holds the mean of what it alone has seen.
+    let mut learner = DoubleQLearning::<f64>::new(Schedule::inverse_visits(1.0, 1.0).unwrap(), 0.9).unwrap();
+    let mut table = QTable::new(1, 1).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+    let mut seen = [(0.0, 0.0); 2];
+    for n in 0..40 {
+        let reward = f64::from(n * n);
+        let first: bool = rng.clone().random();
+        let (sum, count) = &mut seen[usize::from(first)];
+        (*sum, *count) = (*sum + reward, *count + 1.0);
+        let experience = Experience {
+            state: State(0),
+            action: Action(0),
+            step: answer(0, reward, Status::Terminated),
+            next_action: None,
+        };
+        learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
+    }
+    assert!(seen.iter().all(|&(_, count)| count > 10.0));
+    let wanted = seen.iter().map(|(sum, count)| 0.5 * sum / count).sum::<f64>();
+    assert!(
+        (table.max(State(0)) - wanted).abs() < 1e-9,
+        "{} {wanted}",
+        table.max(State(0))
+    );
+    assert_eq!(table.visits(State(0), Action(0)), 40);
 }
 
 fn answer(observation: usize, reward: f64, status: Status) -> Step {

@@ -4,7 +4,10 @@
 
 use std::path::Path;
 
-use qtable::{Action, Intervals, Problem, Product, QTable, Schedule, State, decode, encode, load, save};
+use qtable::{
+    Action, EpsilonGreedy, Intervals, ModelEnvironment, Problem, Product, QTable, Sarsa, Schedule, State,
+    Training, Until, decode, encode, load, save, toys,
+};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
@@ -221,3 +224,71 @@ const GOLDEN: &str = concat!(
     "895154424c0d0a1a010000000700000028000000000000007461626c652f3102040000000000",
     "0000000000000000000000000000000000f83f0000000000000000040000010000e65c7633"
 );
+
+/// A run of every part that a file may hold: a table with visits, a learner with its clock, a policy, an episode on
+/// its way with the next action chosen, and a learning curve.
+#[test]
+fn the_bytes_of_a_run_stay() {
+    let mut chain = toys::chain(3).unwrap();
+    let learner = Sarsa::new(Schedule::linear(0.5, 0.25, 8).unwrap(), 0.5).unwrap();
+    let policy = EpsilonGreedy::new(Schedule::constant(0.75).unwrap()).unwrap();
+    let mut training = Training::new(&chain, QTable::new(3, 2).unwrap(), learner, policy)
+        .unwrap()
+        .with_episode_limit(60)
+        .unwrap()
+        .with_record_every(10)
+        .unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    training.run(&mut chain, Until::Actions(23), &mut rng).unwrap();
+    assert!(training.is_in_episode() && training.episodes() > 0 && training.curve().len() == 2);
+    let bytes = encode("run/1", &(&training, &chain, &rng)).unwrap();
+    let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(hex, GOLDEN_RUN);
+    type Run = (
+        Training<Sarsa, EpsilonGreedy>,
+        ModelEnvironment,
+        Xoshiro256PlusPlus,
+    );
+    let back: Run = decode("run/1", &bytes).unwrap();
+    assert_eq!(back, (training, chain, rng));
+}
+
+const GOLDEN_RUN: &str = concat!(
+    "895154424c0d0a1a01000000050000007b0100000000000072756e2f31020600000000000068",
+    "3f000000000000923f000000000000383f000000000000dc3f00000000000000000000000000",
+    "000000060907050200000001000000000000e03f000000000000d03f08000000000000e03f17",
+    "00000000000000e83f00183c0a17020100010005000000000000000003000000000000000000",
+    "00000000c0a23f0000000000000000000000020a000001000000000000000000000100000000",
+    "00000000140201000000000000f03f019a9999999999c93f01000000000000f03f0100000000",
+    "0000224001666666666666c83f0302070001020304050606000000000000f03f000000000000",
+    "00000000000000000000f03f01000000000000000000000000000000f03f0000000000000000",
+    "0000000000000000f03f02000000000000f03f01000000000000f03f02000000000000000001",
+    "000000000000f03f020000000000000000010100000000000000f03f0000fddbde4b0d2582a9",
+    "a4fdcce845d36ef5cd21fdbf39103848181448fd3c7086bbb71375ff2b64173e"
+);
+
+#[test]
+fn what_is_wide_in_memory_and_short_on_disk_comes_back() {
+    // One byte each in the file, 16 in memory.
+    let wide = vec![0u128; (1 << 16) - 8];
+    assert_eq!(
+        decode::<Vec<u128>>("k", &encode("k", &wide).unwrap()).unwrap(),
+        wide
+    );
+    let longer = vec![7u128; 1 << 17];
+    assert_eq!(
+        decode::<Vec<u128>>("k", &encode("k", &longer).unwrap()).unwrap(),
+        longer
+    );
+}
+
+#[test]
+fn no_room_is_made_for_a_text_that_is_not_there() {
+    for claimed in [1u64 << 25, 1 << 32, 1 << 44, u64::MAX] {
+        let payload = [&[253u8][..], &claimed.to_le_bytes()].concat();
+        match decode::<String>("k", &sealed(1, "k", payload.len() as u64, &payload)) {
+            Err(Problem::Contents(why)) => assert!(why.contains("LimitExceeded"), "{claimed}: {why}"),
+            other => panic!("{claimed}: {other:?}"),
+        }
+    }
+}

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
-    Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, ExpectedSarsa, Learner, ModelEnvironment, NStepQ,
-    Policy, PrioritizedSweeping, QLambda, QLearning, QTable, Sarsa, SarsaLambda, Schedule, TimeLimit,
-    Training, Ucb, Until, decode, encode, toys,
+    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Learner,
+    ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, QLambda, QLearning, QTable, Sarsa, SarsaLambda,
+    Schedule, TimeLimit, Training, Ucb, Until, decode, encode, toys,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -94,4 +94,52 @@ fn damaged_parts_of_a_run_are_refused() {
         .is_err()
     );
     assert!(decode::<qtable::ActionMask>("p", &encode("p", &(2u64, vec![true; 3])).unwrap()).is_err());
+}
+
+/// A run of SARSA on three cells with the given counters, in which state 0 is next and an action was chosen for it.
+fn forged(chosen: u64, count: u64) -> Training<Sarsa, EpsilonGreedy> {
+    let table = QTable::<f64>::new(3, 2).unwrap();
+    let half = (0u32, 0.5f64);
+    let learner = (half, 0.9f64, count);
+    let policy = (half, 0u32, count);
+    let running = Some((0u64, Some(chosen), count, 0.0f64));
+    let tally = (count, 0.0f64, 0.0f64, count, count, count, 0.0f64);
+    let course = ((u64::MAX, 1u64, count, count.saturating_sub(1)), running, tally);
+    let curve = Vec::<u8>::new();
+    decode(
+        "run",
+        &encode("run", &(table, learner, policy, course, curve)).unwrap(),
+    )
+    .unwrap()
+}
+
+#[test]
+fn a_stored_action_is_checked_before_the_environment_sees_it() {
+    let mut chain = toys::chain(3).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut run = |chosen| forged(chosen, 0).run(&mut chain, Until::Actions(5), &mut rng);
+    assert_eq!(run(1), Ok(()));
+    for chosen in [2, 9, u64::MAX] {
+        let refused = Err(Error::ActionOutOfRange {
+            action: Action(chosen as usize),
+            actions: 2,
+        });
+        assert_eq!(run(chosen), refused);
+    }
+}
+
+#[test]
+fn counters_stop_at_their_largest_number() {
+    let mut chain = toys::chain(3).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut training = forged(1, u64::MAX);
+    assert_eq!(
+        (training.actions(), training.episodes()),
+        (u64::MAX, u64::MAX - 1)
+    );
+    training
+        .run(&mut chain, Until::Episodes(u64::MAX), &mut rng)
+        .unwrap();
+    assert_eq!((training.actions(), training.episodes()), (u64::MAX, u64::MAX));
+    assert_eq!(training.curve().last().unwrap().actions, u64::MAX);
 }

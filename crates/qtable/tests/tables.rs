@@ -341,6 +341,8 @@ fn damaged_csv_is_refused_with_its_line() {
     assert_eq!(field("0,0,one,0,1"), (2, "value"));
     assert_eq!(field("0,0,1,0,1\n0,1,1,-1,1"), (3, "visits"));
     assert_eq!(field("0,0,1,0"), (2, "offered"));
+    assert_eq!(field("0,0,1,0,2"), (2, "offered"));
+    assert_eq!(field("0,0,1,0,01"), (2, "offered"));
     assert_eq!(field("0,0,1,0,1,7"), (2, "the line"));
     assert_eq!(field("99999999999999999999,0,1,0,1"), (2, "state"));
     assert!(matches!(

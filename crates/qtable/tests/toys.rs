@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use qtable::{Action, Environment, Error, ModelEnvironment, State, toys};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
 
 /// First states, then every outcome in every state that can be met, one a line.
 fn listing(toy: &ModelEnvironment) -> (usize, String) {
@@ -147,6 +149,35 @@ fn impossible_toys_are_refused() {
         toys::frozen_lake(&["FG"], false),
         Err(Error::Setting { .. })
     ));
+    assert_eq!(
+        toys::frozen_lake(&["SF", "XG"], false),
+        Err(Error::MapLetter {
+            letter: 'X',
+            row: 1,
+            column: 0
+        })
+    );
+    assert!(matches!(
+        toys::frozen_lake(&["Sé", "G"], false),
+        Err(Error::MapLetter { letter: 'é', .. })
+    ));
     assert!(matches!(toys::chain(1), Err(Error::Setting { .. })));
     assert_eq!(toys::taxi().unwrap().states(), 500);
+}
+
+#[test]
+fn an_action_out_of_range_never_reads_another_state() {
+    let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
+    for action in [4, 5, usize::MAX] {
+        assert!(!lake.allows(State(0), Action(action)));
+        let read = std::panic::catch_unwind(|| lake.model().outcomes(State(0), Action(action)).len());
+        assert!(read.is_err(), "{read:?}");
+        let stepped = std::panic::catch_unwind(|| {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
+            lake.clone().step(Action(action), &mut rng)
+        });
+        assert!(stepped.is_err(), "{stepped:?}");
+    }
+    assert!(!lake.allows(State(16), Action(0)));
+    assert!(lake.allows(State(15), Action(3)) && lake.model().outcomes(State(15), Action(3)).len() == 1);
 }

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use qtable::{
     Action, ActionMask, Environment, EnvironmentFault, EpsilonGreedy, Error, Estimate, Greedy, Policy,
     QLearning, QTable, Schedule, State, Status, Step, TimeLimit, TrainConfig, Training, Until, check_env,
-    evaluate, over_seeds, toys, train,
+    evaluate, over_seeds, toys, train, train_in_blocks,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
@@ -132,13 +132,22 @@ fn the_episode_limit_truncates_and_the_value_goes_on() {
 fn faults_of_the_environment_are_named() {
     let config = TrainConfig::paper(100);
     for reward in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let mut faulty = odd(|n| step(1, if n == 7 { reward } else { 1.0 }, Status::Continuing));
-        let error = trained(&mut faulty, &config).unwrap_err();
-        assert!(matches!(error, Error::RewardNotFinite { .. }), "{error}");
-        assert!(matches!(
-            check_env(&mut faulty, 100, 1).unwrap_err(),
-            EnvironmentFault::Endless { .. } | EnvironmentFault::Invalid { .. }
-        ));
+        let faulty = || odd(|n| step(1, if n == 7 { reward } else { 1.0 }, Status::Continuing));
+        let is_it = |error: &Error| match error {
+            Error::RewardNotFinite {
+                state: State(1),
+                reward: found,
+                ..
+            } => found.to_bits() == reward.to_bits(),
+            _ => false,
+        };
+        let error = trained(&mut faulty(), &config).unwrap_err();
+        assert!(is_it(&error), "{error}");
+        let fault = check_env(&mut faulty(), 100, 1).unwrap_err();
+        assert!(
+            matches!(&fault, EnvironmentFault::Invalid { steps: 0, error } if is_it(error)),
+            "{fault}"
+        );
     }
     let mut outside = odd(|_| step(3, 0.0, Status::Continuing));
     assert_eq!(
@@ -333,6 +342,134 @@ fn check_env_tells_what_is_wrong() {
         matches!(fault, EnvironmentFault::NotReproducible { .. }),
         "{fault}"
     );
+}
+
+/// An environment whose shape or mask is another one after some steps.
+struct Shifting {
+    steps: u64,
+    grows: bool,
+}
+
+impl Environment for Shifting {
+    fn states(&self) -> usize {
+        if self.grows && self.steps > 40 { 4 } else { 3 }
+    }
+    fn actions(&self) -> usize {
+        2
+    }
+    fn reset(&mut self, _rng: &mut dyn Rng) -> State {
+        State(0)
+    }
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Step {
+        self.steps += 1;
+        step(1, 0.0, Status::Terminated)
+    }
+    fn allows(&self, _state: State, action: Action) -> bool {
+        self.grows || self.steps <= 40 || action == Action(0)
+    }
+}
+
+#[test]
+fn check_env_tells_what_has_changed() {
+    for (grows, what) in [(true, "the shape"), (false, "the mask")] {
+        let still = check_env(&mut Shifting { steps: 0, grows }, 20, 1);
+        assert!(still.is_ok(), "{still:?}");
+        let fault = check_env(&mut Shifting { steps: 0, grows }, 100, 1).unwrap_err();
+        let EnvironmentFault::Changed { what: found, .. } = fault else {
+            panic!("{fault}");
+        };
+        assert_eq!(found, what);
+    }
+}
+
+#[test]
+fn a_lent_or_boxed_environment_is_the_same_environment() {
+    let play = |environment: &mut dyn Environment| {
+        let config = TrainConfig {
+            episode_limit: 9,
+            ..TrainConfig::paper(2_000)
+        };
+        trained(environment, &config).unwrap().to_csv()
+    };
+    let mut chain = toys::chain(6).unwrap();
+    let wanted = play(&mut chain.clone());
+    assert_eq!(play(&mut Box::new(chain.clone())), wanted);
+    let mut boxed: Box<dyn Environment> = Box::new(chain.clone());
+    assert_eq!(play(&mut boxed), wanted);
+    assert_eq!(play(&mut TimeLimit::new(&mut chain, 9).unwrap()), wanted);
+    // A mask and a word on success come through.
+    let cliff: Box<dyn Environment> = Box::new(toys::cliff_walking().unwrap());
+    assert!(cliff.succeeded(&step(47, -1.0, Status::Terminated)));
+    assert!(
+        !Box::new(Shifting {
+            steps: 41,
+            grows: false
+        })
+        .allows(State(0), Action(1))
+    );
+}
+
+#[test]
+fn settings_changed_on_the_way_leave_the_counters_alone() {
+    let mut chain = toys::chain(9).unwrap();
+    let learner = QLearning::new(Schedule::constant(0.5).unwrap(), 0.9).unwrap();
+    let policy = EpsilonGreedy::new(Schedule::constant(1.0).unwrap()).unwrap();
+    let table = QTable::new(9, 2).unwrap();
+    let mut training = Training::new(&chain, table, learner, policy).unwrap();
+    let mut rng = rng(3);
+    training.run(&mut chain, Until::Actions(1_503), &mut rng).unwrap();
+    let (before, episodes) = (training.clone(), training.episodes());
+    assert!(training.is_in_episode() && episodes > 3);
+    let mut training = training
+        .with_episode_limit(u64::MAX)
+        .unwrap()
+        .with_record_every(1_000)
+        .unwrap();
+    assert_eq!(training, before);
+    training = training
+        .with_episode_limit(20)
+        .unwrap()
+        .with_record_every(100)
+        .unwrap();
+    assert_eq!((training.actions(), training.episodes()), (1_503, episodes));
+    assert!(training.is_in_episode() && training.curve() == before.curve());
+    training.run(&mut chain, Until::Actions(1_600), &mut rng).unwrap();
+    let record = training.curve().last().unwrap();
+    assert_eq!((training.curve().len(), record.actions), (2, 1_600));
+    assert!(training.clone().with_episode_limit(0).is_err() && training.with_record_every(0).is_err());
+}
+
+#[test]
+fn more_blocks_than_actions_are_as_many_as_actions() {
+    let run = |blocks| {
+        let mut table = QTable::<f32>::filled(6, 2, 0.0).unwrap();
+        let config = TrainConfig::paper(300);
+        let chain = &mut toys::chain(6).unwrap();
+        train_in_blocks(chain, &mut table, &config, blocks, &mut rng(4), &mut |_| {}).unwrap();
+        table.to_csv()
+    };
+    assert_eq!(run(u64::MAX), run(300));
+}
+
+#[test]
+fn plateaus_at_the_ends_of_a_range_are_trained_on() {
+    for level in [1e-6, 1e6] {
+        for temperature in [
+            Schedule::linear(level, level, 1_000),
+            Schedule::exponential(level, level, 1_000),
+            Schedule::piecewise(&[(0, level), (999, level)]),
+        ] {
+            let config = TrainConfig {
+                temperature: temperature.unwrap(),
+                alpha: Schedule::linear(1.0, 1.0, 997).unwrap(),
+                ..TrainConfig::paper(1_000)
+            };
+            let mut table = QTable::<f32>::filled(6, 2, 0.0).unwrap();
+            let chain = &mut toys::chain(6).unwrap();
+            train_in_blocks(chain, &mut table, &config, 1_000, &mut rng(4), &mut |_| {}).unwrap();
+            assert!(trained(chain, &config).is_ok());
+        }
+    }
 }
 
 #[test]

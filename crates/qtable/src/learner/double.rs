@@ -13,7 +13,8 @@ use crate::{Error, Policy, QTable, Schedule, Value};
 ///
 /// One table chooses the next action and the other one values it, so that a value overestimated by chance is not
 /// chosen for being overestimated. The caller's table shows the mean of both, and the policy acts on it; A and B
-/// begin as copies of it and are kept here. There are no defaults.
+/// begin as copies of it and are kept here. An α by visits goes by those of the table that learns. There are no
+/// defaults.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -74,7 +75,7 @@ impl<V: Value> Learner<V> for DoubleQLearning<V> {
         let target = self
             .rates
             .target(&step, || tables[valuing].value(step.observation, choice).to_f64());
-        let alpha = self.rates.alpha(table, state, action);
+        let alpha = self.rates.alpha(&tables[learning], state, action);
         let old = tables[learning].value(state, action).to_f64();
         let error = target - old;
         tables[learning].store(state, action, old + alpha * error)?;
@@ -82,8 +83,9 @@ impl<V: Value> Learner<V> for DoubleQLearning<V> {
             .each_ref()
             .map(|one| 0.5 * one.value(state, action).to_f64());
         table.store(state, action, mean[0] + mean[1])?;
+        tables[learning].visit(state, action)?;
         table.visit(state, action)?;
-        self.rates.updates += 1;
+        self.rates.tick();
         Ok(error)
     }
 }

@@ -98,7 +98,7 @@ fn learn_along<V: Value>(
     table.store(state, action, old + alpha * error)?;
     traces.recent.push((state, action, 1.0));
     table.visit(state, action)?;
-    rates.updates += 1;
+    rates.tick();
     match step.status {
         Status::Continuing => traces.decay(rates.gamma),
         Status::Terminated | Status::Truncated => traces.recent.clear(),

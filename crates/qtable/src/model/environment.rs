@@ -123,8 +123,10 @@ impl Environment for ModelEnvironment {
         step
     }
 
+    /// False outside the model.
     fn allows(&self, state: State, action: Action) -> bool {
-        !self.model.outcomes(state, action).is_empty()
+        let inside = state.0 < self.model.states() && action.0 < self.model.actions();
+        inside && !self.model.outcomes(state, action).is_empty()
     }
 
     fn succeeded(&self, last: &Step) -> bool {

@@ -64,7 +64,7 @@ validated!(Boltzmann);
 impl<V: Value> Policy<V> for Boltzmann {
     fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action {
         let temperature = self.temperature();
-        self.choices += 1;
+        self.choices = self.choices.saturating_add(1);
         let weights = self.weights.of_length(table.actions());
         let sum = boltzmann_weights(table, state, temperature, weights);
         let mut rest = rng.random::<f64>() * sum;

@@ -55,7 +55,7 @@ impl<V: Value> Policy<V> for EpsilonGreedy {
     #[inline]
     fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action {
         let epsilon = self.epsilon();
-        self.choices += 1;
+        self.choices = self.choices.saturating_add(1);
         if rng.random::<f64>() >= epsilon {
             return match self.ties {
                 Ties::Lowest => table.best(state),
