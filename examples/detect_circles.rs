@@ -195,7 +195,7 @@ impl Results {
     fn write(&self, options: &Options) -> Result<(), Box<dyn Error>> {
         let csv = format!("file,cx,cy,r,score\n{}", self.csv);
         match &options.csv {
-            Some(path) if path.as_os_str() == "-" => print!("{csv}"),
+            Some(path) if path.as_os_str() == "-" => print_out(&csv),
             Some(path) => write_whole(path, csv.as_bytes())?,
             None => {}
         }
@@ -248,17 +248,26 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
 }
 
 fn print_table(name: &str, found: &[Detection], cpu: Duration) {
-    println!(
-        "{name}: {} circles, {:.1} ms",
+    let mut table = format!(
+        "{name}: {} circles, {:.1} ms\n",
         found.len(),
         cpu.as_secs_f64() * 1e3
     );
-    for Detection { circle, score } in found {
-        println!(
-            "  x {:8.2}  y {:8.2}  r {:7.2}  score {score:.3}",
-            circle.x, circle.y, circle.radius
-        );
+    for Detection {
+        circle: Circle { x, y, radius },
+        score,
+    } in found
+    {
+        table.push_str(&format!(
+            "  x {x:8.2}  y {y:8.2}  r {radius:7.2}  score {score:.3}\n"
+        ));
     }
+    print_out(&table);
+}
+
+/// Prints; a reader who has gone away is no reason to stop.
+fn print_out(text: &str) {
+    let _ = std::io::Write::write_all(&mut std::io::stdout(), text.as_bytes());
 }
 
 /// A CSV field: in quotes where the name has a comma, a quote or a line break in it.

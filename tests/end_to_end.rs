@@ -1,7 +1,7 @@
 //! The whole chain on its real parts: samples, regression, learning, policies on disk, the emulated controller on a
 //! pseudo-terminal (a socket where the system has none), rendered frames, the paper's detector, and the grip.
 
-use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp};
+use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned};
 use hough_heuristic::{Canny, CannyConfig, Heuristic, HeuristicConfig};
 use pipeline_sim::{Ball, ReachForm, Scene, Workspace, sample_moves};
 use puma_grasp::{Rig, Simulator, learn};
@@ -51,7 +51,11 @@ fn agent(rig: &Rig, seed: u64) -> Agent {
     let centering = taught(BehaviourSpec::centering(), 60_000);
     let approaching = taught(BehaviourSpec::approaching(), 300_000);
     let config = AgentConfig::paper(Workspace::paper().search_poses());
-    Agent::new(config, centering, approaching).expect("valid settings")
+    Agent::with_controller(
+        config,
+        Learned::new(centering, approaching).with_kappa(50.0, 20.0),
+    )
+    .expect("valid settings")
 }
 
 #[test]
@@ -61,7 +65,7 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
         let agent = agent(&rig, 2000);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut log = Vec::new();
-        let mut grasped = 0;
+        let (mut grasped, mut moves) = (0, 0);
         for _ in 0..4 {
             let cell = rig.cell().get();
             let (ball, _) = Workspace::paper()
@@ -73,14 +77,16 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
                     log.push((event.kind.clone(), event.joints));
                 })
                 .expect("the line holds");
+            moves += outcome.cycles;
             grasped += usize::from(outcome.gave_up.is_none() && rig.grip_miss() < 0.010);
         }
-        (grasped, log)
+        (grasped, moves, log)
     };
-    let (grasped, log) = run();
+    let (grasped, moves, log) = run();
     assert!(grasped >= 3, "only {grasped} of 4 grasped");
+    assert!(moves <= 4 * 25, "{moves} moves for 4 balls");
     assert!(log.iter().any(|(kind, _)| *kind == EventKind::Gripped));
-    assert!(log == run().1, "the same seed gave another run");
+    assert!(log == run().2, "the same seed gave another run");
 }
 
 #[test]

@@ -19,7 +19,7 @@ pub(crate) struct Options {
     pub(crate) seed: u64,
 
     /// How many balls to go for
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
     pub(crate) runs: usize,
 
     /// Serial device of a VAL II controller (or of an emulator), 9600 8N1, instead of starting one
@@ -47,12 +47,20 @@ pub(crate) struct Options {
     pub(crate) simulator: FormName,
 
     /// Let the emulated arm take the time that a real one would
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["port", "tcp"])]
     pub(crate) realtime: bool,
 
     /// Print the final table only
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("at least one ball is needed".into()),
+        Ok(count) => Ok(count),
+        Err(error) => Err(format!("{error}")),
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
