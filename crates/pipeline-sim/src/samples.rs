@@ -130,6 +130,9 @@ pub fn sample_moves<R: Rng + ?Sized>(
                 after,
             }),
         );
+        if centring.is_empty() && reaching.is_empty() {
+            break;
+        }
     }
     (centring, reaching)
 }
@@ -141,21 +144,20 @@ fn tried_sample<R: Rng + ?Sized, M>(
     rng: &mut R,
     mut draw: impl FnMut(&mut R) -> (JointDelta, M),
 ) -> Option<(Features, Joints, M, Features)> {
-    (0..10_000).find_map(|_| {
+    for _ in 0..10_000 {
+        // Where there is no start there is no sample, however often one asks.
         let (start, joints) = exploring_start(cell, rng)?;
         let (delta, drawn) = draw(rng);
         let after = joints + delta;
         if !start.within_limits(&joints) || !start.within_limits(&after) {
-            return None;
+            continue;
         }
-        let (before, after) = (start.features(&joints)?, start.features(&after)?);
-        Some((
-            with_noise(before, noise, rng),
-            joints,
-            drawn,
-            with_noise(after, noise, rng),
-        ))
-    })
+        if let (Some(before), Some(after)) = (start.features(&joints), start.features(&after)) {
+            let before = with_noise(before, noise, rng);
+            return Some((before, joints, drawn, with_noise(after, noise, rng)));
+        }
+    }
+    None
 }
 
 /// `features` with normal noise of standard deviation `sigma` units on each; the radius stays above a tenth of a unit.

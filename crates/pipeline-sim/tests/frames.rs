@@ -398,6 +398,17 @@ fn senseless_scenes_and_poses_draw_something_or_nothing_but_do_not_fail() {
         width: f64::INFINITY,
         height: 0.0,
     };
+    for (thing, (length, width)) in
+        scene.things[2..]
+            .iter_mut()
+            .zip([(0.1, 0.0), (0.1, -0.1), (f64::INFINITY, 0.1)])
+    {
+        thing.shape = Shape::Print {
+            length,
+            width,
+            lines: u32::MAX,
+        };
+    }
     scene.sensor.gamma = -1.0;
     scene.sensor.defocus = f64::NAN;
     let mut renderer = Renderer::new(&scene, 5);

@@ -403,6 +403,11 @@ impl Studio<'_> {
         };
         let pitch = 0.86 * width / f64::from(lines.max(1));
         let size = 0.55 * pitch;
+        // No sheet at all, or print that no camera could show: not to be drawn stroke by stroke.
+        let drawable = size > 0.0 && length / size <= 1000.0 && lines <= 1000;
+        if !drawable {
+            return;
+        }
         // A fixed, scrambled sequence decides the letters: print looks the same in every frame.
         let mut state = (thing.x.to_bits() ^ thing.y.to_bits()).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1;
         let mut next = |n: u64| {
