@@ -58,7 +58,7 @@ impl Emulator {
         Ok(())
     }
 
-    fn editor_prompt(&mut self, editing: Editing) {
+    pub(super) fn editor_prompt(&mut self, editing: Editing) {
         if let Some(step) = editing.program.steps.get(editing.at)
             && !editing.inserting
         {
