@@ -86,6 +86,7 @@ impl Emulator {
         match self.profile.boot.get(question) {
             Some(asked) => {
                 let text = asked.text.clone();
+                self.terminal.resume();
                 self.mode = Mode::Boot(question);
                 self.print(&text);
             }
@@ -177,6 +178,7 @@ impl Emulator {
 
     fn ask_again(&mut self, variables: Vec<Variable>) {
         self.mode = Mode::Answer(variables);
+        self.terminal.resume();
         self.print("? ");
     }
 
@@ -199,6 +201,7 @@ impl Emulator {
 
     pub(super) fn ask(&mut self, confirm: Confirm) {
         let text = format!("{} (Y/N)? ", self.profile.text(Message::AreYouSure));
+        self.terminal.resume();
         self.terminal.fresh_line(&self.profile, self.now);
         self.print(&text);
         self.mode = Mode::Confirm(confirm);
@@ -253,6 +256,7 @@ impl Emulator {
         let heading = display::place_heading(&self.profile);
         let values = display::place_values(&place, &self.profile);
         let question = self.profile.change_text.clone();
+        self.terminal.resume();
         self.print_line(&heading);
         self.print_line(&values);
         self.print_line(&question);

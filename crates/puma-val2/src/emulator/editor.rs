@@ -59,6 +59,7 @@ impl Emulator {
     }
 
     pub(super) fn editor_prompt(&mut self, editing: Editing) {
+        self.terminal.resume();
         if let Some(step) = editing.program.steps.get(editing.at)
             && !editing.inserting
         {

@@ -234,7 +234,7 @@ impl Terminal {
         }
     }
 
-    /// Output that Ctrl-O has suppressed resumes with the next prompt.
+    /// Output that Ctrl-O has suppressed resumes with the next prompt or question.
     pub(super) fn resume(&mut self) {
         self.dropped = false;
     }
