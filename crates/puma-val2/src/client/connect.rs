@@ -1,6 +1,6 @@
 //! Getting hold of the monitor, and calibrating the arm.
 
-use super::wire::{SPOIL, is_boot_question, is_doubt, last_line, shortened, way_out};
+use super::wire::{NUDGE, SPOIL, is_boot_question, is_doubt, last_line, shortened, way_out};
 use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
 use crate::{ArmError, Transport};
 
@@ -44,6 +44,13 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn reach_monitor(&mut self) -> Result<(), ArmError> {
+        self.wire.nudge = SPOIL;
+        let outcome = self.find_prompt();
+        self.wire.nudge = NUDGE;
+        outcome
+    }
+
+    fn find_prompt(&mut self) -> Result<(), ArmError> {
         let begun = self.wire.line.clock();
         let until = begun.saturating_add(self.config.connect_timeout);
         // Something that is no command and no answer: a half-typed line is spoilt by it, a question asked again.

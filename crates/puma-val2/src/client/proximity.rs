@@ -1,6 +1,6 @@
 //! The proximity sensors: read, and set up to stop the arm.
 
-use super::wire::{Failed, Reply, is_doubt};
+use super::wire::{Failed, NUDGE, Reply, is_doubt};
 use super::{Ending, Val2Client, plain, shortened};
 use crate::{ArmError, Joints, ProximitySensor, Transport};
 
@@ -141,7 +141,8 @@ impl<T: Transport> Val2Client<T> {
             .map_err(|failed| failed.error)
     }
 
-    /// Runs a stored program to its end and returns what it printed. A program that asks for values is aborted.
+    /// Runs a stored program to its end and returns what it printed. A program that asks for values gets none: it is aborted, at once if what it asks
+    /// ends with a question mark, else after `config.motion_timeout`.
     ///
     /// # Errors
     /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch what other programs do; what the line or the controller said, its
@@ -149,7 +150,10 @@ impl<T: Transport> Val2Client<T> {
     pub fn execute(&mut self, program: &str) -> Result<String, ArmError> {
         self.refuse_under_guard("a program")?;
         self.last_known = None;
-        match self.run(&format!("EXECUTE {program}")) {
+        self.wire.nudge = b"";
+        let outcome = self.run(&format!("EXECUTE {program}"));
+        self.wire.nudge = NUDGE;
+        match outcome {
             Ok(text) => Ok(text),
             Err(failed) if failed.maybe_done && is_doubt(&failed.error) => match self.end_program() {
                 Ok(()) => Err(failed.error),
