@@ -5,14 +5,15 @@
 
 use std::collections::VecDeque;
 
-use grasp_agent::{Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
+use grasp_agent::{ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace, exploring_start};
 use puma_val2::{Joint, JointDelta, Joints};
-use qtable::{Action, Progress, QTable, TrainConfig, train};
+use qtable::{Action, Progress, TrainConfig};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
+use crate::training::learn_in;
 use crate::{LearnError, Lesson, schedule};
 
 /// A simulator of approaching that makes no errors, and the starts to learn from.
@@ -101,15 +102,13 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
-        let mut table = QTable::new(spec.states(), spec.actions())?;
-        let simulate = |percept: &Percept, delta: &JointDelta| self.after(percept, delta);
+        let mut plane = ArmPlane::new(&self.model, JointLimits::paper());
+        let simulate = |percept: &Percept, delta: &JointDelta| {
+            let after = plane.after(percept, delta)?;
+            self.sight.sees_features(&after.features).then_some(after)
+        };
         let start = |rng: &mut dyn Rng| self.starts[rng.random_range(0..self.starts.len())];
-        let mut task = grasp_agent::BehaviourTask::new(&spec, config.gamma, simulate, start);
-        let report = train(&mut task, &mut table, config, rng, on_progress)?;
-        Ok(Lesson {
-            behaviour: Behaviour::new(spec, table)?,
-            report,
-        })
+        learn_in(spec, simulate, start, config, rng, on_progress)
     }
 }
 

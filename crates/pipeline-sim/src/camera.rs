@@ -149,6 +149,28 @@ impl Camera {
         Self { principal, ..self }.unfolded()
     }
 
+    /// The same lens before a sensor of `width` x `height` pixels: what the frame showed, the new one shows as large as it can hold all of it;
+    /// a frame of another shape shows more on two sides.
+    ///
+    /// # Errors
+    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::Folds`] if a distorted image would fold.
+    pub fn resized(self, width: u32, height: u32) -> Result<Self, CameraError> {
+        positive("frame width (px)", f64::from(width))?;
+        positive("frame height (px)", f64::from(height))?;
+        let scale =
+            (f64::from(width) / f64::from(self.width)).min(f64::from(height) / f64::from(self.height));
+        let middle = |w: u32, h: u32| Point2::new((f64::from(w) - 1.0) / 2.0, (f64::from(h) - 1.0) / 2.0);
+        let off_middle = self.principal - middle(self.width, self.height);
+        Self {
+            focal_px: self.focal_px * scale,
+            principal: middle(width, height) + off_middle * scale,
+            width,
+            height,
+            distortion: self.distortion,
+        }
+        .unfolded()
+    }
+
     /// The same camera with this lens distortion.
     ///
     /// # Errors

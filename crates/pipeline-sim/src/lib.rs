@@ -16,6 +16,7 @@
 //! 192x144 ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
 
 mod ball;
+mod benchmark_kind;
 mod camera;
 mod cell;
 mod centre_model;
@@ -40,6 +41,7 @@ mod workspace;
 mod y4m;
 
 pub use ball::{Ball, Holder};
+pub use benchmark_kind::BenchmarkKind;
 pub use camera::{Camera, Distortion};
 pub use cell::{Cell, SightRule, WorkingLimits};
 pub use centre_model::CentreModel;
