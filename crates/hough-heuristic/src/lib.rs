@@ -70,6 +70,7 @@ mod frame;
 mod heuristic;
 mod randomized_hough;
 mod region;
+mod sampling;
 #[cfg(feature = "files")]
 mod stages;
 mod standard_hough;
@@ -77,17 +78,18 @@ mod structure;
 
 pub use circle::{Circle, Features};
 pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
-pub use detect::{CircleDetector, Detection};
+pub use detect::{CircleDetector, Detection, StageTimes, Stages};
 pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
 pub use error::ConfigError;
 pub use evidence::Acceptance;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
 pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
-pub use heuristic::{Heuristic, HeuristicConfig, Sampling, StageTimes, detect_circles};
+pub use heuristic::{Heuristic, HeuristicConfig, detect_circles};
 pub use image;
 pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;
+pub use sampling::Sampling;
 #[cfg(feature = "files")]
 pub use stages::{StageError, write_stages};
 pub use standard_hough::{StandardHough, StandardHoughConfig};
