@@ -74,6 +74,7 @@ mod region;
 mod stages;
 mod standard_hough;
 mod structure;
+mod trusted;
 
 pub use circle::{Circle, Features};
 pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
@@ -91,6 +92,7 @@ pub use region::Region;
 #[cfg(feature = "files")]
 pub use stages::{StageError, write_stages};
 pub use standard_hough::{StandardHough, StandardHoughConfig};
+pub use trusted::{Trusted, TrustedConfig};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
