@@ -3,10 +3,11 @@
 mod candidate;
 mod config;
 mod directions;
+mod fit;
 mod halve;
 mod level;
 mod polar;
-mod refine;
+mod proof;
 mod search;
 
 use image::GrayImage;
@@ -18,8 +19,8 @@ use crate::{Circle, CircleDetector, ConfigError, Detection};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
-use polar::Polar;
-use refine::{Proof, Setting};
+use polar::{Grey, Oval, Polar};
+use proof::{Proof, Setting};
 use search::{Budget, Outline, Search};
 
 /// Finds circles at several sizes of the frame and proves each at the full size.
@@ -78,10 +79,10 @@ impl Trusted {
     }
 
     /// For development.
-    pub fn proofs(&self) -> Vec<(Circle, [f32; 4])> {
+    pub fn proofs(&self) -> Vec<(Circle, f32, [f32; 8])> {
         self.proofs
             .iter()
-            .map(|p| (circle_of(p), [p.certainty, p.share, p.background, p.visible]))
+            .map(|p| (circle_of(p), p.certainty, p.features))
             .collect()
     }
 
@@ -106,9 +107,9 @@ impl Trusted {
 
 fn circle_of(proof: &Proof) -> Circle {
     Circle {
-        x: proof.outline.x.into(),
-        y: proof.outline.y.into(),
-        radius: proof.outline.r.into(),
+        x: proof.oval.x.into(),
+        y: proof.oval.y.into(),
+        radius: proof.oval.r.into(),
     }
 }
 
@@ -163,15 +164,44 @@ impl CircleDetector for Trusted {
             };
             search.run(&mut self.level, &mut self.collected, &mut self.budget);
         }
-        let setting = Setting {
-            noise,
-            tests: (pixels * (config.max_radius - config.min_radius + 1.0)).log10() as f32,
-        };
-        self.collected
-            .candidates
-            .sort_by(|a, b| b.support.share().total_cmp(&a.support.share()));
+        let tests = (pixels * (config.max_radius - config.min_radius + 1.0)).log10() as f32;
         for candidate in &self.collected.candidates {
-            if let Some(proof) = refine::refine(frame, &self.circle, &mut self.polar, candidate, &setting) {
+            let mut depth = 0;
+            let mut r = candidate.r;
+            while r >= 24.0 && depth < self.sizes.len() {
+                depth += 1;
+                r *= 0.5;
+            }
+            let scale = (1 << depth) as f32;
+            let setting = Setting {
+                noise: noise / scale + 0.3,
+                tests,
+            };
+            let grey = match depth.checked_sub(1) {
+                None => Grey {
+                    pixels: frame.as_raw(),
+                    width: frame.width() as usize,
+                    height: frame.height() as usize,
+                },
+                Some(index) => {
+                    let size = &self.sizes[index];
+                    Grey {
+                        pixels: &size.grey,
+                        width: size.width,
+                        height: size.height,
+                    }
+                }
+            };
+            let start = Oval {
+                x: candidate.x,
+                y: candidate.y,
+                r: candidate.r,
+                ..Oval::default()
+            };
+            if let Some(mut proof) =
+                proof::prove(grey, &self.circle, &mut self.polar, start.shrunk(scale), &setting)
+            {
+                proof.oval = proof.oval.grown(scale);
                 self.proofs.push(proof);
             }
         }
