@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             Err(FrameError::End) => break,
             Err(error) => return Err(error.into()),
         };
-        detector.detect_into(&frame, &mut found);
+        detector.try_detect_into(&frame, &mut found)?;
         // A reader that has seen enough closes the pipe.
         if writeln!(stdout(), "{}", json!({ "frame": number, "circles": found })).is_err() {
             break;
