@@ -44,9 +44,9 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
-pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_starts};
+pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts};
 pub use rig::{Rig, RigError};
-pub use training::{LearnError, Lesson, Simulator, learn, schedule};
+pub use training::{LearnError, Lesson, Simulator, learn, learn_best, schedule};
 pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]

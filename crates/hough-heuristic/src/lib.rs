@@ -75,6 +75,7 @@ mod sampling;
 mod stages;
 mod standard_hough;
 mod structure;
+mod trusted;
 
 pub use circle::{Circle, Features};
 pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
@@ -93,6 +94,7 @@ pub use sampling::Sampling;
 #[cfg(feature = "files")]
 pub use stages::{StageError, write_stages};
 pub use standard_hough::{StandardHough, StandardHoughConfig};
+pub use trusted::{Trusted, TrustedConfig};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -224,7 +224,7 @@ pub(super) fn check_thresholds(low: f32, high: f32) -> Result<(), ConfigError> {
 }
 
 /// Half of a sampled Gaussian in whole numbers; with the mirrored half they sum up to exactly [`WEIGHT_SUM`].
-fn smoothing_weights(sigma: f32) -> Vec<u16> {
+pub(super) fn smoothing_weights(sigma: f32) -> Vec<u16> {
     let reach = match sigma {
         0.0 => 0,
         ..=1.25 => 2,
@@ -254,7 +254,7 @@ fn smoothing_weights(sigma: f32) -> Vec<u16> {
 }
 
 /// What smoothing and Sobel's kernel make of white noise of deviation 1.
-fn noise_gain(weights: &[u16]) -> f32 {
+pub(super) fn noise_gain(weights: &[u16]) -> f32 {
     let reach = weights.len() - 1;
     let line: Vec<f32> = (0..=2 * reach)
         .map(|k| f32::from(weights[k.abs_diff(reach)]) / f32::from(WEIGHT_SUM))

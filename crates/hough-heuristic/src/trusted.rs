@@ -1,0 +1,227 @@
+//! The detector whose score can be trusted.
+
+mod candidate;
+mod config;
+mod directions;
+mod fit;
+mod halve;
+mod level;
+mod polar;
+mod proof;
+mod search;
+
+use image::GrayImage;
+
+pub use config::TrustedConfig;
+
+use crate::edges::{Maxima, noise_deviation};
+use crate::{Circle, CircleDetector, ConfigError, Detection};
+use candidate::Collected;
+use directions::UnitCircle;
+use level::Level;
+use polar::{Grey, Oval, Polar};
+use proof::{Proof, Setting};
+use search::{Budget, Outline, Search};
+
+/// Finds circles at several sizes of the frame and proves each at the full size.
+#[derive(Clone, Debug)]
+pub struct Trusted {
+    config: TrustedConfig,
+    circle: UnitCircle,
+    outline: Outline,
+    maxima: Maxima,
+    sizes: Vec<Size>,
+    level: Level,
+    collected: Collected,
+    polar: Polar,
+    proofs: Vec<Proof>,
+    budget: Budget,
+}
+
+/// A frame of a power of two below the full size.
+#[derive(Clone, Debug, Default)]
+struct Size {
+    grey: Vec<u8>,
+    width: usize,
+    height: usize,
+}
+
+impl Trusted {
+    /// A detector with these settings.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn new(config: TrustedConfig) -> Result<Self, ConfigError> {
+        config.check()?;
+        let circle = UnitCircle::new();
+        Ok(Self {
+            outline: Outline::new(&circle),
+            circle,
+            maxima: Maxima::new(0.8),
+            sizes: Vec::new(),
+            level: Level::default(),
+            collected: Collected::default(),
+            polar: Polar::default(),
+            proofs: Vec::new(),
+            budget: Budget::default(),
+            config,
+        })
+    }
+
+    /// The settings the detector was built with.
+    pub fn config(&self) -> &TrustedConfig {
+        &self.config
+    }
+
+    /// (draws, looks) for development.
+    pub fn spent(&self) -> (u64, u64) {
+        (self.budget.draws, self.budget.looks)
+    }
+
+    /// For development.
+    pub fn proofs(&self) -> Vec<(Circle, f32, [f32; 8])> {
+        self.proofs
+            .iter()
+            .map(|p| (circle_of(p), p.certainty, p.features))
+            .collect()
+    }
+
+    fn shrink(&mut self, frame: &GrayImage) {
+        let mut depth = 0;
+        let (mut width, mut height) = (frame.width() as usize, frame.height() as usize);
+        while width.min(height) >= 80 && f64::from(1 << depth) * 8.0 <= self.config.max_radius && depth < 5 {
+            depth += 1;
+            (width, height) = (width / 2, height / 2);
+        }
+        self.sizes.resize(depth, Size::default());
+        for index in 0..depth {
+            let (before, rest) = self.sizes.split_at_mut(index);
+            let (grey, width) = before
+                .last()
+                .map_or((frame.as_raw(), frame.width() as usize), |size| (&size.grey, size.width));
+            let size = &mut rest[0];
+            (size.width, size.height) = halve::halve(grey, width, &mut size.grey);
+        }
+    }
+}
+
+fn circle_of(proof: &Proof) -> Circle {
+    Circle {
+        x: proof.oval.x.into(),
+        y: proof.oval.y.into(),
+        radius: proof.oval.r.into(),
+    }
+}
+
+impl CircleDetector for Trusted {
+    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
+        found.clear();
+        self.proofs.clear();
+        if frame.width() < 12 || frame.height() < 12 {
+            return;
+        }
+        let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
+        self.shrink(frame);
+        let pixels = frame.len() as f64;
+        self.budget = Budget {
+            most_looks: (pixels * 3.0) as u64 + 10_000,
+            ..Budget::default()
+        };
+        self.collected.clear(192);
+
+        let config = &self.config;
+        let finest = usize::from(config.min_radius >= 8.0 && !self.sizes.is_empty());
+        for depth in (finest..=self.sizes.len()).rev() {
+            let scale = (1 << depth) as f32;
+            let (grey, width, height): (&[u8], usize, usize) = match depth.checked_sub(1) {
+                None => (frame.as_raw(), frame.width() as usize, frame.height() as usize),
+                Some(index) => {
+                    let size = &self.sizes[index];
+                    (&size.grey, size.width, size.height)
+                }
+            };
+            let contrast = (2.3 * config.contrast as f32)
+                .max(4.5 * (noise / scale + 0.3) * self.maxima.noise_gain());
+            let candidates = self.maxima.find(grey, width, contrast);
+            self.level.fill(width, height, candidates);
+            for candidate in &self.collected.candidates {
+                if candidate.support.share() >= 0.6 {
+                    let ring = candidate.ring(scale);
+                    self.outline
+                        .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
+                }
+            }
+            let top = depth == self.sizes.len();
+            let search = Search {
+                circle: &self.circle,
+                outline: &self.outline,
+                radii: (
+                    (config.min_radius as f32 / scale).max(3.2),
+                    (config.max_radius as f32 / scale).min(if top { f32::MAX } else { 18.0 }),
+                ),
+                scale,
+                seed: config.seed,
+            };
+            search.run(&mut self.level, &mut self.collected, &mut self.budget);
+        }
+        let tests = (pixels * (config.max_radius - config.min_radius + 1.0)).log10() as f32;
+        for candidate in &self.collected.candidates {
+            let mut depth = 0;
+            let mut r = candidate.r;
+            while r >= 24.0 && depth < self.sizes.len() {
+                depth += 1;
+                r *= 0.5;
+            }
+            let scale = (1 << depth) as f32;
+            let setting = Setting {
+                noise: noise / scale + 0.3,
+                tests,
+            };
+            let grey = match depth.checked_sub(1) {
+                None => Grey {
+                    pixels: frame.as_raw(),
+                    width: frame.width() as usize,
+                    height: frame.height() as usize,
+                },
+                Some(index) => {
+                    let size = &self.sizes[index];
+                    Grey {
+                        pixels: &size.grey,
+                        width: size.width,
+                        height: size.height,
+                    }
+                }
+            };
+            let start = Oval {
+                x: candidate.x,
+                y: candidate.y,
+                r: candidate.r,
+                ..Oval::default()
+            };
+            if let Some(mut proof) =
+                proof::prove(grey, &self.circle, &mut self.polar, start.shrunk(scale), &setting)
+            {
+                proof.oval = proof.oval.grown(scale);
+                self.proofs.push(proof);
+            }
+        }
+        self.proofs.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
+        for proof in &self.proofs {
+            let circle = circle_of(proof);
+            let score = f64::from((proof.certainty / (proof.certainty.abs() + 3.0)).max(0.0));
+            let fits = circle.radius >= config.min_radius && circle.radius <= config.max_radius;
+            let placed = config.region.as_ref().is_none_or(|region| region.holds(&circle));
+            let taken = found.iter().any(|other| {
+                let off = (circle.x - other.circle.x).hypot(circle.y - other.circle.y);
+                off < 0.5 * (circle.radius.min(other.circle.radius))
+                    && (circle.radius - other.circle.radius).abs() < 0.4 * circle.radius.max(other.circle.radius)
+            });
+            if score >= config.min_score && fits && placed && !taken {
+                found.push(Detection { circle, score });
+            }
+            if found.len() == config.max_circles {
+                break;
+            }
+        }
+    }
+}
