@@ -177,7 +177,7 @@ def run_ours(name, frames, options, found, scratch):
     repeat = 1 if name in listed(options.slow) else options.repeat
     circles, times = os.path.join(scratch, "found.csv"), os.path.join(scratch, "times.csv")
     command = [options.program, "--detector", name, "--repeat", str(repeat), "--csv", circles, "--times", times,
-               "--min-radius", str(options.min_radius), "--max-radius", str(options.max_radius)]
+               "--min-radius", str(options.min_radius), "--max-radius", str(options.max_radius), "--seed", str(options.detector_seed)]
     subprocess.run(command + [frame.path for frame in frames], check=True)
     by_path = {frame.path: result for frame, result in zip(frames, found)}
     for result in found:
@@ -340,6 +340,7 @@ def main():
     parser.add_argument("--rivals", default="hough,hough-alt,ed,ed-unblurred", help="OpenCV's [%(default)s]")
     parser.add_argument("--min-radius", type=float, default=8, metavar="PX", help="[%(default)s]")
     parser.add_argument("--max-radius", type=float, default=280, metavar="PX", help="[%(default)s]")
+    parser.add_argument("--detector-seed", type=int, default=1, metavar="N", help="seed of our random searches [%(default)s]")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions per frame and round [%(default)s]")
     parser.add_argument("--rounds", type=int, default=2, help="passes through all detectors [%(default)s]")
     parser.add_argument("--slow", default="sht,sht-gradient", help="detectors that see few frames, each once [%(default)s]")
