@@ -132,6 +132,9 @@ impl Evidence {
     pub(crate) fn fill(&mut self, edges: &EdgeMap) {
         self.structure.fill(edges.width(), edges.height(), edges.pixels());
         self.near.fill(edges.width(), edges.height(), edges.pixels());
+        // A circle has at most all of them around, so that what is found does not decide who allocates.
+        self.around.clear();
+        self.around.reserve(edges.pixels().len());
     }
 
     /// The circle with its β, if that is above θ.

@@ -86,7 +86,7 @@ impl<E: EdgeDetector> RandomizedHough<E> {
             evidence: Evidence::new(accept)?,
             sampler: Sampler::new(config.sampling, &accept, config.seed),
             edge_detector,
-            cells: Cells::default(),
+            cells: Cells::with_room_for(config.iterations),
             candidates: None,
             times: StageTimes::default(),
             config,
@@ -100,7 +100,7 @@ impl<E: EdgeDetector> RandomizedHough<E> {
 
     /// The memory that the circle search holds, bytes, edges not included.
     pub fn memory(&self) -> usize {
-        self.evidence.memory() + size_of::<Cell>() * self.cells.slots.capacity()
+        self.evidence.memory() + size_of::<Cell>() * (self.cells.slots.len() + self.cells.moved.len())
     }
 }
 
@@ -204,11 +204,29 @@ struct Cell {
 #[derive(Clone, Debug, Default)]
 struct Cells {
     slots: Vec<Cell>,
+    /// Scratch: the cells in use while the table grows.
+    moved: Vec<Cell>,
     used: usize,
     round: u32,
 }
 
+/// The fewest slots of a table that is not empty.
+const SMALLEST: usize = 1024;
+/// The most votes that memory is set aside for beforehand.
+const FORESEEN: u32 = 1 << 16;
+
 impl Cells {
+    /// A table that asks for no memory until more than this many cells have a vote (or 65536, if that is less). What is set
+    /// aside is not touched, so it costs nothing, before the table grows into it.
+    fn with_room_for(votes: u32) -> Self {
+        let slots = (2 * (votes.min(FORESEEN) as usize + 1)).next_power_of_two();
+        Self {
+            slots: Vec::with_capacity(slots.max(SMALLEST)),
+            moved: Vec::with_capacity(slots / 4),
+            ..Self::default()
+        }
+    }
+
     fn clear(&mut self) {
         self.used = 0;
         self.round = self.round.wrapping_add(1);
@@ -266,13 +284,17 @@ impl Cells {
     }
 
     fn grow(&mut self) {
-        let larger = vec![Cell::default(); (2 * self.slots.len()).max(1024)];
-        let old = std::mem::replace(&mut self.slots, larger);
-        for cell in old {
-            if cell.round == self.round {
-                let place = self.place(cell.key);
-                self.slots[place] = cell;
-            }
+        let round = self.round;
+        self.moved.clear();
+        self.moved
+            .extend(self.slots.iter().filter(|cell| cell.round == round));
+        let larger = (2 * self.slots.len()).max(SMALLEST);
+        self.slots.clear();
+        self.slots.resize(larger, Cell::default());
+        for index in 0..self.moved.len() {
+            let cell = self.moved[index];
+            let place = self.place(cell.key);
+            self.slots[place] = cell;
         }
     }
 }

@@ -87,6 +87,9 @@ struct Ring {
     complete: f64,
 }
 
+/// The peaks that memory is set aside for beforehand: many times as many as pictures without dense texture have.
+const FORESEEN_PEAKS: usize = 1 << 14;
+
 /// Votes by radius, then row, then column.
 #[derive(Clone, Debug, Default)]
 struct Accumulator {
@@ -134,7 +137,7 @@ impl<E: EdgeDetector> StandardHough<E> {
             evidence,
             edge_detector,
             accumulator: Accumulator::default(),
-            peaks: Vec::new(),
+            peaks: Vec::with_capacity(FORESEEN_PEAKS),
             turns: Vec::new(),
             candidates: None,
             times: StageTimes::default(),

@@ -165,6 +165,10 @@ impl EdgeDetector for Canny {
         candidates.clear();
         self.edges.repaint(width, height, |image, pixels, gradients| {
             dispatch::candidates(passes, grey, columns, rows, image, candidates);
+            // At most all of them are open; so the shape of the edges does not decide whether memory is asked for.
+            open.reserve(candidates.len());
+            pixels.reserve(candidates.len());
+            gradients.reserve(candidates.len());
             follow(image, columns, candidates, open);
             for candidate in candidates {
                 let kept = &mut image[candidate.pixel.y as usize * columns + candidate.pixel.x as usize];

@@ -281,14 +281,14 @@ fn a_known_radius_needs_pairs_only() {
         let config = RandomizedHoughConfig {
             accept,
             sampling: Sampling::Anywhere,
-            iterations: 1500,
+            iterations: 300,
             ..RandomizedHoughConfig::default()
         };
         let mut detector = RandomizedHough::new(config, Canny::default()).unwrap();
         let circles = detector.detect(&frame);
         found += usize::from(circles.iter().any(|f| same(&f.circle, &balls[0], 0.5)));
     }
-    assert!(found >= 18, "found {found} of 20 balls");
+    assert!(found >= 16, "found {found} of 20 balls");
 }
 
 #[test]
