@@ -110,12 +110,7 @@ mod tests {
                 continue;
             };
             let (a, b) = (quick.features, slow.features);
-            let off = [
-                a.x - b.x,
-                a.y - b.y,
-                a.r - b.r,
-                quick.theta3 - slow.theta3,
-            ];
+            let off = [a.x - b.x, a.y - b.y, a.r - b.r, quick.theta3 - slow.theta3];
             assert!(
                 off.iter().all(|off| off.abs() < 1e-6 * (1.0 + b.r)),
                 "step {step}: {quick:?} {slow:?}"
