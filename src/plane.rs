@@ -28,7 +28,7 @@ pub struct PlaneScore {
     /// Starts from which the goal was reached.
     pub reached: usize,
     /// Starts in all.
-    pub starts: usize,
+    starts: usize,
     /// Steps of the successful runs, on average.
     pub steps: f64,
     /// The same steps over the breadth-first optimum from the same starts.
@@ -66,6 +66,11 @@ impl ExactPlane {
             sight: SightRule::default(),
             starts: drawn.collect(),
         }
+    }
+
+    /// A start for an episode: one of those drawn at the beginning.
+    pub fn start(&self, rng: &mut dyn Rng) -> Percept {
+        self.starts[rng.random_range(0..self.starts.len())]
     }
 
     /// What is perceived after the move, `None` when the ball is lost.
@@ -121,7 +126,7 @@ impl ExactPlane {
             let after = plane.after(percept, delta)?;
             self.sight.sees_features(&after.features).then_some(after)
         };
-        let start = |rng: &mut dyn Rng| self.starts[rng.random_range(0..self.starts.len())];
+        let start = |rng: &mut dyn Rng| self.start(rng);
         learn_in(spec, simulate, start, trials, config, rng, on_progress)
     }
 }
