@@ -74,8 +74,8 @@ impl Trusted {
     }
 
     /// (draws, looks) for development.
-    pub fn spent(&self) -> (u64, u64) {
-        (self.budget.draws, self.budget.looks)
+    pub fn spent(&self) -> [u64; 5] {
+        [self.budget.draws, self.budget.looks, self.budget.passed, self.budget.added, self.proofs.len() as u64]
     }
 
     /// For development.
@@ -156,7 +156,7 @@ impl CircleDetector for Trusted {
                 circle: &self.circle,
                 outline: &self.outline,
                 radii: (
-                    (config.min_radius as f32 / scale).max(3.2),
+                    (config.min_radius as f32 / scale).max(if depth == finest { 3.2 } else { 6.0 }),
                     (config.max_radius as f32 / scale).min(if top { f32::MAX } else { 18.0 }),
                 ),
                 scale,

@@ -45,21 +45,35 @@ pub(super) fn prove(
     start: Oval,
     setting: &Setting,
 ) -> Option<Proof> {
-    let mut oval = start;
     let mut edges = [Edge::default(); RAYS];
     let half = usize::from(setting.noise > 6.0) + usize::from(setting.noise > 18.0);
     let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
-    for (round, focus) in [4.0f32, 2.5, 1.5].into_iter().enumerate() {
+    let sample = |polar: &mut Polar, oval: &Oval, edges: &mut [Edge; RAYS]| {
         let reach = REACH.min((oval.r - 1.5) as usize).max(2);
-        polar.sample(grey, circle, &oval, (RAYS, reach, half));
-        strongest(polar, least, &mut edges);
+        polar.sample(grey, circle, oval, (RAYS, reach, half));
+        strongest(polar, least, edges);
+    };
+    sample(polar, &start, &mut edges);
+    let first = improve(circle, &edges, start, &[4.0, 3.0, 2.0])?;
+    sample(polar, &first, &mut edges);
+    let second = improve(circle, &edges, first, &[2.0, 1.5])?;
+    sample(polar, &second, &mut edges);
+    Some(weigh(polar, &edges, second, setting))
+}
+
+/// Moves the outline to the edges, in steps that look at those within the foci, pixels.
+fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32]) -> Option<Oval> {
+    let mut oval = start;
+    for &focus in foci {
         let mut moments = Moments::default();
         let mut near = 0;
         for (index, edge) in edges.iter().enumerate() {
-            let off = edge.distance / focus;
+            let unit = circle.point(index, RAYS);
+            let moved = (oval.x - start.x) * unit.0 + (oval.y - start.y) * unit.1;
+            let residual = edge.distance + start.radius(unit) - oval.radius(unit) - moved;
+            let off = residual / focus;
             if edge.slope != 0.0 && off.abs() < 1.0 {
-                let weight = edge.slope.abs().min(30.0) * (1.0 - off * off);
-                moments.add(circle.point(index, RAYS), edge.distance, weight);
+                moments.add(unit, residual, edge.slope.abs().min(30.0) * (1.0 - off * off));
                 near += 1;
             }
         }
@@ -67,26 +81,20 @@ pub(super) fn prove(
             return None;
         }
         let step = moments
-            .step(round > 0 && near >= 40)
+            .step(focus <= 2.0 && near >= 40)
             .or_else(|| moments.step(false))?;
         oval.x += step.x;
         oval.y += step.y;
         oval.r += step.r;
+        let moved = (oval.x - start.x).hypot(oval.y - start.y) + (oval.r - start.r).abs();
+        if !(moved <= 6.0 && oval.r >= 3.0) {
+            return None;
+        }
         let most = 0.08 * oval.r;
         oval.cos2 = (oval.cos2 + step.cos2).clamp(-most, most);
         oval.sin2 = (oval.sin2 + step.sin2).clamp(-most, most);
-        let moved = (oval.x - start.x).hypot(oval.y - start.y) + (oval.r - start.r).abs();
-        if moved > 6.0 || oval.r < 3.0 {
-            return None;
-        }
-        if moved.is_nan() {
-            return None;
-        }
     }
-    let reach = REACH.min((oval.r - 1.5) as usize).max(2);
-    polar.sample(grey, circle, &oval, (RAYS, reach, half));
-    strongest(polar, least, &mut edges);
-    Some(weigh(polar, &edges, oval, setting))
+    Some(oval)
 }
 
 /// Finds the strongest edge along the outline's normal on each ray.
