@@ -46,24 +46,41 @@ pub(super) fn prove(
     setting: &Setting,
 ) -> Option<Proof> {
     let mut edges = [Edge::default(); RAYS];
-    let half = usize::from(setting.noise > 6.0) + usize::from(setting.noise > 18.0);
+    // Slopes are averaged along the outline over some three pixels where there is noise.
+    let arc = start.r * std::f32::consts::TAU / RAYS as f32;
+    let half = if setting.noise > 3.0 {
+        ((super::tune(13, 1.5) / arc) as usize).clamp(1, 5)
+    } else {
+        0
+    };
     let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
     let sample = |polar: &mut Polar, oval: &Oval, edges: &mut [Edge; RAYS]| {
         let reach = REACH.min((oval.r - 1.5) as usize).max(2);
         polar.sample(grey, circle, oval, (RAYS, reach, half));
         strongest(polar, least, edges);
     };
-    sample(polar, &start, &mut edges);
-    let first = improve(circle, &edges, start, &[4.0, 3.0, 2.0])?;
-    sample(polar, &first, &mut edges);
-    let second = improve(circle, &edges, first, &[2.0, 1.5])?;
-    sample(polar, &second, &mut edges);
-    Some(weigh(polar, &edges, second, setting))
+    let mut oval = start;
+    for round in 0..super::tune(15, 4.0) as usize {
+        sample(polar, &oval, &mut edges);
+        let foci: &[f32] = if round == 0 { &[4.0, 3.0, 2.0] } else { &[3.0, 2.0, 1.5] };
+        let (better, near) = improve(circle, &edges, oval, foci)?;
+        if near < super::tune(20, 20.0) as usize {
+            return None;
+        }
+        let moved = (better.x - oval.x).hypot(better.y - oval.y) + (better.r - oval.r).abs();
+        oval = better;
+        if moved < super::tune(16, 0.7) {
+            break;
+        }
+    }
+    sample(polar, &oval, &mut edges);
+    Some(weigh(polar, &edges, oval, setting))
 }
 
 /// Moves the outline to the edges, in steps that look at those within the foci, pixels.
-fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32]) -> Option<Oval> {
+fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32]) -> Option<(Oval, usize)> {
     let mut oval = start;
+    let mut last = 0;
     for &focus in foci {
         let mut moments = Moments::default();
         let mut near = 0;
@@ -80,8 +97,9 @@ fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32])
         if near < 12 {
             return None;
         }
+        last = near;
         let step = moments
-            .step(focus <= 2.0 && near >= 40)
+            .step(focus <= 2.0 && near >= super::tune(10, 100.0) as usize)
             .or_else(|| moments.step(false))?;
         oval.x += step.x;
         oval.y += step.y;
@@ -94,7 +112,7 @@ fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32])
         oval.cos2 = (oval.cos2 + step.cos2).clamp(-most, most);
         oval.sin2 = (oval.sin2 + step.sin2).clamp(-most, most);
     }
-    Some(oval)
+    Some((oval, last))
 }
 
 /// Finds the strongest edge along the outline's normal on each ray.
@@ -141,12 +159,12 @@ fn weigh(polar: &Polar, edges: &[Edge; RAYS], oval: Oval, setting: &Setting) -> 
         certainty: f32::NEG_INFINITY,
         ..Proof::default()
     };
-    for slack in [0.5f32, 0.8, 1.2] {
+    for slack in [super::tune(17, 0.25), 0.5f32, 0.8, 1.2] {
         let hits = edges
             .iter()
             .filter(|edge| edge.slope != 0.0 && edge.distance.abs() <= slack)
             .count();
-        let p = (2.0 * slack + 0.3) / polar.columns as f32;
+        let p = (2.0 * slack + super::tune(9, 0.2)) / polar.columns as f32;
         let share = hits as f32 / (visible as f32).max(1.0);
         let certainty = independent * divergence(share, p) - setting.tests;
         if certainty > best.certainty {

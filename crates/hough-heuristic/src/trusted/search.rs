@@ -1,5 +1,6 @@
 //! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps 3a to 3c.
 
+use super::tune;
 use super::candidate::{Candidate, Collected};
 use super::directions::{CODES, UnitCircle, code};
 use super::level::{EDGE, EdgePoint, Level, Lines};
@@ -80,7 +81,7 @@ impl Outline {
 
     /// Looks at the outline until it is plain that there is no circle; None then.
     #[inline]
-    pub(super) fn support(&self, level: &Level, ring: &Ring, looks: &mut u64) -> Option<Support> {
+    pub(super) fn support(&self, level: &Level, ring: &Ring, least: f32, looks: &mut u64) -> Option<Support> {
         let (width, height) = (level.width as f32, level.height as f32);
         let inside = ring.x - ring.r >= 0.0
             && ring.y - ring.r >= 0.0
@@ -115,11 +116,11 @@ impl Outline {
             }
             support.hits += u32::from(hits);
             *looks += BLOCK as u64;
-            if support.hits * 5 + 5 < support.visible * 2 {
+            if (support.hits + 1) as f32 <= support.visible as f32 * least {
                 return None;
             }
         }
-        (support.visible >= LOOKS as u32 / 3 && support.hits * 5 >= support.visible * 2).then_some(support)
+        (support.visible >= LOOKS as u32 / 3 && support.hits as f32 >= support.visible as f32 * least).then_some(support)
     }
 
     /// Fits the ring to the edge points along it; None if they do not determine one.
@@ -230,7 +231,7 @@ impl Normal {
 /// The two normals' account of the circle through a point and one further along its line; None if they tell of none.
 #[inline]
 fn mirrored(p: &EdgePoint, q: &EdgePoint) -> Option<Ring> {
-    if (p.nx * q.ny + p.ny * q.nx).abs() > MIRROR_SLACK || q.nx.abs() < LEAST_ALONG {
+    if (p.nx * q.ny + p.ny * q.nx).abs() > tune(6, MIRROR_SLACK) || q.nx.abs() < LEAST_ALONG {
         return None;
     }
     // Inward: along the line at p, against it at q.
@@ -287,7 +288,7 @@ impl Search<'_> {
     ) {
         let mut next = at + 1;
         let mut partners = 0;
-        while partners < PARTNERS {
+        while partners < tune(5, PARTNERS as f32) as u32 {
             let lines: &Lines = if transposed { &level.columns } else { &level.rows };
             let p = lines.points[at];
             if p.nx.abs() < LEAST_ALONG || !level.free[p.id as usize] {
@@ -312,26 +313,35 @@ impl Search<'_> {
 
     fn consider(&self, level: &mut Level, ring: Ring, found: &mut Collected, budget: &mut Budget) {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, &mut budget.looks) else {
+        let Some(_) = self.outline.support(level, &ring, tune(0, 0.5), &mut budget.looks) else {
             return;
         };
         budget.passed += 1;
-        let Some(ring) = self.outline.fit(level, &ring, 3.0, &mut budget.looks) else {
-            return;
-        };
-        if ring.r < 0.8 * self.radii.0 || ring.r > 1.25 * self.radii.1 {
+        // Fit until no more of the outline is covered.
+        let (mut ring, mut support) = (ring, Support::default());
+        for round in 0..tune(14, 5.0) as u32 {
+            let reach = if round < 2 { 3.0 } else { 2.0 };
+            let Some(fitted) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
+                break;
+            };
+            if fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1 {
+                break;
+            }
+            let least = tune(1, 0.45);
+            let Some(now) = self.outline.support(level, &fitted, least, &mut budget.looks) else {
+                break;
+            };
+            if now.hits <= support.hits && round > 1 {
+                break;
+            }
+            (ring, support) = (fitted, now);
+        }
+        if support.hits == 0 {
             return;
         }
-        let Some(support) = self.outline.support(level, &ring, &mut budget.looks) else {
-            return;
-        };
         budget.added += 1;
-        let ring = self
-            .outline
-            .fit(level, &ring, 2.0, &mut budget.looks)
-            .unwrap_or(ring);
         found.add(Candidate::new(&ring, self.scale, support), budget);
-        if support.share() >= 0.6 {
+        if support.share() >= tune(4, 0.6) {
             self.outline
                 .explain(self.circle, level, &ring, &mut budget.looks);
         }
