@@ -224,6 +224,16 @@ fn faults_are_refused_and_what_was_learned_stays() {
         update(0, 0, &step(0, 1e39)),
         Err(Error::ValueNotFinite { .. })
     ));
+    // Not even where the learning rate lets nothing in.
+    let mut update = |action, step: &Step| cached.update(State(0), Action(action), step, 0.0, 1.0);
+    assert!(matches!(
+        update(1, &step(0, 0.0)),
+        Err(Error::ActionNotAllowed { .. })
+    ));
+    assert!(matches!(
+        update(0, &step(0, f64::INFINITY)),
+        Err(Error::RewardNotFinite { .. })
+    ));
     let mut same = table.clone();
     cached.write_to(&mut same).unwrap();
     assert_eq!(same, table);
