@@ -291,3 +291,23 @@ fn an_action_out_of_range_is_no_padding() {
         assert!(std::panic::catch_unwind(|| cached.visits(State(0), action)).is_err());
     }
 }
+
+#[test]
+fn of_equals_the_lowest_index_is_best() {
+    let mut cached = CachedBoltzmann::new(&QTable::new(1, 40).unwrap(), 1.0).unwrap();
+    let mut learn = |action, reward| {
+        let step = Step {
+            observation: State(0),
+            reward,
+            status: Status::Terminated,
+        };
+        cached.update(State(0), Action(action), &step, 1.0, 0.0).unwrap();
+        cached.best(State(0)).0
+    };
+    // Risen above, level from below and from above, and fallen.
+    let best = [(30, 2.0), (7, 2.0), (20, 2.0), (7, 1.0), (30, 0.0), (20, -1.0)];
+    assert_eq!(
+        best.map(|(action, reward)| learn(action, reward)),
+        [30, 7, 7, 20, 20, 7]
+    );
+}
