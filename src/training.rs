@@ -1,13 +1,9 @@
 //! From samples of the cell to two learned behaviours: the paper's "first learned in a simulated environment".
 
-use grasp_agent::{
-    Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Episode, Learned, Percept,
-};
+use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Episode, Learned, Percept};
 use pipeline_sim::{CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample};
 use puma_val2::{Joint, JointDelta};
-use qtable::{
-    Action, Progress, QTable, Record, Schedule, TrainConfig, TrainReport, train_in_blocks,
-};
+use qtable::{Action, Progress, QTable, Record, Schedule, TrainConfig, TrainReport, train_in_blocks};
 use rand::{Rng, RngExt};
 
 /// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted to samples.
@@ -165,7 +161,9 @@ pub(crate) fn learn_in(
     let mut best: Option<(usize, u64, QTable)> = None;
     while report.actions < config.actions {
         let from = report.actions;
-        let to = from.saturating_add(config.record_every.max(1)).min(config.actions);
+        let to = from
+            .saturating_add(config.record_every.max(1))
+            .min(config.actions);
         let part = TrainConfig {
             alpha: between(&config.alpha, from, to)?,
             temperature: between(&config.temperature, from, to)?,

@@ -44,6 +44,22 @@ impl Overlay {
         }
     }
 
+    /// A closed curve, given as a function of an angle.
+    #[allow(dead_code, reason = "only the example with an ellipse draws one")]
+    pub(crate) fn closed(&mut self, point: impl Fn(f64) -> (f64, f64)) {
+        const CORNERS: u32 = 120;
+        let at = |corner: u32| {
+            let (x, y) = point(std::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS));
+            Point::new(x.round() as i32, y.round() as i32)
+        };
+        let style = PrimitiveStyle::with_stroke(Rgb888::new(60, 255, 60), 3);
+        for corner in 0..CORNERS {
+            let Ok(()) = Line::new(at(corner), at(corner + 1))
+                .into_styled(style)
+                .draw(self);
+        }
+    }
+
     /// Words on a dark bar at the top.
     pub(crate) fn caption(&mut self, words: &str) {
         let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), 24));

@@ -46,6 +46,21 @@ struct Size {
     height: usize,
 }
 
+/// Development.
+pub(crate) fn tune(index: usize, default: f32) -> f32 {
+    static T: std::sync::OnceLock<Vec<Option<f32>>> = std::sync::OnceLock::new();
+    T.get_or_init(|| {
+        let mut v = vec![None; 64];
+        for part in std::env::var("TUNE").unwrap_or_default().split(',') {
+            if let Some((k, x)) = part.split_once('=') {
+                v[k.parse::<usize>().unwrap_or(63)] = x.parse().ok();
+            }
+        }
+        v
+    })[index]
+    .unwrap_or(default)
+}
+
 impl Trusted {
     /// A detector with these settings.
     ///
@@ -74,8 +89,8 @@ impl Trusted {
     }
 
     /// (draws, looks) for development.
-    pub fn spent(&self) -> (u64, u64) {
-        (self.budget.draws, self.budget.looks)
+    pub fn spent(&self) -> [u64; 5] {
+        [self.budget.draws, self.budget.looks, self.budget.passed, self.budget.added, self.proofs.len() as u64]
     }
 
     /// For development.
@@ -127,7 +142,7 @@ impl CircleDetector for Trusted {
             most_looks: (pixels * 3.0) as u64 + 10_000,
             ..Budget::default()
         };
-        self.collected.clear(192);
+        self.collected.clear(tune(3, 192.0) as usize);
 
         let config = &self.config;
         let finest = usize::from(config.min_radius >= 8.0 && !self.sizes.is_empty());
@@ -140,12 +155,12 @@ impl CircleDetector for Trusted {
                     (&size.grey, size.width, size.height)
                 }
             };
-            let contrast = (2.3 * config.contrast as f32)
-                .max(4.5 * (noise / scale + 0.3) * self.maxima.noise_gain());
+            let contrast = (2.3 * tune(2, config.contrast as f32))
+                .max(tune(18, 4.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
             let candidates = self.maxima.find(grey, width, contrast);
             self.level.fill(width, height, candidates);
             for candidate in &self.collected.candidates {
-                if candidate.support.share() >= 0.6 {
+                if candidate.support.share() >= tune(4, 0.6) {
                     let ring = candidate.ring(scale);
                     self.outline
                         .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
@@ -156,7 +171,7 @@ impl CircleDetector for Trusted {
                 circle: &self.circle,
                 outline: &self.outline,
                 radii: (
-                    (config.min_radius as f32 / scale).max(3.2),
+                    (config.min_radius as f32 / scale).max(if depth == finest { 3.2 } else { tune(19, 6.0) }),
                     (config.max_radius as f32 / scale).min(if top { f32::MAX } else { 18.0 }),
                 ),
                 scale,
@@ -168,7 +183,9 @@ impl CircleDetector for Trusted {
         for candidate in &self.collected.candidates {
             let mut depth = 0;
             let mut r = candidate.r;
-            while r >= 24.0 && depth < self.sizes.len() {
+            while depth < self.sizes.len()
+                && (r >= tune(11, 24.0) || (r >= 12.0 && noise > tune(12, 8.0) * (1 << depth) as f32))
+            {
                 depth += 1;
                 r *= 0.5;
             }

@@ -11,6 +11,8 @@ pub(super) struct Candidate {
     /// Pixels of the frame per pixel of its level.
     pub(super) scale: f32,
     pub(super) support: Support,
+    /// How much speaks for it, to choose among candidates.
+    pub(super) weight: f32,
 }
 
 impl Candidate {
@@ -22,6 +24,11 @@ impl Candidate {
             r: ring.r * scale,
             scale,
             support,
+            weight: {
+                let n = (ring.r * super::tune(21, 4.0)).min(32.0) * support.visible as f32 / 32.0;
+                let (q, p) = (support.share().min(0.999), super::tune(22, 0.2));
+                n * (q * (q / p).ln() + (1.0 - q) * ((1.0 - q) / (1.0 - p)).ln())
+            },
         }
     }
 
@@ -37,7 +44,7 @@ impl Candidate {
 
     fn near(&self, other: &Self) -> bool {
         let off = (self.x - other.x).abs() + (self.y - other.y).abs() + (self.r - other.r).abs();
-        off < 0.12 * self.r.min(other.r) + 1.0 * self.scale.min(other.scale)
+        off < super::tune(8, 0.12) * self.r.min(other.r) + 1.0 * self.scale.min(other.scale)
     }
 }
 
@@ -59,7 +66,7 @@ impl Collected {
     pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) {
         budget.looks += self.candidates.len() as u64 / 4;
         if let Some(known) = self.candidates.iter_mut().find(|known| known.near(&candidate)) {
-            if candidate.support.share() > known.support.share() {
+            if candidate.weight > known.weight {
                 *known = candidate;
             }
         } else if self.candidates.len() < self.most {
@@ -67,8 +74,8 @@ impl Collected {
         } else if let Some(worst) = self
             .candidates
             .iter_mut()
-            .min_by(|a, b| a.support.share().total_cmp(&b.support.share()))
-            && worst.support.share() < candidate.support.share()
+            .min_by(|a, b| a.weight.total_cmp(&b.weight))
+            && worst.weight < candidate.weight
         {
             *worst = candidate;
         }

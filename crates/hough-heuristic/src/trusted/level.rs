@@ -3,6 +3,9 @@
 use super::directions::code;
 use crate::edges::Candidate;
 
+/// Set in the mark of a pixel with an edge.
+pub(super) const EDGE: u8 = 0x80;
+
 /// An edge point, as it lies in a list of rows; in a list of columns x and y have changed places.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct EdgePoint {
@@ -33,7 +36,7 @@ pub(super) struct Level {
     pub(super) columns: Lines,
     /// Which points no circle explains so far.
     pub(super) free: Vec<bool>,
-    /// For each pixel: 0 where no edge is within a pixel, else 1 + the code of the edge's normal.
+    /// For each pixel: 0 where no edge is within a pixel, else [`EDGE`] and the code of the edge's normal.
     near: Vec<u8>,
     /// Where `near` is not 0: which point it is.
     nearest: Vec<u32>,
@@ -69,7 +72,7 @@ impl Level {
                 id,
             });
             // The candidate's own pixel and its four neighbours; candidates never lie on the border.
-            let mark = 1 + code(gx, gy);
+            let mark = EDGE | code(gx, gy);
             let centre = py * width + px;
             for pixel in [centre - width, centre - 1, centre + 1, centre + width] {
                 if self.near[pixel] == 0 {
@@ -96,6 +99,12 @@ impl Level {
         }
         let pixel = row * self.width + column;
         Some((self.near[pixel], pixel))
+    }
+
+    /// The marks of all pixels, row by row.
+    #[inline]
+    pub(super) fn marks(&self) -> &[u8] {
+        &self.near
     }
 
     /// The point that a mark stands for.

@@ -104,6 +104,21 @@ impl Polar {
             }
             let start = radius - reach as f32 - 0.5;
             let (x, y) = (oval.x + start * ux, oval.y + start * uy);
+            let (end_x, end_y) = (x + (samples - 1) as f32 * ux, y + (samples - 1) as f32 * uy);
+            if x.min(end_x) >= 0.0 && y.min(end_y) >= 0.0 && x.max(end_x) < right && y.max(end_y) < bottom {
+                for (step, out) in ray.iter_mut().enumerate() {
+                    let (cx, cy) = (x + step as f32 * ux, y + step as f32 * uy);
+                    let (left, top) = (cx as i32, cy as i32);
+                    let (fx, fy) = (cx - left as f32, cy - top as f32);
+                    let at = (top * width as i32 + left) as usize;
+                    let Some(square) = pixels.get(at..at + width + 2) else { continue };
+                    let (a, b) = (f32::from(square[0]), f32::from(square[1]));
+                    let (c, d) = (f32::from(square[width]), f32::from(square[width + 1]));
+                    let (ab, cd) = (a + (b - a) * fx, c + (d - c) * fx);
+                    *out = ab + (cd - ab) * fy;
+                }
+                continue;
+            }
             for (step, out) in ray.iter_mut().enumerate() {
                 let step = step as f32;
                 let (cx, cy) = ((x + step * ux).clamp(0.0, right), (y + step * uy).clamp(0.0, bottom));

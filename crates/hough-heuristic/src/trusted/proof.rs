@@ -45,48 +45,74 @@ pub(super) fn prove(
     start: Oval,
     setting: &Setting,
 ) -> Option<Proof> {
-    let mut oval = start;
     let mut edges = [Edge::default(); RAYS];
-    let half = usize::from(setting.noise > 6.0) + usize::from(setting.noise > 18.0);
+    // Slopes are averaged along the outline over some three pixels where there is noise.
+    let arc = start.r * std::f32::consts::TAU / RAYS as f32;
+    let half = if setting.noise > 3.0 {
+        ((super::tune(13, 1.5) / arc) as usize).clamp(1, 5)
+    } else {
+        0
+    };
     let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
-    for (round, focus) in [4.0f32, 2.5, 1.5].into_iter().enumerate() {
+    let sample = |polar: &mut Polar, oval: &Oval, edges: &mut [Edge; RAYS]| {
         let reach = REACH.min((oval.r - 1.5) as usize).max(2);
-        polar.sample(grey, circle, &oval, (RAYS, reach, half));
-        strongest(polar, least, &mut edges);
+        polar.sample(grey, circle, oval, (RAYS, reach, half));
+        strongest(polar, least, edges);
+    };
+    let mut oval = start;
+    for round in 0..super::tune(15, 4.0) as usize {
+        sample(polar, &oval, &mut edges);
+        let foci: &[f32] = if round == 0 { &[4.0, 3.0, 2.0] } else { &[3.0, 2.0, 1.5] };
+        let (better, near) = improve(circle, &edges, oval, foci)?;
+        if near < super::tune(20, 20.0) as usize {
+            return None;
+        }
+        let moved = (better.x - oval.x).hypot(better.y - oval.y) + (better.r - oval.r).abs();
+        oval = better;
+        if moved < super::tune(16, 0.7) {
+            break;
+        }
+    }
+    sample(polar, &oval, &mut edges);
+    Some(weigh(polar, &edges, oval, setting))
+}
+
+/// Moves the outline to the edges, in steps that look at those within the foci, pixels.
+fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32]) -> Option<(Oval, usize)> {
+    let mut oval = start;
+    let mut last = 0;
+    for &focus in foci {
         let mut moments = Moments::default();
         let mut near = 0;
         for (index, edge) in edges.iter().enumerate() {
-            let off = edge.distance / focus;
+            let unit = circle.point(index, RAYS);
+            let moved = (oval.x - start.x) * unit.0 + (oval.y - start.y) * unit.1;
+            let residual = edge.distance + start.radius(unit) - oval.radius(unit) - moved;
+            let off = residual / focus;
             if edge.slope != 0.0 && off.abs() < 1.0 {
-                let weight = edge.slope.abs().min(30.0) * (1.0 - off * off);
-                moments.add(circle.point(index, RAYS), edge.distance, weight);
+                moments.add(unit, residual, edge.slope.abs().min(30.0) * (1.0 - off * off));
                 near += 1;
             }
         }
         if near < 12 {
             return None;
         }
+        last = near;
         let step = moments
-            .step(round > 0 && near >= 40)
+            .step(focus <= 2.0 && near >= super::tune(10, 100.0) as usize)
             .or_else(|| moments.step(false))?;
         oval.x += step.x;
         oval.y += step.y;
         oval.r += step.r;
+        let moved = (oval.x - start.x).hypot(oval.y - start.y) + (oval.r - start.r).abs();
+        if !(moved <= 6.0 && oval.r >= 3.0) {
+            return None;
+        }
         let most = 0.08 * oval.r;
         oval.cos2 = (oval.cos2 + step.cos2).clamp(-most, most);
         oval.sin2 = (oval.sin2 + step.sin2).clamp(-most, most);
-        let moved = (oval.x - start.x).hypot(oval.y - start.y) + (oval.r - start.r).abs();
-        if moved > 6.0 || oval.r < 3.0 {
-            return None;
-        }
-        if moved.is_nan() {
-            return None;
-        }
     }
-    let reach = REACH.min((oval.r - 1.5) as usize).max(2);
-    polar.sample(grey, circle, &oval, (RAYS, reach, half));
-    strongest(polar, least, &mut edges);
-    Some(weigh(polar, &edges, oval, setting))
+    Some((oval, last))
 }
 
 /// Finds the strongest edge along the outline's normal on each ray.
@@ -133,12 +159,12 @@ fn weigh(polar: &Polar, edges: &[Edge; RAYS], oval: Oval, setting: &Setting) -> 
         certainty: f32::NEG_INFINITY,
         ..Proof::default()
     };
-    for slack in [0.5f32, 0.8, 1.2] {
+    for slack in [super::tune(17, 0.25), 0.5f32, 0.8, 1.2] {
         let hits = edges
             .iter()
             .filter(|edge| edge.slope != 0.0 && edge.distance.abs() <= slack)
             .count();
-        let p = (2.0 * slack + 0.3) / polar.columns as f32;
+        let p = (2.0 * slack + super::tune(9, 0.2)) / polar.columns as f32;
         let share = hits as f32 / (visible as f32).max(1.0);
         let certainty = independent * divergence(share, p) - setting.tests;
         if certainty > best.certainty {

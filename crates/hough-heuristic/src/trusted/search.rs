@@ -1,8 +1,9 @@
 //! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps 3a to 3c.
 
+use super::tune;
 use super::candidate::{Candidate, Collected};
-use super::directions::{CODES, UnitCircle, apart, code};
-use super::level::{EdgePoint, Level, Lines};
+use super::directions::{CODES, UnitCircle, code};
+use super::level::{EDGE, EdgePoint, Level, Lines};
 
 /// Points of a circle's outline that are looked at.
 pub(super) const LOOKS: usize = 32;
@@ -42,6 +43,8 @@ impl Support {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Budget {
     pub(super) draws: u64,
+    pub(super) passed: u64,
+    pub(super) added: u64,
     pub(super) looks: u64,
     pub(super) most_looks: u64,
 }
@@ -52,54 +55,86 @@ impl Budget {
     }
 }
 
-/// The points of the outline in the order in which they are looked at, each with the code of its normal.
+/// The points of the outline in the order in which they are looked at, each with the lowest code that its edge may have.
 #[derive(Clone, Debug)]
-pub(super) struct Outline(Vec<(f32, f32, u8)>);
+pub(super) struct Outline {
+    x: [f32; LOOKS],
+    y: [f32; LOOKS],
+    lowest: [u8; LOOKS],
+}
+
+/// Points that are looked at together.
+const BLOCK: usize = 8;
 
 impl Outline {
     pub(super) fn new(circle: &UnitCircle) -> Self {
         // Bits reversed: any first part of the order is spread over the whole outline.
-        let order = (0..LOOKS).map(|index| (index as u32).reverse_bits() >> (32 - LOOKS.trailing_zeros()));
-        Self(
-            order
-                .map(|index| {
-                    let (x, y) = circle.point(index as usize, LOOKS);
-                    (x, y, code(x, y))
-                })
-                .collect(),
-        )
+        let order: [usize; LOOKS] =
+            std::array::from_fn(|index| (index as u32).reverse_bits() as usize >> (32 - LOOKS.trailing_zeros()));
+        let points = order.map(|index| circle.point(index, LOOKS));
+        Self {
+            x: points.map(|(x, _)| x),
+            y: points.map(|(_, y)| y),
+            lowest: points.map(|(x, y)| code(x, y).wrapping_sub(DIRECTION_SLACK) % CODES),
+        }
     }
 
     /// Looks at the outline until it is plain that there is no circle; None then.
     #[inline]
-    pub(super) fn support(&self, level: &Level, ring: &Ring, looks: &mut u64) -> Option<Support> {
+    pub(super) fn support(&self, level: &Level, ring: &Ring, least: f32, looks: &mut u64) -> Option<Support> {
+        let (width, height) = (level.width as f32, level.height as f32);
+        let inside = ring.x - ring.r >= 0.0
+            && ring.y - ring.r >= 0.0
+            && ring.x + ring.r <= width - 1.0
+            && ring.y + ring.r <= height - 1.0;
         let mut support = Support::default();
-        for (index, &(ux, uy, normal)) in self.0.iter().enumerate() {
-            if let Some((mark, _)) = level.mark(ring.x + ring.r * ux, ring.y + ring.r * uy) {
-                support.visible += 1;
-                let matches = mark != 0 && apart((mark - 1) % CODES, normal) <= DIRECTION_SLACK;
-                support.hits += u32::from(matches);
+        for block in 0..LOOKS / BLOCK {
+            let (x, y) = (&self.x.as_chunks::<BLOCK>().0[block], &self.y.as_chunks::<BLOCK>().0[block]);
+            let lowest = &self.lowest.as_chunks::<BLOCK>().0[block];
+            let mut marks = [0u8; BLOCK];
+            if inside {
+                let mut pixels = [0i32; BLOCK];
+                for i in 0..BLOCK {
+                    let (column, row) = (ring.x + ring.r * x[i] + 0.5, ring.y + ring.r * y[i] + 0.5);
+                    pixels[i] = row as i32 * level.width as i32 + column as i32;
+                }
+                for i in 0..BLOCK {
+                    marks[i] = level.marks().get(pixels[i] as usize).copied().unwrap_or(0);
+                }
+                support.visible += BLOCK as u32;
+            } else {
+                for i in 0..BLOCK {
+                    if let Some((mark, _)) = level.mark(ring.x + ring.r * x[i], ring.y + ring.r * y[i]) {
+                        marks[i] = mark;
+                        support.visible += 1;
+                    }
+                }
             }
-            if index % 4 == 3 && support.hits * 5 + 5 < support.visible * 2 {
-                *looks += index as u64 + 1;
+            let mut hits = 0u8;
+            for i in 0..BLOCK {
+                hits += u8::from(runs_along(marks[i], lowest[i]));
+            }
+            support.hits += u32::from(hits);
+            *looks += BLOCK as u64;
+            if (support.hits + 1) as f32 <= support.visible as f32 * least {
                 return None;
             }
         }
-        *looks += LOOKS as u64;
-        (support.visible >= LOOKS as u32 / 3 && support.hits * 5 >= support.visible * 2).then_some(support)
+        (support.visible >= LOOKS as u32 / 3 && support.hits as f32 >= support.visible as f32 * least).then_some(support)
     }
 
     /// Fits the ring to the edge points along it; None if they do not determine one.
     pub(super) fn fit(&self, level: &Level, ring: &Ring, reach: f32, looks: &mut u64) -> Option<Ring> {
         let mut normal = Normal::default();
-        for &(ux, uy, direction) in &self.0 {
+        for index in 0..LOOKS {
+            let (ux, uy, lowest) = (self.x[index], self.y[index], self.lowest[index]);
             for step in [0.0, -1.5, 1.5] {
                 *looks += 1;
                 let at = ring.r + step;
                 let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy) else {
                     continue;
                 };
-                if mark == 0 || apart((mark - 1) % CODES, direction) > DIRECTION_SLACK {
+                if !runs_along(mark, lowest) {
                     continue;
                 }
                 let point = level.point_at(pixel);
@@ -125,12 +160,11 @@ impl Outline {
         *looks += 3 * count as u64;
         for index in 0..count {
             let (ux, uy) = circle.point(index, count);
-            let direction = code(ux, uy);
+            let lowest = code(ux, uy).wrapping_sub(DIRECTION_SLACK) % CODES;
             for step in [0.0, -1.5, 1.5] {
                 let at = ring.r + step;
                 if let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy)
-                    && mark != 0
-                    && apart((mark - 1) % CODES, direction) <= DIRECTION_SLACK + 2
+                    && runs_along(mark, lowest)
                 {
                     let id = level.point_at(pixel).id;
                     level.free[id as usize] = false;
@@ -138,6 +172,12 @@ impl Outline {
             }
         }
     }
+}
+
+/// Whether a pixel with this mark has an edge whose code lies at most twice the slack above the lowest.
+#[inline]
+fn runs_along(mark: u8, lowest: u8) -> bool {
+    mark & EDGE != 0 && mark.wrapping_sub(lowest) % CODES <= 2 * DIRECTION_SLACK
 }
 
 /// Least squares of `residual = dr + ux dx + uy dy`.
@@ -191,7 +231,7 @@ impl Normal {
 /// The two normals' account of the circle through a point and one further along its line; None if they tell of none.
 #[inline]
 fn mirrored(p: &EdgePoint, q: &EdgePoint) -> Option<Ring> {
-    if (p.nx * q.ny + p.ny * q.nx).abs() > MIRROR_SLACK || q.nx.abs() < LEAST_ALONG {
+    if (p.nx * q.ny + p.ny * q.nx).abs() > tune(6, MIRROR_SLACK) || q.nx.abs() < LEAST_ALONG {
         return None;
     }
     // Inward: along the line at p, against it at q.
@@ -199,7 +239,6 @@ fn mirrored(p: &EdgePoint, q: &EdgePoint) -> Option<Ring> {
     let (qx, qy) = if q.nx < 0.0 { (q.nx, q.ny) } else { (-q.nx, -q.ny) };
     let (across, along) = (py + qy, px - qx);
     let length = (across * across + along * along).sqrt();
-    let r = (q.x - p.x) * length / (2.0 * along);
     let r = 0.5 * (q.x - p.x) * length / along;
     Some(Ring {
         x: 0.5 * (p.x + q.x),
@@ -223,15 +262,18 @@ impl Search<'_> {
     /// Draws pairs on the rows, then on the columns, until all points have had their turn or the budget is spent.
     pub(super) fn run(&self, level: &mut Level, found: &mut Collected, budget: &mut Budget) {
         for transposed in [false, true] {
-            let count = level.rows.points.len();
-            let stride = stride(count);
-            let mut at = (self.seed % count.max(1) as u64) as usize;
-            for _ in 0..count {
-                at = (at + stride) % count;
-                if budget.is_spent() {
-                    return;
+            let lines = if transposed { level.width } else { level.height };
+            let stride = stride(lines);
+            let mut line = (self.seed % lines.max(1) as u64) as usize;
+            for _ in 0..lines {
+                line = (line + stride) % lines;
+                let starts = if transposed { &level.columns.starts } else { &level.rows.starts };
+                for at in starts[line] as usize..starts[line + 1] as usize {
+                    if budget.is_spent() {
+                        return;
+                    }
+                    self.from_point(level, transposed, at, found, budget);
                 }
-                self.from_point(level, transposed, at, found, budget);
             }
         }
     }
@@ -246,10 +288,10 @@ impl Search<'_> {
     ) {
         let mut next = at + 1;
         let mut partners = 0;
-        while partners < PARTNERS {
+        while partners < tune(5, PARTNERS as f32) as u32 {
             let lines: &Lines = if transposed { &level.columns } else { &level.rows };
             let p = lines.points[at];
-            if !level.free[p.id as usize] || p.nx.abs() < LEAST_ALONG {
+            if p.nx.abs() < LEAST_ALONG || !level.free[p.id as usize] {
                 return;
             }
             let Some(ring) = lines.next_partner(&p, &mut next, self.radii, &level.free, budget) else {
@@ -271,23 +313,35 @@ impl Search<'_> {
 
     fn consider(&self, level: &mut Level, ring: Ring, found: &mut Collected, budget: &mut Budget) {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, &mut budget.looks) else {
+        let Some(_) = self.outline.support(level, &ring, tune(0, 0.5), &mut budget.looks) else {
             return;
         };
-        let fit = |ring: &Ring, reach: f32, budget: &mut Budget| {
-            self.outline.fit(level, ring, reach, &mut budget.looks)
-        };
-        let Some(ring) = fit(&ring, 3.0, budget).and_then(|ring| fit(&ring, 2.0, budget)) else {
-            return;
-        };
-        if ring.r < 0.8 * self.radii.0 || ring.r > 1.25 * self.radii.1 {
+        budget.passed += 1;
+        // Fit until no more of the outline is covered.
+        let (mut ring, mut support) = (ring, Support::default());
+        for round in 0..tune(14, 5.0) as u32 {
+            let reach = if round < 2 { 3.0 } else { 2.0 };
+            let Some(fitted) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
+                break;
+            };
+            if fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1 {
+                break;
+            }
+            let least = tune(1, 0.45);
+            let Some(now) = self.outline.support(level, &fitted, least, &mut budget.looks) else {
+                break;
+            };
+            if now.hits <= support.hits && round > 1 {
+                break;
+            }
+            (ring, support) = (fitted, now);
+        }
+        if support.hits == 0 {
             return;
         }
-        let Some(support) = self.outline.support(level, &ring, &mut budget.looks) else {
-            return;
-        };
+        budget.added += 1;
         found.add(Candidate::new(&ring, self.scale, support), budget);
-        if support.share() >= 0.6 {
+        if support.share() >= tune(4, 0.6) {
             self.outline
                 .explain(self.circle, level, &ring, &mut budget.looks);
         }
@@ -312,12 +366,10 @@ impl Lines {
             if (q.y - p.y).abs() > 1.0 || q.x <= p.x || q.x - p.x > 2.0 * radii.1 {
                 break;
             }
-            if !free[q.id as usize] {
-                continue;
-            }
             if let Some(ring) = mirrored(p, q)
                 && ring.r >= radii.0
                 && ring.r <= radii.1
+                && free[q.id as usize]
             {
                 budget.looks += (*next - first) as u64 / 4;
                 return Some(ring);

@@ -9,24 +9,29 @@ use crate::{ArmError, Gripper, JointDelta, Joints, Manipulator, Transport};
 /// Its name.
 const NAME: &str = "PGLOOP";
 
-/// The key that makes it show the joint angles.
-const KEY_WHERE: &str = "8";
-
 /// What it asks.
 pub(super) const QUESTION: &str = "GO? ";
 
-/// It asks for a key and six angles. Only the key 7 moves the arm: an empty or damaged answer asks again.
+/// Keys of the program. A changed bit can make a carriage return of a character, and its line two: so what a line begins with after an angle
+/// (no angle is as large as these numbers) is no key, and a move ends with its key once more.
+const MOVE: &str = "7";
+const OPEN: &str = "508";
+const CLOSE: &str = "609";
+const WHERE: &str = "817";
+const END: &str = "914";
+
+/// It asks for a key, six angles and the key again. An empty, cut or damaged answer makes it ask anew.
 const STEPS: [&str; 17] = [
-    "10 PROMPT \"GO? \",PGK,PGA,PGB,PGC,PGD,PGE,PGF",
-    "IF PGK == 9 GOTO 20",
-    "IF PGK == 8 GOTO 15",
-    "IF PGK == 5 THEN",
+    "10 PROMPT \"GO? \",PGK,PGA,PGB,PGC,PGD,PGE,PGF,PGZ",
+    "IF PGK == 914 GOTO 20",
+    "IF PGK == 817 GOTO 15",
+    "IF PGK == 508 THEN",
     "OPENI",
     "END",
-    "IF PGK == 6 THEN",
+    "IF PGK == 609 THEN",
     "CLOSEI",
     "END",
-    "IF PGK <> 7 GOTO 10",
+    "IF PGK <> 7 OR PGZ <> 7 GOTO 10",
     "MOVE #PPOINT(PGA,PGB,PGC,PGD,PGE,PGF)",
     "BREAK",
     "15 HERE #PGN",
@@ -36,9 +41,12 @@ const STEPS: [&str; 17] = [
     "20 TYPE \"BYE\"",
 ];
 
+/// The line that ends the program.
+pub(super) const LEAVE: &[u8] = b"914\r";
+
 /// The arm through a program that runs in its controller. While this lives, the monitor is not used.
 ///
-/// A move is one short line and its answer, the joint angles reached. Angles are absolute, so that a move can be commanded again after doubt. The
+/// The controller must know `#PPOINT`. A move is one short line and its answer, the joint angles reached. Angles are absolute, so that a move can be commanded again after doubt. The
 /// program ends with [`Resident::end`] or when this is dropped.
 ///
 /// One line shows the angles once, and nothing else with it that would betray a changed digit. They are believed when they are those that the arm was
@@ -114,7 +122,7 @@ impl<T: Transport> Resident<'_, T> {
         let config = &self.client.config;
         let mut ending = Ending::Question;
         for _ in 0..=config.retries {
-            ending = match wire.exchange_to_end("9", config.patience(), config) {
+            ending = match wire.exchange_to_end(END, config.patience(), config) {
                 Ok(reply) => reply.ending,
                 Err(failed) if is_doubt(&failed.error) => wire.spoil(config)?.ending,
                 Err(failed) => return Err(failed.error),
@@ -123,18 +131,23 @@ impl<T: Transport> Resident<'_, T> {
                 return Ok(());
             }
         }
-        Err(wire.garbled("9", "the monitor's prompt", &format!("{ending:?}")))
+        Err(wire.garbled(END, "the monitor's prompt", &format!("{ending:?}")))
+    }
+
+    fn check_alive(&self) -> Result<(), ArmError> {
+        if !self.ended {
+            return Ok(());
+        }
+        Err(ArmError::Setting {
+            what: "a resident program",
+            value: "used after it has ended".into(),
+            allowed: "start another one",
+        })
     }
 
     /// Gives the program a line until it has answered with its question again, and returns what it said before. Nothing in a line is relative.
     fn give(&mut self, answer: &str) -> Result<Reply, ArmError> {
-        if self.ended {
-            return Err(ArmError::Setting {
-                what: "a resident program",
-                value: "used after it has ended".into(),
-                allowed: "start another one",
-            });
-        }
+        self.check_alive()?;
         let mut tries = 0;
         loop {
             let client = &mut *self.client;
@@ -211,7 +224,7 @@ impl<T: Transport> Resident<'_, T> {
     /// Where the arm stands: what the program shows twice in a row. The arm moves only while a line that says so is answered.
     fn stands(&mut self, mut before: Option<Joints>) -> Result<Joints, ArmError> {
         for _ in 0..self.client.config.retries.saturating_add(3) {
-            let joints = self.ask(KEY_WHERE)?;
+            let joints = self.ask(WHERE)?;
             if before.is_some_and(|before| furthest(&before, &joints).1 < STILL) {
                 return Ok(joints);
             }
@@ -219,7 +232,7 @@ impl<T: Transport> Resident<'_, T> {
         }
         let expected = "the same joint angles twice in a row";
         let heard = before.map(|joints| joints.to_string()).unwrap_or_default();
-        Err(self.client.wire.garbled(KEY_WHERE, expected, &heard))
+        Err(self.client.wire.garbled(WHERE, expected, &heard))
     }
 
     /// The program has ended, the monitor has its prompt: it can say where the arm stands.
@@ -238,7 +251,7 @@ impl<T: Transport> Resident<'_, T> {
 
     fn go(&mut self, target: Joints) -> Result<Joints, ArmError> {
         let values = target.degrees().map(plain).join(",");
-        let shown = self.ask(&format!("7,{}", values.trim_end_matches(",0")))?;
+        let shown = self.ask(&format!("{MOVE},{values},{MOVE}"))?;
         if furthest(&shown, &target).1 <= AS_SENT {
             return Ok(shown);
         }
@@ -259,6 +272,7 @@ impl<T: Transport> Resident<'_, T> {
 
     /// Keeps where the arm is known to stand after a call that may have moved it.
     fn kept(&mut self, call: impl FnOnce(&mut Self) -> Result<Joints, ArmError>) -> Result<Joints, ArmError> {
+        self.check_alive()?;
         let before = self.client.last_known.take();
         match call(self) {
             Ok(joints) => {
@@ -296,8 +310,8 @@ impl<T: Transport> Manipulator for Resident<'_, T> {
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         // The keys of the hand show nothing; the question after them is the answer.
         self.give(match gripper {
-            Gripper::Open => "5",
-            Gripper::Closed => "6",
+            Gripper::Open => OPEN,
+            Gripper::Closed => CLOSE,
         })
         .map(drop)
     }

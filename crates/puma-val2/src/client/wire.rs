@@ -297,7 +297,7 @@ impl<T: Transport> Wire<T> {
         while let Some(bytes) = self.receive(config.quiet, doing)? {
             reader.push(&bytes);
             taken += bytes.len();
-            if taken > 2 * config.reply_limit.max(256) || self.line.clock() >= until {
+            if taken > config.reply_limit.max(256).saturating_mul(2) || self.line.clock() >= until {
                 return Err(self.garbled("an empty line", "silence", &shortened(reader.text())));
             }
         }
@@ -374,7 +374,7 @@ pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     let yes_or_no = question.contains("Y/N");
     let first = attempt.is_multiple_of(2);
     if question.starts_with(super::resident::QUESTION.trim_end()) {
-        b"9\r"
+        super::resident::LEAVE
     } else if of_editor {
         if first { b"\r" } else { b"E\r" }
     } else if yes_or_no {
