@@ -51,14 +51,14 @@ enum Operator {
 
 /// The operator at work.
 enum Edges {
-    Canny(Canny),
+    Canny(Box<Canny>),
     Imageproc(ImageprocCanny),
 }
 
 impl Edges {
     fn operator(&mut self) -> &mut dyn EdgeDetector {
         match self {
-            Self::Canny(canny) => canny,
+            Self::Canny(canny) => &mut **canny,
             Self::Imageproc(canny) => canny,
         }
     }
@@ -82,12 +82,12 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         ..
     } = options;
     let mut detector = match options.operator {
-        Operator::Canny => Edges::Canny(Canny::new(CannyConfig {
+        Operator::Canny => Edges::Canny(Box::new(Canny::new(CannyConfig {
             low,
             high,
             noise_factor,
             ..CannyConfig::default()
-        })?),
+        })?)),
         Operator::Imageproc => Edges::Imageproc(ImageprocCanny::new(low, high)?),
     };
     let mut files = ImageFiles::open(&options.frames)?;

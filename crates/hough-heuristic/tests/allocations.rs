@@ -1,6 +1,10 @@
 //! A detector allocates nothing for a frame once it has seen one like it.
 
 #![allow(unsafe_code)]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may fail that way, also in a function that several tests share"
+)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
