@@ -37,6 +37,7 @@ use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
 use stages::{Stages, Timed};
 
+mod cpu;
 mod files;
 #[path = "grasp/options.rs"]
 mod options;

@@ -31,6 +31,7 @@ use rand::{RngExt, SeedableRng};
 use files::{writable_folder, write_whole};
 use stages::{Stages, Timed};
 
+mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
 mod stages;
