@@ -14,12 +14,12 @@ use image::GrayImage;
 
 pub use config::TrustedConfig;
 
-use crate::edges::{Maxima, noise_deviation};
+use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
-use polar::{Grey, Oval, Polar};
+use polar::{Grey, Polar, Ring};
 use proof::{Proof, Setting};
 use search::{Budget, Outline, Search};
 
@@ -58,7 +58,7 @@ pub(crate) fn tune(index: usize, default: f32) -> f32 {
         }
         v
     })[index]
-    .unwrap_or(default)
+        .unwrap_or(default)
 }
 
 impl Trusted {
@@ -90,7 +90,29 @@ impl Trusted {
 
     /// (draws, looks) for development.
     pub fn spent(&self) -> [u64; 5] {
-        [self.budget.draws, self.budget.looks, self.budget.passed, self.budget.added, self.proofs.len() as u64]
+        [
+            self.budget.draws,
+            self.budget.looks,
+            self.budget.passed,
+            self.budget.added,
+            self.proofs.len() as u64,
+        ]
+    }
+
+    /// For development.
+    pub fn candidates(&self) -> Vec<(Circle, f32, f32, f32)> {
+        self.collected
+            .candidates
+            .iter()
+            .map(|c| {
+                let circle = Circle {
+                    x: c.x.into(),
+                    y: c.y.into(),
+                    radius: c.r.into(),
+                };
+                (circle, c.support.share(), c.weight, c.scale)
+            })
+            .collect()
     }
 
     /// For development.
@@ -113,18 +135,55 @@ impl Trusted {
             let (before, rest) = self.sizes.split_at_mut(index);
             let (grey, width) = before
                 .last()
-                .map_or((frame.as_raw(), frame.width() as usize), |size| (&size.grey, size.width));
+                .map_or((frame.as_raw(), frame.width() as usize), |size| {
+                    (&size.grey, size.width)
+                });
             let size = &mut rest[0];
             (size.width, size.height) = halve::halve(grey, width, &mut size.grey);
         }
     }
 }
 
+/// The search of a level.
+struct Searching<'a> {
+    search: Search<'a>,
+    level: &'a mut Level,
+    collected: &'a mut Collected,
+    budget: &'a mut Budget,
+}
+
+impl Vectorized for Searching<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.search.run(self.level, self.collected, self.budget);
+    }
+}
+
+/// The proof of a candidate.
+struct Proving<'a> {
+    grey: Grey<'a>,
+    circle: &'a UnitCircle,
+    polar: &'a mut Polar,
+    start: Ring,
+    setting: &'a Setting,
+}
+
+impl Vectorized for Proving<'_> {
+    type Output = Option<Proof>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        proof::prove(self.grey, self.circle, self.polar, self.start, self.setting)
+    }
+}
+
 fn circle_of(proof: &Proof) -> Circle {
     Circle {
-        x: proof.oval.x.into(),
-        y: proof.oval.y.into(),
-        radius: proof.oval.r.into(),
+        x: proof.ring.x.into(),
+        y: proof.ring.y.into(),
+        radius: proof.ring.r.into(),
     }
 }
 
@@ -160,7 +219,7 @@ impl CircleDetector for Trusted {
             let candidates = self.maxima.find(grey, width, contrast);
             self.level.fill(width, height, candidates);
             for candidate in &self.collected.candidates {
-                if candidate.support.share() >= tune(4, 0.6) {
+                if candidate.support.share() >= tune(4, 0.7) {
                     let ring = candidate.ring(scale);
                     self.outline
                         .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
@@ -177,7 +236,12 @@ impl CircleDetector for Trusted {
                 scale,
                 seed: config.seed,
             };
-            search.run(&mut self.level, &mut self.collected, &mut self.budget);
+            widest(Searching {
+                search,
+                level: &mut self.level,
+                collected: &mut self.collected,
+                budget: &mut self.budget,
+            });
         }
         let tests = (pixels * (config.max_radius - config.min_radius + 1.0)).log10() as f32;
         for candidate in &self.collected.candidates {
@@ -209,16 +273,20 @@ impl CircleDetector for Trusted {
                     }
                 }
             };
-            let start = Oval {
+            let start = Ring {
                 x: candidate.x,
                 y: candidate.y,
                 r: candidate.r,
-                ..Oval::default()
             };
-            if let Some(mut proof) =
-                proof::prove(grey, &self.circle, &mut self.polar, start.shrunk(scale), &setting)
-            {
-                proof.oval = proof.oval.grown(scale);
+            let proof = widest(Proving {
+                grey,
+                circle: &self.circle,
+                polar: &mut self.polar,
+                start: start.shrunk(scale),
+                setting: &setting,
+            });
+            if let Some(mut proof) = proof {
+                proof.ring = proof.ring.grown(scale);
                 self.proofs.push(proof);
             }
         }
@@ -231,7 +299,8 @@ impl CircleDetector for Trusted {
             let taken = found.iter().any(|other| {
                 let off = (circle.x - other.circle.x).hypot(circle.y - other.circle.y);
                 off < 0.5 * (circle.radius.min(other.circle.radius))
-                    && (circle.radius - other.circle.radius).abs() < 0.4 * circle.radius.max(other.circle.radius)
+                    && (circle.radius - other.circle.radius).abs()
+                        < 0.4 * circle.radius.max(other.circle.radius)
             });
             if score >= config.min_score && fits && placed && !taken {
                 found.push(Detection { circle, score });

@@ -1,6 +1,7 @@
 //! Circles that passed the first looks, waiting for a closer one.
 
-use super::search::{Budget, Ring, Support};
+use super::polar::Ring;
+use super::search::{Budget, Support};
 
 /// A circle found at some level, in pixels of the frame.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +26,7 @@ impl Candidate {
             scale,
             support,
             weight: {
-                let n = (ring.r * super::tune(21, 4.0)).min(32.0) * support.visible as f32 / 32.0;
+                let n = (ring.r * super::tune(21, 2.0)).min(32.0) * support.visible as f32 / 32.0;
                 let (q, p) = (support.share().min(0.999), super::tune(22, 0.2));
                 n * (q * (q / p).ln() + (1.0 - q) * ((1.0 - q) / (1.0 - p)).ln())
             },
