@@ -214,8 +214,8 @@ impl CircleDetector for Trusted {
                     (&size.grey, size.width, size.height)
                 }
             };
-            let contrast = (2.3 * tune(2, config.contrast as f32))
-                .max(tune(18, 4.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
+            let contrast =
+                (2.3 * tune(2, 8.0)).max(tune(18, 3.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
             let candidates = self.maxima.find(grey, width, contrast);
             self.level.fill(width, height, candidates);
             for candidate in &self.collected.candidates {
@@ -235,6 +235,11 @@ impl CircleDetector for Trusted {
                 ),
                 scale,
                 seed: config.seed,
+                mirror_slack: if noise > tune(24, 12.0) {
+                    0.35
+                } else {
+                    tune(6, 0.2)
+                },
             };
             widest(Searching {
                 search,

@@ -10,8 +10,6 @@ use super::tune;
 pub(super) const LOOKS: usize = 32;
 /// How far the direction of an edge may be off that of the outline, in codes of 2.8 degrees.
 pub(super) const DIRECTION_SLACK: u8 = 7;
-/// The sine of how far two normals may be from mirroring one another.
-const MIRROR_SLACK: f32 = 0.2;
 /// The least part of a normal along the line that the pair lies on.
 const LEAST_ALONG: f32 = 0.58;
 /// How many mirrored partners of a point are tried.
@@ -260,6 +258,8 @@ pub(super) struct Search<'a> {
     /// Pixels of the frame per pixel of the level.
     pub(super) scale: f32,
     pub(super) seed: u64,
+    /// The sine of how far two normals may be from mirroring one another.
+    pub(super) mirror_slack: f32,
 }
 
 impl Search<'_> {
@@ -298,9 +298,7 @@ impl Search<'_> {
             return;
         }
         let mut rings = [Ring::default(); PARTNERS];
-        let count = lines.partners(
-            (at, line_end),
-            self.radii,
+        let count = lines.partners((at, line_end), self.radii, self.mirror_slack,
             &level.free,
             &mut rings,
             &mut budget.looks,
@@ -332,18 +330,22 @@ impl Search<'_> {
             return false;
         };
         budget.passed += 1;
-        // Fit until no more of the outline is covered.
+        // Fit until it rests.
         let (mut ring, mut support) = (ring, Support::default());
-        for round in 0..tune(14, 5.0) as u32 {
+        for round in 0..tune(14, 6.0) as u32 {
             let reach = if round < 2 { 3.0 } else { 2.0 };
             let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
                 break;
             };
             let outside = fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1;
-            if outside || (now.hits <= support.hits && round > 1) {
+            if outside || now.hits + 2 < support.hits {
                 break;
             }
+            let moved = (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
             (ring, support) = (fitted, now);
+            if moved < 0.15 {
+                break;
+            }
         }
         if support.share() < tune(1, 0.4) || support.visible < LOOKS as u32 / 3 {
             return false;
@@ -365,6 +367,7 @@ impl Lines {
         &self,
         (at, line_end): (usize, usize),
         radii: (f32, f32),
+        mirror_slack: f32,
         free: &[bool],
         rings: &mut [Ring; PARTNERS],
         looks: &mut u64,
@@ -385,7 +388,7 @@ impl Lines {
                 let crossed = (px * ny[lane] + py * nx[lane]).abs();
                 let dx = qx[lane] - x;
                 let along = px + nx[lane].abs();
-                fits[lane] = i32::from(crossed <= MIRROR_SLACK)
+                fits[lane] = i32::from(crossed <= mirror_slack)
                     & i32::from(nx[lane].abs() >= LEAST_ALONG)
                     & i32::from((qy[lane] - y).abs() <= 1.0)
                     & i32::from(dx >= radii.0 * along)
