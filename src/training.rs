@@ -3,7 +3,7 @@
 use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Percept};
 use pipeline_sim::{CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample};
 use puma_val2::{Joint, JointDelta};
-use qtable::{Progress, QTable, Schedule, TrainConfig, TrainReport, train};
+use qtable::{Progress, QTable, Schedule, TrainConfig, TrainReport, train_in_blocks};
 use rand::{Rng, RngExt};
 
 /// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted to samples.
@@ -101,12 +101,26 @@ pub fn learn(
     on_progress: &mut dyn FnMut(&Progress),
 ) -> Result<Lesson, LearnError> {
     let config = schedule(actions)?;
-    let mut table = QTable::new(spec.states(), spec.actions())?;
     let simulate = |percept: &Percept, delta: &JointDelta| simulator.predict(percept, delta);
-    let mut task = BehaviourTask::new(&spec, config.gamma, simulate, |rng: &mut dyn Rng| {
-        simulator.start(rng)
-    });
-    let report = train(&mut task, &mut table, &config, rng, on_progress)?;
+    let start = |rng: &mut dyn Rng| simulator.start(rng);
+    learn_in(spec, simulate, start, &config, rng, on_progress)
+}
+
+/// Parts of a run in which alpha and the temperature stand still: so many that nothing of their course is lost.
+const BLOCKS: u64 = 512;
+
+/// Learns `spec` in any simulator.
+pub(crate) fn learn_in(
+    spec: BehaviourSpec,
+    simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+    start: impl FnMut(&mut dyn Rng) -> Percept,
+    config: &TrainConfig,
+    mut rng: &mut dyn Rng,
+    on_progress: &mut dyn FnMut(&Progress),
+) -> Result<Lesson, LearnError> {
+    let mut table = QTable::new(spec.states(), spec.actions())?;
+    let mut task = BehaviourTask::new(&spec, config.gamma, simulate, start);
+    let report = train_in_blocks(&mut task, &mut table, config, BLOCKS, &mut rng, on_progress)?;
     Ok(Lesson {
         behaviour: Behaviour::new(spec, table)?,
         report,

@@ -60,6 +60,7 @@
 //! ```
 
 mod agent;
+mod arm_plane;
 mod behaviour;
 mod camera_model;
 mod config;
@@ -85,6 +86,7 @@ pub use puma_val2;
 pub use qtable;
 
 pub use agent::{Agent, Outcome};
+pub use arm_plane::ArmPlane;
 pub use behaviour::{Behaviour, Episode};
 pub use camera_model::CameraModel;
 pub use config::{AgentConfig, ApproachLimit};
