@@ -6,6 +6,7 @@ mod directions;
 mod fit;
 mod halve;
 mod level;
+mod measure;
 mod polar;
 mod proof;
 mod search;
@@ -119,7 +120,7 @@ impl Trusted {
     pub fn proofs(&self) -> Vec<(Circle, f32, [f32; 8])> {
         self.proofs
             .iter()
-            .map(|p| (circle_of(p), p.certainty, p.features))
+            .map(|p| (circle_of(&p.ring), p.certainty, p.features))
             .collect()
     }
 
@@ -179,11 +180,49 @@ impl Vectorized for Proving<'_> {
     }
 }
 
-fn circle_of(proof: &Proof) -> Circle {
+/// The frame, or the one that is as many times half of it.
+fn grey_at<'a>(frame: &'a GrayImage, sizes: &'a [Size], depth: usize) -> Grey<'a> {
+    match depth.checked_sub(1) {
+        None => Grey {
+            pixels: frame.as_raw(),
+            width: frame.width() as usize,
+            height: frame.height() as usize,
+        },
+        Some(index) => Grey {
+            pixels: &sizes[index].grey,
+            width: sizes[index].width,
+            height: sizes[index].height,
+        },
+    }
+}
+
+/// The measurement of a proven circle.
+struct Measuring<'a> {
+    frame: &'a GrayImage,
+    sizes: &'a [Size],
+    depth: usize,
+    circle: &'a UnitCircle,
+    polar: &'a mut Polar,
+    start: Ring,
+    noise: f32,
+}
+
+impl Vectorized for Measuring<'_> {
+    type Output = Option<measure::Measured>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let (frame, sizes) = (self.frame, self.sizes);
+        let frames = (0..=self.depth).rev().map(|depth| grey_at(frame, sizes, depth));
+        measure::measure(frames, self.circle, self.polar, self.start, self.noise)
+    }
+}
+
+fn circle_of(ring: &Ring) -> Circle {
     Circle {
-        x: proof.ring.x.into(),
-        y: proof.ring.y.into(),
-        radius: proof.ring.r.into(),
+        x: ring.x.into(),
+        y: ring.y.into(),
+        radius: ring.r.into(),
     }
 }
 
@@ -253,7 +292,7 @@ impl CircleDetector for Trusted {
             let mut depth = 0;
             let mut r = candidate.r;
             while depth < self.sizes.len()
-                && (r >= tune(11, 24.0) || (r >= 12.0 && noise > tune(12, 8.0) * (1 << depth) as f32))
+                && (r >= tune(11, 24.0) || (r >= tune(25, 9.0) && noise > tune(12, 8.0) * (1 << depth) as f32))
             {
                 depth += 1;
                 r *= 0.5;
@@ -263,21 +302,7 @@ impl CircleDetector for Trusted {
                 noise: noise / scale + 0.3,
                 tests,
             };
-            let grey = match depth.checked_sub(1) {
-                None => Grey {
-                    pixels: frame.as_raw(),
-                    width: frame.width() as usize,
-                    height: frame.height() as usize,
-                },
-                Some(index) => {
-                    let size = &self.sizes[index];
-                    Grey {
-                        pixels: &size.grey,
-                        width: size.width,
-                        height: size.height,
-                    }
-                }
-            };
+            let grey = grey_at(frame, &self.sizes, depth);
             let start = Ring {
                 x: candidate.x,
                 y: candidate.y,
@@ -291,27 +316,43 @@ impl CircleDetector for Trusted {
                 setting: &setting,
             });
             if let Some(mut proof) = proof {
-                proof.ring = proof.ring.grown(scale);
+                proof.depth = depth;
                 self.proofs.push(proof);
             }
         }
         self.proofs.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
-        for proof in &self.proofs {
-            let circle = circle_of(proof);
+        for proof in &mut self.proofs {
             let score = f64::from((proof.certainty / (proof.certainty.abs() + 3.0)).max(0.0));
-            let fits = circle.radius >= config.min_radius && circle.radius <= config.max_radius;
-            let placed = config.region.as_ref().is_none_or(|region| region.holds(&circle));
+            let rough = proof.ring.grown((1 << proof.depth) as f32);
+            if score < config.min_score || found.len() >= config.max_circles {
+                proof.ring = rough;
+                continue;
+            }
             let taken = found.iter().any(|other| {
+                let circle = circle_of(&rough);
                 let off = (circle.x - other.circle.x).hypot(circle.y - other.circle.y);
                 off < 0.5 * (circle.radius.min(other.circle.radius))
-                    && (circle.radius - other.circle.radius).abs()
-                        < 0.4 * circle.radius.max(other.circle.radius)
+                    && (circle.radius - other.circle.radius).abs() < 0.4 * circle.radius.max(other.circle.radius)
             });
-            if score >= config.min_score && fits && placed && !taken {
-                found.push(Detection { circle, score });
+            if taken {
+                proof.ring = rough;
+                continue;
             }
-            if found.len() == config.max_circles {
-                break;
+            let measured = widest(Measuring {
+                frame,
+                sizes: &self.sizes,
+                depth: proof.depth,
+                circle: &self.circle,
+                polar: &mut self.polar,
+                start: proof.ring,
+                noise,
+            });
+            proof.ring = measured.map_or(rough, |measured| measured.ring);
+            let circle = circle_of(&proof.ring);
+            let fits = circle.radius >= config.min_radius && circle.radius <= config.max_radius;
+            let placed = config.region.as_ref().is_none_or(|region| region.holds(&circle));
+            if fits && placed {
+                found.push(Detection { circle, score });
             }
         }
     }

@@ -16,6 +16,8 @@ pub(super) struct Proof {
     pub(super) ring: Ring,
     /// Minus the decimal logarithm of the number of false alarms.
     pub(super) certainty: f32,
+    /// How many times the frame was halved for the proof.
+    pub(super) depth: usize,
     /// Features, for development.
     pub(super) features: [f32; 8],
 }
