@@ -287,7 +287,7 @@ impl CircleDetector for Trusted {
                 budget: &mut self.budget,
             });
         }
-        let tests = (pixels * (config.max_radius - config.min_radius + 1.0)).log10() as f32;
+        let tests = (pixels * f64::from(tune(26, 16.0))).log10() as f32;
         for candidate in &self.collected.candidates {
             let mut depth = 0;
             let mut r = candidate.r;
