@@ -8,6 +8,7 @@ mod halve;
 mod level;
 mod measure;
 mod polar;
+mod prover;
 mod proof;
 mod search;
 
@@ -21,7 +22,8 @@ use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
 use polar::{Grey, Polar, Ring};
-use proof::{Proof, Setting};
+use proof::Proof;
+use prover::{Prover, Pyramid, Size};
 use search::{Budget, Outline, Search};
 
 /// Finds circles at several sizes of the frame and proves each at the full size.
@@ -37,14 +39,6 @@ pub struct Trusted {
     polar: Polar,
     proofs: Vec<Proof>,
     budget: Budget,
-}
-
-/// A frame of a power of two below the full size.
-#[derive(Clone, Debug, Default)]
-struct Size {
-    grey: Vec<u8>,
-    width: usize,
-    height: usize,
 }
 
 /// Development.
@@ -146,60 +140,26 @@ impl Trusted {
 }
 
 /// The search of a level.
-struct Searching<'a> {
+struct Searching<'a, 'b> {
     search: Search<'a>,
+    prover: &'a mut Prover<'b>,
     level: &'a mut Level,
     collected: &'a mut Collected,
     budget: &'a mut Budget,
 }
 
-impl Vectorized for Searching<'_> {
+impl Vectorized for Searching<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        self.search.run(self.level, self.collected, self.budget);
-    }
-}
-
-/// The proof of a candidate.
-struct Proving<'a> {
-    grey: Grey<'a>,
-    circle: &'a UnitCircle,
-    polar: &'a mut Polar,
-    start: Ring,
-    setting: &'a Setting,
-}
-
-impl Vectorized for Proving<'_> {
-    type Output = Option<Proof>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        proof::prove(self.grey, self.circle, self.polar, self.start, self.setting)
-    }
-}
-
-/// The frame, or the one that is as many times half of it.
-fn grey_at<'a>(frame: &'a GrayImage, sizes: &'a [Size], depth: usize) -> Grey<'a> {
-    match depth.checked_sub(1) {
-        None => Grey {
-            pixels: frame.as_raw(),
-            width: frame.width() as usize,
-            height: frame.height() as usize,
-        },
-        Some(index) => Grey {
-            pixels: &sizes[index].grey,
-            width: sizes[index].width,
-            height: sizes[index].height,
-        },
+        self.search.run(self.level, self.collected, self.prover, self.budget);
     }
 }
 
 /// The measurement of a proven circle.
 struct Measuring<'a> {
-    frame: &'a GrayImage,
-    sizes: &'a [Size],
+    pyramid: Pyramid<'a>,
     depth: usize,
     circle: &'a UnitCircle,
     polar: &'a mut Polar,
@@ -212,8 +172,8 @@ impl Vectorized for Measuring<'_> {
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let (frame, sizes) = (self.frame, self.sizes);
-        let frames = (0..=self.depth).rev().map(|depth| grey_at(frame, sizes, depth));
+        let pyramid = self.pyramid;
+        let frames = (0..=self.depth).rev().map(|depth| pyramid.grey(depth));
         measure::measure(frames, self.circle, self.polar, self.start, self.noise)
     }
 }
@@ -244,33 +204,37 @@ impl CircleDetector for Trusted {
 
         let config = &self.config;
         let finest = usize::from(config.min_radius >= 8.0 && !self.sizes.is_empty());
+        let pyramid = Pyramid {
+            frame,
+            sizes: &self.sizes,
+        };
+        let mut prover = Prover {
+            pyramid,
+            circle: &self.circle,
+            polar: &mut self.polar,
+            noise,
+            tests: (pixels * f64::from(tune(26, 16.0))).log10() as f32,
+            proofs: &mut self.proofs,
+        };
         for depth in (finest..=self.sizes.len()).rev() {
             let scale = (1 << depth) as f32;
-            let (grey, width, height): (&[u8], usize, usize) = match depth.checked_sub(1) {
-                None => (frame.as_raw(), frame.width() as usize, frame.height() as usize),
-                Some(index) => {
-                    let size = &self.sizes[index];
-                    (&size.grey, size.width, size.height)
-                }
-            };
+            let Grey { pixels: grey, width, height } = pyramid.grey(depth);
             let contrast =
                 (2.3 * tune(2, 8.0)).max(tune(18, 3.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
             let candidates = self.maxima.find(grey, width, contrast);
             self.level.fill(width, height, candidates);
-            for candidate in &self.collected.candidates {
-                if candidate.support.share() >= tune(4, 0.7) {
-                    let ring = candidate.ring(scale);
-                    self.outline
-                        .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
-                }
+            for proof in prover.proofs.iter().filter(|proof| proof.certainty >= tune(28, 6.0)) {
+                let ring = proof.ring.grown((1 << proof.depth) as f32).shrunk(scale);
+                self.outline
+                    .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
             }
             let top = depth == self.sizes.len();
             let search = Search {
                 circle: &self.circle,
                 outline: &self.outline,
                 radii: (
-                    (config.min_radius as f32 / scale).max(if depth == finest { 3.2 } else { tune(19, 6.0) }),
-                    (config.max_radius as f32 / scale).min(if top { f32::MAX } else { 18.0 }),
+                    (config.min_radius as f32 / scale).max(if depth == finest { 3.2 } else { tune(19, 8.0) }),
+                    (config.max_radius as f32 / scale).min(if top { f32::MAX } else { tune(29, 20.0) }),
                 ),
                 scale,
                 seed: config.seed,
@@ -282,43 +246,14 @@ impl CircleDetector for Trusted {
             };
             widest(Searching {
                 search,
+                prover: &mut prover,
                 level: &mut self.level,
                 collected: &mut self.collected,
                 budget: &mut self.budget,
             });
         }
-        let tests = (pixels * f64::from(tune(26, 16.0))).log10() as f32;
-        for candidate in &self.collected.candidates {
-            let mut depth = 0;
-            let mut r = candidate.r;
-            while depth < self.sizes.len()
-                && (r >= tune(11, 24.0) || (r >= tune(25, 9.0) && noise > tune(12, 8.0) * (1 << depth) as f32))
-            {
-                depth += 1;
-                r *= 0.5;
-            }
-            let scale = (1 << depth) as f32;
-            let setting = Setting {
-                noise: noise / scale + 0.3,
-                tests,
-            };
-            let grey = grey_at(frame, &self.sizes, depth);
-            let start = Ring {
-                x: candidate.x,
-                y: candidate.y,
-                r: candidate.r,
-            };
-            let proof = widest(Proving {
-                grey,
-                circle: &self.circle,
-                polar: &mut self.polar,
-                start: start.shrunk(scale),
-                setting: &setting,
-            });
-            if let Some(mut proof) = proof {
-                proof.depth = depth;
-                self.proofs.push(proof);
-            }
+        for candidate in self.collected.candidates.iter().filter(|candidate| !candidate.tried) {
+            prover.prove(candidate);
         }
         self.proofs.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
         for proof in &mut self.proofs {
@@ -339,8 +274,7 @@ impl CircleDetector for Trusted {
                 continue;
             }
             let measured = widest(Measuring {
-                frame,
-                sizes: &self.sizes,
+                pyramid,
                 depth: proof.depth,
                 circle: &self.circle,
                 polar: &mut self.polar,

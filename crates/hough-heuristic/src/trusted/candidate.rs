@@ -14,6 +14,8 @@ pub(super) struct Candidate {
     pub(super) support: Support,
     /// How much speaks for it, to choose among candidates.
     pub(super) weight: f32,
+    /// Whether it has been to the proof.
+    pub(super) tried: bool,
 }
 
 impl Candidate {
@@ -25,6 +27,7 @@ impl Candidate {
             r: ring.r * scale,
             scale,
             support,
+            tried: false,
             weight: {
                 let n = (ring.r * super::tune(21, 2.0)).min(32.0) * support.visible as f32 / 32.0;
                 let (q, p) = (support.share().min(0.999), super::tune(22, 0.2));
@@ -33,13 +36,12 @@ impl Candidate {
         }
     }
 
-    /// The ring at a level of this scale.
-    pub(super) fn ring(&self, scale: f32) -> Ring {
-        let corner = 0.5 * (scale - 1.0);
+    /// The circle, in pixels of the frame.
+    pub(super) fn ring(&self) -> Ring {
         Ring {
-            x: (self.x - corner) / scale,
-            y: (self.y - corner) / scale,
-            r: self.r / scale,
+            x: self.x,
+            y: self.y,
+            r: self.r,
         }
     }
 
@@ -63,22 +65,22 @@ impl Collected {
         self.most = most;
     }
 
-    /// Keeps the better of those that are nearly one.
-    pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) {
+    /// Keeps the better of those that are nearly one; tells where it is if it was kept.
+    pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
         budget.looks += self.candidates.len() as u64 / 4;
-        if let Some(known) = self.candidates.iter_mut().find(|known| known.near(&candidate)) {
-            if candidate.weight > known.weight {
-                *known = candidate;
-            }
+        let better = |known: &Candidate| candidate.weight > known.weight;
+        let place = if let Some(place) = self.candidates.iter().position(|known| known.near(&candidate)) {
+            place
         } else if self.candidates.len() < self.most {
             self.candidates.push(candidate);
-        } else if let Some(worst) = self
-            .candidates
-            .iter_mut()
-            .min_by(|a, b| a.weight.total_cmp(&b.weight))
-            && worst.weight < candidate.weight
-        {
-            *worst = candidate;
-        }
+            return Some(self.candidates.len() - 1);
+        } else {
+            let weights = self.candidates.iter().map(|known| known.weight).enumerate();
+            weights.min_by(|a, b| a.1.total_cmp(&b.1))?.0
+        };
+        better(&self.candidates[place]).then(|| {
+            self.candidates[place] = candidate;
+            place
+        })
     }
 }

@@ -4,6 +4,7 @@ use super::candidate::{Candidate, Collected};
 use super::directions::{CODES, UnitCircle, code};
 use super::level::{EDGE, Level, Lines};
 use super::polar::{LANES, Ring};
+use super::prover::Prover;
 use super::tune;
 
 /// Points of a circle's outline that are looked at.
@@ -265,7 +266,13 @@ pub(super) struct Search<'a> {
 impl Search<'_> {
     /// Draws pairs on the rows, then on the columns, until all points have had their turn or the budget is spent.
     #[inline(always)]
-    pub(super) fn run(&self, level: &mut Level, found: &mut Collected, budget: &mut Budget) {
+    pub(super) fn run(
+        &self,
+        level: &mut Level,
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) {
         for transposed in [false, true] {
             let lines = if transposed { level.width } else { level.height };
             let stride = stride(lines);
@@ -278,7 +285,7 @@ impl Search<'_> {
                     if budget.is_spent() {
                         return;
                     }
-                    self.from_point(level, transposed, (at, line_end), found, budget);
+                    self.from_point(level, transposed, (at, line_end), found, prover, budget);
                 }
             }
         }
@@ -291,6 +298,7 @@ impl Search<'_> {
         transposed: bool,
         (at, line_end): (usize, usize),
         found: &mut Collected,
+        prover: &mut Prover<'_>,
         budget: &mut Budget,
     ) {
         let lines = if transposed { &level.columns } else { &level.rows };
@@ -313,7 +321,7 @@ impl Search<'_> {
             } else {
                 *ring
             };
-            if self.consider(level, ring, found, budget) {
+            if self.consider(level, ring, found, prover, budget) {
                 return;
             }
         }
@@ -321,7 +329,14 @@ impl Search<'_> {
 
     /// Looks at the circle and keeps it if it is worth it; true if it explains its points.
     #[inline(always)]
-    fn consider(&self, level: &mut Level, ring: Ring, found: &mut Collected, budget: &mut Budget) -> bool {
+    fn consider(
+        &self,
+        level: &mut Level,
+        ring: Ring,
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) -> bool {
         budget.draws += 1;
         let Some(_) = self
             .outline
@@ -351,12 +366,22 @@ impl Search<'_> {
             return false;
         }
         budget.added += 1;
-        found.add(Candidate::new(&ring, self.scale, support), budget);
-        let explains = support.share() >= tune(4, 0.7);
-        if explains {
-            self.outline.explain(self.circle, level, &ring, &mut budget.looks);
+        let candidate = Candidate::new(&ring, self.scale, support);
+        let Some(place) = found.add(candidate, budget) else {
+            return false;
+        };
+        if support.share() < tune(4, 0.7) {
+            return false;
         }
-        explains
+        // Likely enough to be proven at once; what is proven beyond doubt takes its points along.
+        found.candidates[place].tried = true;
+        budget.looks += tune(27, 400.0) as u64;
+        let Some(proven) = prover.prove(&candidate) else {
+            return false;
+        };
+        self.outline
+            .explain(self.circle, level, &proven.shrunk(self.scale), &mut budget.looks);
+        true
     }
 }
 
