@@ -197,7 +197,7 @@ impl CircleDetector for Trusted {
         self.shrink(frame);
         let pixels = frame.len() as f64;
         self.budget = Budget {
-            most_looks: (pixels * 3.0) as u64 + 10_000,
+            most_looks: (pixels * f64::from(tune(40, 3.0))) as u64 + 10_000,
             ..Budget::default()
         };
         self.collected.clear(tune(3, 192.0) as usize);

@@ -16,6 +16,8 @@ pub(super) struct Candidate {
     pub(super) weight: f32,
     /// Whether it has been to the proof.
     pub(super) tried: bool,
+    /// How often it was met.
+    met: u32,
 }
 
 impl Candidate {
@@ -28,6 +30,7 @@ impl Candidate {
             scale,
             support,
             tried: false,
+            met: 0,
             weight: {
                 let n = (ring.r * super::tune(21, 2.0)).min(32.0) * support.visible as f32 / 32.0;
                 let (q, p) = (support.share().min(0.999), super::tune(22, 0.2));
@@ -65,6 +68,16 @@ impl Collected {
         self.most = most;
     }
 
+    /// Whether nearly this circle has been met often enough.
+    pub(super) fn is_known(&mut self, circle: &Candidate, budget: &mut Budget) -> bool {
+        budget.looks += self.candidates.len() as u64 / 4;
+        let known = self.candidates.iter_mut().find(|known| known.near(circle));
+        known.is_some_and(|known| {
+            known.met += 1;
+            known.met > super::tune(41, 3.0) as u32
+        })
+    }
+
     /// Keeps the better of those that are nearly one; tells where it is if it was kept.
     pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
         budget.looks += self.candidates.len() as u64 / 4;
@@ -79,7 +92,8 @@ impl Collected {
             weights.min_by(|a, b| a.1.total_cmp(&b.1))?.0
         };
         better(&self.candidates[place]).then(|| {
-            self.candidates[place] = candidate;
+            let met = self.candidates[place].met;
+            self.candidates[place] = Candidate { met, ..candidate };
             place
         })
     }

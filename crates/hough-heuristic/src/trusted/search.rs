@@ -345,6 +345,10 @@ impl Search<'_> {
             return false;
         };
         budget.passed += 1;
+        // The same circle is met again and again; a few fits from different pairs are enough.
+        if found.is_known(&Candidate::new(&ring, self.scale, Support::default()), budget) {
+            return false;
+        }
         // Fit until it rests.
         let (mut ring, mut support) = (ring, Support::default());
         for round in 0..tune(14, 6.0) as u32 {
@@ -358,7 +362,7 @@ impl Search<'_> {
             }
             let moved = (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
             (ring, support) = (fitted, now);
-            if moved < 0.15 {
+            if moved < tune(42, 0.15) {
                 break;
             }
         }
