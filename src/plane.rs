@@ -3,16 +3,15 @@
 //! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything, and (y, r, theta 3) is the whole state:
 //! turning arm and ball together about the shoulder changes nothing. Centering has nothing to do here.
 
-use std::collections::VecDeque;
-
-use grasp_agent::{Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
+use grasp_agent::{ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace, exploring_start};
-use puma_val2::{Joint, JointDelta, Joints};
-use qtable::{Action, Progress, QTable, TrainConfig, train};
+use puma_val2::{JointDelta, Joints};
+use qtable::{Action, Progress, TrainConfig};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
+use crate::training::learn_in;
 use crate::{LearnError, Lesson, schedule};
 
 /// A simulator of approaching that makes no errors, and the starts to learn from.
@@ -69,6 +68,11 @@ impl ExactPlane {
         }
     }
 
+    /// A start for an episode: one of those drawn at the beginning.
+    pub fn start(&self, rng: &mut dyn Rng) -> Percept {
+        self.starts[rng.random_range(0..self.starts.len())]
+    }
+
     /// What is perceived after the move, `None` when the ball is lost.
     pub fn after(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         self.model
@@ -87,44 +91,50 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
-        self.learn_with(spec, &schedule(actions)?, rng, on_progress)
+        self.learn_with(spec, &[], &schedule(actions)?, rng, on_progress)
     }
 
-    /// Learns `spec` here.
+    /// As [`ExactPlane::learn`], and keeps the table that does best from `trials`: see [`learn_best`](crate::learn_best).
+    ///
+    /// # Errors
+    /// As for [`learn`](crate::learn).
+    pub fn learn_best(
+        &self,
+        spec: BehaviourSpec,
+        trials: &[Percept],
+        actions: u64,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Lesson, LearnError> {
+        self.learn_with(spec, trials, &schedule(actions)?, rng, on_progress)
+    }
+
+    /// As [`ExactPlane::learn_best`], with other settings.
     ///
     /// # Errors
     /// As for [`learn`](crate::learn).
     pub fn learn_with(
         &self,
         spec: BehaviourSpec,
+        trials: &[Percept],
         config: &TrainConfig,
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
-        let mut table = QTable::new(spec.states(), spec.actions())?;
-        let simulate = |percept: &Percept, delta: &JointDelta| self.after(percept, delta);
-        let start = |rng: &mut dyn Rng| self.starts[rng.random_range(0..self.starts.len())];
-        let mut task = grasp_agent::BehaviourTask::new(&spec, config.gamma, simulate, start);
-        let report = train(&mut task, &mut table, config, rng, on_progress)?;
-        Ok(Lesson {
-            behaviour: Behaviour::new(spec, table)?,
-            report,
-        })
+        let mut plane = ArmPlane::new(&self.model, JointLimits::paper());
+        let simulate = |percept: &Percept, delta: &JointDelta| {
+            let after = plane.after(percept, delta)?;
+            self.sight.sees_features(&after.features).then_some(after)
+        };
+        let start = |rng: &mut dyn Rng| self.start(rng);
+        learn_in(spec, simulate, start, trials, config, rng, on_progress)
     }
 }
 
 /// `count` balls as the search finds them, turned into the arm's plane, with the optimum from each.
 pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let workspace = Workspace::paper();
     let spec = BehaviourSpec::approaching();
-    let elbow = workspace.search_poses()[0];
-    let starts = std::iter::repeat_with(|| {
-        let cell = Cell::paper(workspace.sample_ball(&mut rng));
-        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
-        let mut joints = elbow;
-        joints.0[0] = goal.0[0];
-        cell.features(&joints)?;
+    let starts = found_by_search(seed).filter_map(|(cell, joints)| {
         let optimum = optimum(&cell, &joints, &spec)?;
         Some(PlaneStart {
             cell,
@@ -132,7 +142,32 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
             optimum,
         })
     });
-    starts.flatten().take(count).collect()
+    starts.take(count).collect()
+}
+
+/// What is perceived of `count` balls where the search finds them, turned into the arm's plane: trials for
+/// [`learn_best`](crate::learn_best).
+pub fn search_percepts(count: usize, seed: u64) -> Vec<Percept> {
+    let seen = found_by_search(seed).filter_map(|(cell, joints)| {
+        let features = cell.features(&joints)?;
+        Some(Percept::new(features, &joints))
+    });
+    seen.take(count).collect()
+}
+
+/// Balls and search poses that see them, with the ball in the arm's plane.
+fn found_by_search(seed: u64) -> impl Iterator<Item = (Cell, Joints)> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let workspace = Workspace::paper();
+    let elbow = workspace.search_poses()[0];
+    std::iter::repeat_with(move || {
+        let cell = Cell::paper(workspace.sample_ball(&mut rng));
+        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
+        let mut joints = elbow;
+        joints.0[0] = goal.0[0];
+        cell.features(&joints).map(|_| (cell, joints))
+    })
+    .flatten()
 }
 
 /// How a policy does from `starts`: greedy, with the loop breaker at `kappa`.
@@ -171,58 +206,13 @@ fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Optio
     None
 }
 
-/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after each; `None` if there is no way.
-///
-/// The joints can only stand on a lattice around the start, because all steps are multiples of 0.2 and 0.1 degrees.
+/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after each ([`Cell::fewest_moves`]); `None` if
+/// there is no way.
 pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
-    /// What a place of the lattice is known to be.
-    #[derive(Clone, Copy, PartialEq)]
-    enum Place {
-        Unknown,
-        Closed,
-        Open,
-    }
-    const GRID: [f64; 2] = [0.2, 0.1];
-    let [from2, from3] = [joints[Joint::J2].to_degrees(), joints[Joint::J3].to_degrees()];
-    let span = |from: f64, (low, high): (f64, f64), grid: f64| {
-        let below = ((from - low) / grid).floor() as i64;
-        (below, below + 1 + ((high - from) / grid).floor() as i64)
-    };
-    let (below2, size2) = span(from2, (-150.0, -20.0), GRID[0]);
-    let (below3, size3) = span(from3, (120.0, 215.0), GRID[1]);
-    let mut moves: Vec<(i64, i64)> = (0..spec.actions())
-        .map(|action| {
-            let d = spec.delta(Action(action)).degrees();
-            ((d[1] / GRID[0]).round() as i64, (d[2] / GRID[1]).round() as i64)
-        })
+    let moves: Vec<JointDelta> = (0..spec.actions())
+        .map(|action| spec.delta(Action(action)))
         .collect();
-    moves.sort_unstable();
-    moves.dedup();
-    let mut places = vec![Place::Unknown; (size2 * size3).max(1) as usize];
-    let index = |(i, j): (i64, i64)| ((i + below2) * size3 + j + below3) as usize;
-    let mut queue = VecDeque::from([((0, 0), 0)]);
-    places[index((0, 0))] = Place::Closed;
-    while let Some(((i, j), steps)) = queue.pop_front() {
-        for (di, dj) in &moves {
-            let next = (i + di, j + dj);
-            let inside =
-                (-below2..size2 - below2).contains(&next.0) && (-below3..size3 - below3).contains(&next.1);
-            if !inside || places[index(next)] != Place::Unknown {
-                continue;
-            }
-            let mut pose = *joints;
-            pose.0[1] = (from2 + GRID[0] * next.0 as f64).to_radians();
-            pose.0[2] = (from3 + GRID[1] * next.1 as f64).to_radians();
-            let Some(features) = cell.features(&pose) else {
-                places[index(next)] = Place::Closed;
-                continue;
-            };
-            if spec.at_goal(&Percept::new(Features { ..features }, &pose)) {
-                return Some(steps + 1);
-            }
-            places[index(next)] = Place::Open;
-            queue.push_back((next, steps + 1));
-        }
-    }
-    None
+    let reached = |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
+    let fewest = cell.fewest_moves(joints, &moves, reached, MOST_STEPS as u32);
+    Some(fewest.ok()?? as usize)
 }

@@ -187,8 +187,21 @@ impl BehaviourSpec {
     /// # Errors
     /// An input that is NaN, with its position.
     pub fn state(&self, percept: &Percept) -> Result<State, DiscretiseError> {
-        let values: Vec<f64> = self.inputs.iter().map(|input| input.of(percept)).collect();
-        self.space.index(&values)
+        let axes = self.space.quantities();
+        if axes.len() != self.inputs.len() {
+            return Err(DiscretiseError::WrongCount {
+                needed: axes.len(),
+                found: self.inputs.len(),
+            });
+        }
+        let mut state = 0;
+        for (quantity, (input, axis)) in self.inputs.iter().zip(axes).enumerate() {
+            let bin = axis
+                .index(input.of(percept))
+                .map_err(|_| DiscretiseError::NotANumber { quantity })?;
+            state = state * axis.bins() + bin;
+        }
+        Ok(State(state))
     }
 
     /// The joint move that `action` stands for: a mixed-radix number, the last joint's step varying fastest.

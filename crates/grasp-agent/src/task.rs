@@ -13,6 +13,8 @@ use crate::{BehaviourSpec, Percept};
 /// starts are drawn by a second one.
 pub struct BehaviourTask<'a, M, S> {
     spec: &'a BehaviourSpec,
+    /// The joint move of each action.
+    deltas: Vec<JointDelta>,
     gamma: f64,
     simulate: M,
     start: S,
@@ -40,6 +42,7 @@ where
         };
         Self {
             spec,
+            deltas: (0..spec.actions()).map(|a| spec.delta(Action(a))).collect(),
             gamma,
             simulate,
             start,
@@ -85,7 +88,9 @@ where
 
     fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
         let reward = &self.spec.reward;
-        let after = (self.simulate)(&self.now, &self.spec.delta(action));
+        let known = self.deltas.get(action.0).copied();
+        let delta = known.unwrap_or_else(|| self.spec.delta(action));
+        let after = (self.simulate)(&self.now, &delta);
         // What is not a number cannot be seen either.
         let seen = after.and_then(|percept| Some((percept, self.spec.state(&percept).ok()?)));
         let Some((after, observation)) = seen else {
