@@ -221,7 +221,7 @@ impl CircleDetector for Trusted {
             let Grey { pixels: grey, width, height } = pyramid.grey(depth);
             let contrast =
                 (2.3 * tune(2, 8.0)).max(tune(18, 3.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
-            let candidates = self.maxima.find(grey, width, contrast);
+            let candidates = self.maxima.find(grey, width, contrast, (width * height) / tune(44, 12.0) as usize);
             self.level.fill(width, height, candidates);
             for proof in prover.proofs.iter().filter(|proof| proof.certainty >= tune(28, 6.0)) {
                 let ring = proof.ring.grown((1 << proof.depth) as f32).shrunk(scale);
@@ -281,7 +281,15 @@ impl CircleDetector for Trusted {
                 start: proof.ring,
                 noise,
             });
-            proof.ring = measured.map_or(rough, |measured| measured.ring);
+            let near = |ring: &Ring| {
+                let (dx, dy) = (ring.x - rough.x, ring.y - rough.y);
+                (dx * dx + dy * dy).sqrt() + (ring.r - rough.r).abs()
+                    <= tune(43, 100.0) * (1 << proof.depth) as f32 + tune(45, 0.0) * rough.r
+            };
+            proof.ring = measured
+                .map(|measured| measured.ring)
+                .filter(|ring| near(ring))
+                .unwrap_or(rough);
             let circle = circle_of(&proof.ring);
             let fits = circle.radius >= config.min_radius && circle.radius <= config.max_radius;
             let placed = config.region.as_ref().is_none_or(|region| region.holds(&circle));

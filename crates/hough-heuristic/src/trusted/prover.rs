@@ -63,22 +63,36 @@ impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
     pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
         let depth = self.depth_for(candidate.r);
+        let mut best = self.prove_at(candidate.ring(), depth);
+        if super::tune(46, 1.0) > 0.0
+            && let Some(fine) = best
+            && depth < self.pyramid.depth()
+            && fine.ring.r >= tune(47, 12.0)
+            && (tune(48, -4.0)..tune(49, 6.0)).contains(&fine.certainty)
+        {
+            // A soft or uneven outline is plainer from afar.
+            let coarse = self.prove_at(fine.ring.grown((1 << depth) as f32), depth + 1);
+            best = coarse.filter(|coarse| coarse.certainty > fine.certainty).or(best);
+        }
+        let proof = best?;
+        let ring = proof.ring.grown((1 << proof.depth) as f32);
+        self.proofs.push(proof);
+        (proof.certainty >= tune(28, 6.0)).then_some(ring)
+    }
+
+    fn prove_at(&mut self, start: Ring, depth: usize) -> Option<Proof> {
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),
             circle: self.circle,
             polar: self.polar,
-            start: candidate.ring().shrunk(scale),
+            start: start.shrunk(scale),
             setting: Setting {
                 noise: self.noise / scale + 0.3,
                 tests: self.tests,
             },
         });
-        let mut proof = proof?;
-        proof.depth = depth;
-        let ring = proof.ring.grown(scale);
-        self.proofs.push(proof);
-        (proof.certainty >= tune(28, 6.0)).then_some(ring)
+        proof.map(|proof| Proof { depth, ..proof })
     }
 
     /// How many times the frame is to be halved for a circle of this radius.
