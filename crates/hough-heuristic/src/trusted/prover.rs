@@ -6,8 +6,14 @@ use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Grey, Polar, Ring};
 use super::proof::{self, Proof, Setting};
-use super::{tune};
 use crate::edges::{Vectorized, widest};
+
+/// From this radius on a circle is proven at half the size, pixels.
+const LARGE: f32 = 24.0;
+/// In noise, from this radius on.
+const SMALL: f32 = 9.0;
+/// What noise that is, grey levels.
+const NOISY: f32 = 8.0;
 
 /// The frame and its halves.
 #[derive(Clone, Copy, Debug)]
@@ -63,43 +69,27 @@ impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
     pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
         let depth = self.depth_for(candidate.r);
-        let mut best = self.prove_at(candidate.ring(), depth);
-        if super::tune(46, 1.0) > 0.0
-            && let Some(fine) = best
-            && depth < self.pyramid.depth()
-            && fine.ring.r >= tune(47, 12.0)
-            && (tune(48, -4.0)..tune(49, 6.0)).contains(&fine.certainty)
-        {
-            // A soft or uneven outline is plainer from afar.
-            let coarse = self.prove_at(fine.ring.grown((1 << depth) as f32), depth + 1);
-            best = coarse.filter(|coarse| coarse.certainty > fine.certainty).or(best);
-        }
-        let proof = best?;
-        let ring = proof.ring.grown((1 << proof.depth) as f32);
-        self.proofs.push(proof);
-        (proof.certainty >= tune(28, 6.0)).then_some(ring)
-    }
-
-    fn prove_at(&mut self, start: Ring, depth: usize) -> Option<Proof> {
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),
             circle: self.circle,
             polar: self.polar,
-            start: start.shrunk(scale),
+            start: candidate.ring().shrunk(scale),
             setting: Setting {
                 noise: self.noise / scale + 0.3,
                 tests: self.tests,
             },
         });
-        proof.map(|proof| Proof { depth, ..proof })
+        let proof = Proof { depth, ..proof? };
+        self.proofs.push(proof);
+        proof.is_beyond_doubt().then(|| proof.in_frame())
     }
 
     /// How many times the frame is to be halved for a circle of this radius.
     fn depth_for(&self, mut r: f32) -> usize {
         let mut depth = 0;
         while depth < self.pyramid.depth()
-            && (r >= tune(11, 24.0) || (r >= tune(25, 9.0) && self.noise > tune(12, 8.0) * (1 << depth) as f32))
+            && (r >= LARGE || (r >= SMALL && self.noise > NOISY * (1 << depth) as f32))
         {
             depth += 1;
             r *= 0.5;
