@@ -17,22 +17,26 @@ use std::process::ExitCode;
 use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
-    JacobianAt, Learned, LookAhead, PositionBased, ServoSettings,
+    JacobianAt, Learned, LookAhead, Percept, PositionBased, ServoSettings,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
-use puma_grasp::{ExactPlane, Simulator, TrialCell, learn};
+use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use files::{writable_folder, write_whole};
 use table::{Row, Tally};
+use world::World;
 
 #[allow(dead_code, reason = "shared with the examples that write pictures")]
 mod files;
 #[path = "compare_controllers/table.rs"]
 mod table;
+#[path = "compare_controllers/world.rs"]
+mod world;
 
-/// Compare controllers on the feature shortcut: drawn errors of arm and camera, drawn balls, the same for all.
+/// Compare controllers: drawn errors of arm and camera, drawn balls, the same for all. On the feature shortcut, or, with --full-chain, on
+/// rendered frames, circle detection and VAL II on a line; then fewer --draws and --starts will do.
 ///
 /// A run succeeds when the ball stands at the goal within 60 moves. All controllers have the same search, recovery and limits, and none
 /// turns a joint farther in one move than the largest step of the paper's behaviours. The hybrid first makes up to --moves moves in each drawn
@@ -67,9 +71,17 @@ struct Options {
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
 
-    /// Let the hand have its bodies: it can run into the ball, and success is the ball in the jaws
+    /// Success is the ball in the jaws; on the feature shortcut the hand has its bodies then and can run into the ball
     #[arg(long)]
     grip: bool,
+
+    /// Render frames, find the circle in them, and talk VAL II to an emulated controller
+    #[arg(long)]
+    full_chain: bool,
+
+    /// How the circle is found in rendered frames: heuristic, rht, sht
+    #[arg(long, value_name = "NAME", default_value_t)]
+    detector: BallDetector,
 
     /// Write the event log of every run that fails to failures/ in the folder
     #[arg(long)]
@@ -97,25 +109,29 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     for level in &options.levels {
         let mut tallies = vec![Tally::default(); rivals.len()];
         for draw in 0..options.draws {
-            let cell = TrialCell::draw(*level, seed_of(options.seed, &[1, draw]))?;
-            let cell = if options.grip { cell } else { cell.without_bodies() };
+            let errors = seed_of(options.seed, &[1, draw]);
+            let mut world = if options.full_chain {
+                World::chain(*level, errors, options.detector)?
+            } else {
+                World::shortcut(*level, errors, options.grip)?
+            };
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
-                let made = (rival.make)(&cell, seed_of(options.seed, &[2, draw]), options.moves)?;
+                let made = (rival.make)(&mut world, seed_of(options.seed, &[2, draw]), options.moves)?;
                 tally.begin_draw();
-                let mut agent = Agent::with_controller(AgentConfig::paper(cell.search_poses()), made)?;
+                let mut agent = Agent::with_controller(AgentConfig::paper(world.search_poses()), made)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut log = EventLog::default();
-                    let result = cell.run(&mut agent, seed, &mut |_, _| (), &mut |event| log.note(event))?;
-                    if let Some(result) = result {
-                        let success = if options.grip { result.held } else { result.reached };
-                        tally.add(success, &result.outcome);
-                        if options.logs && !success {
-                            let folder = options.out.join("failures");
-                            writable_folder(&folder)?;
-                            let name = format!("{level} {} cell {draw} ball {start}.json", rival.name);
-                            write_whole(&folder.join(name), &serde_json::to_vec_pretty(&log)?)?;
-                        }
+                    let Some(trial) = world.run(&mut agent, seed, &mut |event| log.note(event))? else {
+                        continue;
+                    };
+                    let success = if options.grip { trial.held } else { trial.reached };
+                    tally.add(success, &trial.outcome);
+                    if options.logs && !success {
+                        let folder = options.out.join("failures");
+                        writable_folder(&folder)?;
+                        let name = format!("{level} {} cell {draw} ball {start}.json", rival.name);
+                        write_whole(&folder.join(name), &serde_json::to_vec_pretty(&log)?)?;
                     }
                 }
             }
@@ -142,7 +158,7 @@ struct Rival {
 }
 
 type Made = Result<Box<dyn Controller>, Box<dyn Error>>;
-type Make = Box<dyn Fn(&TrialCell, u64, usize) -> Made>;
+type Make = Box<dyn Fn(&mut World, u64, usize) -> Made>;
 
 fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
     let servo = ServoSettings::paper();
@@ -199,28 +215,31 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
     let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
     let plane = ExactPlane::new(20_000, &mut rng);
-    let centering = learn(BehaviourSpec::centering(), &rigid, 60_000, &mut rng, &mut |_| ())?.behaviour;
+    let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
+    let trials = search_percepts(500, seed_of(options.seed, &[4]));
+    let (spec, quiet) = (BehaviourSpec::centering(), &mut |_: &qtable::Progress| ());
+    let centering = learn_best(spec, &rigid, &anywhere, 60_000, &mut rng, quiet)?.behaviour;
     let (paper, fine) = (BehaviourSpec::approaching, BehaviourSpec::approaching_fine);
     let approaching = [
         (
             "Q 90, linear regression",
-            learn(paper(), &linear, 500_000, &mut rng, &mut |_| ())?,
+            learn_best(paper(), &linear, &trials, 500_000, &mut rng, quiet)?,
         ),
         (
             "Q 90, rigid regression",
-            learn(paper(), &rigid, 500_000, &mut rng, &mut |_| ())?,
+            learn_best(paper(), &rigid, &trials, 500_000, &mut rng, quiet)?,
         ),
         (
             "Q 540, rigid regression",
-            learn(fine(), &rigid, 2_000_000, &mut rng, &mut |_| ())?,
+            learn_best(fine(), &rigid, &trials, 4_000_000, &mut rng, quiet)?,
         ),
         (
             "Q 90, exact plane",
-            plane.learn(paper(), 500_000, &mut rng, &mut |_| ())?,
+            plane.learn_best(paper(), &trials, 500_000, &mut rng, quiet)?,
         ),
         (
             "Q 540, exact plane",
-            plane.learn(fine(), 2_000_000, &mut rng, &mut |_| ())?,
+            plane.learn_best(fine(), &trials, 4_000_000, &mut rng, quiet)?,
         ),
     ];
     let both = |lesson: puma_grasp::Lesson| Learned::new(centering.clone(), lesson.behaviour);
@@ -231,8 +250,8 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
 }
 
 /// The hybrid after at most `moves` moves in `cell`, learning nothing more.
-fn taught_hybrid(cell: &TrialCell, seed: u64, moves: usize) -> Made {
-    let config = AgentConfig::paper(cell.search_poses());
+fn taught_hybrid(world: &mut World, seed: u64, moves: usize) -> Made {
+    let config = AgentConfig::paper(world.search_poses());
     let longest = config.max_cycles;
     let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
     let mut made = 0;
@@ -241,8 +260,8 @@ fn taught_hybrid(cell: &TrialCell, seed: u64, moves: usize) -> Made {
         if made + longest > moves || run > moves as u64 {
             break;
         }
-        let result = cell.run(&mut agent, seed_of(seed, &[run]), &mut |_, _| (), &mut |_| ())?;
-        made += result.map_or(0, |result| result.outcome.cycles);
+        let trial = world.run(&mut agent, seed_of(seed, &[run]), &mut |_| ())?;
+        made += trial.map_or(0, |trial| trial.outcome.cycles);
     }
     Ok(Box::new(agent.into_controller().frozen()))
 }

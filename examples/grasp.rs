@@ -18,20 +18,27 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, Learned, Reward};
-use hough_heuristic::{Canny, CannyConfig, CircleDetector, Heuristic, HeuristicConfig};
+use grasp_agent::{
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, Learned, OnlineLearning,
+    Outcome, Percept,
+};
+use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use pipeline_sim::{Ball, Cell, ReachForm, Scene, Shape, Workspace, sample_moves};
-use puma_grasp::{Lesson, Rig, RigError, Simulator, learn};
+use pipeline_sim::{Ball, Cell, ReachForm, Workspace, sample_moves};
+use puma_grasp::{
+    Lesson, Rig, RigError, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts,
+};
 use qtable::TrainReport;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
 use files::{writable_folder, write_png, write_whole};
-use options::{DetectorName, FormName, Options, RewardName};
+use options::{FormName, Options, RewardName};
 use record::{Picture, RunRecord};
-use results::{Summary, TrainingSummary};
+use results::{ContactSheet, Summary, TrainingSummary};
+use stages::{Stages, Timed};
 
+mod cpu;
 mod files;
 #[path = "grasp/options.rs"]
 mod options;
@@ -42,6 +49,7 @@ mod plots;
 mod record;
 #[path = "grasp/results.rs"]
 mod results;
+mod stages;
 
 /// Moves sampled in the cell for the regression.
 const SAMPLES: usize = 2_500;
@@ -49,9 +57,10 @@ const SAMPLES: usize = 2_500;
 const FEATURE_NOISE: f64 = 0.5;
 /// Actions of training, centering and approaching.
 const ACTIONS: (u64, u64) = (60_000, 500_000);
-/// What choosing an action again in the same state costs at run time, in units of Q, centering and approaching. What was learned in
-/// a regression simulator goes in circles on the arm more often than what was learned on the arm itself.
-const KAPPA: (f64, f64) = (50.0, 20.0);
+/// Actions of training, approaching on 540 states.
+const ACTIONS_FINE: u64 = 4_000_000;
+/// Trials in simulation by which the best table is chosen.
+const TRIALS: usize = 500;
 /// From the gripper to the ball's centre: the jaws close on the ball up to this far, metres.
 const GRASP_TOLERANCE: f64 = 0.010;
 
@@ -68,11 +77,13 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     // Whatever can be found wrong is found before the long work.
     writable_folder(&options.out)?;
-    let mut detector = detector(options)?;
+    let frames = Frames::new(&options.out.join("frames"))?;
+    let mut detector = options.detector.build(options.seed)?;
+    let pair = behaviours(options)?;
     let loaded = options
         .policy
         .as_ref()
-        .map(|folder| Taught::load(folder, options.reward))
+        .map(|folder| Taught::load(folder, &pair))
         .transpose()?;
     let mut rig = open_rig(options)?;
     say(
@@ -84,7 +95,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let begin = Instant::now();
     let taught = match loaded {
         Some(taught) => taught,
-        None => Taught::train(options, &rig.cell().get(), &mut rng)?,
+        None => Taught::train(options, &pair, &rig.cell().get(), &mut rng)?,
     };
     let training = TrainingSummary {
         trained: taught.reports.is_some(),
@@ -102,11 +113,23 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
 
     let workspace = Workspace::paper();
-    let config = AgentConfig::paper(workspace.search_poses());
-    let learned = Learned::new(taught.centering, taught.approaching).with_kappa(KAPPA.0, KAPPA.1);
-    let agent = Agent::with_controller(config, learned)?;
+    let config = AgentConfig {
+        goal: pair.goal(),
+        ..AgentConfig::paper(workspace.search_poses())
+    };
+    let stages = Stages::default();
+    let learned = Learned::new(taught.centering, taught.approaching);
+    let learned = Timed {
+        inner: if options.keep_learning {
+            learned.learning(OnlineLearning::careful(options.seed))
+        } else {
+            learned
+        },
+        stages: stages.clone(),
+    };
+    let mut agent = Agent::with_controller(config, learned)?;
     let mut records = Vec::new();
-    let mut pictures = Vec::new();
+    let mut sheet = ContactSheet::default();
     // What has been done until a fault is worth keeping.
     let mut broken_off = None;
     let bar = progress_bar(options, options.runs as u64, "balls");
@@ -114,8 +137,26 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let (ball, _) = workspace
             .sample_seen_ball(&rig.cell().get(), &mut rng)
             .ok_or("no place of the workspace is in view from a search pose")?;
-        match reach_for(&agent, &mut rig, &mut *detector, &ball, run, &mut pictures) {
-            Ok(record) => {
+        let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
+        let done = reach_for(
+            &mut agent,
+            &mut rig,
+            &mut *detector,
+            &ball,
+            &mut |event| match record.note(run, event) {
+                Some(picture) => {
+                    sheet.add(&picture);
+                    frames.write(&picture)
+                }
+                None => Ok(()),
+            },
+        );
+        match done {
+            Ok(outcome) => {
+                if outcome.gave_up.is_none() {
+                    record.gripped_at(rig.grip_miss(), GRASP_TOLERANCE);
+                }
+                record.outcome = Some(outcome);
                 bar.suspend(|| say(options, &one_line(run, &record)));
                 records.push(record);
                 bar.inc(1);
@@ -127,38 +168,30 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         }
     }
     bar.finish_and_clear();
+    if options.keep_learning {
+        // Also what was learned in a run that was broken off.
+        let (centering, approaching) = agent.into_controller().inner.into_behaviours();
+        for behaviour in [&centering, &approaching] {
+            behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
+        }
+    }
 
     let summary = Summary::new(options.seed, training, &records);
-    write_results(&options.out, &summary, &records, &pictures)?;
+    write_results(&options.out, &summary, &records, &sheet)?;
     print_out(&summary.table());
+    say(options, &stages.to_string());
     say(options, &format!("results: {}", options.out.display()));
     broken_off.map_or(Ok(()), |reason| Err(reason.into()))
 }
 
 /// The arm: an emulated controller of our own, or one that is there already.
 fn open_rig(options: &Options) -> Result<Rig, RigError> {
-    let (scene, seed) = (scene(), options.seed);
+    let (scene, seed) = (bright_ball_scene(), options.seed);
     match (&options.port, &options.tcp) {
         (Some(path), _) => Rig::on_port(path, &scene, seed),
         (None, Some(address)) => Rig::on_socket(address, &scene, seed),
         (None, None) => Rig::emulated(options.realtime, &scene, seed),
     }
-}
-
-/// A bright ball over a dark wooden table with boxes and tape on it.
-///
-/// Nothing else in the scene is round: seen straight on, a disc on the table cannot be told from a ball by its outline.
-fn scene() -> Scene {
-    let mut scene = Scene::laboratory();
-    scene.table.albedo = 0.20;
-    scene.table.texture = 0.30;
-    scene
-        .things
-        .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
-    for thing in &mut scene.things {
-        thing.look.albedo *= 0.5;
-    }
-    scene
 }
 
 /// Two behaviours and how they came about.
@@ -172,7 +205,12 @@ struct Taught {
 
 impl Taught {
     /// Samples the cell, fits the regression simulator, learns both behaviours in it, and saves them.
-    fn train(options: &Options, cell: &Cell, rng: &mut dyn Rng) -> Result<Self, Box<dyn Error>> {
+    fn train(
+        options: &Options,
+        pair: &BehaviourPair,
+        cell: &Cell,
+        rng: &mut dyn Rng,
+    ) -> Result<Self, Box<dyn Error>> {
         say(options, &format!("sampling {SAMPLES} moves in the cell"));
         let (centring, reaching) = sample_moves(cell, SAMPLES, FEATURE_NOISE, rng);
         let form = match options.simulator {
@@ -192,33 +230,34 @@ impl Taught {
             );
             r2.insert(quality.output, quality.r2);
         }
-        let [centering, approaching] = specs(options.reward);
-        let Lesson {
-            behaviour: centering,
-            report: first,
-        } = teach(options, centering, &simulator, ACTIONS.0, rng)?;
-        let Lesson {
-            behaviour: approaching,
-            report: second,
-        } = teach(options, approaching, &simulator, ACTIONS.1, rng)?;
+        // The literal rewards are left as they come: nothing is chosen.
+        let trials = match options.reward {
+            RewardName::Literal => 0,
+            RewardName::Mended => TRIALS,
+        };
+        let anywhere: Vec<Percept> = (0..trials).map(|_| simulator.start(rng)).collect();
+        let first = teach(options, &pair.centering, &simulator, &anywhere, ACTIONS.0, rng)?;
+        let from_search = search_percepts(trials, options.seed);
+        let actions = if options.fine { ACTIONS_FINE } else { ACTIONS.1 };
+        let second = teach(options, &pair.approaching, &simulator, &from_search, actions, rng)?;
 
         // What goes to work is what lies on the disk.
-        for behaviour in [&centering, &approaching] {
+        for behaviour in [&first.behaviour, &second.behaviour] {
             behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
         }
-        let saved = Self::load(&options.out, options.reward)?;
+        let saved = Self::load(&options.out, pair)?;
         say(options, &format!("policies saved to {}", options.out.display()));
         Ok(Self {
-            reports: Some((first, second)),
+            reports: Some((first.report, second.report)),
             r2,
             ..saved
         })
     }
 
     /// Reads behaviours that were saved before.
-    fn load(folder: &Path, reward: RewardName) -> Result<Self, Box<dyn Error>> {
-        let [centering, approaching] =
-            specs(reward).map(|spec| Behaviour::load(&policy_path(folder, &spec), &spec));
+    fn load(folder: &Path, pair: &BehaviourPair) -> Result<Self, Box<dyn Error>> {
+        let [centering, approaching] = [&pair.centering, &pair.approaching]
+            .map(|spec| Behaviour::load(&policy_path(folder, spec), spec));
         Ok(Self {
             centering: centering?,
             approaching: approaching?,
@@ -232,21 +271,28 @@ fn policy_path(folder: &Path, spec: &BehaviourSpec) -> PathBuf {
     folder.join(format!("{}.policy", spec.name))
 }
 
-fn specs(reward: RewardName) -> [BehaviourSpec; 2] {
-    let (centering, approaching) = (BehaviourSpec::centering(), BehaviourSpec::approaching());
-    match reward {
-        RewardName::Mended => [centering, approaching],
-        RewardName::Literal => [
-            centering.with_reward(Reward::centering_literal()),
-            approaching.with_reward(Reward::approaching_literal()),
-        ],
-    }
+fn behaviours(options: &Options) -> Result<BehaviourPair, Box<dyn Error>> {
+    let mended = BehaviourPair::paper_mended();
+    let literal = BehaviourPair::paper_literal();
+    let rewards = match options.reward {
+        RewardName::Mended => mended,
+        RewardName::Literal => literal,
+    };
+    let mut pair = if options.fine {
+        BehaviourPair::fine()
+    } else {
+        rewards.clone()
+    };
+    pair.centering.reward = rewards.centering.reward;
+    pair.approaching.reward = rewards.approaching.reward;
+    Ok(pair.with_y_goal(options.y_goal.goal())?)
 }
 
 fn teach(
     options: &Options,
-    spec: BehaviourSpec,
+    spec: &BehaviourSpec,
     simulator: &Simulator,
+    trials: &[Percept],
     actions: u64,
     rng: &mut dyn Rng,
 ) -> Result<Lesson, Box<dyn Error>> {
@@ -257,7 +303,7 @@ fn teach(
         spec.states(),
         spec.actions()
     );
-    let lesson = learn(spec, simulator, actions, rng, &mut |progress| {
+    let lesson = learn_best(spec.clone(), simulator, trials, actions, rng, &mut |progress| {
         bar.set_position(progress.actions);
     })?;
     bar.finish_and_clear();
@@ -270,73 +316,72 @@ fn teach(
     Ok(lesson)
 }
 
-fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
-    // The ball's outline measures 5 to 68 feature units: 20 to 272 pixels of the camera's frame.
-    let radii = (20.0, 272.0);
-    // The shaded side of the ball is hardly brighter than the table: edges must be taken that are weaker than usual.
-    let edges = CannyConfig {
-        low: 20.0,
-        high: 50.0,
-        ..CannyConfig::default()
-    };
-    Ok(match options.detector {
-        DetectorName::Heuristic => {
-            let config = HeuristicConfig {
-                theta: 0.6,
-                min_radius: radii.0,
-                max_radius: radii.1,
-                seed: options.seed,
-                ..HeuristicConfig::default()
-            };
-            Box::new(Heuristic::new(config, Canny::new(edges)?)?)
-        }
-    })
-}
-
-/// One run: places the ball, lets the agent go for it, and measures in the cell whether it has it.
+/// One run: places the ball and lets the agent go for it. What `observe` cannot write ends the run's pictures, not the run.
 fn reach_for(
-    agent: &Agent,
+    agent: &mut Agent<Timed<Learned>>,
     rig: &mut Rig,
     detector: &mut dyn CircleDetector,
     ball: &Ball,
-    run: usize,
-    pictures: &mut Vec<Picture>,
-) -> Result<RunRecord, Box<dyn Error>> {
+    observe: &mut dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>>,
+) -> Result<Outcome, Box<dyn Error>> {
     rig.place(ball);
-    let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
-    let outcome = rig.run(agent, detector, &mut |event| {
-        pictures.extend(record.note(run, event));
+    let stages = agent.controller().stages.clone();
+    let RigParts {
+        camera,
+        arm,
+        mut sensor,
+    } = rig.parts();
+    let (mut camera, mut arm, mut detector) = (
+        Timed {
+            inner: camera,
+            stages: stages.clone(),
+        },
+        Timed {
+            inner: arm,
+            stages: stages.clone(),
+        },
+        Timed {
+            inner: detector,
+            stages: stages.clone(),
+        },
+    );
+    let mut written = Ok(());
+    let mut eye = CameraEye::new(&mut camera, &mut detector);
+    let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
+        if written.is_ok() {
+            written = observe(event);
+        }
     })?;
-    if outcome.gave_up.is_none() {
-        let miss = rig.grip_miss();
-        record.miss_mm = Some(miss * 1000.0);
-        record.grasped = miss <= GRASP_TOLERANCE;
+    written.map(|()| outcome)
+}
+
+/// The folder of the frames: a picture is written when it is made.
+struct Frames(PathBuf);
+
+impl Frames {
+    /// Makes the folder anew: frames of an earlier run must not mix with these.
+    fn new(folder: &Path) -> Result<Self, Box<dyn Error>> {
+        if folder.exists() {
+            std::fs::remove_dir_all(folder)
+                .map_err(|error| format!("{}: cannot be replaced: {error}", folder.display()))?;
+        }
+        writable_folder(folder)?;
+        Ok(Self(folder.to_owned()))
     }
-    record.outcome = Some(outcome);
-    Ok(record)
+
+    fn write(&self, picture: &Picture) -> Result<(), Box<dyn Error>> {
+        let name = format!("run{:03}-frame{:03}.png", picture.run, picture.number);
+        write_png(&self.0.join(name), &picture.image)
+    }
 }
 
 fn write_results(
     out: &Path,
     summary: &Summary,
     records: &[RunRecord],
-    pictures: &[Picture],
+    sheet: &ContactSheet,
 ) -> Result<(), Box<dyn Error>> {
-    let frames = out.join("frames");
-    // Frames of an earlier run must not mix with these.
-    if frames.exists() {
-        std::fs::remove_dir_all(&frames)
-            .map_err(|error| format!("{}: cannot be replaced: {error}", frames.display()))?;
-    }
-    writable_folder(&frames)?;
-    for picture in pictures {
-        let name = format!("run{:03}-frame{:03}.png", picture.run, picture.number);
-        write_png(&frames.join(name), &picture.image)?;
-    }
-    write_png(
-        &out.join("contact_sheet.png"),
-        &results::contact_sheet(pictures, 12),
-    )?;
+    write_png(&out.join("contact_sheet.png"), &sheet.drawn(12))?;
     write_whole(
         &out.join("features.svg"),
         plots::features_per_step(records)?.as_bytes(),

@@ -16,27 +16,32 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
-use grasp_agent::{Agent, AgentConfig, EventKind, EventLog, Hybrid, HybridSettings, Outcome};
-use hough_heuristic::{Canny, CannyConfig, CircleDetector, Features, Heuristic, HeuristicConfig};
+use grasp_agent::{
+    Agent, AgentConfig, Belief, CameraEye, EventKind, EventLog, Hybrid, HybridSettings, Outcome,
+};
+use hough_heuristic::{CircleDetector, Features};
 use image::GrayImage;
 use image::imageops::{FilterType, resize};
-use pipeline_sim::{Cell, ErrorLevel, Scene, Shape, Workspace};
-use puma_grasp::Rig;
+use pipeline_sim::{Cell, ErrorLevel, Workspace};
+use puma_grasp::{BallDetector, Rig, RigParts, bright_ball_scene};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use files::{writable_folder, write_whole};
+use stages::{Stages, Timed};
 
+mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
+mod stages;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
 /// The controller makes --teach runs on balls at rest first, to learn the camera; then come the runs that count.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Folder for track.csv, track.png (the first run, animated) and the event logs of failures
+    /// Folder for track.csv, track.png (the first run, animated), camera.belief and the event logs of failures
     #[arg(long, value_name = "DIR", default_value = "out/track")]
     out: PathBuf,
 
@@ -55,6 +60,18 @@ struct Options {
     /// What happens to the ball
     #[arg(long, value_enum, default_value_t = Fate::Push)]
     ball: Fate,
+
+    /// How the circle is found: heuristic, rht, sht
+    #[arg(long, value_name = "NAME", default_value_t)]
+    detector: BallDetector,
+
+    /// Noise of the camera in the dark, grey levels; that of the scene unless given
+    #[arg(long, value_name = "LEVELS")]
+    noise: Option<f64>,
+
+    /// Begin with what an earlier run learned of the camera: its camera.belief
+    #[arg(long, value_name = "FILE")]
+    belief: Option<PathBuf>,
 
     /// Errors of the camera: none, moderate, heavy, extreme
     #[arg(long, value_name = "LEVEL", default_value_t = ErrorLevel::Moderate)]
@@ -87,8 +104,11 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
-    let mut detector = detector(options.seed)?;
-    let mut rig = Rig::emulated(false, &scene(), options.seed)?;
+    let mut detector = options.detector.build(options.seed)?;
+    let belief = options.belief.as_deref().map(Belief::load).transpose()?;
+    let mut scene = bright_ball_scene();
+    scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
+    let mut rig = Rig::emulated(false, &scene, options.seed)?;
     let errors = options.level.draw(&mut rng);
     let wrong = errors.apply(&rig.cell().get())?;
     rig.cell().with(|cell| *cell = wrong);
@@ -96,14 +116,24 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let workspace = Workspace::paper();
     let mut config = AgentConfig::paper(workspace.search_poses());
     config.max_cycles = 120;
-    let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
+    let settings = HybridSettings::paper();
+    let hybrid = match belief {
+        Some(belief) => Hybrid::with_belief(settings, belief),
+        None => Hybrid::new(settings),
+    };
+    let stages = Stages::default();
+    let timed = |inner| Timed {
+        inner,
+        stages: stages.clone(),
+    };
+    let mut agent = Agent::with_controller(config, timed(hybrid))?;
     let (mut csv, mut film) = (String::from("run,move,x,y,r,event\n"), Vec::new());
-    let (mut grasped, mut moves) = (0, 0);
+    let (mut grasped, mut moves, mut near) = (0, 0, 0);
     for number in 0..options.teach + options.runs {
         let teaching = number < options.teach;
         if number == options.teach {
-            let controller = agent.controller().clone().frozen();
-            agent = Agent::with_controller(agent.config().clone(), controller)?;
+            let controller = agent.controller().inner.clone().frozen();
+            agent = Agent::with_controller(agent.config().clone(), timed(controller))?;
             println!("learned the camera from {number} runs");
         }
         let (ball, _) = workspace
@@ -114,10 +144,31 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let mut world = World::new(fate, rng.random());
         let (shared, mut log) = (rig.cell().clone(), EventLog::default());
         let mut miss = None;
-        let end = rig.run_and_learn(&mut agent, &mut *detector, &mut |event| {
+        let RigParts {
+            camera,
+            arm,
+            mut sensor,
+        } = rig.parts();
+        let (mut camera, mut detector, mut arm) = (
+            Timed {
+                inner: camera,
+                stages: stages.clone(),
+            },
+            Timed {
+                inner: &mut *detector as &mut dyn CircleDetector,
+                stages: stages.clone(),
+            },
+            Timed {
+                inner: arm,
+                stages: stages.clone(),
+            },
+        );
+        let mut eye = CameraEye::new(&mut camera, &mut detector);
+        let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
             log.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),
+                EventKind::TooNear if !teaching => near += 1,
                 EventKind::Gripping(_) => miss = Some(shared.with(|cell| cell.grip_miss(&event.joints))),
                 EventKind::Seen(sighting) if !teaching => {
                     let (f, row) = (sighting.features, number - options.teach + 1);
@@ -138,6 +189,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 ));
             }
         });
+        // Whatever it ended with: what was learned until then is kept.
+        let learned = agent.controller().inner.belief();
+        learned.save(&options.out.join("camera.belief"))?;
         let success =
             matches!(&end, Ok(Outcome { gave_up: None, .. })) && miss.is_some_and(|miss| miss < 0.010);
         if teaching {
@@ -159,15 +213,28 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if !film.is_empty() {
         write_whole(&options.out.join("track.png"), &animated(&film)?)?;
     }
+    println!("{stages}");
     let runs = options.runs.max(1);
+    let (low, high) = interval(grasped, runs);
     println!(
-        "{grasped} of {} grasped ({:.1} %), {:.1} moves a run; results: {}",
+        "{grasped} of {} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {near} stops by the proximity sensors; \
+         results: {}",
         options.runs,
         100.0 * grasped as f64 / runs as f64,
         moves as f64 / runs as f64,
         options.out.display()
     );
     Ok(())
+}
+
+/// Wilson's interval of a share, percent.
+fn interval(successes: usize, runs: usize) -> (f64, f64) {
+    const Z: f64 = 1.96;
+    let (n, share) = (runs as f64, successes as f64 / runs as f64);
+    let middle = share + 0.5 * Z * Z / n;
+    let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
+    let scale = 100.0 / (1.0 + Z * Z / n);
+    (scale * (middle - half), scale * (middle + half))
 }
 
 /// What happens to one ball.
@@ -239,33 +306,6 @@ impl World {
 
 fn at_goal(f: &Features) -> bool {
     (99.0..=108.0).contains(&f.x) && (74.0..=82.0).contains(&f.y) && (32.0..=34.0).contains(&f.r)
-}
-
-/// A bright ball over a dark table with boxes and tape on it.
-fn scene() -> Scene {
-    let mut scene = Scene::laboratory();
-    (scene.table.albedo, scene.table.texture) = (0.20, 0.30);
-    scene
-        .things
-        .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
-    scene.things.iter_mut().for_each(|thing| thing.look.albedo *= 0.5);
-    scene
-}
-
-fn detector(seed: u64) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
-    let edges = CannyConfig {
-        low: 20.0,
-        high: 50.0,
-        ..CannyConfig::default()
-    };
-    let config = HeuristicConfig {
-        theta: 0.6,
-        min_radius: 20.0,
-        max_radius: 272.0,
-        seed,
-        ..HeuristicConfig::default()
-    };
-    Ok(Box::new(Heuristic::new(config, Canny::new(edges)?)?))
 }
 
 /// An animated PNG, three frames a second.

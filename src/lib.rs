@@ -35,6 +35,7 @@
 
 mod plane;
 mod rig;
+mod setup;
 mod training;
 mod trial;
 
@@ -44,9 +45,10 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
-pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_starts};
-pub use rig::{Rig, RigError};
-pub use training::{LearnError, Lesson, Simulator, learn, schedule};
+pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts};
+pub use rig::{Rig, RigError, RigParts};
+pub use setup::{BallDetector, UnknownDetector, bright_ball_scene};
+pub use training::{LearnError, Lesson, Simulator, learn, learn_best, schedule};
 pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]

@@ -68,6 +68,11 @@ impl ExactPlane {
         }
     }
 
+    /// A start for an episode: one of those drawn at the beginning.
+    pub fn start(&self, rng: &mut dyn Rng) -> Percept {
+        self.starts[rng.random_range(0..self.starts.len())]
+    }
+
     /// What is perceived after the move, `None` when the ball is lost.
     pub fn after(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         self.model
@@ -86,16 +91,32 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
-        self.learn_with(spec, &schedule(actions)?, rng, on_progress)
+        self.learn_with(spec, &[], &schedule(actions)?, rng, on_progress)
     }
 
-    /// Learns `spec` here.
+    /// As [`ExactPlane::learn`], and keeps the table that does best from `trials`: see [`learn_best`](crate::learn_best).
+    ///
+    /// # Errors
+    /// As for [`learn`](crate::learn).
+    pub fn learn_best(
+        &self,
+        spec: BehaviourSpec,
+        trials: &[Percept],
+        actions: u64,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Lesson, LearnError> {
+        self.learn_with(spec, trials, &schedule(actions)?, rng, on_progress)
+    }
+
+    /// As [`ExactPlane::learn_best`], with other settings.
     ///
     /// # Errors
     /// As for [`learn`](crate::learn).
     pub fn learn_with(
         &self,
         spec: BehaviourSpec,
+        trials: &[Percept],
         config: &TrainConfig,
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
@@ -105,23 +126,15 @@ impl ExactPlane {
             let after = plane.after(percept, delta)?;
             self.sight.sees_features(&after.features).then_some(after)
         };
-        let start = |rng: &mut dyn Rng| self.starts[rng.random_range(0..self.starts.len())];
-        learn_in(spec, simulate, start, config, rng, on_progress)
+        let start = |rng: &mut dyn Rng| self.start(rng);
+        learn_in(spec, simulate, start, trials, config, rng, on_progress)
     }
 }
 
 /// `count` balls as the search finds them, turned into the arm's plane, with the optimum from each.
 pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let workspace = Workspace::paper();
     let spec = BehaviourSpec::approaching();
-    let elbow = workspace.search_poses()[0];
-    let starts = std::iter::repeat_with(|| {
-        let cell = Cell::paper(workspace.sample_ball(&mut rng));
-        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
-        let mut joints = elbow;
-        joints.0[0] = goal.0[0];
-        cell.features(&joints)?;
+    let starts = found_by_search(seed).filter_map(|(cell, joints)| {
         let optimum = optimum(&cell, &joints, &spec)?;
         Some(PlaneStart {
             cell,
@@ -129,7 +142,32 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
             optimum,
         })
     });
-    starts.flatten().take(count).collect()
+    starts.take(count).collect()
+}
+
+/// What is perceived of `count` balls where the search finds them, turned into the arm's plane: trials for
+/// [`learn_best`](crate::learn_best).
+pub fn search_percepts(count: usize, seed: u64) -> Vec<Percept> {
+    let seen = found_by_search(seed).filter_map(|(cell, joints)| {
+        let features = cell.features(&joints)?;
+        Some(Percept::new(features, &joints))
+    });
+    seen.take(count).collect()
+}
+
+/// Balls and search poses that see them, with the ball in the arm's plane.
+fn found_by_search(seed: u64) -> impl Iterator<Item = (Cell, Joints)> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let workspace = Workspace::paper();
+    let elbow = workspace.search_poses()[0];
+    std::iter::repeat_with(move || {
+        let cell = Cell::paper(workspace.sample_ball(&mut rng));
+        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
+        let mut joints = elbow;
+        joints.0[0] = goal.0[0];
+        cell.features(&joints).map(|_| (cell, joints))
+    })
+    .flatten()
 }
 
 /// How a policy does from `starts`: greedy, with the loop breaker at `kappa`.

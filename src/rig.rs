@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use grasp_agent::{Agent, AgentError, CameraEye, Controller, Event, Outcome};
-use hough_heuristic::CircleDetector;
+use hough_heuristic::{CircleDetector, FrameSource};
 use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
@@ -151,21 +151,51 @@ impl Rig {
         detector: &mut dyn CircleDetector,
         observe: &mut dyn FnMut(&Event<'_>),
     ) -> Result<Outcome, AgentError> {
-        let mut sensor = CellSensor {
-            cell: self.cell.clone(),
-            pose: Arc::clone(&self.pose),
-        };
-        agent.run_and_learn(
-            &mut CameraEye::new(&mut self.camera, detector),
-            &mut *self.arm,
-            &mut sensor,
-            observe,
-        )
+        let RigParts {
+            camera,
+            arm,
+            mut sensor,
+        } = self.parts();
+        agent.run_and_learn(&mut CameraEye::new(camera, detector), arm, &mut *sensor, observe)
+    }
+
+    /// Camera, arm and sensor apart, for an eye of one's own or with something in between.
+    pub fn parts(&mut self) -> RigParts<'_> {
+        RigParts {
+            camera: &mut self.camera,
+            arm: &mut *self.arm,
+            sensor: Box::new(CellSensor {
+                cell: self.cell.clone(),
+                pose: Arc::clone(&self.pose),
+            }),
+        }
+    }
+
+    /// Where the arm stands, now and whenever the closure is called.
+    pub fn pose(&self) -> impl Fn() -> Joints + Send + Sync + use<> {
+        let pose = Arc::clone(&self.pose);
+        move || pose()
     }
 
     /// How far the point between the jaws is from the ball's centre, metres.
     pub fn grip_miss(&self) -> f64 {
         self.cell.get().grip_miss(&(self.pose)())
+    }
+}
+
+/// What a [`Rig`] is made of.
+pub struct RigParts<'a> {
+    /// The camera on the hand.
+    pub camera: &'a mut dyn FrameSource,
+    /// The arm behind its controller.
+    pub arm: &'a mut dyn Manipulator,
+    /// The sensors on the hand.
+    pub sensor: Box<dyn ProximitySensor>,
+}
+
+impl std::fmt::Debug for RigParts<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RigParts").finish_non_exhaustive()
     }
 }
 

@@ -1,32 +1,15 @@
 //! The whole chain on its real parts: samples, regression, learning, policies on disk, the emulated controller on a
 //! pseudo-terminal (a socket where the system has none), rendered frames, the paper's detector, and the grip.
 
-use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned};
-use hough_heuristic::{Canny, CannyConfig, Heuristic, HeuristicConfig};
-use pipeline_sim::{Ball, ReachForm, Scene, Workspace, sample_moves};
-use puma_grasp::{Rig, Simulator, learn};
+use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned, Percept};
+use hough_heuristic::CircleDetector;
+use pipeline_sim::{Ball, ReachForm, Workspace, sample_moves};
+use puma_grasp::{BallDetector, Rig, Simulator, bright_ball_scene, learn_best, search_percepts};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-fn scene() -> Scene {
-    let mut scene = Scene::plain();
-    scene.table.albedo = 0.2;
-    scene
-}
-
-fn detector() -> Heuristic<Canny> {
-    let edges = CannyConfig {
-        low: 20.0,
-        high: 50.0,
-        ..CannyConfig::default()
-    };
-    let config = HeuristicConfig {
-        theta: 0.6,
-        min_radius: 20.0,
-        max_radius: 272.0,
-        ..HeuristicConfig::default()
-    };
-    Heuristic::new(config, Canny::new(edges).expect("valid thresholds")).expect("valid settings")
+fn detector() -> Box<dyn CircleDetector + Send> {
+    BallDetector::Heuristic.build(1).expect("valid settings")
 }
 
 /// Learns both behaviours in a simulator fitted to `rig`'s cell; they pass through files on the way.
@@ -40,28 +23,24 @@ fn agent(rig: &Rig, seed: u64) -> Agent {
         simulator.quality()
     );
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut taught = |spec: BehaviourSpec, actions| {
-        let lesson = learn(spec, &simulator, actions, &mut rng, &mut |_| {}).expect("learns");
+    let mut taught = |spec: BehaviourSpec, trials: &[Percept], actions| {
+        let lesson = learn_best(spec, &simulator, trials, actions, &mut rng, &mut |_| {}).expect("learns");
         let path = folder.path().join("behaviour.policy");
         lesson.behaviour.save(&path).expect("saves");
         let loaded = Behaviour::load(&path, lesson.behaviour.spec()).expect("loads");
         assert_eq!(loaded, lesson.behaviour);
         loaded
     };
-    let centering = taught(BehaviourSpec::centering(), 60_000);
-    let approaching = taught(BehaviourSpec::approaching(), 300_000);
+    let centering = taught(BehaviourSpec::centering(), &[], 60_000);
+    let approaching = taught(BehaviourSpec::approaching(), &search_percepts(200, seed), 300_000);
     let config = AgentConfig::paper(Workspace::paper().search_poses());
-    Agent::with_controller(
-        config,
-        Learned::new(centering, approaching).with_kappa(50.0, 20.0),
-    )
-    .expect("valid settings")
+    Agent::with_controller(config, Learned::new(centering, approaching)).expect("valid settings")
 }
 
 #[test]
 fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
     let run = || {
-        let mut rig = Rig::emulated(false, &scene(), 3).expect("an emulated controller");
+        let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
         let agent = agent(&rig, 2000);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut log = Vec::new();
@@ -73,7 +52,7 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
                 .expect("a ball in view");
             rig.place(&ball);
             let outcome = rig
-                .run(&agent, &mut detector(), &mut |event| {
+                .run(&agent, &mut *detector(), &mut |event| {
                     log.push((event.kind.clone(), event.joints));
                 })
                 .expect("the line holds");
@@ -91,13 +70,13 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
 
 #[test]
 fn a_ball_out_of_view_is_reported_and_not_gripped() {
-    let mut rig = Rig::emulated(false, &scene(), 3).expect("an emulated controller");
+    let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
     let agent = agent(&rig, 1);
     // Behind the arm.
     rig.place(&Ball::at(-0.6, 0.0, -0.1));
     let mut searched = Vec::new();
     let outcome = rig
-        .run(&agent, &mut detector(), &mut |event| {
+        .run(&agent, &mut *detector(), &mut |event| {
             if let EventKind::AtSearchPose(pose) = event.kind {
                 searched.push(pose);
             }

@@ -4,12 +4,12 @@
     python3 -m venv venv && venv/bin/pip install numpy 'opencv-contrib-python-headless<5'
     cargo build --release --example detect_circles --example render_dataset
     venv/bin/python docs/benchmarks/compare_circles.py FOLDER... --csv circles.csv
-    venv/bin/python docs/benchmarks/compare_circles.py --scenes plain,noise --sizes 192x144,768x576 --frames 20
+    venv/bin/python docs/benchmarks/compare_circles.py --scenes benchmark --sizes 192x144,768x576 --frames 20
 
 A FOLDER is a set. It holds images and may hold the tables that `render_dataset` writes: truth.csv (file,cx,cy,r and any further columns;
 (0, 0) is the centre of the top-left pixel) with a row a circle, and frames.csv (file,scene) or files.txt (a name a line) with
 the frames that count. A frame without a row in truth.csv holds no circle; a folder without truth.csv holds none at all. With frames.csv every scene
-is a set of its own. `--scenes` renders sets of these kinds first (`all` for every kind there is).
+is a set of its own. `--scenes` renders sets of these kinds first, as `render_dataset` names them.
 
 Prints a Markdown table and writes CSV, a row for each set and detector, and a row `mean of sets` for each detector. Columns:
 
@@ -111,11 +111,8 @@ def read_sets(folder, scratch, pad):
 
 def render(options, size, out):
     """Renders the scenes at a size, "WxH"."""
-    command = [options.renderer, "--out", out, "--frames", str(options.frames), "--seed", str(options.seed)]
-    if options.scenes != "all":
-        command += ["--kinds", options.scenes]
-    if size != "768x576":
-        command += ["--size", size]
+    command = [options.renderer, "--out", out, "--frames", str(options.frames), "--seed", str(options.seed),
+               "--kinds", options.scenes, "--size", size]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
@@ -177,9 +174,10 @@ def run_rival(detect, frames, options, found):
 
 
 def run_ours(name, frames, options, found, scratch):
+    repeat = 1 if name in listed(options.slow) else options.repeat
     circles, times = os.path.join(scratch, "found.csv"), os.path.join(scratch, "times.csv")
-    command = [options.program, "--detector", name, "--repeat", str(options.repeat), "--csv", circles, "--times", times,
-               "--min-radius", str(options.min_radius), "--max-radius", str(options.max_radius)]
+    command = [options.program, "--detector", name, "--repeat", str(repeat), "--csv", circles, "--times", times,
+               "--min-radius", str(options.min_radius), "--max-radius", str(options.max_radius), "--seed", str(options.detector_seed)]
     subprocess.run(command + [frame.path for frame in frames], check=True)
     by_path = {frame.path: result for frame, result in zip(frames, found)}
     for result in found:
@@ -342,12 +340,13 @@ def main():
     parser.add_argument("--rivals", default="hough,hough-alt,ed,ed-unblurred", help="OpenCV's [%(default)s]")
     parser.add_argument("--min-radius", type=float, default=8, metavar="PX", help="[%(default)s]")
     parser.add_argument("--max-radius", type=float, default=280, metavar="PX", help="[%(default)s]")
+    parser.add_argument("--detector-seed", type=int, default=1, metavar="N", help="seed of our random searches [%(default)s]")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions per frame and round [%(default)s]")
     parser.add_argument("--rounds", type=int, default=2, help="passes through all detectors [%(default)s]")
-    parser.add_argument("--slow", default="sht,sht-gradient", help="detectors that get one round, and few frames [%(default)s]")
+    parser.add_argument("--slow", default="sht,sht-gradient", help="detectors that see few frames, each once [%(default)s]")
     parser.add_argument("--slow-frames", type=int, default=5, help="that many, spread over the set [%(default)s]")
     parser.add_argument("--pad", type=int, default=0, metavar="PX", help="widen the frames of folders by repeating their border")
-    parser.add_argument("--scenes", help="kinds of scenes to render, or `all`")
+    parser.add_argument("--scenes", metavar="KIND,...", help="kinds of scenes to render; `benchmark` for those made for this")
     parser.add_argument("--sizes", default="768x576", help="at these sizes; the radius range is scaled along [%(default)s]")
     parser.add_argument("--frames", type=int, default=20, help="so many frames of each [%(default)s]")
     parser.add_argument("--seed", type=int, default=1, help="from this seed [%(default)s]")

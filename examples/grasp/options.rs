@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
+use grasp_agent::YGoal;
+use puma_grasp::BallDetector;
 
 /// Learn to reach a ball in simulation, then see, reach and grasp it with a (simulated) PUMA 560 through VAL II.
 ///
@@ -34,13 +37,25 @@ pub(crate) struct Options {
     #[arg(long, value_name = "DIR")]
     pub(crate) policy: Option<PathBuf>,
 
+    /// Go on learning at work, and save what was learned to the output folder
+    #[arg(long)]
+    pub(crate) keep_learning: bool,
+
     /// How the circle is found
-    #[arg(long, value_enum, default_value_t = DetectorName::Heuristic)]
-    pub(crate) detector: DetectorName,
+    #[arg(long, value_name = "NAME", default_value_t, value_parser = detectors())]
+    pub(crate) detector: BallDetector,
 
     /// Reward while learning: the paper's formulas as printed do not teach the goal
     #[arg(long, value_enum, default_value_t = RewardName::Mended)]
     pub(crate) reward: RewardName,
+
+    /// Learn approaching on 540 states instead of 90: fewer moves, longer training
+    #[arg(long)]
+    pub(crate) fine: bool,
+
+    /// Which of the paper's two goal intervals of y
+    #[arg(long, value_enum, default_value_t = YGoalName::Equation6)]
+    pub(crate) y_goal: YGoalName,
 
     /// Form of the regression simulator
     #[arg(long, value_enum, default_value_t = FormName::Rigid22)]
@@ -63,10 +78,26 @@ fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
+fn detectors() -> impl TypedValueParser<Value = BallDetector> {
+    let names = BallDetector::ALL.map(BallDetector::name);
+    PossibleValuesParser::new(names).try_map(|name| name.parse())
+}
+
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum DetectorName {
-    /// Three random edge pixels, belonging against a threshold (the paper's)
-    Heuristic,
+pub(crate) enum YGoalName {
+    /// 74 to 82
+    Equation6,
+    /// 74 to 92: the hand stops farther from where the grip is aimed
+    Section4,
+}
+
+impl YGoalName {
+    pub(crate) fn goal(self) -> YGoal {
+        match self {
+            Self::Equation6 => YGoal::Equation6,
+            Self::Section4 => YGoal::Section4,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -75,19 +75,24 @@ pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
         .unwrap_or(1)
         .max(1) as f64;
     let distinct = [
-        (0, RGBColor(30, 90, 180)),
-        (tracks.len() / 2, RGBColor(180, 60, 40)),
-        (tracks.len().saturating_sub(1), RGBColor(200, 140, 0)),
+        (0, RGBColor(30, 90, 180), "the farthest start"),
+        (tracks.len() / 2, RGBColor(180, 60, 40), "a start in between"),
+        (
+            tracks.len().saturating_sub(1),
+            RGBColor(200, 140, 0),
+            "the nearest start",
+        ),
     ];
+    const OTHERS: RGBColor = RGBColor(200, 200, 205);
     let colour = |index: usize| {
         distinct
             .iter()
-            .find(|(i, _)| *i == index)
-            .map_or(RGBColor(200, 200, 205), |(_, colour)| *colour)
+            .find(|(i, ..)| *i == index)
+            .map_or(OTHERS, |(_, colour, _)| *colour)
     };
     // Gray lines first, so that the coloured ones lie on top.
     let mut order: Vec<usize> = (0..tracks.len()).collect();
-    order.sort_by_key(|index| distinct.iter().any(|(i, _)| i == index));
+    order.sort_by_key(|index| distinct.iter().any(|(i, ..)| i == index));
 
     type Pick = fn(&Features) -> f64;
     let panels: [(&str, Range<f64>, Range<f64>, Pick); 3] = [
@@ -97,9 +102,15 @@ pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
     ];
     let mut svg = String::new();
     {
-        let root = SVGBackend::with_string(&mut svg, (900, 900)).into_drawing_area();
+        let root = SVGBackend::with_string(&mut svg, (900, 930)).into_drawing_area();
         root.fill(&WHITE)?;
-        for (area, (name, range, goal, pick)) in root.split_evenly((3, 1)).iter().zip(panels) {
+        let (top, below) = root.split_vertically(30);
+        let goal_key = ("goal", GOAL.mix(0.5));
+        let keys = distinct
+            .iter()
+            .map(|(_, colour, words)| (*words, colour.mix(1.0)));
+        legend(&top, keys.chain([("other runs", OTHERS.mix(1.0)), goal_key]))?;
+        for (area, (name, range, goal, pick)) in below.split_evenly((3, 1)).iter().zip(panels) {
             let lines: Vec<Line> = order
                 .iter()
                 .map(|&i| {
@@ -125,6 +136,19 @@ pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
         root.present()?;
     }
     Ok(svg)
+}
+
+/// What the colours mean, in a row.
+fn legend<'a>(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    keys: impl Iterator<Item = (&'a str, RGBAColor)>,
+) -> Result<(), Box<dyn Error>> {
+    let words = ("sans-serif", 14).into_font().color(&INK);
+    for ((text, colour), x) in keys.zip((70..).step_by(165)) {
+        area.draw(&Rectangle::new([(x, 13), (x + 22, 19)], colour.filled()))?;
+        area.draw(&Text::new(text, (x + 28, 9), words.clone()))?;
+    }
+    Ok(())
 }
 
 type Line = (Vec<(f64, f64)>, RGBColor);

@@ -13,6 +13,8 @@ pub(crate) struct RunRecord {
     /// The ball's centre, millimetres in the arm's world frame.
     pub(crate) ball_mm: [f64; 3],
     pub(crate) rows: Vec<Row>,
+    /// Frames looked at.
+    frames: usize,
     pub(crate) outcome: Option<Outcome>,
     pub(crate) grasped: bool,
     /// From the gripper to the ball's centre when the jaws closed, millimetres.
@@ -31,6 +33,7 @@ pub(crate) struct Row {
 /// A frame with what was found in it drawn in, at half size.
 pub(crate) struct Picture {
     pub(crate) run: usize,
+    /// From 1, in each run.
     pub(crate) number: usize,
     pub(crate) step: usize,
     /// Whether the ball was found.
@@ -43,6 +46,7 @@ impl RunRecord {
         Self {
             ball_mm,
             rows: Vec::new(),
+            frames: 0,
             outcome: None,
             grasped: false,
             miss_mm: None,
@@ -56,7 +60,6 @@ impl RunRecord {
             EventKind::Moved(delta) => (None, Some(delta)),
             _ => (None, None),
         };
-        let number = self.rows.len();
         self.rows.push(Row {
             step: event.cycle,
             event: event.kind.word(),
@@ -66,6 +69,7 @@ impl RunRecord {
         });
 
         let mut overlay = Overlay::new(event.frame?);
+        self.frames += 1;
         if let EventKind::Seen(sighting) = event.kind {
             overlay.circle(&sighting.detection.circle);
         }
@@ -80,11 +84,17 @@ impl RunRecord {
         let (step, seen) = (event.cycle, features.is_some());
         Some(Picture {
             run,
-            number,
+            number: self.frames,
             step,
             seen,
             image: overlay.into_image(),
         })
+    }
+
+    /// The jaws have closed `miss` metres from the ball's centre.
+    pub(crate) fn gripped_at(&mut self, miss: f64, tolerance: f64) {
+        self.miss_mm = Some(miss * 1000.0);
+        self.grasped = miss <= tolerance;
     }
 
     /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.

@@ -164,32 +164,57 @@ pub(crate) fn features_csv(records: &[RunRecord]) -> String {
     csv
 }
 
-/// The frames in which the ball was seen, run after run, in rows of `columns`; a run begins a new row.
-pub(crate) fn contact_sheet(pictures: &[Picture], columns: u32) -> RgbImage {
-    const TILE: (u32, u32) = (160, 120);
-    let mut places: Vec<(&Picture, u32, u32)> = Vec::new();
-    for picture in pictures.iter().filter(|picture| picture.seen) {
-        let (row, column) = match places.last() {
-            None => (0, 0),
-            Some((before, row, column)) if before.run == picture.run && column + 1 < columns => {
-                (*row, column + 1)
-            }
-            Some((_, row, _)) => (row + 1, 0),
-        };
-        places.push((picture, row, column));
-    }
-    let rows = places.last().map_or(1, |(_, row, _)| row + 1);
-    let mut sheet = RgbImage::from_pixel(columns * TILE.0, rows * TILE.1, Rgb([245, 245, 248]));
-    for (picture, row, column) in places {
+/// The frames in which the ball was seen, run after run, in rows; a run begins a new row.
+#[derive(Default)]
+pub(crate) struct ContactSheet(Vec<Tile>);
+
+struct Tile {
+    run: usize,
+    image: RgbImage,
+}
+
+/// Size of a tile with its border, pixels.
+const TILE: (u32, u32) = (160, 120);
+/// Runs that are shown, the first ones.
+const RUNS_SHOWN: usize = 20;
+
+impl ContactSheet {
+    pub(crate) fn add(&mut self, picture: &Picture) {
+        if !picture.seen || picture.run > RUNS_SHOWN {
+            return;
+        }
         let small = resize(&picture.image, TILE.0 - 4, TILE.1 - 4, FilterType::Triangle);
         let mut tile = Overlay::from(small);
         tile.caption(&format!("run {} step {}", picture.run, picture.step));
-        replace(
-            &mut sheet,
-            &tile.into_image(),
-            i64::from(column * TILE.0 + 2),
-            i64::from(row * TILE.1 + 2),
-        );
+        self.0.push(Tile {
+            run: picture.run,
+            image: tile.into_image(),
+        });
     }
-    sheet
+
+    /// The sheet, with `columns` tiles to a row.
+    pub(crate) fn drawn(&self, columns: u32) -> RgbImage {
+        let mut places: Vec<(&Tile, u32, u32)> = Vec::new();
+        for tile in &self.0 {
+            let (row, column) = match places.last() {
+                None => (0, 0),
+                Some((before, row, column)) if before.run == tile.run && column + 1 < columns => {
+                    (*row, column + 1)
+                }
+                Some((_, row, _)) => (row + 1, 0),
+            };
+            places.push((tile, row, column));
+        }
+        let rows = places.last().map_or(1, |(_, row, _)| row + 1);
+        let mut sheet = RgbImage::from_pixel(columns * TILE.0, rows * TILE.1, Rgb([245, 245, 248]));
+        for (tile, row, column) in places {
+            replace(
+                &mut sheet,
+                &tile.image,
+                i64::from(column * TILE.0 + 2),
+                i64::from(row * TILE.1 + 2),
+            );
+        }
+        sheet
+    }
 }

@@ -3,6 +3,8 @@
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{CircleDetector, Detection, Features, FrameError, FrameSource};
 
+use crate::{BallFeatures, ObjectFeatures};
+
 /// Looks for the ball from where the camera is now.
 pub trait Eye {
     /// One look.
@@ -17,7 +19,7 @@ pub trait Eye {
 pub struct Look {
     /// The frame that was looked at; `None` from an eye that needs none.
     pub frame: Option<GrayImage>,
-    /// The ball, if it was found.
+    /// The ball, or the object in its place, if it was found.
     pub ball: Option<Sighting>,
 }
 
@@ -31,22 +33,23 @@ pub struct Sighting {
     pub features: Features,
 }
 
-/// A camera with a circle detector behind it.
+/// A camera, and what is looked for in its frames.
 pub struct CameraEye<'a> {
     source: &'a mut dyn FrameSource,
-    detector: &'a mut dyn CircleDetector,
-    found: Vec<Detection>,
+    object: Box<dyn ObjectFeatures + 'a>,
 }
 
 impl<'a> CameraEye<'a> {
-    /// An eye that takes frames from `source` and finds circles with `detector`.
-    ///
-    /// The ball is the best circle whose centre lies in the frame.
+    /// An eye that takes frames from `source` and looks for the ball with `detector`: see [`BallFeatures`].
     pub fn new(source: &'a mut dyn FrameSource, detector: &'a mut dyn CircleDetector) -> Self {
+        Self::looking_for(source, BallFeatures::new(detector))
+    }
+
+    /// An eye that takes frames from `source` and looks for any object in them.
+    pub fn looking_for(source: &'a mut dyn FrameSource, object: impl ObjectFeatures + 'a) -> Self {
         Self {
             source,
-            detector,
-            found: Vec::new(),
+            object: Box::new(object),
         }
     }
 }
@@ -54,17 +57,7 @@ impl<'a> CameraEye<'a> {
 impl Eye for CameraEye<'_> {
     fn look(&mut self) -> Result<Look, FrameError> {
         let frame = self.source.grab()?;
-        self.detector.detect_into(&frame, &mut self.found);
-        let height = Features::WIDTH * f64::from(frame.height()) / f64::from(frame.width());
-        let ball = self.found.iter().find_map(|detection| {
-            let features = Features::from_circle(&detection.circle, frame.width());
-            let inside =
-                (0.0..=Features::WIDTH).contains(&features.x) && (0.0..=height).contains(&features.y);
-            (inside && features.r.is_finite()).then_some(Sighting {
-                detection: *detection,
-                features,
-            })
-        });
+        let ball = self.object.find(&frame);
         Ok(Look {
             frame: Some(frame),
             ball,

@@ -48,9 +48,9 @@ impl OnlineLearning {
 
 impl Learned {
     /// Loop breaker of centering unless set otherwise, in units of Q.
-    pub const CENTERING_KAPPA: f64 = 50.0;
+    pub const CENTERING_KAPPA: f64 = 20.0;
     /// Loop breaker of approaching unless set otherwise, in units of Q.
-    pub const APPROACHING_KAPPA: f64 = 5.0;
+    pub const APPROACHING_KAPPA: f64 = 20.0;
 
     /// Two behaviours, frozen, with the loop breaker at [`Learned::CENTERING_KAPPA`] and [`Learned::APPROACHING_KAPPA`].
     pub fn new(centering: Behaviour, approaching: Behaviour) -> Self {

@@ -5,10 +5,11 @@
 //! radius, **approaching** turns the second and third by y, radius and the elbow angle. Around them stand a search from fixed
 //! poses, a recovery for when the ball leaves the image, the activation of the gripper, and a stop when something comes too near.
 //!
-//! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. The paper's two are presets.
+//! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. A [`BehaviourPair`] is both together:
+//!   [`paper_literal`](BehaviourPair::paper_literal), [`paper_mended`](BehaviourPair::paper_mended), [`fine`](BehaviourPair::fine).
 //! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which [`qtable`] learns it.
 //! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked what to do.
-//! * An [`Agent`] runs a [`Controller`] on an [`Eye`] ([`CameraEye`]: camera and circle detector) and a
+//! * An [`Agent`] runs a [`Controller`] on an [`Eye`] ([`CameraEye`]: camera, and an object described by [`ObjectFeatures`]) and a
 //!   [`Manipulator`](puma_val2::Manipulator), and tells every [`Event`] as it happens; an [`EventLog`] keeps them and replays the run.
 //! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those that the paper names as alternatives,
 //!   [`PositionBased`], [`ImageBased`], [`Fuzzy`] and [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins
@@ -73,7 +74,9 @@ mod eye;
 mod hybrid;
 mod learned;
 mod log;
+mod object;
 mod percept;
+mod preset;
 mod reward;
 mod run;
 mod servo;
@@ -97,7 +100,9 @@ pub use eye::{CameraEye, Eye, Look, Sighting};
 pub use hybrid::{Belief, Hybrid, HybridSettings, Prior};
 pub use learned::{Learned, OnlineLearning};
 pub use log::{EventLog, LoggedEvent};
+pub use object::{BallFeatures, EggFeatures, EggLimits, ObjectFeatures};
 pub use percept::{Input, Percept, theta3};
+pub use preset::{BehaviourPair, YGoal};
 pub use reward::{Reward, RewardTerm};
 pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSettings};
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};

@@ -1,0 +1,119 @@
+//! Where controllers are compared: on the feature shortcut, or through the full chain.
+
+use std::error::Error;
+
+use grasp_agent::{Agent, Controller, Event, EventKind, Outcome};
+use hough_heuristic::CircleDetector;
+use pipeline_sim::{ErrorLevel, Workspace};
+use puma_grasp::{BallDetector, Rig, RigParts, TrialCell, bright_ball_scene};
+use puma_val2::Joints;
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+/// From the gripper to the ball's centre: the jaws close on the ball up to this far, metres.
+const GRASP_TOLERANCE: f64 = 0.010;
+
+/// A cell with drawn errors.
+pub(crate) enum World {
+    /// Features straight from the geometry, an arm that moves at once.
+    Shortcut(TrialCell),
+    /// Rendered frames, circle detection, VAL II on a line.
+    Chain(Box<Chain>),
+}
+
+pub(crate) struct Chain {
+    rig: Rig,
+    detector: Box<dyn CircleDetector + Send>,
+    workspace: Workspace,
+}
+
+/// What came of one ball.
+pub(crate) struct Trial {
+    pub(crate) outcome: Outcome,
+    pub(crate) reached: bool,
+    pub(crate) held: bool,
+}
+
+impl World {
+    pub(crate) fn shortcut(level: ErrorLevel, seed: u64, with_bodies: bool) -> Result<Self, Box<dyn Error>> {
+        let cell = TrialCell::draw(level, seed)?;
+        Ok(Self::Shortcut(if with_bodies {
+            cell
+        } else {
+            cell.without_bodies()
+        }))
+    }
+
+    /// The emulated arm has no play: of the drawn errors, those of camera and ball are there.
+    pub(crate) fn chain(
+        level: ErrorLevel,
+        seed: u64,
+        detector: BallDetector,
+    ) -> Result<Self, Box<dyn Error>> {
+        let rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
+        let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let wrong = errors.apply(&rig.cell().get())?;
+        rig.cell().with(|cell| *cell = wrong);
+        Ok(Self::Chain(Box::new(Chain {
+            rig,
+            detector: detector.build(seed)?,
+            workspace: Workspace::paper(),
+        })))
+    }
+
+    pub(crate) fn search_poses(&self) -> [Joints; 6] {
+        match self {
+            Self::Shortcut(cell) => cell.search_poses(),
+            Self::Chain(chain) => chain.workspace.search_poses(),
+        }
+    }
+
+    /// Lets `agent` go for the ball that `seed` places; `None` if no ball can be seen.
+    pub(crate) fn run<C: Controller>(
+        &mut self,
+        agent: &mut Agent<C>,
+        seed: u64,
+        observe: &mut dyn FnMut(&Event<'_>),
+    ) -> Result<Option<Trial>, Box<dyn Error>> {
+        match self {
+            Self::Shortcut(cell) => {
+                let result = cell.run(agent, seed, &mut |_, _| (), observe)?;
+                Ok(result.map(|result| Trial {
+                    outcome: result.outcome,
+                    reached: result.reached,
+                    held: result.held,
+                }))
+            }
+            Self::Chain(chain) => chain.run(agent, seed, observe),
+        }
+    }
+}
+
+impl Chain {
+    fn run<C: Controller>(
+        &mut self,
+        agent: &mut Agent<C>,
+        seed: u64,
+        observe: &mut dyn FnMut(&Event<'_>),
+    ) -> Result<Option<Trial>, Box<dyn Error>> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let cell = self.rig.cell().get();
+        let Some((ball, _)) = self.workspace.sample_seen_ball(&cell, &mut rng) else {
+            return Ok(None);
+        };
+        self.rig.place(&ball);
+        let RigParts { arm, .. } = self.rig.parts();
+        arm.move_to(self.workspace.search_poses()[3])?;
+        let mut reached = false;
+        let outcome = self.rig.run_and_learn(agent, &mut *self.detector, &mut |event| {
+            reached |= event.kind == EventKind::AtGoal;
+            observe(event);
+        })?;
+        let held = outcome.gave_up.is_none() && self.rig.grip_miss() <= GRASP_TOLERANCE;
+        Ok(Some(Trial {
+            outcome,
+            reached,
+            held,
+        }))
+    }
+}

@@ -1,0 +1,279 @@
+//! Another object: an egg, found as an ellipse, reached by the behaviours that were learned for a ball, and gripped across.
+//!
+//! "It is possible to extend the grasping behavior to objects of different shapes, characterizing them uniquely, simply by considering a
+//! different set of features of the images" (section 2.1 of the paper).
+//!
+//! ```text
+//! cargo run --release --example ellipse_object -- --help
+//! ```
+
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for a terminal"
+)]
+
+use std::cell::Cell;
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::rc::Rc;
+
+use clap::Parser;
+use grasp_agent::{
+    Agent, AgentConfig, BehaviourPair, CameraEye, Consequence, Controller, EggFeatures, EggLimits, EventKind,
+    GaveUp, JointLimits, Learned, ObjectFeatures, Percept, Sighting, Situation,
+};
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse};
+use nalgebra::Vector3;
+use pipeline_sim::{ReachForm, Workspace, sample_moves};
+use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts};
+use puma_val2::{JointDelta, Joints};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+use egg::{Egg, EggCamera};
+use files::{writable_folder, write_png};
+use overlay::Overlay;
+
+#[path = "ellipse_object/egg.rs"]
+mod egg;
+#[allow(dead_code, reason = "shared with the examples that write other files")]
+mod files;
+#[allow(dead_code, reason = "shared with the examples that draw circles")]
+mod overlay;
+
+/// Find, reach and grip eggs through rendered frames, ellipse detection and VAL II.
+///
+/// The behaviours are learned for a ball that is as thick as the egg; in the place of its radius the controller is told the shorter half-axis
+/// of the egg's outline. For the grip the hand is turned so that the jaws close across the egg.
+#[derive(Parser, Debug)]
+struct Options {
+    /// Folder for a picture of each egg as it was seen last
+    #[arg(long, value_name = "DIR", default_value = "out/egg")]
+    out: PathBuf,
+
+    /// Seed of everything random
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    seed: u64,
+
+    /// How many eggs to go for
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    runs: usize,
+
+    /// Length of the egg, millimetres; it is 40 thick
+    #[arg(long, value_name = "MM", default_value_t = 56.0, value_parser = length)]
+    length: f64,
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(length) if (40.0..=80.0).contains(&length) => Ok(length),
+        _ => Err("a length of 40 to 80 mm is needed".into()),
+    }
+}
+
+/// From the gripper to the egg's centre: the jaws close on it up to this far, metres.
+const GRASP_TOLERANCE: f64 = 0.010;
+/// How far the jaws may be from closing straight across the egg, degrees.
+const ACROSS_TOLERANCE: f64 = 20.0;
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    writable_folder(&options.out)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
+    let scene = bright_ball_scene();
+    let mut rig = Rig::emulated(false, &scene, options.seed)?;
+    let mut features = Watched {
+        features: egg_features(options.seed)?,
+        outline: Rc::default(),
+    };
+    let workspace = Workspace::paper();
+    let controller = AcrossTheEgg {
+        learned: taught_for_balls(&rig, options.seed, &mut rng)?,
+        outline: Rc::clone(&features.outline),
+    };
+    let agent = Agent::with_controller(AgentConfig::paper(workspace.search_poses()), controller)?;
+
+    let (mut gripped, mut moves) = (0, 0);
+    println!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
+    for run in 1..=options.runs {
+        let (place, _) = workspace
+            .sample_seen_ball(&rig.cell().get(), &mut rng)
+            .ok_or("no place of the workspace is in view from a search pose")?;
+        let egg = Egg {
+            half_length: 0.5e-3 * options.length,
+            heading: rng.random_range(0.0..std::f64::consts::PI),
+        };
+        rig.place(&place);
+        let (cell, pose) = (rig.cell().clone(), rig.pose());
+        let RigParts {
+            camera,
+            arm,
+            mut sensor,
+        } = rig.parts();
+        let mut camera = EggCamera::new(camera, cell, pose, egg, scene.clone(), rng.random());
+        let mut last = None;
+        let outline = Rc::clone(&features.outline);
+        let mut eye = CameraEye::looking_for(&mut camera, &mut features);
+        let outcome = agent.run(&mut eye, arm, &mut *sensor, &mut |event| {
+            if let (EventKind::Seen(_), Some(frame), Some(ellipse)) =
+                (&event.kind, event.frame, outline.get())
+            {
+                last = Some((frame.clone(), ellipse));
+            }
+        })?;
+        // The camera holds the rig until here.
+        drop(eye);
+        drop(camera);
+        let (miss, off) = (rig.grip_miss(), off_across(&rig, &egg));
+        let round = options.length < 44.0;
+        let held = outcome.gave_up.is_none() && miss <= GRASP_TOLERANCE && (round || off <= ACROSS_TOLERANCE);
+        gripped += usize::from(held);
+        moves += if held { outcome.cycles } else { 0 };
+        let seen = outcome.last_seen.map_or("-".into(), |sighting| {
+            let f = sighting.features;
+            format!("{:6.1} {:6.1} {:6.1}", f.x, f.y, f.r)
+        });
+        let result = match outcome.gave_up {
+            Some(reason) => format!("not gripped: {reason}"),
+            None if held => "gripped".into(),
+            None => "not gripped: the jaws closed beside or along it".into(),
+        };
+        println!(
+            "{run:4}  {:5}  {:4}  {seen:<32} {:9.1}  {off:16.1}  {result}",
+            outcome.cycles,
+            outcome.losses,
+            1e3 * miss
+        );
+        if let Some((frame, ellipse)) = last {
+            let mut overlay = Overlay::new(&frame);
+            overlay.closed(|angle| {
+                let (sin, cos) = ellipse.angle.sin_cos();
+                let (u, v) = (ellipse.major * angle.cos(), ellipse.minor * angle.sin());
+                (ellipse.x + cos * u - sin * v, ellipse.y + sin * u + cos * v)
+            });
+            write_png(
+                &options.out.join(format!("egg{run:03}.png")),
+                &overlay.into_image(),
+            )?;
+        }
+    }
+    println!(
+        "\n{gripped} of {} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
+        options.runs,
+        100.0 * gripped as f64 / options.runs.max(1) as f64,
+        moves as f64 / gripped.max(1) as f64,
+        options.out.display()
+    );
+    Ok(())
+}
+
+/// Ellipses among the edges of the frame.
+fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
+    let edges = Canny::new(CannyConfig {
+        low: 20.0,
+        high: 50.0,
+        ..CannyConfig::default()
+    })?;
+    let search = CurveSearch::new(CurveSearchConfig {
+        theta: 0.75,
+        iterations: 200_000,
+        tolerance: 1.0,
+        max_curves: 1,
+        reach: Some(150.0),
+        seed,
+    })?;
+    Ok(EggFeatures::new(
+        edges,
+        search,
+        EggLimits {
+            min_minor: 20.0,
+            max_minor: 272.0,
+            elongation: 2.2,
+        },
+    ))
+}
+
+/// The paper's behaviours, learned for balls.
+fn taught_for_balls(rig: &Rig, seed: u64, rng: &mut Xoshiro256PlusPlus) -> Result<Learned, Box<dyn Error>> {
+    let (centring, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, rng);
+    let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
+    let pair = BehaviourPair::paper_mended();
+    let anywhere: Vec<Percept> = (0..500).map(|_| simulator.start(rng)).collect();
+    let found = search_percepts(500, seed);
+    let centering = learn_best(pair.centering, &simulator, &anywhere, 60_000, rng, &mut |_| ())?;
+    let approaching = learn_best(pair.approaching, &simulator, &found, 500_000, rng, &mut |_| ())?;
+    Ok(Learned::new(centering.behaviour, approaching.behaviour))
+}
+
+/// Features whose ellipse others can look at.
+struct Watched {
+    features: EggFeatures,
+    outline: Rc<Cell<Option<Ellipse>>>,
+}
+
+impl ObjectFeatures for Watched {
+    fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
+        let found = self.features.find(frame);
+        self.outline.set(self.features.outline());
+        found
+    }
+}
+
+/// The learned controller, and a grip that turns the hand by what the outline says.
+#[derive(Clone)]
+struct AcrossTheEgg {
+    learned: Learned,
+    outline: Rc<Cell<Option<Ellipse>>>,
+}
+
+impl Controller for AcrossTheEgg {
+    fn name(&self) -> &str {
+        "learned, gripping across"
+    }
+
+    fn begin(&mut self) {
+        self.learned.begin();
+    }
+
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        self.learned.decide(now, limits)
+    }
+
+    fn judge(&mut self, consequence: &Consequence) {
+        self.learned.judge(consequence);
+    }
+
+    fn arm_at(&mut self, joints: &Joints) {
+        self.learned.arm_at(joints);
+    }
+
+    /// The paper's turn of the fifth joint, and one of the sixth.
+    ///
+    /// The jaws open along the rows of the image, and a turn of `JT6` turns them from x toward y. They shall close along the shorter axis.
+    fn grip(&mut self, _now: &Situation, _limits: &JointLimits) -> Option<JointDelta> {
+        const LONG: f64 = 1.1;
+        let ellipse = self.outline.get().filter(|e| e.major > LONG * e.minor)?;
+        let across = ellipse.angle.to_degrees() + 90.0;
+        let turn = if across > 90.0 { across - 180.0 } else { across };
+        Some(JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.01, turn]))
+    }
+}
+
+/// How far the jaws are from closing straight across the egg, degrees.
+fn off_across(rig: &Rig, egg: &Egg) -> f64 {
+    let hand = rig.cell().get().params.wrist(&(rig.pose())());
+    let along_the_jaws = hand.rotation * Vector3::y();
+    along_the_jaws.dot(&egg.axis()).abs().min(1.0).asin().to_degrees()
+}

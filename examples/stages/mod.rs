@@ -1,0 +1,149 @@
+//! Where the time of a control cycle goes: camera, detector, controller and arm, each with a stopwatch around it.
+
+use std::cell::RefCell;
+use std::fmt;
+use std::rc::Rc;
+use std::time::Duration;
+
+use grasp_agent::{Consequence, Controller, GaveUp, JointLimits, Situation};
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{CircleDetector, Detection, FrameError, FrameSource};
+use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
+
+use crate::cpu::cpu_time;
+
+/// CPU time of this thread and time on the wall, by stage, of all cycles so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Stages(Rc<RefCell<Spent>>);
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Spent {
+    moves: u32,
+    render: Duration,
+    detect: Duration,
+    decide: Duration,
+    serial: Duration,
+    /// While the arm was driven, on the wall.
+    driven: Duration,
+}
+
+impl Stages {
+    fn measured<T>(&self, stage: fn(&mut Spent) -> &mut Duration, work: impl FnOnce() -> T) -> T {
+        let begin = cpu_time();
+        let result = work();
+        *stage(&mut self.0.borrow_mut()) += cpu_time().saturating_sub(begin);
+        result
+    }
+
+    fn driven<T>(&self, work: impl FnOnce() -> T) -> T {
+        let begin = std::time::Instant::now();
+        let result = self.measured(|spent| &mut spent.serial, work);
+        self.0.borrow_mut().driven += begin.elapsed();
+        result
+    }
+}
+
+impl fmt::Display for Stages {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let spent = *self.0.borrow();
+        let each = |time: Duration| 1e3 * time.as_secs_f64() / f64::from(spent.moves.max(1));
+        write!(
+            f,
+            "per move, ms of CPU: edges and circle {:.2}, decision {:.3}, serial line {:.2}; waiting for the arm {:.2} ms; \
+             rendering {:.2} ms of CPU, which a camera would not need ({} moves)",
+            each(spent.detect),
+            each(spent.decide),
+            each(spent.serial),
+            each(spent.driven.saturating_sub(spent.serial)),
+            each(spent.render),
+            spent.moves
+        )
+    }
+}
+
+/// Something with a stopwatch around it.
+#[derive(Clone, Debug)]
+pub(crate) struct Timed<T> {
+    pub(crate) inner: T,
+    pub(crate) stages: Stages,
+}
+
+impl FrameSource for Timed<&mut dyn FrameSource> {
+    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+        self.stages
+            .measured(|spent| &mut spent.render, || self.inner.grab())
+    }
+}
+
+impl CircleDetector for Timed<&mut dyn CircleDetector> {
+    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
+        self.stages
+            .measured(|spent| &mut spent.detect, || self.inner.detect_into(frame, found));
+    }
+}
+
+impl<C: Controller> Controller for Timed<C> {
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        self.stages
+            .measured(|spent| &mut spent.decide, || self.inner.decide(now, limits))
+    }
+
+    fn judge(&mut self, consequence: &Consequence) {
+        self.stages
+            .measured(|spent| &mut spent.decide, || self.inner.judge(consequence));
+    }
+
+    fn arm_at(&mut self, joints: &Joints) {
+        self.inner.arm_at(joints);
+    }
+
+    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        self.stages
+            .measured(|spent| &mut spent.decide, || self.inner.grip(now, limits))
+    }
+
+    fn begin(&mut self) {
+        self.inner.begin();
+    }
+
+    fn end(&mut self) {
+        self.stages
+            .measured(|spent| &mut spent.decide, || self.inner.end());
+    }
+}
+
+impl Timed<&mut dyn Manipulator> {
+    fn moved(
+        &mut self,
+        order: impl FnOnce(&mut dyn Manipulator) -> Result<Joints, ArmError>,
+    ) -> Result<Joints, ArmError> {
+        self.stages.0.borrow_mut().moves += 1;
+        self.stages.driven(|| order(&mut *self.inner))
+    }
+}
+
+impl Manipulator for Timed<&mut dyn Manipulator> {
+    fn joints(&mut self) -> Result<Joints, ArmError> {
+        self.stages.driven(|| self.inner.joints())
+    }
+
+    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        self.moved(|arm| arm.move_by(delta))
+    }
+
+    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
+        self.moved(|arm| arm.move_to(target))
+    }
+
+    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+        self.stages.driven(|| self.inner.set_gripper(gripper))
+    }
+
+    fn stop(&mut self) -> Result<(), ArmError> {
+        self.inner.stop()
+    }
+}

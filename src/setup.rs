@@ -1,0 +1,157 @@
+//! What the programs and tests of this package have in common: detectors by name, set for the camera on the hand, and a scene.
+
+use std::fmt;
+use std::str::FromStr;
+
+use hough_heuristic::{
+    Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, Heuristic, HeuristicConfig, RandomizedHough,
+    RandomizedHoughConfig, StandardHough, StandardHoughConfig,
+};
+use pipeline_sim::{Scene, Shape};
+
+/// A way of finding the ball in frames of the camera on the hand.
+///
+/// This is the one place that knows which there are: what is in [`BallDetector::ALL`] can be named on every command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum BallDetector {
+    /// Three random edge pixels, belonging against a threshold: the paper's.
+    #[default]
+    Heuristic,
+    /// The randomized Hough transform.
+    RandomizedHough,
+    /// The standard Hough transform, voting along the gradient; some seconds a frame.
+    StandardHough,
+}
+
+/// Radii of the ball's outline, pixels of the camera's frame: 5 to 68 feature units.
+const RADII: (f64, f64) = (20.0, 272.0);
+
+/// The belonging that a circle must exceed.
+const THETA: f64 = 0.6;
+
+impl BallDetector {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Heuristic, Self::RandomizedHough, Self::StandardHough];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Heuristic => "heuristic",
+            Self::RandomizedHough => "rht",
+            Self::StandardHough => "sht",
+        }
+    }
+
+    /// The detector, set for the ball of 20 mm radius in frames of 768x576 pixels. `seed` is that of its draws, if it has any.
+    ///
+    /// # Errors
+    /// None for the settings that are made here; the type says that others could.
+    pub fn build(self, seed: u64) -> Result<Box<dyn CircleDetector + Send>, ConfigError> {
+        let accept = Acceptance {
+            theta: THETA,
+            min_radius: RADII.0,
+            max_radius: RADII.1,
+            ..Acceptance::default()
+        };
+        Ok(match self {
+            Self::Heuristic => {
+                let config = HeuristicConfig {
+                    theta: THETA,
+                    min_radius: RADII.0,
+                    max_radius: RADII.1,
+                    seed,
+                    ..HeuristicConfig::default()
+                };
+                Box::new(Heuristic::new(config, weak_edges()?)?)
+            }
+            Self::RandomizedHough => {
+                let config = RandomizedHoughConfig {
+                    accept,
+                    seed,
+                    ..RandomizedHoughConfig::default()
+                };
+                Box::new(RandomizedHough::new(config, weak_edges()?)?)
+            }
+            Self::StandardHough => {
+                let config = StandardHoughConfig {
+                    accept,
+                    gradient: true,
+                    ..StandardHoughConfig::default()
+                };
+                Box::new(StandardHough::new(config, weak_edges()?)?)
+            }
+        })
+    }
+}
+
+/// The shaded side of the ball is hardly brighter than the table: edges must be taken that are weaker than usual.
+fn weak_edges() -> Result<Canny, ConfigError> {
+    Canny::new(CannyConfig {
+        low: 20.0,
+        high: 50.0,
+        ..CannyConfig::default()
+    })
+}
+
+impl fmt::Display for BallDetector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for BallDetector {
+    type Err = UnknownDetector;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|detector| detector.name() == text)
+            .ok_or_else(|| UnknownDetector(text.into()))
+    }
+}
+
+/// A name that no detector has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no detector {0:?}; there are {names}", names = BallDetector::ALL.map(BallDetector::name).join(", "))]
+pub struct UnknownDetector(String);
+
+/// A bright ball over a dark wooden table with boxes and tape on it.
+///
+/// Nothing else in the scene is round: seen straight on, a disc on the table cannot be told from a ball by its outline.
+pub fn bright_ball_scene() -> Scene {
+    let mut scene = Scene::laboratory();
+    (scene.table.albedo, scene.table.texture) = (0.20, 0.30);
+    scene
+        .things
+        .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
+    for thing in &mut scene.things {
+        thing.look.albedo *= 0.5;
+    }
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hough_heuristic::Features;
+    use pipeline_sim::{Ball, Cell, Renderer, Workspace};
+
+    #[test]
+    fn every_detector_goes_by_its_name_and_finds_the_ball() {
+        let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
+        let pose = Workspace::paper().search_poses()[3];
+        let truth = cell.features(&pose).expect("the ball is in view");
+        let mut renderer = Renderer::new(&bright_ball_scene(), 1);
+        let frame = renderer.render(&cell, &pose);
+        for kind in BallDetector::ALL {
+            assert_eq!(kind.to_string().parse(), Ok(kind));
+            let found = kind.build(1).expect("valid settings").detect(frame);
+            let seen = Features::from_circle(&found[0].circle, frame.width());
+            let off = (seen.x - truth.x).hypot(seen.y - truth.y) + (seen.r - truth.r).abs();
+            assert!(off < 0.5, "{kind}: {seen:?} for {truth:?}");
+        }
+        let unknown = "houhg".parse::<BallDetector>().expect_err("no such detector");
+        assert!(unknown.to_string().contains("rht"), "{unknown}");
+    }
+}
