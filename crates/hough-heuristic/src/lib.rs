@@ -94,7 +94,7 @@ pub use sampling::Sampling;
 #[cfg(feature = "files")]
 pub use stages::{StageError, write_stages};
 pub use standard_hough::{StandardHough, StandardHoughConfig};
-pub use trusted::{Trusted, TrustedConfig};
+pub use trusted::{Effort, Measurement, Trusted, TrustedConfig};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -43,6 +43,12 @@ impl EdgeGradient {
         (along * f64::from(dx), along * f64::from(dy))
     }
 
+    /// Squared length, in units of its own.
+    #[inline]
+    pub(crate) fn square(&self) -> i32 {
+        self.squares[1]
+    }
+
     /// The gradient in units of its own, and the [`offset`](EdgeGradient::offset), in single precision.
     #[inline]
     pub(crate) fn level_geometry(&self) -> (f32, f32, f32, f32) {

@@ -12,6 +12,7 @@ pub(crate) struct Maxima {
     rows: Rows,
     marks: Vec<u8>,
     candidates: Vec<Candidate>,
+    squares: Vec<i32>,
 }
 
 impl Maxima {
@@ -28,6 +29,7 @@ impl Maxima {
             rows: Rows::default(),
             marks: Vec::new(),
             candidates: Vec::new(),
+            squares: Vec::new(),
         }
     }
 
@@ -36,8 +38,9 @@ impl Maxima {
         self.noise_gain
     }
 
-    /// The maxima above `threshold`, in grey levels of Sobel's gradient, row by row; none in a frame below 3x3.
-    pub(crate) fn find(&mut self, grey: &[u8], width: usize, threshold: f32) -> &[Candidate] {
+    /// The maxima above `threshold`, in grey levels of Sobel's gradient, row by row, and of more than `most` only the strongest; none in a
+    /// frame below 3x3.
+    pub(crate) fn find(&mut self, grey: &[u8], width: usize, threshold: f32, most: usize) -> &[Candidate] {
         self.candidates.clear();
         let height = grey.len().checked_div(width).unwrap_or(0);
         if width >= 3 && height >= 3 {
@@ -52,6 +55,14 @@ impl Maxima {
                 &mut self.marks,
                 &mut self.candidates,
             );
+        }
+        if self.candidates.len() > most {
+            self.squares.clear();
+            self.squares
+                .extend(self.candidates.iter().map(|candidate| candidate.gradient.square()));
+            let rank = self.squares.len() - most;
+            let (_, &mut least, _) = self.squares.select_nth_unstable(rank);
+            self.candidates.retain(|candidate| candidate.gradient.square() >= least);
         }
         &self.candidates
     }

@@ -1,7 +1,11 @@
 //! Circles that passed the first looks, waiting for a closer one.
 
 use super::polar::Ring;
+use super::proof::log10;
 use super::search::{Budget, Support};
+
+/// How often a circle is met before it is passed by.
+const MEETINGS: u32 = 3;
 
 /// A circle found at some level, in pixels of the frame.
 #[derive(Clone, Copy, Debug)]
@@ -31,11 +35,7 @@ impl Candidate {
             support,
             tried: false,
             met: 0,
-            weight: {
-                let n = (ring.r * super::tune(21, 2.0)).min(32.0) * support.visible as f32 / 32.0;
-                let (q, p) = (support.share().min(0.999), super::tune(22, 0.2));
-                n * (q * (q / p).ln() + (1.0 - q) * ((1.0 - q) / (1.0 - p)).ln())
-            },
+            weight: weight(ring.r, support),
         }
     }
 
@@ -50,8 +50,18 @@ impl Candidate {
 
     fn near(&self, other: &Self) -> bool {
         let off = (self.x - other.x).abs() + (self.y - other.y).abs() + (self.r - other.r).abs();
-        off < super::tune(8, 0.12) * self.r.min(other.r) + 1.0 * self.scale.min(other.scale)
+        off < 0.12 * self.r.min(other.r) + 1.0 * self.scale.min(other.scale)
     }
+}
+
+/// The divergence of what the outline shows from what chance would, over all of the outline.
+fn weight(r: f32, support: Support) -> f32 {
+    let independent = (2.0 * r).min(32.0) * support.visible as f32 / 32.0;
+    let (share, chance) = (support.share().min(0.999), 0.2);
+    if share <= 0.0 {
+        return 0.0;
+    }
+    independent * (share * log10(share / chance) + (1.0 - share) * log10((1.0 - share) / (1.0 - chance)))
 }
 
 /// The candidates of a frame.
@@ -74,7 +84,7 @@ impl Collected {
         let known = self.candidates.iter_mut().find(|known| known.near(circle));
         known.is_some_and(|known| {
             known.met += 1;
-            known.met > super::tune(41, 3.0) as u32
+            known.met > MEETINGS
         })
     }
 

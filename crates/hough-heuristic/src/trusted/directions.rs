@@ -81,8 +81,8 @@ pub(super) fn code(x: f32, y: f32) -> u8 {
 }
 
 /// How far apart two codes are, 0..=32.
-#[inline]
-pub(super) fn apart(a: u8, b: u8) -> u8 {
+#[cfg(test)]
+fn apart(a: u8, b: u8) -> u8 {
     let difference = a.wrapping_sub(b) % CODES;
     difference.min(CODES - difference)
 }

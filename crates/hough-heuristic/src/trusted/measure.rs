@@ -16,10 +16,31 @@ pub(super) struct Measured {
     pub(super) sin2: f32,
 }
 
+impl Measured {
+    /// A circle that was not measured, known to a fraction of a pixel of the size it was proven at.
+    pub(super) fn roughly(ring: Ring, scale: f32) -> Self {
+        Self {
+            ring,
+            centre_error: 0.5 * scale,
+            radius_error: 0.5 * scale,
+            ..Self::default()
+        }
+    }
+
+    /// Shortest by longest diameter.
+    pub(super) fn axis_ratio(&self) -> f32 {
+        let flattening = (self.cos2 * self.cos2 + self.sin2 * self.sin2).sqrt() / self.ring.r;
+        ((1.0 - flattening) / (1.0 + flattening)).clamp(0.0, 1.0)
+    }
+}
+
 /// The most directions.
 const MOST: usize = 256;
 /// How far on either side of the outline edges are sought, pixels.
 const REACH: usize = 4;
+
+/// How often the circle is fitted at the full size.
+const ROUNDS: usize = 3;
 
 /// The steepest place along each ray.
 struct Steepest {
@@ -52,13 +73,13 @@ pub(super) fn measure<'a>(
         let count = rays.x.len();
         let arc = measured.ring.r * std::f32::consts::TAU / count as f32;
         // Averaged along the outline over a length that grows with the noise.
-        let length = (super::tune(30, 0.35) * noise).clamp(super::tune(31, 1.0), (0.3 * measured.ring.r).max(1.0));
+        let length = (0.35 * noise).clamp(1.0, (0.3 * measured.ring.r).max(1.0));
         let half = ((0.5 * length / arc) as usize).min(8);
-        let rounds = if last { super::tune(32, 3.0) as usize } else { 1 };
+        let rounds = if last { ROUNDS } else { 1 };
         for round in 0..rounds {
-            let reach = if round == 0 { REACH } else { super::tune(33, 3.0) as usize };
+            let reach = if round == 0 { REACH } else { 3 };
             polar.sample(frame, rays, &measured.ring, reach.min(measured.ring.r as usize), half);
-            let focus = if round == 0 { 4.0 } else { super::tune(34, 2.5) };
+            let focus = if round == 0 { 4.0 } else { 2.5 };
             let steepest = Steepest::on(polar, focus);
             let step = steepest.fit(rays.x, rays.y, focus)?;
             measured.ring.x += step.x;
@@ -125,12 +146,12 @@ fn limb_shift(
         whole.iter_mut().zip(profile).for_each(|(sum, part)| *sum += part);
     }
     let visible: f32 = used.iter().sum();
-    let common = shift_of(&whole[..steps], super::tune(37, 6.0) * noise * visible.sqrt()).unwrap_or(0.0);
+    let common = shift_of(&whole[..steps], 6.0 * noise * visible.sqrt()).unwrap_or(0.0);
     let mut moments = Moments::default();
     for block in 0..count / LANES {
         let sector = block * LANES * SECTORS / count;
-        let own = shift_of(&profiles[sector][..steps], super::tune(38, 12.0) * noise * used[sector].sqrt());
-        let shift = if super::tune(39, 1.0) > 0.0 { own.unwrap_or(common) } else { common };
+        let own = shift_of(&profiles[sector][..steps], 12.0 * noise * used[sector].sqrt());
+        let shift = own.unwrap_or(common);
         let weight = if used[sector] > 0.0 { 1.0 } else { 0.0 };
         let (ux, uy) = (&rays.x.as_chunks().0[block], &rays.y.as_chunks().0[block]);
         moments.add(ux, uy, &[shift; LANES], &[weight; LANES]);
@@ -180,7 +201,7 @@ impl Steepest {
             for step in 0..polar.steps {
                 let off = polar.distance(step as f32) / (focus + 1.5);
                 let strength = slope(step) * (1.0 - off * off).max(0.0)
-                    - super::tune(35, 0.5) * polar.along[step * count + ray].abs();
+                    - 0.5 * polar.along[step * count + ray].abs();
                 if strength > best {
                     (best, at) = (strength, step);
                 }
@@ -195,7 +216,7 @@ impl Steepest {
                 }
             }
             steepest.distance[ray] = polar.distance(place);
-            steepest.weight[ray] = if best > 0.0 { here.min(super::tune(36, 30.0)) } else { 0.0 };
+            steepest.weight[ray] = if best > 0.0 { here.min(30.0) } else { 0.0 };
         }
         steepest
     }

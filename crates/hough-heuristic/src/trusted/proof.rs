@@ -9,6 +9,9 @@ const RAYS: usize = 64;
 /// How far on either side of the outline the strongest edge is sought, pixels.
 const REACH: usize = 6;
 
+/// Fewer rays than these do not make a circle.
+const LEAST_NEAR: usize = 20;
+
 /// What a candidate proved to be.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Proof {
@@ -18,9 +21,32 @@ pub(super) struct Proof {
     pub(super) certainty: f32,
     /// How many times the frame was halved for the proof.
     pub(super) depth: usize,
-    /// Features, for development.
-    pub(super) features: [f32; 8],
+    /// Share of the outline in the frame whose strongest edge lies on the outline.
+    pub(super) covered: f32,
+    /// Share of the outline that lies in the frame.
+    pub(super) visible: f32,
 }
+
+impl Proof {
+    /// Whether it explains the edge points on it.
+    pub(super) fn is_beyond_doubt(&self) -> bool {
+        self.certainty >= 6.0
+    }
+
+    /// The circle in pixels of the frame.
+    pub(super) fn in_frame(&self) -> Ring {
+        self.ring.grown((1 << self.depth) as f32)
+    }
+
+    /// 0..1: the certainty, so that a number of false alarms of 1 in 10000 frames gives one half.
+    pub(super) fn score(&self) -> f64 {
+        let certainty = f64::from(self.certainty.max(0.0));
+        certainty / (certainty + HALF_SURE)
+    }
+}
+
+/// The certainty that gives a score of one half.
+const HALF_SURE: f64 = 4.0;
 
 /// What the proof needs to know of the level.
 #[derive(Clone, Copy, Debug)]
@@ -130,7 +156,7 @@ pub(super) fn prove(
             let (dx, dy) = (better.x - other.x, better.y - other.y);
             (dx * dx + dy * dy).sqrt() + (better.r - other.r).abs()
         };
-        if near < super::tune(20, 20.0) as usize || !(apart(&start) <= 6.0 && better.r >= 3.0) {
+        if near < LEAST_NEAR || !(apart(&start) <= 6.0 && better.r >= 3.0) {
             return None;
         }
         let moved = apart(&ring);
@@ -198,21 +224,13 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting) -> Proof {
             .zip(&edges.slope)
             .filter(|&edge| on(edge))
             .count();
-        let p = (2.0 * slack + super::tune(9, 0.2)) / polar.steps as f32;
+        let p = (2.0 * slack + 0.2) / polar.steps as f32;
         let share = hits as f32 / visible.max(1.0);
         let certainty = independent * divergence(share, p) - setting.tests;
         if certainty > best.certainty {
             best.certainty = certainty;
-            best.features = [
-                share,
-                slack,
-                visible / RAYS as f32,
-                independent,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            ];
+            best.covered = share;
+            best.visible = visible / RAYS as f32;
         }
     }
     best
@@ -223,6 +241,43 @@ fn divergence(share: f32, p: f32) -> f32 {
     if share <= p {
         return 0.0;
     }
-    let term = |q: f32, p: f32| if q > 0.0 { q * (q / p).log10() } else { 0.0 };
+    let term = |q: f32, p: f32| if q > 0.0 { q * log10(q / p) } else { 0.0 };
     term(share, p) + term(1.0 - share, 1.0 - p)
+}
+
+/// The decimal logarithm of a normal number above 0, by the four operations alone: the same bits on every machine.
+pub(super) fn log10(x: f32) -> f32 {
+    let bits = f64::from(x).to_bits();
+    let exponent = (bits >> 52) as i64 - 1023;
+    // The mantissa, 1..2.
+    let m = f64::from_bits((bits & ((1 << 52) - 1)) | (1023 << 52));
+    // ln m = 2 artanh z, with z up to 1/3.
+    let z = (m - 1.0) / (m + 1.0);
+    let mut power = z;
+    let mut sum = 0.0;
+    for k in 0..14 {
+        sum += power / f64::from(2 * k + 1);
+        power *= z * z;
+    }
+    let natural = 2.0 * sum + exponent as f64 * std::f64::consts::LN_2;
+    (natural * std::f64::consts::LOG10_E) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logarithms_are_those_of_the_library() {
+        for x in [1e-30f32, 0.001, 0.3, 0.999, 1.0, 1.5, 1.999, 2.0, 10.0, 1e7] {
+            assert!((log10(x) - x.log10()).abs() <= 1e-6 * x.log10().abs().max(1.0), "{x}");
+        }
+    }
+
+    #[test]
+    fn only_more_than_expected_is_evidence() {
+        assert!(divergence(0.1, 0.2) <= 0.0 && divergence(0.2, 0.2) <= 0.0);
+        assert!((divergence(1.0, 0.1) - 1.0).abs() < 1e-6);
+        assert!(divergence(0.6, 0.1) > divergence(0.5, 0.1));
+    }
 }

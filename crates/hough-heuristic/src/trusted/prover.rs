@@ -6,8 +6,14 @@ use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Grey, Polar, Ring};
 use super::proof::{self, Proof, Setting};
-use super::{tune};
 use crate::edges::{Vectorized, widest};
+
+/// From this radius on a circle is proven at half the size, pixels.
+const LARGE: f32 = 24.0;
+/// In noise, from this radius on.
+const SMALL: f32 = 9.0;
+/// What noise that is, grey levels.
+const NOISY: f32 = 8.0;
 
 /// The frame and its halves.
 #[derive(Clone, Copy, Debug)]
@@ -74,18 +80,16 @@ impl Prover<'_> {
                 tests: self.tests,
             },
         });
-        let mut proof = proof?;
-        proof.depth = depth;
-        let ring = proof.ring.grown(scale);
+        let proof = Proof { depth, ..proof? };
         self.proofs.push(proof);
-        (proof.certainty >= tune(28, 6.0)).then_some(ring)
+        proof.is_beyond_doubt().then(|| proof.in_frame())
     }
 
     /// How many times the frame is to be halved for a circle of this radius.
     fn depth_for(&self, mut r: f32) -> usize {
         let mut depth = 0;
         while depth < self.pyramid.depth()
-            && (r >= tune(11, 24.0) || (r >= tune(25, 9.0) && self.noise > tune(12, 8.0) * (1 << depth) as f32))
+            && (r >= LARGE || (r >= SMALL && self.noise > NOISY * (1 << depth) as f32))
         {
             depth += 1;
             r *= 0.5;

@@ -1,11 +1,13 @@
 //! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps 3a to 3c.
 
+use std::time::Instant;
+
 use super::candidate::{Candidate, Collected};
 use super::directions::{CODES, UnitCircle, code};
+use super::fit::Moments;
 use super::level::{EDGE, Level, Lines};
 use super::polar::{LANES, Ring};
 use super::prover::Prover;
-use super::tune;
 
 /// Points of a circle's outline that are looked at.
 pub(super) const LOOKS: usize = 32;
@@ -13,6 +15,8 @@ pub(super) const LOOKS: usize = 32;
 pub(super) const DIRECTION_SLACK: u8 = 7;
 /// The least part of a normal along the line that the pair lies on.
 const LEAST_ALONG: f32 = 0.58;
+/// What a proof costs, in looks.
+pub(super) const PROOF: u64 = 400;
 /// How many mirrored partners of a point are tried.
 const PARTNERS: usize = 6;
 
@@ -31,19 +35,31 @@ impl Support {
     }
 }
 
+/// Looks that a draw takes at most, in the mean.
+const LOOKS_PER_DRAW: u64 = 25;
+
 /// What may be spent, and what has been.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Budget {
     pub(super) draws: u64,
-    pub(super) passed: u64,
-    pub(super) added: u64,
     pub(super) looks: u64,
-    pub(super) most_looks: u64,
+    pub(super) most_draws: u64,
+    pub(super) deadline: Option<Instant>,
+    pub(super) spent: bool,
 }
 
 impl Budget {
-    pub(super) fn is_spent(&self) -> bool {
-        self.looks >= self.most_looks
+    /// Whether no more may be drawn; once it is spent it remains so.
+    #[inline(always)]
+    pub(super) fn is_spent(&mut self) -> bool {
+        self.spent |= self.draws >= self.most_draws || self.looks >= LOOKS_PER_DRAW * self.most_draws + 10_000;
+        self.spent
+    }
+
+    /// Looks at the clock, if there is one to be looked at.
+    pub(super) fn is_late(&mut self) -> bool {
+        self.spent |= self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        self.spent
     }
 }
 
@@ -129,50 +145,54 @@ impl Outline {
         reach: f32,
         looks: &mut u64,
     ) -> Option<(Ring, Support)> {
-        let mut normal = Normal::default();
         let mut support = Support::default();
-        let mut points = [(0.0f32, 0.0f32); LOOKS];
-        let mut count = 0;
+        let (mut dx, mut dy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let (mut ux, mut uy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let (mut residual, mut weight) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
         for index in 0..LOOKS {
-            let (ux, uy, lowest) = (self.x[index], self.y[index], self.lowest[index]);
+            let (x, y, lowest) = (self.x[index], self.y[index], self.lowest[index]);
             let mut inside = false;
             for step in [0.0, -1.5, 1.5] {
                 *looks += 1;
                 let at = ring.r + step;
-                let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy) else {
+                let Some((mark, pixel)) = level.mark(ring.x + at * x, ring.y + at * y) else {
                     continue;
                 };
                 inside = true;
                 if !runs_along(mark, lowest) {
                     continue;
                 }
-                let (point_x, point_y) = level.point_at(pixel);
-                let (dx, dy) = (point_x - ring.x, point_y - ring.y);
-                let distance = (dx * dx + dy * dy).sqrt();
-                let residual = distance - ring.r;
-                if residual.abs() <= reach && distance > 0.5 {
-                    normal.add(dx / distance, dy / distance, residual, 1.0);
-                    points[count] = (dx, dy);
-                    count += 1;
+                let point = level.point_at(pixel);
+                (dx[index], dy[index]) = (point.0 - ring.x, point.1 - ring.y);
+                let distance = (dx[index] * dx[index] + dy[index] * dy[index]).sqrt();
+                let off = distance - ring.r;
+                if off.abs() <= reach && distance > 0.5 {
+                    (ux[index], uy[index]) = (dx[index] / distance, dy[index] / distance);
+                    (residual[index], weight[index]) = (off, 1.0);
                     break;
                 }
             }
             support.visible += u32::from(inside);
         }
-        let (dx, dy, dr) = normal.solve()?;
-        if dx.abs() + dy.abs() + dr.abs() > 3.0 * reach {
+        let mut moments = Moments::default();
+        for block in 0..LOOKS / LANES {
+            let of = |values: &[f32; LOOKS]| values.as_chunks::<LANES>().0[block];
+            moments.add(&of(&ux), &of(&uy), &of(&residual), &of(&weight));
+        }
+        let shift = moments.step()?;
+        if !(shift.x.abs() + shift.y.abs() + shift.r.abs() <= 3.0 * reach) {
             return None;
         }
         let fitted = Ring {
-            x: ring.x + dx,
-            y: ring.y + dy,
-            r: ring.r + dr,
+            x: ring.x + shift.x,
+            y: ring.y + shift.y,
+            r: ring.r + shift.r,
         };
-        let slack = tune(23, 0.7) + 0.02 * fitted.r;
-        for (px, py) in &points[..count] {
-            let (x, y) = (px - dx, py - dy);
+        let slack = 0.7 + 0.02 * fitted.r;
+        for index in 0..LOOKS {
+            let (x, y) = (dx[index] - shift.x, dy[index] - shift.y);
             let off = (x * x + y * y).sqrt() - fitted.r;
-            support.hits += u32::from(off.abs() <= slack);
+            support.hits += u32::from(weight[index] > 0.0 && off.abs() <= slack);
         }
         Some((fitted, support))
     }
@@ -200,54 +220,6 @@ impl Outline {
 #[inline]
 fn runs_along(mark: u8, lowest: u8) -> bool {
     mark & EDGE != 0 && mark.wrapping_sub(lowest) % CODES <= 2 * DIRECTION_SLACK
-}
-
-/// Least squares of `residual = dr + ux dx + uy dy`.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Normal {
-    pub(super) n: f32,
-    ux: f32,
-    uy: f32,
-    uxx: f32,
-    uxy: f32,
-    uyy: f32,
-    d: f32,
-    dx: f32,
-    dy: f32,
-}
-
-impl Normal {
-    #[inline]
-    pub(super) fn add(&mut self, ux: f32, uy: f32, residual: f32, weight: f32) {
-        self.n += weight;
-        self.ux += weight * ux;
-        self.uy += weight * uy;
-        self.uxx += weight * ux * ux;
-        self.uxy += weight * ux * uy;
-        self.uyy += weight * uy * uy;
-        self.d += weight * residual;
-        self.dx += weight * residual * ux;
-        self.dy += weight * residual * uy;
-    }
-
-    pub(super) fn solve(&self) -> Option<(f32, f32, f32)> {
-        let n = self.n;
-        if n <= 0.0 {
-            return None;
-        }
-        let uxx = self.uxx - self.ux * self.ux / n;
-        let uxy = self.uxy - self.ux * self.uy / n;
-        let uyy = self.uyy - self.uy * self.uy / n;
-        let dx = self.dx - self.ux * self.d / n;
-        let dy = self.dy - self.uy * self.d / n;
-        let determinant = uxx * uyy - uxy * uxy;
-        if determinant < 1e-3 * n * n {
-            return None;
-        }
-        let x = (dx * uyy - dy * uxy) / determinant;
-        let y = (dy * uxx - dx * uxy) / determinant;
-        Some((x, y, (self.d - self.ux * x - self.uy * y) / n))
-    }
 }
 
 /// Everything the search of a level needs.
@@ -279,6 +251,9 @@ impl Search<'_> {
             let mut line = (self.seed % lines.max(1) as u64) as usize;
             for _ in 0..lines {
                 line = (line + stride) % lines;
+                if budget.is_late() {
+                    return;
+                }
                 let points = level.line(transposed, line);
                 let line_end = points.end;
                 for at in points {
@@ -340,18 +315,17 @@ impl Search<'_> {
         budget.draws += 1;
         let Some(_) = self
             .outline
-            .support(level, &ring, tune(0, 0.5), &mut budget.looks)
+            .support(level, &ring, 0.5, &mut budget.looks)
         else {
             return false;
         };
-        budget.passed += 1;
         // The same circle is met again and again; a few fits from different pairs are enough.
         if found.is_known(&Candidate::new(&ring, self.scale, Support::default()), budget) {
             return false;
         }
         // Fit until it rests.
         let (mut ring, mut support) = (ring, Support::default());
-        for round in 0..tune(14, 6.0) as u32 {
+        for round in 0..6 {
             let reach = if round < 2 { 3.0 } else { 2.0 };
             let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
                 break;
@@ -362,24 +336,23 @@ impl Search<'_> {
             }
             let moved = (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
             (ring, support) = (fitted, now);
-            if moved < tune(42, 0.15) {
+            if moved < 0.15 {
                 break;
             }
         }
-        if support.share() < tune(1, 0.4) || support.visible < LOOKS as u32 / 3 {
+        if support.share() < 0.4 || support.visible < LOOKS as u32 / 3 {
             return false;
         }
-        budget.added += 1;
         let candidate = Candidate::new(&ring, self.scale, support);
         let Some(place) = found.add(candidate, budget) else {
             return false;
         };
-        if support.share() < tune(4, 0.7) {
+        if support.share() < 0.7 {
             return false;
         }
         // Likely enough to be proven at once; what is proven beyond doubt takes its points along.
         found.candidates[place].tried = true;
-        budget.looks += tune(27, 400.0) as u64;
+        budget.looks += PROOF;
         let Some(proven) = prover.prove(&candidate) else {
             return false;
         };
