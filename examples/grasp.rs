@@ -19,7 +19,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, Learned, Outcome, Percept,
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, Learned, OnlineLearning,
+    Outcome, Percept,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -37,6 +38,7 @@ use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
 use stages::{Stages, Timed};
 
+mod cpu;
 mod files;
 #[path = "grasp/options.rs"]
 mod options;
@@ -116,11 +118,16 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         ..AgentConfig::paper(workspace.search_poses())
     };
     let stages = Stages::default();
+    let learned = Learned::new(taught.centering, taught.approaching);
     let learned = Timed {
-        inner: Learned::new(taught.centering, taught.approaching),
+        inner: if options.keep_learning {
+            learned.learning(OnlineLearning::careful(options.seed))
+        } else {
+            learned
+        },
         stages: stages.clone(),
     };
-    let agent = Agent::with_controller(config, learned)?;
+    let mut agent = Agent::with_controller(config, learned)?;
     let mut records = Vec::new();
     let mut sheet = ContactSheet::default();
     // What has been done until a fault is worth keeping.
@@ -131,15 +138,19 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             .sample_seen_ball(&rig.cell().get(), &mut rng)
             .ok_or("no place of the workspace is in view from a search pose")?;
         let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
-        let done = reach_for(&agent, &mut rig, &mut *detector, &ball, &mut |event| match record
-            .note(run, event)
-        {
-            Some(picture) => {
-                sheet.add(&picture);
-                frames.write(&picture)
-            }
-            None => Ok(()),
-        });
+        let done = reach_for(
+            &mut agent,
+            &mut rig,
+            &mut *detector,
+            &ball,
+            &mut |event| match record.note(run, event) {
+                Some(picture) => {
+                    sheet.add(&picture);
+                    frames.write(&picture)
+                }
+                None => Ok(()),
+            },
+        );
         match done {
             Ok(outcome) => {
                 if outcome.gave_up.is_none() {
@@ -157,6 +168,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         }
     }
     bar.finish_and_clear();
+    if options.keep_learning {
+        // Also what was learned in a run that was broken off.
+        let (centering, approaching) = agent.into_controller().inner.into_behaviours();
+        for behaviour in [&centering, &approaching] {
+            behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
+        }
+    }
 
     let summary = Summary::new(options.seed, training, &records);
     write_results(&options.out, &summary, &records, &sheet)?;
@@ -300,14 +318,14 @@ fn teach(
 
 /// One run: places the ball and lets the agent go for it. What `observe` cannot write ends the run's pictures, not the run.
 fn reach_for(
-    agent: &Agent<Timed<Learned>>,
+    agent: &mut Agent<Timed<Learned>>,
     rig: &mut Rig,
     detector: &mut dyn CircleDetector,
     ball: &Ball,
     observe: &mut dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>>,
 ) -> Result<Outcome, Box<dyn Error>> {
     rig.place(ball);
-    let stages = &agent.controller().stages;
+    let stages = agent.controller().stages.clone();
     let RigParts {
         camera,
         arm,
@@ -329,7 +347,7 @@ fn reach_for(
     );
     let mut written = Ok(());
     let mut eye = CameraEye::new(&mut camera, &mut detector);
-    let outcome = agent.run(&mut eye, &mut arm, &mut *sensor, &mut |event| {
+    let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
         if written.is_ok() {
             written = observe(event);
         }

@@ -17,22 +17,31 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{Agent, AgentConfig, BehaviourSpec, EventKind, Learned, Reward};
+use grasp_agent::{Agent, AgentConfig, BehaviourPair, EventKind, Learned, Percept, YGoal};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
-use plotters::prelude::*;
 use puma_grasp::{
-    ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn, schedule, score, search_starts,
+    ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn_best, score, search_percepts, search_starts,
 };
 use qtable::Record;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use files::{writable_folder, write_whole};
+use cpu::cpu_time;
+use files::{writable_folder, write_png, write_whole};
+use plot::{Panel, drawn};
 
-#[allow(dead_code, reason = "shared with the examples that write pictures")]
+mod cpu;
 mod files;
+#[path = "paper_figures/on_the_arm.rs"]
+mod on_the_arm;
+mod overlay;
+#[path = "paper_figures/plot.rs"]
+mod plot;
+#[path = "paper_figures/snapshots.rs"]
+mod snapshots;
 
-/// Make the figures of the paper again, as SVG and CSV, on the feature shortcut; Fig. 9 is what the example `grasp` writes.
+/// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut, Fig. 9 through the full chain; and what
+/// becomes of the behaviours when they are taken from simulation to an arm with errors, and go on learning there.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for the figures
@@ -43,9 +52,13 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 10)]
     seeds: u64,
 
-    /// Also learn with the fine preset of 540 states, this many actions
-    #[arg(long, value_name = "N")]
-    fine: Option<u64>,
+    /// Actions to learn by with the fine preset of 540 states
+    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
+    fine: u64,
+
+    /// Arms, each with errors of its own, to take the behaviours to
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    arms: u64,
 }
 
 fn main() -> ExitCode {
@@ -62,6 +75,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
     let taught = figure_6(options)?;
     figures_7_and_8(options, &taught)?;
+    write_png(
+        &options.out.join("figure9.png"),
+        &snapshots::snapshots(&taught, 2000)?,
+    )?;
+    let report = on_the_arm::from_simulation_to_the_arm(options.arms)?;
+    write_whole(&options.out.join("on_the_arm.svg"), report.svg.as_bytes())?;
+    write_whole(&options.out.join("on_the_arm.csv"), report.csv.as_bytes())?;
     println!("figures: {}", options.out.display());
     Ok(())
 }
@@ -74,7 +94,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         "approaching from 400 search starts, breadth-first optimum {optimum:.2} steps; kappa {}",
         Learned::APPROACHING_KAPPA
     );
-    println!("seed  learned in / reward            success %   steps   x optimum");
+    println!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
     let mut curves: Vec<(&str, Vec<Vec<Record>>)> =
         vec![("centering", Vec::new()), ("approaching", Vec::new())];
     let mut taught = None;
@@ -85,57 +105,65 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
         let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
         let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
-        let paper = BehaviourSpec::approaching;
-        let wide = || BehaviourSpec::approaching().with_y_goal(74.0, 92.0);
-        let literal = || paper().with_reward(Reward::approaching_literal());
-        let floored = || {
-            paper().with_reward(Reward {
-                floor: 1.0,
-                ..Reward::approaching_literal()
-            })
+        let (literal, mended) = (BehaviourPair::paper_literal(), BehaviourPair::paper_mended());
+        let (fine, wide) = (
+            BehaviourPair::fine(),
+            mended.clone().with_y_goal(YGoal::Section4)?,
+        );
+        let mut floored = literal.approaching.clone();
+        floored.reward.floor = 1.0;
+        let quiet = &mut |_: &qtable::Progress| ();
+        let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
+        let centering = learn_best(mended.centering, &rigid, &anywhere, 60_000, &mut rng, quiet)?;
+        let found = search_percepts(1_000, 1_000_000 + seed);
+        let rng = &mut rng;
+        let timed = |learn: &mut dyn FnMut() -> Result<Lesson, LearnError>| {
+            let begin = cpu_time();
+            let lesson = learn();
+            (lesson, cpu_time().saturating_sub(begin))
         };
-        let centering = learn(BehaviourSpec::centering(), &rigid, 60_000, &mut rng, &mut |_| ())?;
-        let mut lessons = vec![
+        let lessons = [
             (
                 "exact plane, mended",
-                plane.learn(paper(), 500_000, &mut rng, &mut |_| ()),
+                timed(&mut || plane.learn_best(mended.approaching.clone(), &found, 500_000, rng, quiet)),
+            ),
+            (
+                "exact plane, mended, last table",
+                timed(&mut || plane.learn(mended.approaching.clone(), 500_000, rng, quiet)),
             ),
             (
                 "exact plane, y goal 74..92",
-                plane.learn(wide()?, 500_000, &mut rng, &mut |_| ()),
+                timed(&mut || plane.learn_best(wide.approaching.clone(), &found, 500_000, rng, quiet)),
             ),
             (
                 "exact plane, literal",
-                plane.learn(literal(), 500_000, &mut rng, &mut |_| ()),
+                timed(&mut || plane.learn(literal.approaching.clone(), 500_000, rng, quiet)),
             ),
             (
                 "exact plane, floored only",
-                plane.learn(floored(), 500_000, &mut rng, &mut |_| ()),
+                timed(&mut || plane.learn(floored.clone(), 500_000, rng, quiet)),
+            ),
+            (
+                "exact plane, fine",
+                timed(&mut || plane.learn_best(fine.approaching.clone(), &found, options.fine, rng, quiet)),
             ),
             (
                 "rigid regression, mended",
-                learn(paper(), &rigid, 500_000, &mut rng, &mut |_| ()),
+                timed(&mut || learn_best(mended.approaching.clone(), &rigid, &found, 500_000, rng, quiet)),
             ),
             (
                 "linear regression, mended",
-                learn(paper(), &linear, 500_000, &mut rng, &mut |_| ()),
+                timed(&mut || learn_best(mended.approaching.clone(), &linear, &found, 500_000, rng, quiet)),
             ),
         ];
-        if let Some(actions) = options.fine {
-            let fine = plane.learn_with(
-                BehaviourSpec::approaching_fine(),
-                &schedule(actions)?,
-                &mut rng,
-                &mut |_| (),
+        for (name, (lesson, spent)) in &lessons {
+            println!(
+                "{seed:4}  {name:32} {}  {:8.2}",
+                scored(lesson, &starts),
+                spent.as_secs_f64()
             );
-            lessons.push(("exact plane, fine", fine));
         }
-        for (name, lesson) in &lessons {
-            println!("{seed:4}  {name:30} {}", scored(lesson, &starts));
-        }
-        let Some((_, approaching)) = lessons.into_iter().next() else {
-            continue;
-        };
+        let [(_, (approaching, _)), ..] = lessons;
         let approaching = approaching?;
         curves[0].1.push(centering.report.curve);
         curves[1].1.push(approaching.report.curve);
@@ -154,16 +182,15 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     write_whole(&options.out.join("figure6.csv"), csv.as_bytes())?;
     let mut panels = Vec::new();
     for (name, seeds) in &curves {
-        panels.push(Panel::of_seeds(
-            &format!("{name}: goal reached, % of episodes"),
-            seeds,
-            |r| r.success_share.map(|s| 100.0 * s),
-        ));
+        let success = Panel::of_seeds(&format!("{name}: goal reached, % of episodes"), seeds, |r| {
+            r.success_share.map(|s| 100.0 * s)
+        });
+        panels.push(success.up_to(105.0));
         panels.push(Panel::of_seeds(&format!("{name}: mean error of Q"), seeds, |r| {
             r.mean_td_error
         }));
     }
-    write_whole(&options.out.join("figure6.svg"), drawn(&panels)?.as_bytes())?;
+    write_whole(&options.out.join("figure6.svg"), drawn(&panels, 2)?.as_bytes())?;
     taught.ok_or_else(|| "at least one seed is needed".into())
 }
 
@@ -232,119 +259,41 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         };
         let mut paths: Vec<_> = reach.iter().filter(ends_here).collect();
         paths.sort_by(|a, b| a[0].0.r.total_cmp(&b[0].0.r));
-        let three = [paths.first(), paths.get(paths.len() / 2), paths.last()];
-        for (name, feature) in FEATURES {
-            let lines = three.iter().flatten().map(|path| {
-                path.iter()
-                    .enumerate()
-                    .map(|(i, (f, _))| (i as f64, feature(f)))
-                    .collect()
+        let three = [
+            ("far", paths.first()),
+            ("middle", paths.get(paths.len() / 2)),
+            ("near", paths.last()),
+        ];
+        for (name, (low_end, high_end), feature) in FEATURES {
+            let lines = three.iter().filter_map(|(start, path)| {
+                let along = path.as_ref()?.iter().enumerate();
+                let line = along.map(|(i, (f, _))| (i as f64, feature(f))).collect();
+                Some((format!("{start}"), line))
             });
-            panels.push(Panel::new(
-                &format!("{name} per step, theta 3 ends in {low}..{high}"),
-                lines.collect(),
-            ));
+            let title = format!("{name}, theta 3 ends in {low}..{high}");
+            panels.push(Panel::new(&title, "step", lines.collect()).with_goal(low_end, high_end));
         }
     }
-    write_whole(&options.out.join("figure7.svg"), drawn(&panels)?.as_bytes())?;
-    let lines = track.iter().map(|path| {
-        path.iter()
-            .enumerate()
-            .map(|(i, (f, _))| (i as f64, f.r))
-            .collect()
-    });
-    let panel = Panel::new(
-        "r per step; the ball is pushed to r = 60 three times",
-        lines.collect(),
-    );
-    write_whole(&options.out.join("figure8.svg"), drawn(&[panel])?.as_bytes())
+    write_whole(&options.out.join("figure7.svg"), drawn(&panels, 3)?.as_bytes())?;
+    let panels: Vec<Panel> = track
+        .iter()
+        .zip(1..)
+        .map(|(path, number)| {
+            let line = path.iter().enumerate().map(|(i, (f, _))| (i as f64, f.r));
+            let title = format!("r, ball {number}, pushed to r = 60 three times");
+            let (low, high) = FEATURES[2].1;
+            Panel::new(&title, "step", vec![(String::new(), line.collect())])
+                .with_goal(low, high)
+                .up_to(70.0)
+        })
+        .collect();
+    write_whole(&options.out.join("figure8.svg"), drawn(&panels, 3)?.as_bytes())
 }
 
-type Feature = (&'static str, fn(&hough_heuristic::Features) -> f64);
-const FEATURES: [Feature; 3] = [("x", |f| f.x), ("y", |f| f.y), ("r", |f| f.r)];
-
-/// A diagram: some lines and a band.
-struct Panel {
-    title: String,
-    lines: Vec<Vec<(f64, f64)>>,
-    band: Vec<(f64, f64, f64)>,
-}
-
-impl Panel {
-    fn new(title: &str, lines: Vec<Vec<(f64, f64)>>) -> Self {
-        Self {
-            title: title.into(),
-            lines,
-            band: Vec::new(),
-        }
-    }
-
-    /// Mean over the seeds, with the 95 % interval as band.
-    fn of_seeds(title: &str, seeds: &[Vec<Record>], value: impl Fn(&Record) -> Option<f64>) -> Self {
-        let (mut mean_line, mut band) = (Vec::new(), Vec::new());
-        for i in 0..seeds.iter().map(Vec::len).min().unwrap_or(0) {
-            let values: Vec<f64> = seeds.iter().filter_map(|curve| value(&curve[i])).collect();
-            if values.is_empty() {
-                continue;
-            }
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-            let half = 2.26 * (variance / n).sqrt();
-            let x = seeds[0][i].actions as f64;
-            mean_line.push((x, mean));
-            band.push((x, mean - half, mean + half));
-        }
-        Self {
-            title: title.into(),
-            lines: vec![mean_line],
-            band,
-        }
-    }
-}
-
-fn drawn(panels: &[Panel]) -> Result<String, Box<dyn Error>> {
-    const COLOURS: [RGBColor; 3] = [
-        RGBColor(30, 90, 180),
-        RGBColor(190, 70, 40),
-        RGBColor(40, 140, 70),
-    ];
-    let columns = if panels.len().is_multiple_of(3) {
-        3
-    } else {
-        panels.len().min(2)
-    }
-    .max(1);
-    let rows = panels.len().div_ceil(columns).max(1);
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (1200, 300 * rows as u32)).into_drawing_area();
-        root.fill(&WHITE)?;
-        for (area, panel) in root.split_evenly((rows, columns)).iter().zip(panels) {
-            let points = || panel.lines.iter().flatten();
-            let right = points().map(|p| p.0).fold(1.0, f64::max);
-            let top = points()
-                .map(|p| p.1)
-                .chain(panel.band.iter().map(|b| b.2))
-                .fold(1.0, f64::max);
-            let mut chart = ChartBuilder::on(area)
-                .caption(&panel.title, ("sans-serif", 15))
-                .margin(6)
-                .x_label_area_size(24)
-                .y_label_area_size(44)
-                .build_cartesian_2d(0.0..right, 0.0..1.05 * top)?;
-            chart.configure_mesh().draw()?;
-            let edge = panel
-                .band
-                .iter()
-                .map(|b| (b.0, b.1))
-                .chain(panel.band.iter().rev().map(|b| (b.0, b.2)));
-            chart.draw_series([Polygon::new(edge.collect::<Vec<_>>(), COLOURS[0].mix(0.2))])?;
-            for (line, colour) in panel.lines.iter().zip(COLOURS.iter().cycle()) {
-                chart.draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)))?;
-            }
-        }
-        root.present()?;
-    }
-    Ok(svg)
-}
+/// A feature: its name, its goal, and how to read it.
+type Feature = (&'static str, (f64, f64), fn(&hough_heuristic::Features) -> f64);
+const FEATURES: [Feature; 3] = [
+    ("x", (99.0, 108.0), |f| f.x),
+    ("y", (74.0, 82.0), |f| f.y),
+    ("r", (32.0, 34.0), |f| f.r),
+];

@@ -31,6 +31,7 @@ use rand::{RngExt, SeedableRng};
 use files::{writable_folder, write_whole};
 use stages::{Stages, Timed};
 
+mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
 mod stages;
@@ -63,6 +64,10 @@ struct Options {
     /// How the circle is found: heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t)]
     detector: BallDetector,
+
+    /// Noise of the camera in the dark, grey levels; that of the scene unless given
+    #[arg(long, value_name = "LEVELS")]
+    noise: Option<f64>,
 
     /// Begin with what an earlier run learned of the camera: its camera.belief
     #[arg(long, value_name = "FILE")]
@@ -101,7 +106,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let mut detector = options.detector.build(options.seed)?;
     let belief = options.belief.as_deref().map(Belief::load).transpose()?;
-    let mut rig = Rig::emulated(false, &bright_ball_scene(), options.seed)?;
+    let mut scene = bright_ball_scene();
+    scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
+    let mut rig = Rig::emulated(false, &scene, options.seed)?;
     let errors = options.level.draw(&mut rng);
     let wrong = errors.apply(&rig.cell().get())?;
     rig.cell().with(|cell| *cell = wrong);
@@ -121,7 +128,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     let mut agent = Agent::with_controller(config, timed(hybrid))?;
     let (mut csv, mut film) = (String::from("run,move,x,y,r,event\n"), Vec::new());
-    let (mut grasped, mut moves) = (0, 0);
+    let (mut grasped, mut moves, mut near) = (0, 0, 0);
     for number in 0..options.teach + options.runs {
         let teaching = number < options.teach;
         if number == options.teach {
@@ -161,6 +168,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             log.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),
+                EventKind::TooNear if !teaching => near += 1,
                 EventKind::Gripping(_) => miss = Some(shared.with(|cell| cell.grip_miss(&event.joints))),
                 EventKind::Seen(sighting) if !teaching => {
                     let (f, row) = (sighting.features, number - options.teach + 1);
@@ -207,14 +215,26 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     println!("{stages}");
     let runs = options.runs.max(1);
+    let (low, high) = interval(grasped, runs);
     println!(
-        "{grasped} of {} grasped ({:.1} %), {:.1} moves a run; results: {}",
+        "{grasped} of {} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {near} stops by the proximity sensors; \
+         results: {}",
         options.runs,
         100.0 * grasped as f64 / runs as f64,
         moves as f64 / runs as f64,
         options.out.display()
     );
     Ok(())
+}
+
+/// Wilson's interval of a share, percent.
+fn interval(successes: usize, runs: usize) -> (f64, f64) {
+    const Z: f64 = 1.96;
+    let (n, share) = (runs as f64, successes as f64 / runs as f64);
+    let middle = share + 0.5 * Z * Z / n;
+    let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
+    let scale = 100.0 / (1.0 + Z * Z / n);
+    (scale * (middle - half), scale * (middle + half))
 }
 
 /// What happens to one ball.

@@ -197,6 +197,7 @@ fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Err
             .map_while(Result::ok)
             .try_for_each(|line| sender.send(line))
     });
+    let mut trouble = None;
     loop {
         let line = match lines.recv_timeout(Duration::from_millis(200)) {
             Ok(line) => line,
@@ -206,10 +207,12 @@ fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Err
                 String::new()
             }
         };
-        if let Some(floppy) = &mut floppy
-            && let Err(problem) = floppy.follow(server)
-        {
-            println!("the floppy disk cannot be written: {problem}");
+        if let Some(floppy) = &mut floppy {
+            let problem = floppy.follow(server).err().map(|problem| problem.to_string());
+            if let Some(problem) = problem.as_ref().filter(|_| problem != trouble) {
+                println!("the floppy disk cannot be written: {problem}");
+            }
+            trouble = problem;
         }
         if line.trim() == "quit" {
             return Ok(());

@@ -28,7 +28,7 @@ pub struct PlaneScore {
     /// Starts from which the goal was reached.
     pub reached: usize,
     /// Starts in all.
-    starts: usize,
+    pub starts: usize,
     /// Steps of the successful runs, on average.
     pub steps: f64,
     /// The same steps over the breadth-first optimum from the same starts.

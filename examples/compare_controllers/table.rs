@@ -123,57 +123,67 @@ pub(crate) fn csv(rows: &[Row]) -> String {
     csv
 }
 
-/// Success over cycles, a panel a level.
+/// A bar for each controller and level: how long it is says how often the goal was reached, a line across its end how sure that is, and
+/// words how many moves it took.
 pub(crate) fn plot(rows: &[Row]) -> Result<String, Box<dyn Error>> {
-    let mut levels: Vec<ErrorLevel> = rows.iter().map(|row| row.level).collect();
-    levels.dedup();
+    const NAMES: i32 = 210;
+    const COLUMN: i32 = 190;
+    const BAR: i32 = 100;
+    const LINE: i32 = 22;
+    const HEAD: i32 = 40;
+    let mut levels: Vec<ErrorLevel> = Vec::new();
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !levels.contains(&row.level) {
+            levels.push(row.level);
+        }
+        if !names.contains(&row.name.as_str()) {
+            names.push(&row.name);
+        }
+    }
+    let size = (
+        (NAMES + COLUMN * levels.len() as i32) as u32,
+        (HEAD + LINE * names.len() as i32 + 12) as u32,
+    );
+    let ink = RGBColor(40, 40, 60);
     let mut svg = String::new();
     {
-        let root =
-            SVGBackend::with_string(&mut svg, (1100, 360 * levels.len().max(1) as u32)).into_drawing_area();
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
-        for (area, level) in root.split_evenly((levels.len().max(1), 1)).iter().zip(&levels) {
-            let mut chart = ChartBuilder::on(area)
-                .caption(format!("errors: {level}"), ("sans-serif", 18))
-                .margin(8)
-                .x_label_area_size(36)
-                .y_label_area_size(44)
-                .build_cartesian_2d(0.0..30.0, 0.0..105.0)?;
-            chart
-                .configure_mesh()
-                .x_desc("moves of a successful run")
-                .y_desc("success, %")
-                .draw()?;
-            for row in rows
-                .iter()
-                .filter(|row| row.level == *level && row.cycles.is_finite())
-            {
-                let ours = row.name.starts_with("hybrid");
-                let colour = if ours {
-                    RGBColor(200, 40, 40)
-                } else {
-                    RGBColor(60, 90, 160)
-                };
-                let (x, y, half) = (
-                    row.cycles,
-                    row.success.0,
-                    if row.success.1.is_finite() {
-                        row.success.1
-                    } else {
-                        0.0
-                    },
-                );
-                chart.draw_series([PathElement::new(
-                    [(x, (y - half).max(0.0)), (x, (y + half).min(100.0))],
-                    colour.stroke_width(1),
-                )])?;
-                chart.draw_series([Circle::new((x, y), 4, colour.filled())])?;
-                chart.draw_series([Text::new(
-                    row.name.clone(),
-                    (x + 0.25, y - 1.0),
-                    ("sans-serif", 11),
-                )])?;
+        let words = |size: i32| ("sans-serif", size).into_font().color(&ink);
+        root.draw(&Text::new("% at the goal / moves", (10, 14), words(13)))?;
+        for (level, left) in levels.iter().zip((NAMES..).step_by(COLUMN as usize)) {
+            root.draw(&Text::new(format!("errors: {level}"), (left, 14), words(14)))?;
+        }
+        for row in rows {
+            let of = |found: Option<usize>| found.unwrap_or(0) as i32;
+            let left = NAMES + COLUMN * of(levels.iter().position(|level| *level == row.level));
+            let line = of(names.iter().position(|name| *name == row.name));
+            let top = HEAD + LINE * line;
+            if left == NAMES {
+                root.draw(&Text::new(row.name.clone(), (10, top + 2), words(13)))?;
             }
+            let colour = if row.name.starts_with("hybrid") {
+                RGBColor(200, 60, 50)
+            } else {
+                RGBColor(90, 120, 185)
+            };
+            let (mean, half) = row.success;
+            let at = |percent: f64| left + (0.01 * f64::from(BAR) * percent.clamp(0.0, 100.0)) as i32;
+            let bar = |to: i32, style: ShapeStyle| Rectangle::new([(left, top), (to, top + LINE - 7)], style);
+            root.draw(&bar(left + BAR, RGBColor(236, 236, 241).filled()))?;
+            root.draw(&bar(at(mean), colour.filled()))?;
+            if half > 0.0 {
+                let middle = top + (LINE - 7) / 2;
+                let ends = vec![(at(mean - half), middle), (at(mean + half), middle)];
+                root.draw(&PathElement::new(ends, ink.stroke_width(1)))?;
+            }
+            let moves = if row.cycles.is_finite() {
+                format!("{mean:.1} / {:.1}", row.cycles)
+            } else {
+                format!("{mean:.1} / -")
+            };
+            root.draw(&Text::new(moves, (left + BAR + 6, top + 2), words(12)))?;
         }
         root.present()?;
     }

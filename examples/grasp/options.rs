@@ -37,6 +37,10 @@ pub(crate) struct Options {
     #[arg(long, value_name = "DIR")]
     pub(crate) policy: Option<PathBuf>,
 
+    /// Go on learning at work, and save what was learned to the output folder
+    #[arg(long)]
+    pub(crate) keep_learning: bool,
+
     /// How the circle is found
     #[arg(long, value_name = "NAME", default_value_t, value_parser = detectors())]
     pub(crate) detector: BallDetector,

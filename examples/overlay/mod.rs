@@ -44,6 +44,24 @@ impl Overlay {
         }
     }
 
+    /// A straight line.
+    #[allow(dead_code, reason = "only the examples that draw more than circles need it")]
+    pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
+        let at = |(x, y): (f64, f64)| Point::new(x.round() as i32, y.round() as i32);
+        let style = PrimitiveStyle::with_stroke(colour, width);
+        let Ok(()) = Line::new(at(from), at(to)).into_styled(style).draw(self);
+    }
+
+    /// A filled disc.
+    #[allow(dead_code, reason = "only the examples that draw more than circles need it")]
+    pub(crate) fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
+        let at = Point::new(centre.0.round() as i32, centre.1.round() as i32);
+        let diameter = (2.0 * radius).round().max(1.0) as u32;
+        let Ok(()) = Ring::with_center(at, diameter)
+            .into_styled(PrimitiveStyle::with_fill(colour))
+            .draw(self);
+    }
+
     /// A closed curve, given as a function of an angle.
     #[allow(dead_code, reason = "only the example with an ellipse draws one")]
     pub(crate) fn closed(&mut self, point: impl Fn(f64) -> (f64, f64)) {

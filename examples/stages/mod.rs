@@ -10,6 +10,8 @@ use hough_heuristic::image::GrayImage;
 use hough_heuristic::{CircleDetector, Detection, FrameError, FrameSource};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
 
+use crate::cpu::cpu_time;
+
 /// CPU time of this thread and time on the wall, by stage, of all cycles so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stages(Rc<RefCell<Spent>>);
@@ -56,23 +58,6 @@ impl fmt::Display for Stages {
             each(spent.render),
             spent.moves
         )
-    }
-}
-
-/// CPU time of this thread; time on the wall where the system does not tell.
-fn cpu_time() -> Duration {
-    #[cfg(unix)]
-    {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-        Duration::new(
-            time.tv_sec.unsigned_abs(),
-            u32::try_from(time.tv_nsec).unwrap_or(0),
-        )
-    }
-    #[cfg(not(unix))]
-    {
-        static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        BEGIN.get_or_init(std::time::Instant::now).elapsed()
     }
 }
 

@@ -61,13 +61,21 @@ impl EventLog {
             .events
             .iter()
             .zip(&self.events)
-            .position(|(now, then)| now != then);
+            .position(|(now, then)| !same(now, then));
         let differs = differs
             .or((log.events.len() != self.events.len()).then(|| log.events.len().min(self.events.len())));
         match (differs, end) {
             (Some(event), _) => Err(AgentError::Replay { event }),
             (None, end) => Ok((end?, log)),
         }
+    }
+}
+
+/// Whether two events are the same. A failure of camera or arm comes back in other words: its type is not in the log.
+fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
+    match (&now.kind, &then.kind) {
+        (EventKind::Failed(_), EventKind::Failed(_)) => now.cycle == then.cycle && now.joints == then.joints,
+        _ => now == then,
     }
 }
 
@@ -87,6 +95,14 @@ impl Tape<'_> {
             }
         }
         None
+    }
+
+    /// Why there is no answer: what the run ended with, or that the log is too short.
+    fn silence(&self) -> String {
+        match self.events.last().map(|event| &event.kind) {
+            Some(EventKind::Failed(reason)) => format!("this failed then: {reason}"),
+            _ => "the log ends here".into(),
+        }
     }
 
     /// Whether the next answer was that something is near; moves on only if so.
@@ -120,12 +136,13 @@ const NAME: &str = "replayed event log";
 
 impl Played<'_, '_> {
     fn stand(&self) -> Result<Joints, ArmError> {
-        match self.0.borrow_mut().answer() {
+        let mut tape = self.0.borrow_mut();
+        match tape.answer() {
             Some(event) => Ok(event.joints),
             None => Err(ArmError::Refused {
                 port: NAME.into(),
                 sent: "a move".into(),
-                message: "the log ends here".into(),
+                message: tape.silence(),
             }),
         }
     }
@@ -161,7 +178,8 @@ impl ProximitySensor for Played<'_, '_> {
 
 impl Eye for Played<'_, '_> {
     fn look(&mut self) -> Result<Look, FrameError> {
-        match self.0.borrow_mut().answer().map(|event| event.kind) {
+        let mut tape = self.0.borrow_mut();
+        match tape.answer().map(|event| event.kind) {
             Some(EventKind::Seen(sighting)) => Ok(Look {
                 frame: None,
                 ball: Some(sighting),
@@ -169,7 +187,7 @@ impl Eye for Played<'_, '_> {
             Some(EventKind::NotSeen) => Ok(Look::default()),
             _ => Err(FrameError::Failed {
                 origin: NAME.into(),
-                reason: "nothing was looked at here".into(),
+                reason: tape.silence(),
             }),
         }
     }

@@ -89,7 +89,8 @@ impl BehaviourPair {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AgentConfig, Input};
+    use crate::{AgentConfig, CameraModel, Input};
+    use hough_heuristic::Features;
     use puma_val2::Joints;
 
     #[test]
@@ -109,6 +110,30 @@ mod tests {
         assert!(!literal.approaching.reward.absorbing && mended.approaching.reward.absorbing);
         assert_eq!(literal.approaching.space, mended.approaching.space);
         assert_eq!(mended.approaching.reward, fine.approaching.reward);
+    }
+
+    /// From the gripper to the ball after the paper's turn of the fifth joint, at the worst place of the goal, metres.
+    fn worst_miss(goal: YGoal) -> f64 {
+        let model = CameraModel::paper();
+        let (low, high) = goal.ends();
+        let mut worst: f64 = 0.0;
+        for (x, y, r) in [99.0, 108.0]
+            .into_iter()
+            .flat_map(|x| [low, high].map(|y| (x, y)))
+            .flat_map(|(x, y)| [32.0, 34.0].map(|r| (x, y, r)))
+        {
+            let pose = |jt5| Joints::from_degrees([0.0, -53.0, 186.2, 0.0, jt5, 0.0]);
+            let ball = model.locate(&pose(45.0), &Features { x, y, r }).unwrap();
+            worst = worst.max((model.tool_point(&pose(45.0 - 18.01)) - ball).norm());
+        }
+        worst
+    }
+
+    #[test]
+    fn the_gripper_comes_nearer_with_the_narrower_goal() {
+        let (narrow, wide) = (worst_miss(YGoal::Equation6), worst_miss(YGoal::Section4));
+        assert!(narrow < 0.006, "{narrow}");
+        assert!((0.008..0.0105).contains(&wide), "{wide}");
     }
 
     #[test]

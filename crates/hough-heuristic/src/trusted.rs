@@ -6,7 +6,9 @@ mod directions;
 mod fit;
 mod halve;
 mod level;
+mod measure;
 mod polar;
+mod prover;
 mod proof;
 mod search;
 
@@ -14,13 +16,14 @@ use image::GrayImage;
 
 pub use config::TrustedConfig;
 
-use crate::edges::{Maxima, noise_deviation};
+use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
-use polar::{Grey, Oval, Polar};
-use proof::{Proof, Setting};
+use polar::{Grey, Polar, Ring};
+use proof::Proof;
+use prover::{Prover, Pyramid, Size};
 use search::{Budget, Outline, Search};
 
 /// Finds circles at several sizes of the frame and proves each at the full size.
@@ -38,14 +41,6 @@ pub struct Trusted {
     budget: Budget,
 }
 
-/// A frame of a power of two below the full size.
-#[derive(Clone, Debug, Default)]
-struct Size {
-    grey: Vec<u8>,
-    width: usize,
-    height: usize,
-}
-
 /// Development.
 pub(crate) fn tune(index: usize, default: f32) -> f32 {
     static T: std::sync::OnceLock<Vec<Option<f32>>> = std::sync::OnceLock::new();
@@ -58,7 +53,7 @@ pub(crate) fn tune(index: usize, default: f32) -> f32 {
         }
         v
     })[index]
-    .unwrap_or(default)
+        .unwrap_or(default)
 }
 
 impl Trusted {
@@ -90,14 +85,36 @@ impl Trusted {
 
     /// (draws, looks) for development.
     pub fn spent(&self) -> [u64; 5] {
-        [self.budget.draws, self.budget.looks, self.budget.passed, self.budget.added, self.proofs.len() as u64]
+        [
+            self.budget.draws,
+            self.budget.looks,
+            self.budget.passed,
+            self.budget.added,
+            self.proofs.len() as u64,
+        ]
+    }
+
+    /// For development.
+    pub fn candidates(&self) -> Vec<(Circle, f32, f32, f32)> {
+        self.collected
+            .candidates
+            .iter()
+            .map(|c| {
+                let circle = Circle {
+                    x: c.x.into(),
+                    y: c.y.into(),
+                    radius: c.r.into(),
+                };
+                (circle, c.support.share(), c.weight, c.scale)
+            })
+            .collect()
     }
 
     /// For development.
     pub fn proofs(&self) -> Vec<(Circle, f32, [f32; 8])> {
         self.proofs
             .iter()
-            .map(|p| (circle_of(p), p.certainty, p.features))
+            .map(|p| (circle_of(&p.ring), p.certainty, p.features))
             .collect()
     }
 
@@ -113,18 +130,59 @@ impl Trusted {
             let (before, rest) = self.sizes.split_at_mut(index);
             let (grey, width) = before
                 .last()
-                .map_or((frame.as_raw(), frame.width() as usize), |size| (&size.grey, size.width));
+                .map_or((frame.as_raw(), frame.width() as usize), |size| {
+                    (&size.grey, size.width)
+                });
             let size = &mut rest[0];
             (size.width, size.height) = halve::halve(grey, width, &mut size.grey);
         }
     }
 }
 
-fn circle_of(proof: &Proof) -> Circle {
+/// The search of a level.
+struct Searching<'a, 'b> {
+    search: Search<'a>,
+    prover: &'a mut Prover<'b>,
+    level: &'a mut Level,
+    collected: &'a mut Collected,
+    budget: &'a mut Budget,
+}
+
+impl Vectorized for Searching<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.search.run(self.level, self.collected, self.prover, self.budget);
+    }
+}
+
+/// The measurement of a proven circle.
+struct Measuring<'a> {
+    pyramid: Pyramid<'a>,
+    depth: usize,
+    circle: &'a UnitCircle,
+    polar: &'a mut Polar,
+    start: Ring,
+    noise: f32,
+}
+
+impl Vectorized for Measuring<'_> {
+    type Output = Option<measure::Measured>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let pyramid = self.pyramid;
+        let frames = (0..=self.depth).rev().map(|depth| pyramid.grey(depth));
+        measure::measure(frames, self.circle, self.polar, self.start, self.noise)
+    }
+}
+
+fn circle_of(ring: &Ring) -> Circle {
     Circle {
-        x: proof.oval.x.into(),
-        y: proof.oval.y.into(),
-        radius: proof.oval.r.into(),
+        x: ring.x.into(),
+        y: ring.y.into(),
+        radius: ring.r.into(),
     }
 }
 
@@ -139,105 +197,96 @@ impl CircleDetector for Trusted {
         self.shrink(frame);
         let pixels = frame.len() as f64;
         self.budget = Budget {
-            most_looks: (pixels * 3.0) as u64 + 10_000,
+            most_looks: (pixels * f64::from(tune(40, 3.0))) as u64 + 10_000,
             ..Budget::default()
         };
         self.collected.clear(tune(3, 192.0) as usize);
 
         let config = &self.config;
         let finest = usize::from(config.min_radius >= 8.0 && !self.sizes.is_empty());
+        let pyramid = Pyramid {
+            frame,
+            sizes: &self.sizes,
+        };
+        let mut prover = Prover {
+            pyramid,
+            circle: &self.circle,
+            polar: &mut self.polar,
+            noise,
+            tests: (pixels * f64::from(tune(26, 16.0))).log10() as f32,
+            proofs: &mut self.proofs,
+        };
         for depth in (finest..=self.sizes.len()).rev() {
             let scale = (1 << depth) as f32;
-            let (grey, width, height): (&[u8], usize, usize) = match depth.checked_sub(1) {
-                None => (frame.as_raw(), frame.width() as usize, frame.height() as usize),
-                Some(index) => {
-                    let size = &self.sizes[index];
-                    (&size.grey, size.width, size.height)
-                }
-            };
-            let contrast = (2.3 * tune(2, config.contrast as f32))
-                .max(tune(18, 4.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
+            let Grey { pixels: grey, width, height } = pyramid.grey(depth);
+            let contrast =
+                (2.3 * tune(2, 8.0)).max(tune(18, 3.5) * (noise / scale + 0.3) * self.maxima.noise_gain());
             let candidates = self.maxima.find(grey, width, contrast);
             self.level.fill(width, height, candidates);
-            for candidate in &self.collected.candidates {
-                if candidate.support.share() >= tune(4, 0.6) {
-                    let ring = candidate.ring(scale);
-                    self.outline
-                        .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
-                }
+            for proof in prover.proofs.iter().filter(|proof| proof.certainty >= tune(28, 6.0)) {
+                let ring = proof.ring.grown((1 << proof.depth) as f32).shrunk(scale);
+                self.outline
+                    .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
             }
             let top = depth == self.sizes.len();
             let search = Search {
                 circle: &self.circle,
                 outline: &self.outline,
                 radii: (
-                    (config.min_radius as f32 / scale).max(if depth == finest { 3.2 } else { tune(19, 6.0) }),
-                    (config.max_radius as f32 / scale).min(if top { f32::MAX } else { 18.0 }),
+                    (config.min_radius as f32 / scale).max(if depth == finest { 3.2 } else { tune(19, 8.0) }),
+                    (config.max_radius as f32 / scale).min(if top { f32::MAX } else { tune(29, 20.0) }),
                 ),
                 scale,
                 seed: config.seed,
-            };
-            search.run(&mut self.level, &mut self.collected, &mut self.budget);
-        }
-        let tests = (pixels * (config.max_radius - config.min_radius + 1.0)).log10() as f32;
-        for candidate in &self.collected.candidates {
-            let mut depth = 0;
-            let mut r = candidate.r;
-            while depth < self.sizes.len()
-                && (r >= tune(11, 24.0) || (r >= 12.0 && noise > tune(12, 8.0) * (1 << depth) as f32))
-            {
-                depth += 1;
-                r *= 0.5;
-            }
-            let scale = (1 << depth) as f32;
-            let setting = Setting {
-                noise: noise / scale + 0.3,
-                tests,
-            };
-            let grey = match depth.checked_sub(1) {
-                None => Grey {
-                    pixels: frame.as_raw(),
-                    width: frame.width() as usize,
-                    height: frame.height() as usize,
+                mirror_slack: if noise > tune(24, 12.0) {
+                    0.35
+                } else {
+                    tune(6, 0.2)
                 },
-                Some(index) => {
-                    let size = &self.sizes[index];
-                    Grey {
-                        pixels: &size.grey,
-                        width: size.width,
-                        height: size.height,
-                    }
-                }
             };
-            let start = Oval {
-                x: candidate.x,
-                y: candidate.y,
-                r: candidate.r,
-                ..Oval::default()
-            };
-            if let Some(mut proof) =
-                proof::prove(grey, &self.circle, &mut self.polar, start.shrunk(scale), &setting)
-            {
-                proof.oval = proof.oval.grown(scale);
-                self.proofs.push(proof);
-            }
+            widest(Searching {
+                search,
+                prover: &mut prover,
+                level: &mut self.level,
+                collected: &mut self.collected,
+                budget: &mut self.budget,
+            });
+        }
+        for candidate in self.collected.candidates.iter().filter(|candidate| !candidate.tried) {
+            prover.prove(candidate);
         }
         self.proofs.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
-        for proof in &self.proofs {
-            let circle = circle_of(proof);
+        for proof in &mut self.proofs {
             let score = f64::from((proof.certainty / (proof.certainty.abs() + 3.0)).max(0.0));
-            let fits = circle.radius >= config.min_radius && circle.radius <= config.max_radius;
-            let placed = config.region.as_ref().is_none_or(|region| region.holds(&circle));
+            let rough = proof.ring.grown((1 << proof.depth) as f32);
+            if score < config.min_score || found.len() >= config.max_circles {
+                proof.ring = rough;
+                continue;
+            }
             let taken = found.iter().any(|other| {
+                let circle = circle_of(&rough);
                 let off = (circle.x - other.circle.x).hypot(circle.y - other.circle.y);
                 off < 0.5 * (circle.radius.min(other.circle.radius))
                     && (circle.radius - other.circle.radius).abs() < 0.4 * circle.radius.max(other.circle.radius)
             });
-            if score >= config.min_score && fits && placed && !taken {
-                found.push(Detection { circle, score });
+            if taken {
+                proof.ring = rough;
+                continue;
             }
-            if found.len() == config.max_circles {
-                break;
+            let measured = widest(Measuring {
+                pyramid,
+                depth: proof.depth,
+                circle: &self.circle,
+                polar: &mut self.polar,
+                start: proof.ring,
+                noise,
+            });
+            proof.ring = measured.map_or(rough, |measured| measured.ring);
+            let circle = circle_of(&proof.ring);
+            let fits = circle.radius >= config.min_radius && circle.radius <= config.max_radius;
+            let placed = config.region.as_ref().is_none_or(|region| region.holds(&circle));
+            if fits && placed {
+                found.push(Detection { circle, score });
             }
         }
     }

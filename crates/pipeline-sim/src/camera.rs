@@ -58,6 +58,16 @@ impl Distortion {
         })
     }
 
+    /// As [`Distortion::undistort`], with the answer for a place nearby as a start.
+    pub(crate) fn undistort_near(
+        &self,
+        p: Point2<f64>,
+        (other, undone): (Point2<f64>, Point2<f64>),
+    ) -> Option<Point2<f64>> {
+        self.newton(p, undone + (p - other), false)
+            .or_else(|| self.undistort(p))
+    }
+
     /// Newton's method from `start`. It must come nearer with every step; where it does not, the step is halved if `patient`, else that is
     /// the end of it.
     fn newton(&self, p: Point2<f64>, start: Point2<f64>, patient: bool) -> Option<Point2<f64>> {
@@ -68,6 +78,9 @@ impl Distortion {
                 break;
             }
             let slope = self.jacobian(q);
+            if slope.determinant() <= 0.0 {
+                return None;
+            }
             let step = slope.try_inverse()? * error;
             let halvings = if patient { 30 } else { 1 };
             let nearer = (0..halvings).find_map(|k| {
@@ -81,11 +94,9 @@ impl Distortion {
                 None if error.norm() <= 10.0 * enough => break,
                 None => return None,
             }
-            if self.jacobian(q).determinant() <= 0.0 {
-                return None;
-            }
         }
-        (error.norm() <= 10.0 * enough).then_some(q)
+        let sound = error.norm() <= 10.0 * enough && self.jacobian(q).determinant() > 0.0;
+        sound.then_some(q)
     }
 
     /// Derivatives of [`Distortion::distort`].

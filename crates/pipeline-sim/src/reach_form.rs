@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 
-/// Which terms a [`ReachModel`] is made of.
+/// Which terms a [`ReachModel`](crate::ReachModel) is made of.
 ///
 /// With d2, d3 the moves in degrees, a = d2 / 20, b = d3 / 16, Z = 33 / r, V = (y - 72) / r, E = (`JT3` - 140) / 40 before the move. In
 /// the arm's plane (Z, V) is, up to a scale, the ball's place as the camera sees it, and a move of the arm turns and

@@ -118,7 +118,7 @@ impl Transport for Noisy {
         let Some(count) = self.inner.receive(&mut buffer[..room], timeout)? else {
             return Ok(None);
         };
-        let bytes = self.damaged(&buffer[..count].to_vec());
+        let bytes = self.damaged(&buffer[..count]);
         buffer[..bytes.len()].copy_from_slice(&bytes);
         Ok((!bytes.is_empty()).then_some(bytes.len()))
     }

@@ -19,6 +19,8 @@ pub(crate) enum Fault {
     Garbage,
     /// Every seventh look finds a circle that is not the ball.
     FalseCircle,
+    /// The detector sees circles everywhere, and never the ball.
+    Phantoms,
     ArmStuck(usize),
     LineDead(usize),
     Near(usize),
@@ -103,6 +105,14 @@ impl Eye for Shared {
                 y: 30.0,
                 r: 25.0,
             }),
+            Fault::Phantoms => {
+                let wander = (cell.looks * 37 % 100) as f64;
+                Some(Features {
+                    x: 40.0 + wander,
+                    y: 20.0 + wander,
+                    r: 8.0 + 0.4 * wander,
+                })
+            }
             _ => seen,
         };
         cell.old = seen.or(cell.old);

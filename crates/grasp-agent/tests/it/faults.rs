@@ -128,3 +128,59 @@ fn what_was_learned_before_the_line_died_is_kept() {
     assert!(cell.run(&mut agent, &mut EventLog::default()).is_err());
     assert_ne!(*agent.controller().belief(), untaught);
 }
+
+#[test]
+fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a_pose_out_of_limits() {
+    let mut checked = config();
+    checked.lift = Some(puma_val2::JointDelta::from_degrees([
+        0.0, -15.0, 0.0, 0.0, 18.01, 0.0,
+    ]));
+    for gain in [1.0, 0.5] {
+        let servo = ServoSettings::paper().with_gain(gain);
+        let mut agent = Agent::with_controller(checked.clone(), PositionBased::new(servo)).unwrap();
+        let cell = Shared::new(CameraModel::paper(), [-0.6, 0.0, -0.1], Fault::Phantoms);
+        let mut log = EventLog::default();
+        let outcome = cell.run(&mut agent, &mut log).unwrap();
+        assert!(outcome.gave_up.is_some(), "{outcome:?}");
+        assert!(outcome.cycles <= checked.max_cycles + checked.recovery.len() + 1);
+        let moved = log
+            .events
+            .iter()
+            .filter(|event| matches!(event.kind, EventKind::Moved(_)));
+        assert!(moved.clone().count() > 3);
+        assert!(moved.into_iter().all(|event| checked.limits.admit(&event.joints)));
+    }
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
+    use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning, qtable::QTable};
+    let blank = |spec: &grasp_agent::BehaviourSpec| {
+        let table = QTable::new(spec.states(), spec.actions()).unwrap();
+        Behaviour::new(spec.clone(), table).unwrap()
+    };
+    let pair = BehaviourPair::paper_mended();
+    let (centering, approaching) = (blank(&pair.centering), blank(&pair.approaching));
+    let learned = Learned::new(centering, approaching.clone()).learning(OnlineLearning::careful(3));
+    let mut agent = Agent::with_controller(config(), learned).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::LineDead(6));
+    let error = cell.run(&mut agent, &mut EventLog::default()).unwrap_err();
+    assert!(matches!(error, AgentError::Arm(ArmError::Line { .. })), "{error}");
+    let (centering, after) = agent.into_controller().into_behaviours();
+    assert_ne!(after, approaching);
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("approaching.policy");
+    after.save(&path).unwrap();
+    let resumed = Behaviour::load(&path, &pair.approaching).unwrap();
+    assert_eq!(resumed, after);
+    let fine = Behaviour::load(&path, &BehaviourPair::fine().approaching).unwrap_err();
+    assert!(fine.to_string().contains("differs"), "{fine}");
+    // On another line it goes on from there.
+    let learned = Learned::new(centering, resumed).learning(OnlineLearning::careful(4));
+    let mut agent = Agent::with_controller(config(), learned).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    cell.run(&mut agent, &mut EventLog::default()).unwrap();
+    assert_ne!(*agent.controller().approaching(), after);
+}

@@ -1,8 +1,9 @@
 //! The log of a run replays to the same run.
 
+use grasp_agent::qtable::QTable;
 use grasp_agent::{
-    Agent, AgentError, CameraModel, Controller, EventLog, Hybrid, HybridSettings, ImageBased, JacobianAt,
-    PositionBased, ServoSettings,
+    Agent, AgentError, BehaviourPair, CameraModel, Controller, EventLog, Hybrid, HybridSettings, ImageBased,
+    JacobianAt, Learned, OnlineLearning, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -29,6 +30,33 @@ fn logs_replay_to_the_same_run() {
         replays(PositionBased::new(servo), fault);
         replays(ImageBased::new(servo, JacobianAt::Goal), fault);
         replays(Hybrid::new(HybridSettings::paper()), fault);
+    }
+}
+
+#[test]
+fn logs_of_learned_behaviours_replay_frozen_and_learning() {
+    let blank = |spec: grasp_agent::BehaviourSpec| {
+        let table = QTable::new(spec.states(), spec.actions()).unwrap();
+        grasp_agent::Behaviour::new(spec, table).unwrap()
+    };
+    let pair = BehaviourPair::paper_mended();
+    let learned = Learned::new(blank(pair.centering), blank(pair.approaching));
+    for fault in [Fault::None, Fault::Near(4), Fault::FalseCircle] {
+        replays(learned.clone(), fault);
+        replays(learned.clone().learning(OnlineLearning::careful(7)), fault);
+    }
+}
+
+#[test]
+fn logs_of_runs_that_failed_replay_to_the_same_failure() {
+    let servo = ServoSettings::paper();
+    for fault in [
+        Fault::NoFrame(3),
+        Fault::FrozenFrame(3),
+        Fault::ArmStuck(3),
+        Fault::LineDead(4),
+    ] {
+        replays(PositionBased::new(servo), fault);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Circles that passed the first looks, waiting for a closer one.
 
-use super::search::{Budget, Ring, Support};
+use super::polar::Ring;
+use super::search::{Budget, Support};
 
 /// A circle found at some level, in pixels of the frame.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +14,10 @@ pub(super) struct Candidate {
     pub(super) support: Support,
     /// How much speaks for it, to choose among candidates.
     pub(super) weight: f32,
+    /// Whether it has been to the proof.
+    pub(super) tried: bool,
+    /// How often it was met.
+    met: u32,
 }
 
 impl Candidate {
@@ -24,21 +29,22 @@ impl Candidate {
             r: ring.r * scale,
             scale,
             support,
+            tried: false,
+            met: 0,
             weight: {
-                let n = (ring.r * super::tune(21, 4.0)).min(32.0) * support.visible as f32 / 32.0;
+                let n = (ring.r * super::tune(21, 2.0)).min(32.0) * support.visible as f32 / 32.0;
                 let (q, p) = (support.share().min(0.999), super::tune(22, 0.2));
                 n * (q * (q / p).ln() + (1.0 - q) * ((1.0 - q) / (1.0 - p)).ln())
             },
         }
     }
 
-    /// The ring at a level of this scale.
-    pub(super) fn ring(&self, scale: f32) -> Ring {
-        let corner = 0.5 * (scale - 1.0);
+    /// The circle, in pixels of the frame.
+    pub(super) fn ring(&self) -> Ring {
         Ring {
-            x: (self.x - corner) / scale,
-            y: (self.y - corner) / scale,
-            r: self.r / scale,
+            x: self.x,
+            y: self.y,
+            r: self.r,
         }
     }
 
@@ -62,22 +68,33 @@ impl Collected {
         self.most = most;
     }
 
-    /// Keeps the better of those that are nearly one.
-    pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) {
+    /// Whether nearly this circle has been met often enough.
+    pub(super) fn is_known(&mut self, circle: &Candidate, budget: &mut Budget) -> bool {
         budget.looks += self.candidates.len() as u64 / 4;
-        if let Some(known) = self.candidates.iter_mut().find(|known| known.near(&candidate)) {
-            if candidate.weight > known.weight {
-                *known = candidate;
-            }
+        let known = self.candidates.iter_mut().find(|known| known.near(circle));
+        known.is_some_and(|known| {
+            known.met += 1;
+            known.met > super::tune(41, 3.0) as u32
+        })
+    }
+
+    /// Keeps the better of those that are nearly one; tells where it is if it was kept.
+    pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
+        budget.looks += self.candidates.len() as u64 / 4;
+        let better = |known: &Candidate| candidate.weight > known.weight;
+        let place = if let Some(place) = self.candidates.iter().position(|known| known.near(&candidate)) {
+            place
         } else if self.candidates.len() < self.most {
             self.candidates.push(candidate);
-        } else if let Some(worst) = self
-            .candidates
-            .iter_mut()
-            .min_by(|a, b| a.weight.total_cmp(&b.weight))
-            && worst.weight < candidate.weight
-        {
-            *worst = candidate;
-        }
+            return Some(self.candidates.len() - 1);
+        } else {
+            let weights = self.candidates.iter().map(|known| known.weight).enumerate();
+            weights.min_by(|a, b| a.1.total_cmp(&b.1))?.0
+        };
+        better(&self.candidates[place]).then(|| {
+            let met = self.candidates[place].met;
+            self.candidates[place] = Candidate { met, ..candidate };
+            place
+        })
     }
 }

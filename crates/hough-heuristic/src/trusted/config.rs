@@ -40,9 +40,24 @@ impl Default for TrustedConfig {
 impl TrustedConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         require_radii(self.min_radius, self.max_radius)?;
-        require("min_radius", self.min_radius, "at least 4", self.min_radius >= 4.0)?;
-        require("max_circles", self.max_circles as f64, "at least 1", self.max_circles > 0)?;
-        require("min_score", self.min_score, "0..=1", (0.0..=1.0).contains(&self.min_score))?;
+        require(
+            "min_radius",
+            self.min_radius,
+            "at least 4",
+            self.min_radius >= 4.0,
+        )?;
+        require(
+            "max_circles",
+            self.max_circles as f64,
+            "at least 1",
+            self.max_circles > 0,
+        )?;
+        require(
+            "min_score",
+            self.min_score,
+            "0..=1",
+            (0.0..=1.0).contains(&self.min_score),
+        )?;
         require(
             "contrast",
             self.contrast,

@@ -7,7 +7,18 @@ pub(super) const TURN: usize = 1024;
 
 /// The unit circle at [`TURN`] even steps, beginning at +x and turning to +y.
 #[derive(Clone, Debug)]
-pub(super) struct UnitCircle(Vec<(f32, f32)>);
+pub(super) struct UnitCircle {
+    points: Vec<(f32, f32)>,
+    /// The same in lists of x and of y, for 64, 128 and 256 steps.
+    rays: [(Vec<f32>, Vec<f32>); 3],
+}
+
+/// Evenly spaced unit vectors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rays<'a> {
+    pub(super) x: &'a [f32],
+    pub(super) y: &'a [f32],
+}
 
 impl UnitCircle {
     pub(super) fn new() -> Self {
@@ -29,13 +40,26 @@ impl UnitCircle {
             let (x, y) = points[index - TURN / 4];
             points[index] = (-y, x);
         }
-        Self(points.into_iter().map(|(x, y)| (x as f32, y as f32)).collect())
+        let points: Vec<(f32, f32)> = points.into_iter().map(|(x, y)| (x as f32, y as f32)).collect();
+        let rays = [64, 128, 256].map(|count| points.iter().step_by(TURN / count).copied().unzip());
+        Self { points, rays }
+    }
+
+    /// About `wanted` evenly spaced directions: 64, 128 or 256.
+    #[inline]
+    pub(super) fn rays(&self, wanted: usize) -> Rays<'_> {
+        let (x, y) = match wanted {
+            0..=64 => &self.rays[0],
+            65..=128 => &self.rays[1],
+            _ => &self.rays[2],
+        };
+        Rays { x, y }
     }
 
     /// Point `index` of `count` evenly spaced ones.
     #[inline]
     pub(super) fn point(&self, index: usize, count: usize) -> (f32, f32) {
-        self.0[(index * TURN / count) % TURN]
+        self.points[(index * TURN / count) % TURN]
     }
 }
 
@@ -73,7 +97,10 @@ mod tests {
         for index in 0..TURN {
             let (sin, cos) = (index as f64 / TURN as f64 * std::f64::consts::TAU).sin_cos();
             let (x, y) = circle.point(index, TURN);
-            assert!((f64::from(x) - cos).abs() < 1e-6 && (f64::from(y) - sin).abs() < 1e-6, "{index}");
+            assert!(
+                (f64::from(x) - cos).abs() < 1e-6 && (f64::from(y) - sin).abs() < 1e-6,
+                "{index}"
+            );
         }
     }
 

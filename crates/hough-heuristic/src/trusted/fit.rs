@@ -1,65 +1,58 @@
-//! Weighted least squares for an outline: how far it is to be moved, widened and made oval.
+//! Weighted least squares for a circle: how far it is to be moved and widened.
 
-use super::polar::Oval;
+use super::polar::{LANES, Ring};
 
-/// Moments of `residual = dr + ux dx + uy dy + cos2 c + sin2 d` over unit vectors `u`.
+/// Moments of `residual = dr + ux dx + uy dy` over unit vectors `u`, in eight sums each that are added up at the end.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Moments {
-    matrix: [[f64; N]; N],
-    right: [f64; N],
-}
-
-const N: usize = 5;
+pub(super) struct Moments([[f32; LANES]; 9]);
 
 impl Moments {
-    #[inline]
-    pub(super) fn add(&mut self, (ux, uy): (f32, f32), residual: f32, weight: f32) {
-        let (x, y) = (f64::from(ux), f64::from(uy));
-        let row = [1.0, x, y, x * x - y * y, 2.0 * x * y];
-        let weight = f64::from(weight);
-        for i in 0..N {
-            let scaled = weight * row[i];
-            self.right[i] += scaled * f64::from(residual);
-            for j in 0..=i {
-                self.matrix[i][j] += scaled * row[j];
-            }
+    /// Adds eight residuals.
+    #[inline(always)]
+    pub(super) fn add(
+        &mut self,
+        ux: &[f32; LANES],
+        uy: &[f32; LANES],
+        residual: &[f32; LANES],
+        weight: &[f32; LANES],
+    ) {
+        let [n, x, y, xx, xy, yy, d, dx, dy] = &mut self.0;
+        for lane in 0..LANES {
+            let (wx, wy) = (weight[lane] * ux[lane], weight[lane] * uy[lane]);
+            n[lane] += weight[lane];
+            x[lane] += wx;
+            y[lane] += wy;
+            xx[lane] += wx * ux[lane];
+            xy[lane] += wx * uy[lane];
+            yy[lane] += wy * uy[lane];
+            d[lane] += weight[lane] * residual[lane];
+            dx[lane] += wx * residual[lane];
+            dy[lane] += wy * residual[lane];
         }
     }
 
-    /// The step, of a circle or of an oval; None if the directions do not determine it.
-    pub(super) fn step(&self, oval: bool) -> Option<Oval> {
-        let count = if oval { N } else { 3 };
-        // Cholesky's decomposition.
-        let mut lower = [[0.0; N]; N];
-        for i in 0..count {
-            for j in 0..=i {
-                let sum: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
-                let rest = self.matrix[i][j] - sum;
-                if i == j {
-                    if rest <= 2e-3 * self.matrix[0][0] {
-                        return None;
-                    }
-                    lower[i][i] = rest.sqrt();
-                } else {
-                    lower[i][j] = rest / lower[j][j];
-                }
-            }
+    /// The step to the best circle; None if the directions do not determine it.
+    #[inline(always)]
+    pub(super) fn step(&self) -> Option<Ring> {
+        let [n, ux, uy, uxx, uxy, uyy, d, dx, dy] = self.0.map(|sums| {
+            let [a, b, c, d, e, f, g, h] = sums;
+            ((a + e) + (c + g)) + ((b + f) + (d + h))
+        });
+        if n <= 0.0 {
+            return None;
         }
-        let mut x = self.right;
-        for i in 0..count {
-            let sum: f64 = (0..i).map(|k| lower[i][k] * x[k]).sum();
-            x[i] = (x[i] - sum) / lower[i][i];
+        let (uxx, uxy, uyy) = (uxx - ux * ux / n, uxy - ux * uy / n, uyy - uy * uy / n);
+        let (dx, dy) = (dx - ux * d / n, dy - uy * d / n);
+        let determinant = uxx * uyy - uxy * uxy;
+        if determinant < 1e-3 * n * n {
+            return None;
         }
-        for i in (0..count).rev() {
-            let sum: f64 = (i + 1..count).map(|k| lower[k][i] * x[k]).sum();
-            x[i] = (x[i] - sum) / lower[i][i];
-        }
-        Some(Oval {
-            r: x[0] as f32,
-            x: x[1] as f32,
-            y: x[2] as f32,
-            cos2: if oval { x[3] as f32 } else { 0.0 },
-            sin2: if oval { x[4] as f32 } else { 0.0 },
+        let x = (dx * uyy - dy * uxy) / determinant;
+        let y = (dy * uxx - dx * uxy) / determinant;
+        Some(Ring {
+            x,
+            y,
+            r: (d - ux * x - uy * y) / n,
         })
     }
 }

@@ -1,30 +1,27 @@
 //! One size of the frame: its edge points, in lists by row and by column, and as a map of directions.
 
+use std::ops::Range;
+
 use super::directions::code;
+use super::polar::LANES;
 use crate::edges::Candidate;
 
 /// Set in the mark of a pixel with an edge.
 pub(super) const EDGE: u8 = 0x80;
 
-/// An edge point, as it lies in a list of rows; in a list of columns x and y have changed places.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct EdgePoint {
-    /// Position, pixels of the level.
-    pub(super) x: f32,
-    pub(super) y: f32,
-    /// Unit vector across the edge, from dark to bright.
-    pub(super) nx: f32,
-    pub(super) ny: f32,
-    /// Its place in the list of rows.
-    pub(super) id: u32,
-}
-
-/// Edge points in rows, or transposed in columns.
+/// Edge points in rows, one list for each of their parts; or transposed in columns, where x and y have changed places.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lines {
-    /// Where each line begins in `points`, and at the end their number.
-    pub(super) starts: Vec<u32>,
-    pub(super) points: Vec<EdgePoint>,
+    /// Where each line begins, and at the end the number of points.
+    starts: Vec<u32>,
+    /// Position, pixels of the level.
+    pub(super) x: Vec<f32>,
+    pub(super) y: Vec<f32>,
+    /// Unit vector across the edge, from dark to bright.
+    pub(super) nx: Vec<f32>,
+    pub(super) ny: Vec<f32>,
+    /// Its place in the list of rows.
+    pub(super) id: Vec<u32>,
 }
 
 /// The edges of one level.
@@ -54,23 +51,21 @@ impl Level {
         self.free.resize(candidates.len(), true);
 
         let rows = &mut self.rows;
-        rows.points.clear();
+        rows.resize(candidates.len());
         rows.starts.clear();
-        for candidate in candidates {
+        for (index, candidate) in candidates.iter().enumerate() {
             let (px, py) = (candidate.pixel.x as usize, candidate.pixel.y as usize);
-            let id = rows.points.len() as u32;
+            let id = index as u32;
             while rows.starts.len() <= py {
                 rows.starts.push(id);
             }
             let (gx, gy, dx, dy) = candidate.gradient.level_geometry();
             let unit = 1.0 / (gx * gx + gy * gy).sqrt().max(1e-20);
-            rows.points.push(EdgePoint {
-                x: px as f32 + dx,
-                y: py as f32 + dy,
-                nx: gx * unit,
-                ny: gy * unit,
-                id,
-            });
+            rows.x[index] = px as f32 + dx;
+            rows.y[index] = py as f32 + dy;
+            rows.nx[index] = gx * unit;
+            rows.ny[index] = gy * unit;
+            rows.id[index] = id;
             // The candidate's own pixel and its four neighbours; candidates never lie on the border.
             let mark = EDGE | code(gx, gy);
             let centre = py * width + px;
@@ -84,9 +79,9 @@ impl Level {
             self.nearest[centre] = id;
         }
         while rows.starts.len() <= height {
-            rows.starts.push(rows.points.len() as u32);
+            rows.starts.push(candidates.len() as u32);
         }
-        self.columns.transpose(&self.rows, width);
+        self.columns.transpose(&self.rows, candidates.len(), width);
     }
 
     /// The mark of the pixel, or None outside.
@@ -107,41 +102,61 @@ impl Level {
         &self.near
     }
 
-    /// The point that a mark stands for.
-    #[inline]
-    pub(super) fn point_at(&self, pixel: usize) -> &EdgePoint {
-        &self.rows.points[self.nearest[pixel] as usize]
+    /// The position of the point that a mark stands for.
+    #[inline(always)]
+    pub(super) fn point_at(&self, pixel: usize) -> (f32, f32) {
+        let id = self.nearest[pixel] as usize;
+        (self.rows.x[id], self.rows.y[id])
     }
 
-    /// Share of the pixels that have an edge within a pixel.
-    pub(super) fn density(&self) -> f32 {
-        5.0 * self.rows.points.len() as f32 / (self.near.len() as f32).max(1.0)
+    /// Takes the point that a mark stands for out of the search.
+    #[inline(always)]
+    pub(super) fn explain(&mut self, pixel: usize) {
+        self.free[self.nearest[pixel] as usize] = false;
+    }
+
+    /// The points of a row, or of a column.
+    #[inline(always)]
+    pub(super) fn line(&self, transposed: bool, line: usize) -> Range<usize> {
+        let starts = if transposed {
+            &self.columns.starts
+        } else {
+            &self.rows.starts
+        };
+        starts[line] as usize..starts[line + 1] as usize
     }
 }
 
 impl Lines {
+    /// Makes room for `count` points and a margin that is far from all of them.
+    fn resize(&mut self, count: usize) {
+        for values in [&mut self.x, &mut self.nx, &mut self.ny] {
+            values.resize(count + LANES, 0.0);
+        }
+        self.y.resize(count + LANES, 0.0);
+        self.y[count..].fill(f32::INFINITY);
+        self.id.resize(count + LANES, 0);
+    }
+
     /// Makes this list the columns of `rows`.
-    fn transpose(&mut self, rows: &Lines, width: usize) {
+    fn transpose(&mut self, rows: &Self, count: usize, width: usize) {
         self.starts.clear();
         self.starts.resize(width + 2, 0);
-        let column = |point: &EdgePoint| ((point.x + 0.5) as usize).min(width - 1);
-        for point in &rows.points {
-            self.starts[column(point) + 2] += 1;
+        let column = |x: f32| ((x + 0.5) as usize).min(width - 1);
+        for &x in &rows.x[..count] {
+            self.starts[column(x) + 2] += 1;
         }
         for index in 2..self.starts.len() {
             self.starts[index] += self.starts[index - 1];
         }
-        self.points.resize(rows.points.len(), EdgePoint::default());
-        for point in &rows.points {
-            let slot = &mut self.starts[column(point) + 1];
-            self.points[*slot as usize] = EdgePoint {
-                x: point.y,
-                y: point.x,
-                nx: point.ny,
-                ny: point.nx,
-                id: point.id,
-            };
+        self.resize(count);
+        for index in 0..count {
+            let slot = &mut self.starts[column(rows.x[index]) + 1];
+            let at = *slot as usize;
             *slot += 1;
+            (self.x[at], self.y[at]) = (rows.y[index], rows.x[index]);
+            (self.nx[at], self.ny[at]) = (rows.ny[index], rows.nx[index]);
+            self.id[at] = index as u32;
         }
         self.starts.pop();
     }

@@ -1,6 +1,8 @@
-//! A frame around an outline, unrolled: a row for each direction, a column for each distance from the outline.
+//! A frame around a circle, unrolled: a column of values for each direction, a row for each distance from the outline.
+//!
+//! All directions of a row lie together, so that the loops over them become vector code.
 
-use super::directions::UnitCircle;
+use super::directions::Rays;
 
 /// A grey frame of any size of the pyramid.
 #[derive(Clone, Copy, Debug)]
@@ -10,155 +12,177 @@ pub(super) struct Grey<'a> {
     pub(super) height: usize,
 }
 
-/// An outline that is nearly a circle: `r + cos2 cos(2 a) + sin2 sin(2 a)` in direction `a`.
+/// A circle in pixels of some size of the pyramid.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Oval {
+pub(super) struct Ring {
     pub(super) x: f32,
     pub(super) y: f32,
     pub(super) r: f32,
-    pub(super) cos2: f32,
-    pub(super) sin2: f32,
 }
 
-impl Oval {
-    #[inline]
-    pub(super) fn radius(&self, (ux, uy): (f32, f32)) -> f32 {
-        self.r + self.cos2 * (ux * ux - uy * uy) + self.sin2 * (2.0 * ux * uy)
-    }
-
-    /// The outline in a frame whose pixels are `factor` times as large.
+impl Ring {
+    /// The circle in a frame whose pixels are `factor` times as large.
     pub(super) fn shrunk(&self, factor: f32) -> Self {
         let corner = 0.5 * (factor - 1.0);
         Self {
             x: (self.x - corner) / factor,
             y: (self.y - corner) / factor,
             r: self.r / factor,
-            cos2: self.cos2 / factor,
-            sin2: self.sin2 / factor,
         }
     }
 
-    /// The outline in a frame whose pixels are `factor` times as small.
+    /// The circle in a frame whose pixels are `factor` times as small.
     pub(super) fn grown(&self, factor: f32) -> Self {
         let corner = 0.5 * (factor - 1.0);
         Self {
             x: self.x * factor + corner,
             y: self.y * factor + corner,
             r: self.r * factor,
-            cos2: self.cos2 * factor,
-            sin2: self.sin2 * factor,
         }
     }
 }
 
-/// Derivatives along and across the outline, on a grid of directions and distances.
+/// Derivatives outward and along the outline, on a grid of directions and distances.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polar {
-    /// Directions.
+    /// Directions, a multiple of [`LANES`].
     pub(super) rays: usize,
     /// Distances.
-    pub(super) columns: usize,
-    /// Grey levels, a ray a row, one more than distances.
+    pub(super) steps: usize,
+    /// Grey levels, one row more than distances; a row begins and ends with [`MARGIN`] values of the other end.
     grey: Vec<f32>,
-    /// Derivative outward per pixel, averaged along the outline.
+    /// Derivative outward per pixel, averaged along the outline; `rays` values a row.
     pub(super) outward: Vec<f32>,
-    /// Derivative along the outline per pixel.
+    /// Derivative along the outline per pixel; `rays` values a row.
     pub(super) along: Vec<f32>,
-    /// Whether the outline is inside the frame there.
-    pub(super) visible: Vec<bool>,
+    /// 1 where the outline is inside the frame, 0 elsewhere.
+    pub(super) visible: Vec<f32>,
 }
 
+/// Directions that are worked on together.
+pub(super) const LANES: usize = 8;
+/// How many directions at the most are averaged on either side.
+const MARGIN: usize = 8;
+
 impl Polar {
-    /// How far a column lies outside of the outline, pixels; fractions lie between columns.
-    #[inline]
-    pub(super) fn distance(&self, column: f32) -> f32 {
-        column - 0.5 * (self.columns - 1) as f32
+    /// How far a row lies outside of the outline, pixels; fractions lie between rows.
+    #[inline(always)]
+    pub(super) fn distance(&self, row: f32) -> f32 {
+        row - 0.5 * (self.steps - 1) as f32
     }
 
-    /// Samples the frame along `rays` directions, up to `reach` pixels on either side of the outline, and averages the
-    /// slopes over `2 half + 1` neighbouring directions.
-    pub(super) fn sample(
-        &mut self,
-        frame: Grey<'_>,
-        circle: &UnitCircle,
-        oval: &Oval,
-        (rays, reach, half): (usize, usize, usize),
-    ) {
-        let samples = 2 * reach + 2;
-        self.rays = rays;
-        self.columns = samples - 1;
-        self.grey.resize(rays * samples, 0.0);
-        self.visible.clear();
-        let Grey { pixels, width, height } = frame;
+    /// Samples the frame along the rays, up to `reach` pixels on either side of the outline, and averages the outward
+    /// slopes over `2 half + 1` neighbouring directions (`half` at most 8).
+    #[inline(always)]
+    pub(super) fn sample(&mut self, frame: Grey<'_>, rays: Rays<'_>, ring: &Ring, reach: usize, half: usize) {
+        let Rays { x: ux, y: uy } = rays;
+        let count = ux.len();
+        let stride = count + 2 * MARGIN;
+        self.rays = count;
+        self.steps = 2 * reach + 1;
+        self.grey.resize((self.steps + 1) * stride, 0.0);
+        self.outward.resize(self.steps * count, 0.0);
+        self.along.resize(self.steps * count, 0.0);
+        self.visible.resize(count, 0.0);
+
+        let Grey {
+            pixels,
+            width,
+            height,
+        } = frame;
         let (right, bottom) = ((width - 1) as f32, (height - 1) as f32);
-        let (last_left, last_top) = (width.saturating_sub(2), height.saturating_sub(2));
-        for (index, ray) in self.grey.chunks_exact_mut(samples).enumerate() {
-            let (ux, uy) = circle.point(index, rays);
-            let radius = oval.radius((ux, uy));
-            let (at_x, at_y) = (oval.x + radius * ux, oval.y + radius * uy);
-            let inside = at_x >= 0.5 && at_y >= 0.5 && at_x <= right - 0.5 && at_y <= bottom - 0.5;
-            self.visible.push(inside);
-            if !inside {
-                ray.fill(0.0);
-                continue;
-            }
-            let start = radius - reach as f32 - 0.5;
-            let (x, y) = (oval.x + start * ux, oval.y + start * uy);
-            let (end_x, end_y) = (x + (samples - 1) as f32 * ux, y + (samples - 1) as f32 * uy);
-            if x.min(end_x) >= 0.0 && y.min(end_y) >= 0.0 && x.max(end_x) < right && y.max(end_y) < bottom {
-                for (step, out) in ray.iter_mut().enumerate() {
-                    let (cx, cy) = (x + step as f32 * ux, y + step as f32 * uy);
-                    let (left, top) = (cx as i32, cy as i32);
-                    let (fx, fy) = (cx - left as f32, cy - top as f32);
-                    let at = (top * width as i32 + left) as usize;
-                    let Some(square) = pixels.get(at..at + width + 2) else { continue };
-                    let (a, b) = (f32::from(square[0]), f32::from(square[1]));
-                    let (c, d) = (f32::from(square[width]), f32::from(square[width + 1]));
-                    let (ab, cd) = (a + (b - a) * fx, c + (d - c) * fx);
-                    *out = ab + (cd - ab) * fy;
-                }
-                continue;
-            }
-            for (step, out) in ray.iter_mut().enumerate() {
-                let step = step as f32;
-                let (cx, cy) = ((x + step * ux).clamp(0.0, right), (y + step * uy).clamp(0.0, bottom));
-                let (left, top) = ((cx as usize).min(last_left), (cy as usize).min(last_top));
-                let (fx, fy) = (cx - left as f32, cy - top as f32);
-                let at = top * width + left;
-                let (upper, lower) = (&pixels[at..at + 2], &pixels[at + width..at + width + 2]);
-                let (a, b) = (f32::from(upper[0]), f32::from(upper[1]));
-                let (c, d) = (f32::from(lower[0]), f32::from(lower[1]));
-                let (ab, cd) = (a + (b - a) * fx, c + (d - c) * fx);
-                *out = ab + (cd - ab) * fy;
-            }
+        // Just inside of the last pixels, so that there is always a neighbour.
+        let (most_x, most_y) = (right - 0.001, bottom - 0.001);
+        let inside = |at: f32, end: f32| f32::from(u8::from(at >= 0.5 && at <= end - 0.5));
+        for (visible, (&ux, &uy)) in self.visible.iter_mut().zip(ux.iter().zip(uy)) {
+            *visible = inside(ring.x + ring.r * ux, right) * inside(ring.y + ring.r * uy, bottom);
         }
-        self.differentiate(oval.r, half);
+        for (step, row) in self.grey.chunks_exact_mut(stride).enumerate() {
+            let r = ring.r - reach as f32 - 0.5 + step as f32;
+            let out = &mut row[MARGIN..MARGIN + count];
+            let (ux, uy) = (ux.as_chunks::<LANES>().0, uy.as_chunks::<LANES>().0);
+            for ((out, ux), uy) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(ux).zip(uy) {
+                *out = bilinear(pixels, width, ring, r, (most_x, most_y), ux, uy);
+            }
+            row.copy_within(count..MARGIN + count, 0);
+            row.copy_within(MARGIN..2 * MARGIN, MARGIN + count);
+        }
+        self.differentiate(ring.r, half.min(MARGIN));
     }
 
+    #[inline(always)]
     fn differentiate(&mut self, r: f32, half: usize) {
-        let (n, m) = (self.rays, self.columns);
-        let samples = m + 1;
-        self.outward.resize(n * m, 0.0);
-        self.along.resize(n * m, 0.0);
-        let arc = r * std::f32::consts::TAU / n as f32;
+        let count = self.rays;
+        let stride = count + 2 * MARGIN;
+        let arc = r * std::f32::consts::TAU / count as f32;
         // The slope along the outline is taken over at least two pixels.
-        let lag = ((1.0 / arc.max(0.1)) as usize + 1).max(half);
+        let lag = ((1.0 / arc.max(0.1)) as usize + 1).max(half).min(MARGIN);
         let (share, slope) = (1.0 / (2 * half + 1) as f32, 0.25 / (lag as f32 * arc));
-        for index in 0..n {
-            let out = &mut self.outward[index * m..][..m];
+        for step in 0..self.steps {
+            let (near, far) = self.grey[step * stride..][..2 * stride].split_at(stride);
+            let out = &mut self.outward[step * count..][..count];
             out.fill(0.0);
-            for step in 0..=2 * half {
-                let ray = &self.grey[((index + n + step - half) % n) * samples..][..samples];
-                for column in 0..m {
-                    out[column] += (ray[column + 1] - ray[column]) * share;
+            for shift in MARGIN - half..=MARGIN + half {
+                let (near, far) = (&near[shift..][..count], &far[shift..][..count]);
+                for index in 0..count {
+                    out[index] += (far[index] - near[index]) * share;
                 }
             }
-            let ahead = &self.grey[((index + lag) % n) * samples..][..samples];
-            let behind = &self.grey[((index + n - lag % n) % n) * samples..][..samples];
-            let out = &mut self.along[index * m..][..m];
-            for column in 0..m {
-                out[column] = slope * (ahead[column] + ahead[column + 1] - behind[column] - behind[column + 1]);
+            let out = &mut self.along[step * count..][..count];
+            let (ahead, behind) = (MARGIN + lag, MARGIN - lag);
+            let (near_ahead, near_behind) = (&near[ahead..][..count], &near[behind..][..count]);
+            let (far_ahead, far_behind) = (&far[ahead..][..count], &far[behind..][..count]);
+            for index in 0..count {
+                out[index] = slope
+                    * ((near_ahead[index] + far_ahead[index]) - (near_behind[index] + far_behind[index]));
             }
         }
     }
+}
+
+/// The grey levels at distance `r` from the centre of the ring in eight directions.
+#[inline(always)]
+fn bilinear(
+    pixels: &[u8],
+    width: usize,
+    ring: &Ring,
+    r: f32,
+    (most_x, most_y): (f32, f32),
+    ux: &[f32; LANES],
+    uy: &[f32; LANES],
+) -> [f32; LANES] {
+    let (mut fx, mut fy, mut at) = ([0.0; LANES], [0.0; LANES], [0i32; LANES]);
+    for lane in 0..LANES {
+        let x = (ring.x + r * ux[lane]).max(0.0).min(most_x);
+        let y = (ring.y + r * uy[lane]).max(0.0).min(most_y);
+        let (left, top) = (x as i32, y as i32);
+        fx[lane] = x - left as f32;
+        fy[lane] = y - top as f32;
+        at[lane] = top * width as i32 + left;
+    }
+    // Four neighbouring pixels as the four bytes of a word.
+    let mut squares = [0i32; LANES];
+    for lane in 0..LANES {
+        // Always there; the check is cheaper than a proof.
+        if let Some(square) = pixels
+            .get(at[lane] as usize..)
+            .and_then(|rest| rest.get(..width + 2))
+        {
+            squares[lane] = i32::from_le_bytes([square[0], square[1], square[width], square[width + 1]]);
+        }
+    }
+    let (mut a, mut b, mut c, mut d) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for lane in 0..LANES {
+        a[lane] = (squares[lane] & 0xff) as f32;
+        b[lane] = ((squares[lane] >> 8) & 0xff) as f32;
+        c[lane] = ((squares[lane] >> 16) & 0xff) as f32;
+        d[lane] = ((squares[lane] >> 24) & 0xff) as f32;
+    }
+    let mut grey = [0.0; LANES];
+    for lane in 0..LANES {
+        let upper = a[lane] + (b[lane] - a[lane]) * fx[lane];
+        let lower = c[lane] + (d[lane] - c[lane]) * fx[lane];
+        grey[lane] = upper + (lower - upper) * fy[lane];
+    }
+    grey
 }

@@ -1,8 +1,8 @@
 //! The evidence for a candidate, weighed where its radius is one or two dozen pixels: the same at every size.
 
-use super::directions::UnitCircle;
+use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
-use super::polar::{Grey, Oval, Polar};
+use super::polar::{Grey, LANES, Polar, Ring};
 
 /// Directions that are looked in.
 const RAYS: usize = 64;
@@ -12,10 +12,12 @@ const REACH: usize = 6;
 /// What a candidate proved to be.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Proof {
-    /// In pixels of the frame.
-    pub(super) oval: Oval,
+    /// In pixels of the level, or of the frame once it has been measured.
+    pub(super) ring: Ring,
     /// Minus the decimal logarithm of the number of false alarms.
     pub(super) certainty: f32,
+    /// How many times the frame was halved for the proof.
+    pub(super) depth: usize,
     /// Features, for development.
     pub(super) features: [f32; 8],
 }
@@ -30,146 +32,187 @@ pub(super) struct Setting {
 }
 
 /// The strongest edge along each ray.
-#[derive(Clone, Copy, Debug, Default)]
-struct Edge {
+#[derive(Clone, Debug)]
+struct Edges {
     /// How far outside the outline, pixels.
-    distance: f32,
-    /// Signed slope; 0 where there is no edge.
-    slope: f32,
+    distance: [f32; RAYS],
+    /// Slope without its sign; 0 where there is no edge.
+    slope: [f32; RAYS],
 }
 
+impl Edges {
+    /// Finds the strongest edge along the outline's normal on each ray.
+    #[inline(always)]
+    fn around(
+        ring: &Ring,
+        grey: Grey<'_>,
+        rays: Rays<'_>,
+        polar: &mut Polar,
+        half: usize,
+        least: f32,
+    ) -> Self {
+        let reach = REACH.min((ring.r - 1.5) as usize).max(2);
+        polar.sample(grey, rays, ring, reach, half);
+        let mut edges = Self {
+            distance: [0.0; RAYS],
+            slope: [0.0; RAYS],
+        };
+        let mut at = [0i32; RAYS];
+        for (block, at) in at.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let visible = polar.visible.as_chunks::<LANES>().0[block];
+            let (mut best, mut place) = ([least; LANES], [0i32; LANES]);
+            let rows = polar
+                .outward
+                .chunks_exact(RAYS)
+                .zip(polar.along.chunks_exact(RAYS));
+            for (step, (outward, along)) in rows.enumerate() {
+                let outward = outward.as_chunks::<LANES>().0[block];
+                let along = along.as_chunks::<LANES>().0[block];
+                for lane in 0..LANES {
+                    let strength = (outward[lane].abs() - 0.7 * along[lane].abs()) * visible[lane];
+                    let better = -i32::from(strength > best[lane]);
+                    place[lane] = (better & (step as i32 + 1)) | (!better & place[lane]);
+                    best[lane] = strength.max(best[lane]);
+                }
+            }
+            *at = place;
+        }
+        for ray in 0..RAYS {
+            let Some(step) = (at[ray] as usize).checked_sub(1) else {
+                edges.distance[ray] = 0.0;
+                edges.slope[ray] = 0.0;
+                continue;
+            };
+            let slope = |step: usize| polar.outward[step * RAYS + ray].abs();
+            let here = slope(step);
+            let mut place = step as f32;
+            if step > 0 && step + 1 < polar.steps {
+                let (before, behind) = (slope(step - 1), slope(step + 1));
+                let bend = 2.0 * here - before - behind;
+                if bend > 0.0 {
+                    place += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
+                }
+            }
+            edges.distance[ray] = polar.distance(place);
+            edges.slope[ray] = here;
+        }
+        edges
+    }
+}
+
+#[inline(always)]
 pub(super) fn prove(
     grey: Grey<'_>,
     circle: &UnitCircle,
     polar: &mut Polar,
-    start: Oval,
+    start: Ring,
     setting: &Setting,
 ) -> Option<Proof> {
-    let mut edges = [Edge::default(); RAYS];
+    let rays = circle.rays(RAYS);
     // Slopes are averaged along the outline over some three pixels where there is noise.
     let arc = start.r * std::f32::consts::TAU / RAYS as f32;
     let half = if setting.noise > 3.0 {
-        ((super::tune(13, 1.5) / arc) as usize).clamp(1, 5)
+        ((1.5 / arc) as usize).clamp(1, 5)
     } else {
         0
     };
     let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
-    let sample = |polar: &mut Polar, oval: &Oval, edges: &mut [Edge; RAYS]| {
-        let reach = REACH.min((oval.r - 1.5) as usize).max(2);
-        polar.sample(grey, circle, oval, (RAYS, reach, half));
-        strongest(polar, least, edges);
-    };
-    let mut oval = start;
-    for round in 0..super::tune(15, 4.0) as usize {
-        sample(polar, &oval, &mut edges);
-        let foci: &[f32] = if round == 0 { &[4.0, 3.0, 2.0] } else { &[3.0, 2.0, 1.5] };
-        let (better, near) = improve(circle, &edges, oval, foci)?;
-        if near < super::tune(20, 20.0) as usize {
+    let mut ring = start;
+    for round in 0..4 {
+        let edges = Edges::around(&ring, grey, rays, polar, half, least);
+        let foci = if round == 0 {
+            [4.0, 3.0, 2.0]
+        } else {
+            [3.0, 2.0, 1.5]
+        };
+        let (better, near) = improve(rays, &edges, ring, foci)?;
+        let apart = |other: &Ring| {
+            let (dx, dy) = (better.x - other.x, better.y - other.y);
+            (dx * dx + dy * dy).sqrt() + (better.r - other.r).abs()
+        };
+        if near < super::tune(20, 20.0) as usize || !(apart(&start) <= 6.0 && better.r >= 3.0) {
             return None;
         }
-        let moved = (better.x - oval.x).hypot(better.y - oval.y) + (better.r - oval.r).abs();
-        oval = better;
-        if moved < super::tune(16, 0.7) {
+        let moved = apart(&ring);
+        ring = better;
+        if moved < 0.7 {
             break;
         }
     }
-    sample(polar, &oval, &mut edges);
-    Some(weigh(polar, &edges, oval, setting))
+    let edges = Edges::around(&ring, grey, rays, polar, half, least);
+    Some(weigh(polar, &edges, ring, setting))
 }
 
-/// Moves the outline to the edges, in steps that look at those within the foci, pixels.
-fn improve(circle: &UnitCircle, edges: &[Edge; RAYS], start: Oval, foci: &[f32]) -> Option<(Oval, usize)> {
-    let mut oval = start;
-    let mut last = 0;
-    for &focus in foci {
+/// Moves the outline to the edges, in steps that look at those within the foci, pixels; also tells how many there were.
+#[inline(always)]
+fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option<(Ring, usize)> {
+    let mut ring = start;
+    let mut near = 0.0;
+    for focus in foci {
         let mut moments = Moments::default();
-        let mut near = 0;
-        for (index, edge) in edges.iter().enumerate() {
-            let unit = circle.point(index, RAYS);
-            let moved = (oval.x - start.x) * unit.0 + (oval.y - start.y) * unit.1;
-            let residual = edge.distance + start.radius(unit) - oval.radius(unit) - moved;
-            let off = residual / focus;
-            if edge.slope != 0.0 && off.abs() < 1.0 {
-                moments.add(unit, residual, edge.slope.abs().min(30.0) * (1.0 - off * off));
-                near += 1;
+        let mut count = [0.0f32; LANES];
+        let (shift_x, shift_y, shift_r) = (ring.x - start.x, ring.y - start.y, ring.r - start.r);
+        for block in 0..RAYS / LANES {
+            let ux = &rays.x.as_chunks::<LANES>().0[block];
+            let uy = &rays.y.as_chunks::<LANES>().0[block];
+            let distance = &edges.distance.as_chunks::<LANES>().0[block];
+            let slope = &edges.slope.as_chunks::<LANES>().0[block];
+            let (mut residual, mut weight) = ([0.0; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                residual[lane] = distance[lane] - shift_r - shift_x * ux[lane] - shift_y * uy[lane];
+                let off = residual[lane] / focus;
+                let within = (1.0 - off * off).max(0.0);
+                weight[lane] = slope[lane].min(30.0) * within;
+                count[lane] += f32::from(u8::from(weight[lane] > 0.0));
             }
+            moments.add(ux, uy, &residual, &weight);
         }
-        if near < 12 {
+        near = count.iter().sum();
+        if near < 12.0 {
             return None;
         }
-        last = near;
-        let step = moments
-            .step(focus <= 2.0 && near >= super::tune(10, 100.0) as usize)
-            .or_else(|| moments.step(false))?;
-        oval.x += step.x;
-        oval.y += step.y;
-        oval.r += step.r;
-        let moved = (oval.x - start.x).hypot(oval.y - start.y) + (oval.r - start.r).abs();
-        if !(moved <= 6.0 && oval.r >= 3.0) {
-            return None;
-        }
-        let most = 0.08 * oval.r;
-        oval.cos2 = (oval.cos2 + step.cos2).clamp(-most, most);
-        oval.sin2 = (oval.sin2 + step.sin2).clamp(-most, most);
-    }
-    Some((oval, last))
-}
-
-/// Finds the strongest edge along the outline's normal on each ray.
-fn strongest(polar: &Polar, least: f32, edges: &mut [Edge; RAYS]) {
-    let m = polar.columns;
-    for (index, edge) in edges.iter_mut().enumerate() {
-        *edge = Edge::default();
-        if !polar.visible[index] {
-            continue;
-        }
-        let (row, along) = (&polar.outward[index * m..][..m], &polar.along[index * m..][..m]);
-        let (mut best, mut at) = (least, usize::MAX);
-        for column in 0..m {
-            let strength = row[column].abs() - 0.7 * along[column].abs();
-            if strength > best {
-                (best, at) = (strength, column);
-            }
-        }
-        if at == usize::MAX {
-            continue;
-        }
-        let here = row[at].abs();
-        let mut column = at as f32;
-        if at > 0 && at + 1 < m {
-            let (before, behind) = (row[at - 1].abs(), row[at + 1].abs());
-            let bend = 2.0 * here - before - behind;
-            if bend > 0.0 {
-                column += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
-            }
-        }
-        *edge = Edge {
-            distance: polar.distance(column),
-            slope: row[at],
+        let step = moments.step()?;
+        ring = Ring {
+            x: ring.x + step.x,
+            y: ring.y + step.y,
+            r: ring.r + step.r,
         };
     }
+    Some((ring, near as usize))
 }
 
 /// Weighs how many of the strongest edges lie on the outline.
-fn weigh(polar: &Polar, edges: &[Edge; RAYS], oval: Oval, setting: &Setting) -> Proof {
-    let visible = polar.visible.iter().filter(|&&visible| visible).count();
-    let independent = (oval.r * std::f32::consts::TAU / 2.5).min(RAYS as f32) / RAYS as f32 * visible as f32;
+fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting) -> Proof {
+    let visible: f32 = polar.visible.iter().sum();
+    let independent = (ring.r * std::f32::consts::TAU / 2.5).min(RAYS as f32) / RAYS as f32 * visible;
     let mut best = Proof {
-        oval,
+        ring,
         certainty: f32::NEG_INFINITY,
         ..Proof::default()
     };
-    for slack in [super::tune(17, 0.25), 0.5f32, 0.8, 1.2] {
+    for slack in [0.25f32, 0.5, 0.8, 1.2] {
+        let on = |(distance, slope): (&f32, &f32)| *slope > 0.0 && distance.abs() <= slack;
         let hits = edges
+            .distance
             .iter()
-            .filter(|edge| edge.slope != 0.0 && edge.distance.abs() <= slack)
+            .zip(&edges.slope)
+            .filter(|&edge| on(edge))
             .count();
-        let p = (2.0 * slack + super::tune(9, 0.2)) / polar.columns as f32;
-        let share = hits as f32 / (visible as f32).max(1.0);
+        let p = (2.0 * slack + super::tune(9, 0.2)) / polar.steps as f32;
+        let share = hits as f32 / visible.max(1.0);
         let certainty = independent * divergence(share, p) - setting.tests;
         if certainty > best.certainty {
             best.certainty = certainty;
-            best.features = [share, slack, visible as f32 / RAYS as f32, independent, 0.0, 0.0, 0.0, 0.0];
+            best.features = [
+                share,
+                slack,
+                visible / RAYS as f32,
+                independent,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ];
         }
     }
     best

@@ -1,28 +1,20 @@
 //! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps 3a to 3c.
 
-use super::tune;
 use super::candidate::{Candidate, Collected};
 use super::directions::{CODES, UnitCircle, code};
-use super::level::{EDGE, EdgePoint, Level, Lines};
+use super::level::{EDGE, Level, Lines};
+use super::polar::{LANES, Ring};
+use super::prover::Prover;
+use super::tune;
 
 /// Points of a circle's outline that are looked at.
 pub(super) const LOOKS: usize = 32;
 /// How far the direction of an edge may be off that of the outline, in codes of 2.8 degrees.
 pub(super) const DIRECTION_SLACK: u8 = 7;
-/// The sine of how far two normals may be from mirroring one another.
-const MIRROR_SLACK: f32 = 0.25;
 /// The least part of a normal along the line that the pair lies on.
-const LEAST_ALONG: f32 = 0.45;
+const LEAST_ALONG: f32 = 0.58;
 /// How many mirrored partners of a point are tried.
-const PARTNERS: u32 = 6;
-
-/// A circle in pixels of a level.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ring {
-    pub(super) x: f32,
-    pub(super) y: f32,
-    pub(super) r: f32,
-}
+const PARTNERS: usize = 6;
 
 /// What a ring's outline shows.
 #[derive(Clone, Copy, Debug, Default)]
@@ -69,8 +61,9 @@ const BLOCK: usize = 8;
 impl Outline {
     pub(super) fn new(circle: &UnitCircle) -> Self {
         // Bits reversed: any first part of the order is spread over the whole outline.
-        let order: [usize; LOOKS] =
-            std::array::from_fn(|index| (index as u32).reverse_bits() as usize >> (32 - LOOKS.trailing_zeros()));
+        let order: [usize; LOOKS] = std::array::from_fn(|index| {
+            (index as u32).reverse_bits() as usize >> (32 - LOOKS.trailing_zeros())
+        });
         let points = order.map(|index| circle.point(index, LOOKS));
         Self {
             x: points.map(|(x, _)| x),
@@ -80,7 +73,7 @@ impl Outline {
     }
 
     /// Looks at the outline until it is plain that there is no circle; None then.
-    #[inline]
+    #[inline(always)]
     pub(super) fn support(&self, level: &Level, ring: &Ring, least: f32, looks: &mut u64) -> Option<Support> {
         let (width, height) = (level.width as f32, level.height as f32);
         let inside = ring.x - ring.r >= 0.0
@@ -89,7 +82,10 @@ impl Outline {
             && ring.y + ring.r <= height - 1.0;
         let mut support = Support::default();
         for block in 0..LOOKS / BLOCK {
-            let (x, y) = (&self.x.as_chunks::<BLOCK>().0[block], &self.y.as_chunks::<BLOCK>().0[block]);
+            let (x, y) = (
+                &self.x.as_chunks::<BLOCK>().0[block],
+                &self.y.as_chunks::<BLOCK>().0[block],
+            );
             let lowest = &self.lowest.as_chunks::<BLOCK>().0[block];
             let mut marks = [0u8; BLOCK];
             if inside {
@@ -120,38 +116,65 @@ impl Outline {
                 return None;
             }
         }
-        (support.visible >= LOOKS as u32 / 3 && support.hits as f32 >= support.visible as f32 * least).then_some(support)
+        (support.visible >= LOOKS as u32 / 3 && support.hits as f32 >= support.visible as f32 * least)
+            .then_some(support)
     }
 
-    /// Fits the ring to the edge points along it; None if they do not determine one.
-    pub(super) fn fit(&self, level: &Level, ring: &Ring, reach: f32, looks: &mut u64) -> Option<Ring> {
+    /// Fits the ring to the edge points along it, and counts those that lie on it then; None if they do not determine one.
+    #[inline(always)]
+    pub(super) fn fit(
+        &self,
+        level: &Level,
+        ring: &Ring,
+        reach: f32,
+        looks: &mut u64,
+    ) -> Option<(Ring, Support)> {
         let mut normal = Normal::default();
+        let mut support = Support::default();
+        let mut points = [(0.0f32, 0.0f32); LOOKS];
+        let mut count = 0;
         for index in 0..LOOKS {
             let (ux, uy, lowest) = (self.x[index], self.y[index], self.lowest[index]);
+            let mut inside = false;
             for step in [0.0, -1.5, 1.5] {
                 *looks += 1;
                 let at = ring.r + step;
                 let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy) else {
                     continue;
                 };
+                inside = true;
                 if !runs_along(mark, lowest) {
                     continue;
                 }
-                let point = level.point_at(pixel);
-                let (dx, dy) = (point.x - ring.x, point.y - ring.y);
+                let (point_x, point_y) = level.point_at(pixel);
+                let (dx, dy) = (point_x - ring.x, point_y - ring.y);
                 let distance = (dx * dx + dy * dy).sqrt();
-                if (distance - ring.r).abs() <= reach && distance > 0.5 {
-                    normal.add(dx / distance, dy / distance, distance - ring.r, 1.0);
+                let residual = distance - ring.r;
+                if residual.abs() <= reach && distance > 0.5 {
+                    normal.add(dx / distance, dy / distance, residual, 1.0);
+                    points[count] = (dx, dy);
+                    count += 1;
                     break;
                 }
             }
+            support.visible += u32::from(inside);
         }
         let (dx, dy, dr) = normal.solve()?;
-        (dx.abs() + dy.abs() + dr.abs() <= 3.0 * reach).then_some(Ring {
+        if dx.abs() + dy.abs() + dr.abs() > 3.0 * reach {
+            return None;
+        }
+        let fitted = Ring {
             x: ring.x + dx,
             y: ring.y + dy,
             r: ring.r + dr,
-        })
+        };
+        let slack = tune(23, 0.7) + 0.02 * fitted.r;
+        for (px, py) in &points[..count] {
+            let (x, y) = (px - dx, py - dy);
+            let off = (x * x + y * y).sqrt() - fitted.r;
+            support.hits += u32::from(off.abs() <= slack);
+        }
+        Some((fitted, support))
     }
 
     /// Marks the points along the ring as explained.
@@ -166,8 +189,7 @@ impl Outline {
                 if let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy)
                     && runs_along(mark, lowest)
                 {
-                    let id = level.point_at(pixel).id;
-                    level.free[id as usize] = false;
+                    level.explain(pixel);
                 }
             }
         }
@@ -228,25 +250,6 @@ impl Normal {
     }
 }
 
-/// The two normals' account of the circle through a point and one further along its line; None if they tell of none.
-#[inline]
-fn mirrored(p: &EdgePoint, q: &EdgePoint) -> Option<Ring> {
-    if (p.nx * q.ny + p.ny * q.nx).abs() > tune(6, MIRROR_SLACK) || q.nx.abs() < LEAST_ALONG {
-        return None;
-    }
-    // Inward: along the line at p, against it at q.
-    let (px, py) = if p.nx > 0.0 { (p.nx, p.ny) } else { (-p.nx, -p.ny) };
-    let (qx, qy) = if q.nx < 0.0 { (q.nx, q.ny) } else { (-q.nx, -q.ny) };
-    let (across, along) = (py + qy, px - qx);
-    let length = (across * across + along * along).sqrt();
-    let r = 0.5 * (q.x - p.x) * length / along;
-    Some(Ring {
-        x: 0.5 * (p.x + q.x),
-        y: 0.5 * (p.y + q.y) + r * across / length,
-        r,
-    })
-}
-
 /// Everything the search of a level needs.
 pub(super) struct Search<'a> {
     pub(super) circle: &'a UnitCircle,
@@ -256,48 +259,59 @@ pub(super) struct Search<'a> {
     /// Pixels of the frame per pixel of the level.
     pub(super) scale: f32,
     pub(super) seed: u64,
+    /// The sine of how far two normals may be from mirroring one another.
+    pub(super) mirror_slack: f32,
 }
 
 impl Search<'_> {
     /// Draws pairs on the rows, then on the columns, until all points have had their turn or the budget is spent.
-    pub(super) fn run(&self, level: &mut Level, found: &mut Collected, budget: &mut Budget) {
+    #[inline(always)]
+    pub(super) fn run(
+        &self,
+        level: &mut Level,
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) {
         for transposed in [false, true] {
             let lines = if transposed { level.width } else { level.height };
             let stride = stride(lines);
             let mut line = (self.seed % lines.max(1) as u64) as usize;
             for _ in 0..lines {
                 line = (line + stride) % lines;
-                let starts = if transposed { &level.columns.starts } else { &level.rows.starts };
-                for at in starts[line] as usize..starts[line + 1] as usize {
+                let points = level.line(transposed, line);
+                let line_end = points.end;
+                for at in points {
                     if budget.is_spent() {
                         return;
                     }
-                    self.from_point(level, transposed, at, found, budget);
+                    self.from_point(level, transposed, (at, line_end), found, prover, budget);
                 }
             }
         }
     }
 
+    #[inline(always)]
     fn from_point(
         &self,
         level: &mut Level,
         transposed: bool,
-        at: usize,
+        (at, line_end): (usize, usize),
         found: &mut Collected,
+        prover: &mut Prover<'_>,
         budget: &mut Budget,
     ) {
-        let mut next = at + 1;
-        let mut partners = 0;
-        while partners < tune(5, PARTNERS as f32) as u32 {
-            let lines: &Lines = if transposed { &level.columns } else { &level.rows };
-            let p = lines.points[at];
-            if p.nx.abs() < LEAST_ALONG || !level.free[p.id as usize] {
-                return;
-            }
-            let Some(ring) = lines.next_partner(&p, &mut next, self.radii, &level.free, budget) else {
-                return;
-            };
-            partners += 1;
+        let lines = if transposed { &level.columns } else { &level.rows };
+        if lines.nx[at].abs() < LEAST_ALONG || !level.free[lines.id[at] as usize] {
+            return;
+        }
+        let mut rings = [Ring::default(); PARTNERS];
+        let count = lines.partners((at, line_end), self.radii, self.mirror_slack,
+            &level.free,
+            &mut rings,
+            &mut budget.looks,
+        );
+        for ring in &rings[..count] {
             let ring = if transposed {
                 Ring {
                     x: ring.y,
@@ -305,78 +319,137 @@ impl Search<'_> {
                     r: ring.r,
                 }
             } else {
-                ring
+                *ring
             };
-            self.consider(level, ring, found, budget);
+            if self.consider(level, ring, found, prover, budget) {
+                return;
+            }
         }
     }
 
-    fn consider(&self, level: &mut Level, ring: Ring, found: &mut Collected, budget: &mut Budget) {
+    /// Looks at the circle and keeps it if it is worth it; true if it explains its points.
+    #[inline(always)]
+    fn consider(
+        &self,
+        level: &mut Level,
+        ring: Ring,
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) -> bool {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, tune(0, 0.5), &mut budget.looks) else {
-            return;
+        let Some(_) = self
+            .outline
+            .support(level, &ring, tune(0, 0.5), &mut budget.looks)
+        else {
+            return false;
         };
         budget.passed += 1;
-        // Fit until no more of the outline is covered.
-        let (mut ring, mut support) = (ring, Support::default());
-        for round in 0..tune(14, 5.0) as u32 {
-            let reach = if round < 2 { 3.0 } else { 2.0 };
-            let Some(fitted) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
-                break;
-            };
-            if fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1 {
-                break;
-            }
-            let least = tune(1, 0.45);
-            let Some(now) = self.outline.support(level, &fitted, least, &mut budget.looks) else {
-                break;
-            };
-            if now.hits <= support.hits && round > 1 {
-                break;
-            }
-            (ring, support) = (fitted, now);
+        // The same circle is met again and again; a few fits from different pairs are enough.
+        if found.is_known(&Candidate::new(&ring, self.scale, Support::default()), budget) {
+            return false;
         }
-        if support.hits == 0 {
-            return;
+        // Fit until it rests.
+        let (mut ring, mut support) = (ring, Support::default());
+        for round in 0..tune(14, 6.0) as u32 {
+            let reach = if round < 2 { 3.0 } else { 2.0 };
+            let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
+                break;
+            };
+            let outside = fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1;
+            if outside || now.hits + 2 < support.hits {
+                break;
+            }
+            let moved = (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
+            (ring, support) = (fitted, now);
+            if moved < tune(42, 0.15) {
+                break;
+            }
+        }
+        if support.share() < tune(1, 0.4) || support.visible < LOOKS as u32 / 3 {
+            return false;
         }
         budget.added += 1;
-        found.add(Candidate::new(&ring, self.scale, support), budget);
-        if support.share() >= tune(4, 0.6) {
-            self.outline
-                .explain(self.circle, level, &ring, &mut budget.looks);
+        let candidate = Candidate::new(&ring, self.scale, support);
+        let Some(place) = found.add(candidate, budget) else {
+            return false;
+        };
+        if support.share() < tune(4, 0.7) {
+            return false;
         }
+        // Likely enough to be proven at once; what is proven beyond doubt takes its points along.
+        found.candidates[place].tried = true;
+        budget.looks += tune(27, 400.0) as u64;
+        let Some(proven) = prover.prove(&candidate) else {
+            return false;
+        };
+        self.outline
+            .explain(self.circle, level, &proven.shrunk(self.scale), &mut budget.looks);
+        true
     }
 }
 
 impl Lines {
-    /// The next point on the line of `p` that mirrors it, as the circle of the two.
-    #[inline]
-    fn next_partner(
+    /// The circles of the point `at` and the nearest points further along its line whose normals mirror its own.
+    #[inline(always)]
+    fn partners(
         &self,
-        p: &EdgePoint,
-        next: &mut usize,
+        (at, line_end): (usize, usize),
         radii: (f32, f32),
+        mirror_slack: f32,
         free: &[bool],
-        budget: &mut Budget,
-    ) -> Option<Ring> {
-        let first = *next;
-        while let Some(q) = self.points.get(*next) {
-            *next += 1;
-            // A point of another line lies at least half a pixel off, and most often lies before this one.
-            if (q.y - p.y).abs() > 1.0 || q.x <= p.x || q.x - p.x > 2.0 * radii.1 {
-                break;
+        rings: &mut [Ring; PARTNERS],
+        looks: &mut u64,
+    ) -> usize {
+        // Inward: along the line at p, against it at q.
+        let sign = 1f32.copysign(self.nx[at]);
+        let (x, y, px, py) = (self.x[at], self.y[at], sign * self.nx[at], sign * self.ny[at]);
+        let end = x + 2.0 * radii.1;
+        let mut count = 0;
+        let mut first = at + 1;
+        // The lists end in a margin of points that mirror none.
+        while first < line_end && self.x[first] <= end {
+            *looks += 2;
+            let block = |values: &'_ [f32]| -> [f32; LANES] { values[first..first + LANES].as_chunks().0[0] };
+            let (qx, qy, nx, ny) = (block(&self.x), block(&self.y), block(&self.nx), block(&self.ny));
+            let mut fits = [0i32; LANES];
+            for lane in 0..LANES {
+                let crossed = (px * ny[lane] + py * nx[lane]).abs();
+                let dx = qx[lane] - x;
+                let along = px + nx[lane].abs();
+                fits[lane] = i32::from(crossed <= mirror_slack)
+                    & i32::from(nx[lane].abs() >= LEAST_ALONG)
+                    & i32::from((qy[lane] - y).abs() <= 1.0)
+                    & i32::from(dx >= radii.0 * along)
+                    & i32::from(dx <= radii.1 * along);
             }
-            if let Some(ring) = mirrored(p, q)
-                && ring.r >= radii.0
-                && ring.r <= radii.1
-                && free[q.id as usize]
-            {
-                budget.looks += (*next - first) as u64 / 4;
-                return Some(ring);
+            let mut bits = 0u32;
+            for (lane, fit) in fits.iter().enumerate() {
+                bits |= (*fit as u32) << lane;
             }
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize % LANES;
+                bits &= bits - 1;
+                if !free[self.id[first + lane] as usize] {
+                    continue;
+                }
+                let sign = -(1f32.copysign(nx[lane]));
+                let (along, across) = (px - sign * nx[lane], py + sign * ny[lane]);
+                let length = (along * along + across * across).sqrt();
+                let r = 0.5 * (qx[lane] - x) * length / along;
+                rings[count] = Ring {
+                    x: 0.5 * (x + qx[lane]),
+                    y: 0.5 * (y + qy[lane]) + r * across / length,
+                    r,
+                };
+                count += 1;
+                if count == PARTNERS {
+                    return count;
+                }
+            }
+            first += LANES;
         }
-        budget.looks += (*next - first) as u64 / 4;
-        None
+        count
     }
 }
 

@@ -38,10 +38,16 @@ impl Warp {
         let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
         let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
         let large = Camera::ideal(focal, Point2::from(principal - low), w, h);
+        // From pixel to pixel the answer changes little: the last one is where to look for the next.
+        let image = |x: u32, y: u32| (Point2::new(f64::from(x), f64::from(y)) - principal) / focal;
+        let mut last = (Point2::origin(), Point2::origin());
         let sources = (0..height)
             .flat_map(|y| (0..width).map(move |x| (x, y)))
             .map(|(x, y)| {
-                let p = ideal(x, y) - low;
+                let shown = Point2::from(image(x, y));
+                let undone = camera.distortion().undistort_near(shown, last);
+                last = (shown, undone.unwrap_or(last.1));
+                let p = principal + last.1.coords * focal - low;
                 let (i, j) = (p.x.floor(), p.y.floor());
                 ((j as u32) * w + i as u32, (p.x - i) as f32, (p.y - j) as f32)
             })

@@ -1,10 +1,10 @@
 //! Characters damaged in a move of the joints.
 
-use puma_val2::{Manipulator, MoveWay, Profile};
+use puma_val2::{ArmError, ClientConfig, Emulator, Manipulator, MoveWay, Profile, PumaParams, Val2Client};
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
-use crate::harness::{STEP, Subject, Tally, client, judge, truth};
-use crate::line::{CHARACTERS, Damage};
+use crate::harness::{STEP, Subject, Tally, client, config, judge, truth};
+use crate::line::{CHARACTERS, Damage, FaultyLine, Way};
 
 fn profiles_and_ways() -> Vec<(Profile, MoveWay)> {
     let silent = Profile {
@@ -74,4 +74,51 @@ fn noise_on_the_line() {
         sum.injected > 200 && sum.recovered * 10 > sum.injected * 8,
         "{sum:?}"
     );
+}
+
+/// A call that gives up with its line typed and not ended leaves nothing behind that the next line could be added to.
+#[test]
+fn a_half_typed_line_is_not_added_to_the_next() {
+    let config = ClientConfig {
+        retries: 0,
+        ..config(MoveWay::Automatic)
+    };
+    let line = FaultyLine::new(Emulator::new(PumaParams::unimation(), Profile::val2()));
+    let mut client = Val2Client::connect(line, config).unwrap();
+    client
+        .line_mut()
+        .strike(Way::FromController, 3, Damage::Flipped(0));
+    assert!(matches!(client.set_speed(30.0), Err(ArmError::Garbled { .. })));
+    assert!(client.line().struck);
+    client.joints().unwrap();
+}
+
+/// `-1` and `0` do not become each other by one character.
+#[test]
+fn a_signal_is_read_right_whatever_happens_to_one_character() {
+    let mut client = client(Profile::val2(), MoveWay::Automatic);
+    for on in [false, true] {
+        client
+            .line_mut()
+            .inner
+            .emulator_mut()
+            .set_signal(1001, on)
+            .unwrap();
+        for damage in CHARACTERS {
+            for direction in [Way::ToController, Way::FromController] {
+                for at in 0.. {
+                    client.line_mut().heal();
+                    client.joints().unwrap();
+                    client.line_mut().struck = false;
+                    client.line_mut().strike(direction, at, damage(at));
+                    if let Ok(read) = client.signal(1001) {
+                        assert_eq!(read, on, "{direction:?} {:?} at {at}", damage(at));
+                    }
+                    if !client.line().struck {
+                        break;
+                    }
+                }
+            }
+        }
+    }
 }

@@ -181,18 +181,3 @@ fn angles_that_were_shown_once_are_not_believed() {
     assert!(off(truth(&client), goal + by) < 1e-6);
     assert_not_misled(&client, "end");
 }
-
-#[test]
-fn a_half_typed_line_is_not_added_to_the_next() {
-    // The echo of every try is damaged: the call gives up with the line typed and not ended.
-    let mut client = client(Profile::val2(), MoveWay::Automatic);
-    let start = truth(&client);
-    let mut resident = client.resident().unwrap();
-    use rand::SeedableRng;
-    resident.line_mut().noise = Some((1.0, rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1)));
-    resident.move_by(STEP).unwrap_err();
-    resident.line_mut().noise = None;
-    let _ = resident.joints();
-    drop(resident);
-    assert!(off(truth(&client), start) < 1e-6);
-}

@@ -1,0 +1,134 @@
+//! From simulation to the arm: what the behaviours are worth there at once, and what learning on the arm adds.
+
+use std::error::Error;
+use std::fmt::Write as _;
+
+use grasp_agent::{Agent, AgentConfig, BehaviourSpec, GoalInterval, Learned, OnlineLearning, Percept};
+use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
+use puma_grasp::{Simulator, TrialCell, learn_best, search_percepts};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::plot::{Panel, drawn, mean_and_interval};
+
+/// Moves on the arm after which the behaviours are looked at.
+const MOVES: [usize; 4] = [0, 500, 2_000, 10_000];
+/// Balls by which they are judged, frozen.
+const BALLS: u64 = 40;
+
+/// What came of it: figure and table.
+pub(crate) struct Report {
+    pub(crate) svg: String,
+    pub(crate) csv: String,
+}
+
+/// `seeds` times: learns in both regression simulators, takes the behaviours to an arm with errors drawn anew, and lets them go on
+/// learning there.
+pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn Error>> {
+    println!(
+        "\nlearned in          errors of the arm  goal   moves learned from  success %        moves of a success"
+    );
+    let mut csv =
+        String::from("learned_in,errors,goal,moves_learned_from,success_percent,half_interval,moves\n");
+    let mut panels = Vec::new();
+    for (name, form) in [
+        ("rigid regression", ReachForm::Rigid22),
+        ("linear regression", ReachForm::Linear),
+    ] {
+        let mut lines = Vec::new();
+        for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
+            // For each seed: centering at once, then the whole task after each number of moves.
+            let mut scores: Vec<Vec<(f64, f64)>> = Vec::new();
+            for seed in 0..seeds {
+                scores.push(one_arm(form, level, seed)?);
+            }
+            let mut line = Vec::new();
+            for (column, (goal, made)) in std::iter::once(("x", 0))
+                .chain(MOVES.map(|made| ("all", made)))
+                .enumerate()
+            {
+                let success: Vec<f64> = scores.iter().map(|score| score[column].0).collect();
+                let (mean, half) = mean_and_interval(&success);
+                let moves: Vec<f64> = scores
+                    .iter()
+                    .map(|score| score[column].1)
+                    .filter(|moves| moves.is_finite())
+                    .collect();
+                let moves = moves.iter().sum::<f64>() / moves.len() as f64;
+                println!(
+                    "{name:19} {level:18} {goal:5} {made:19}  {mean:5.1} +- {half:4.1} {moves:17.1}",
+                    level = level.to_string()
+                );
+                let _ = writeln!(csv, "{name},{level},{goal},{made},{mean:.2},{half:.2},{moves:.2}");
+                if goal == "all" {
+                    line.push((made as f64, mean));
+                }
+            }
+            lines.push((format!("errors: {level}"), line));
+        }
+        let title = format!("goal reached, %, first learned in the {name}");
+        panels.push(Panel::new(&title, "moves learned from on the arm", lines).up_to(105.0));
+    }
+    Ok(Report {
+        svg: drawn(&panels, 2)?,
+        csv,
+    })
+}
+
+/// Success in percent and moves of a success, on one arm: centering at once, then the whole task after each of [`MOVES`].
+fn one_arm(form: ReachForm, level: ErrorLevel, seed: u64) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (centring, reaching) = sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 2_500, 0.5, &mut rng);
+    let simulator = Simulator::fit(&centring, &reaching, form)?;
+    let anywhere: Vec<Percept> = (0..500).map(|_| simulator.start(&mut rng)).collect();
+    let found = search_percepts(500, 1_000 + seed);
+    let (center, approach) = (BehaviourSpec::centering(), BehaviourSpec::approaching());
+    let only_x = center.goal.clone();
+    let centering = learn_best(center, &simulator, &anywhere, 60_000, &mut rng, &mut |_| ())?.behaviour;
+    let approaching = learn_best(approach, &simulator, &found, 500_000, &mut rng, &mut |_| ())?.behaviour;
+    let learned = Learned::new(centering, approaching);
+
+    let cell = TrialCell::draw(level, 50 + seed)?.without_bodies();
+    let mut scores = vec![score(&cell, &learned, Some(only_x))?];
+    let config = AgentConfig::paper(cell.search_poses());
+    let learning = learned.learning(OnlineLearning::careful(seed));
+    let mut agent = Agent::with_controller(config, learning)?;
+    let (mut made, mut ball) = (0, 0);
+    for moves in MOVES {
+        while made < moves {
+            let result = cell.run(&mut agent, 1_000_000 + ball, &mut |_, _| (), &mut |_| ())?;
+            made += result.map_or(0, |result| result.outcome.cycles);
+            ball += 1;
+        }
+        scores.push(score(&cell, &agent.controller().clone().frozen(), None)?);
+    }
+    Ok(scores)
+}
+
+fn score(
+    cell: &TrialCell,
+    controller: &Learned,
+    goal: Option<Vec<GoalInterval>>,
+) -> Result<(f64, f64), Box<dyn Error>> {
+    let config = AgentConfig::paper(cell.search_poses());
+    let config = AgentConfig {
+        goal: goal.unwrap_or(config.goal),
+        ..config
+    };
+    let mut agent = Agent::with_controller(config, controller.clone())?;
+    let (mut runs, mut reached, mut moves) = (0, 0, 0);
+    for ball in 0..BALLS {
+        let Some(result) = cell.run(&mut agent, ball, &mut |_, _| (), &mut |_| ())? else {
+            continue;
+        };
+        runs += 1;
+        if result.reached {
+            reached += 1;
+            moves += result.outcome.cycles;
+        }
+    }
+    Ok((
+        100.0 * f64::from(reached) / f64::from(runs),
+        moves as f64 / f64::from(reached),
+    ))
+}

@@ -1,0 +1,153 @@
+//! Figure 9: what the arm looks like and what its camera sees, at four moments of a reach.
+
+use std::error::Error;
+
+use embedded_graphics::pixelcolor::Rgb888;
+use grasp_agent::{Agent, AgentConfig, CameraModel, EventKind, Learned, Sighting};
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{Canny, CannyConfig, EdgeDetector};
+use image::RgbImage;
+use image::imageops::{FilterType, replace, resize};
+use nalgebra::{Point3, Rotation3, Vector3};
+use pipeline_sim::{Ball, Workspace};
+use puma_grasp::{BallDetector, Rig, bright_ball_scene};
+use puma_val2::{Joint, Joints};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::overlay::Overlay;
+
+/// Size of each picture.
+const TILE: (u32, u32) = (384, 288);
+/// Pixels a metre, and where the shoulder is, in the drawing of the pose.
+const SCALE: f64 = 290.0;
+const SHOULDER: (f64, f64) = (80.0, 165.0);
+
+/// A moment of the reach.
+struct Moment {
+    frame: GrayImage,
+    sighting: Sighting,
+    joints: Joints,
+    moves: usize,
+}
+
+/// Four columns: from the first sighting to the goal; three rows: the pose from the side, the frame with the circle, its edges.
+pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dyn Error>> {
+    let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
+    let mut detector = BallDetector::default().build(seed)?;
+    let workspace = Workspace::paper();
+    let agent = Agent::with_controller(AgentConfig::paper(workspace.search_poses()), learned.clone())?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (ball, _) = workspace
+        .sample_seen_ball(&rig.cell().get(), &mut rng)
+        .ok_or("no place of the workspace is in view from a search pose")?;
+    rig.place(&ball);
+    let table = rig.cell().get().table;
+    let mut moments = Vec::new();
+    rig.run(&agent, &mut *detector, &mut |event| {
+        if let (EventKind::Seen(sighting), Some(frame)) = (&event.kind, event.frame) {
+            moments.push(Moment {
+                frame: frame.clone(),
+                sighting: *sighting,
+                joints: event.joints,
+                moves: event.cycle,
+            });
+        }
+    })?;
+    let last = moments.len().checked_sub(1).ok_or("the ball was never seen")?;
+    let mut sheet = RgbImage::from_pixel(4 * TILE.0, 3 * TILE.1, image::Rgb([255; 3]));
+    for column in 0..4_usize {
+        let moment = &moments[column * last / 3];
+        let rows = [pose(moment, &ball, table), seen(moment), edges(moment)?];
+        for (row, picture) in (0_u32..).zip(rows) {
+            let at = (column as u32 * TILE.0, row * TILE.1);
+            replace(&mut sheet, &picture, at.0.into(), at.1.into());
+        }
+    }
+    Ok(sheet)
+}
+
+/// The arm from the side, in the plane that it moves in.
+fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
+    let (dark, blue) = (Rgb888::new(60, 60, 75), Rgb888::new(30, 90, 180));
+    let (model, joints) = (CameraModel::paper(), &moment.joints);
+    let into_plane = Rotation3::from_axis_angle(&Vector3::z_axis(), -joints[Joint::J1]);
+    let at = |point: Point3<f64>| {
+        let point = into_plane * point;
+        (SHOULDER.0 + SCALE * point.x, SHOULDER.1 - SCALE * point.z)
+    };
+    let wrist = model.arm.wrist(joints);
+    let camera = wrist * model.mount;
+    let (sin, cos) = joints[Joint::J2].sin_cos();
+    let elbow = into_plane.inverse() * Point3::new(model.arm.a2 * cos, 0.0, -model.arm.a2 * sin);
+    let mut drawing = Overlay::over(RgbImage::from_pixel(TILE.0, TILE.1, image::Rgb([250, 250, 252])));
+    let surface = SHOULDER.1 - SCALE * table;
+    drawing.line(
+        (0.0, surface),
+        (f64::from(TILE.0), surface),
+        Rgb888::new(170, 140, 100),
+        3,
+    );
+    drawing.line(SHOULDER, (SHOULDER.0, surface), dark, 12);
+    // What the camera sees: the upper and the lower border of its image.
+    let slope = 0.5 * 144.0 / model.focal;
+    for border in [-slope, slope] {
+        let far = camera * Point3::new(0.0, 0.55 * border, 0.55);
+        let eye = camera * Point3::origin();
+        drawing.line(at(eye), at(far), Rgb888::new(190, 205, 230), 1);
+    }
+    drawing.line(SHOULDER, at(elbow), blue, 9);
+    drawing.line(at(elbow), at(wrist * Point3::origin()), blue, 7);
+    drawing.line(
+        at(wrist * Point3::origin()),
+        at(model.tool_point(joints)),
+        dark,
+        4,
+    );
+    drawing.disc(at(camera * Point3::origin()), 5.0, Rgb888::new(20, 130, 60));
+    drawing.disc(at(ball.centre), SCALE * ball.radius, Rgb888::new(220, 110, 20));
+    let degrees = joints.degrees();
+    drawing.caption(&format!(
+        "move {}: {:.0} {:.0} {:.0} deg",
+        moment.moves, degrees[0], degrees[1], degrees[2]
+    ));
+    drawing.into_image()
+}
+
+fn seen(moment: &Moment) -> RgbImage {
+    let mut overlay = Overlay::new(&moment.frame);
+    overlay.circle(&moment.sighting.detection.circle);
+    let f = moment.sighting.features;
+    small(overlay, &format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r))
+}
+
+fn edges(moment: &Moment) -> Result<RgbImage, Box<dyn Error>> {
+    let mut canny = Canny::new(CannyConfig {
+        low: 20.0,
+        high: 50.0,
+        ..CannyConfig::default()
+    })?;
+    // At half size already, so that the thin lines stay bright.
+    let mut image = RgbImage::new(TILE.0, TILE.1);
+    for pixel in canny.detect_edges(&moment.frame).pixels() {
+        let (x, y) = (
+            pixel.x * TILE.0 / moment.frame.width().max(1),
+            pixel.y * TILE.1 / moment.frame.height().max(1),
+        );
+        image.put_pixel(x, y, image::Rgb([255; 3]));
+    }
+    let mut overlay = Overlay::over(image);
+    overlay.caption("edges");
+    Ok(overlay.into_image())
+}
+
+fn small(overlay: Overlay, words: &str) -> RgbImage {
+    let mut overlay = Overlay::over(resize(
+        &overlay.into_image(),
+        TILE.0,
+        TILE.1,
+        FilterType::Triangle,
+    ));
+    overlay.caption(words);
+    overlay.into_image()
+}
