@@ -103,8 +103,8 @@ impl Edges {
             }
             *at = place;
         }
-        for ray in 0..RAYS {
-            let Some(step) = (at[ray] as usize).checked_sub(1) else {
+        for (ray, &at) in at.iter().enumerate() {
+            let Some(step) = (at as usize).checked_sub(1) else {
                 edges.distance[ray] = 0.0;
                 edges.slope[ray] = 0.0;
                 continue;

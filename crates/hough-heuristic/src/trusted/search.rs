@@ -181,7 +181,8 @@ impl Outline {
             moments.add(&of(&ux), &of(&uy), &of(&residual), &of(&weight));
         }
         let shift = moments.step()?;
-        if !(shift.x.abs() + shift.y.abs() + shift.r.abs() <= 3.0 * reach) {
+        let moved = shift.x.abs() + shift.y.abs() + shift.r.abs();
+        if moved.is_nan() || moved > 3.0 * reach {
             return None;
         }
         let fitted = Ring {
@@ -261,14 +262,14 @@ impl Search<'_> {
                     if budget.is_spent() {
                         return;
                     }
-                    self.from_point(level, transposed, (at, line_end), found, prover, budget);
+                    self.draw_from(level, transposed, (at, line_end), found, prover, budget);
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn from_point(
+    fn draw_from(
         &self,
         level: &mut Level,
         transposed: bool,

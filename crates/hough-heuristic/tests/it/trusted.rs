@@ -222,7 +222,7 @@ fn adversarial(width: u32, height: u32) -> Vec<(&'static str, GrayImage)> {
         (
             "checkerboard",
             paint(&mut |x, y, _| {
-                if (x / 6.0).floor() % 2.0 == (y / 6.0).floor() % 2.0 {
+                if (x / 6.0) as u32 % 2 == (y / 6.0) as u32 % 2 {
                     30.0
                 } else {
                     220.0
