@@ -22,7 +22,7 @@ use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Acceptance, Canny, Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic,
     HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StageTimes, StandardHough,
-    StandardHoughConfig, write_stages,
+    StandardHoughConfig, Trusted, TrustedConfig, write_stages,
 };
 
 use files::{writable_folder, write_png, write_whole};
@@ -38,7 +38,7 @@ mod overlay;
 #[derive(Parser, Debug)]
 struct Options {
     /// Which detector to use
-    #[arg(long, value_enum, default_value_t = DetectorName::Heuristic)]
+    #[arg(long, value_enum, default_value_t = DetectorName::Trusted)]
     detector: DetectorName,
 
     /// Smallest radius, pixels
@@ -85,6 +85,8 @@ struct Options {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum DetectorName {
+    /// Pairs of edge points at several sizes, each circle proven against chance
+    Trusted,
     /// Three random edge pixels, belonging against a threshold (the paper's)
     Heuristic,
     /// The same, all three pixels from the whole image, as the paper samples
@@ -281,6 +283,13 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
         StandardHough::new(config, Canny::default())
     };
     let mut detector: Box<dyn CircleDetector> = match options.detector {
+        DetectorName::Trusted => Box::new(Trusted::new(TrustedConfig {
+            min_radius: accept.min_radius,
+            max_radius: accept.max_radius,
+            max_circles: accept.max_circles,
+            seed: options.seed,
+            ..TrustedConfig::default()
+        })?),
         DetectorName::Heuristic => Box::new(heuristic(Sampling::Near)?),
         DetectorName::HeuristicAnywhere => Box::new(heuristic(Sampling::Anywhere)?),
         DetectorName::Rht => Box::new(randomized(Sampling::Near)?),

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use hough_heuristic::{
     Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, Heuristic, HeuristicConfig, RandomizedHough,
-    RandomizedHoughConfig, StandardHough, StandardHoughConfig,
+    RandomizedHoughConfig, StandardHough, StandardHoughConfig, Trusted, TrustedConfig,
 };
 use pipeline_sim::{Scene, Shape};
 
@@ -15,8 +15,10 @@ use pipeline_sim::{Scene, Shape};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum BallDetector {
-    /// Three random edge pixels, belonging against a threshold: the paper's.
+    /// Pairs of edge points at several sizes, each circle proven against chance: goes beyond the paper.
     #[default]
+    Trusted,
+    /// Three random edge pixels, belonging against a threshold: the paper's.
     Heuristic,
     /// The randomized Hough transform.
     RandomizedHough,
@@ -32,11 +34,17 @@ const THETA: f64 = 0.6;
 
 impl BallDetector {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Heuristic, Self::RandomizedHough, Self::StandardHough];
+    pub const ALL: [Self; 4] = [
+        Self::Trusted,
+        Self::Heuristic,
+        Self::RandomizedHough,
+        Self::StandardHough,
+    ];
 
     /// What it is called.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Trusted => "trusted",
             Self::Heuristic => "heuristic",
             Self::RandomizedHough => "rht",
             Self::StandardHough => "sht",
@@ -55,6 +63,16 @@ impl BallDetector {
             ..Acceptance::default()
         };
         Ok(match self {
+            Self::Trusted => {
+                let config = TrustedConfig {
+                    min_radius: RADII.0,
+                    max_radius: RADII.1,
+                    max_circles: 1,
+                    seed,
+                    ..TrustedConfig::default()
+                };
+                Box::new(Trusted::new(config)?)
+            }
             Self::Heuristic => {
                 let config = HeuristicConfig {
                     theta: THETA,

@@ -67,7 +67,10 @@ pub struct Trusted {
     circle: UnitCircle,
     outline: Outline,
     maxima: Maxima,
+    /// As many as a frame needed so far.
     sizes: Vec<Size>,
+    /// How many of them belong to the last frame.
+    depth: usize,
     level: Level,
     collected: Collected,
     polar: Polar,
@@ -124,6 +127,7 @@ impl Trusted {
             circle,
             maxima: Maxima::new(SMOOTHING),
             sizes: Vec::new(),
+            depth: 0,
             level: Level::default(),
             collected: Collected::default(),
             polar: Polar::default(),
@@ -183,7 +187,8 @@ impl Trusted {
             depth += 1;
             side /= 2;
         }
-        self.sizes.resize(depth, Size::default());
+        self.depth = depth;
+        self.sizes.resize(depth.max(self.sizes.len()), Size::default());
         for index in 0..depth {
             let (before, rest) = self.sizes.split_at_mut(index);
             let (grey, width) = before
@@ -200,7 +205,7 @@ impl Trusted {
     fn prove(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
         let pyramid = Pyramid {
             frame,
-            sizes: &self.sizes,
+            sizes: &self.sizes[..self.depth],
         };
         let mut prover = Prover {
             pyramid,
@@ -214,7 +219,11 @@ impl Trusted {
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
         for depth in (finest..=smallest).rev() {
             let scale = (1 << depth) as f32;
-            let Grey { pixels, width, height } = pyramid.grey(depth);
+            let Grey {
+                pixels,
+                width,
+                height,
+            } = pyramid.grey(depth);
             let threshold = (STEP_GAIN * self.config.contrast as f32)
                 .max(NOISE_FACTOR * (noise / scale + ROUNDING) * self.maxima.noise_gain());
             let points = self
@@ -246,7 +255,12 @@ impl Trusted {
                 budget: &mut self.budget,
             });
         }
-        for candidate in self.collected.candidates.iter().filter(|candidate| !candidate.tried) {
+        for candidate in self
+            .collected
+            .candidates
+            .iter()
+            .filter(|candidate| !candidate.tried)
+        {
             if self.budget.is_late() {
                 break;
             }
@@ -259,16 +273,21 @@ impl Trusted {
     fn report(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
         let pyramid = Pyramid {
             frame,
-            sizes: &self.sizes,
+            sizes: &self.sizes[..self.depth],
         };
-        self.proofs.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
+        self.proofs
+            .sort_unstable_by(|a, b| b.certainty.total_cmp(&a.certainty));
         for proof in &self.proofs {
             let score = proof.score();
             if score < self.config.min_score || self.measurements.len() == self.config.max_circles {
                 break;
             }
             let rough = circle_of(&proof.in_frame());
-            if self.measurements.iter().any(|other| is_same(&rough, &other.circle)) {
+            if self
+                .measurements
+                .iter()
+                .any(|other| is_same(&rough, &other.circle))
+            {
                 continue;
             }
             self.budget.looks += 4 * search::PROOF;
@@ -306,9 +325,21 @@ impl Trusted {
 
 impl CircleDetector for Trusted {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        self.find(frame, (self.config.min_radius, self.config.max_radius));
         found.clear();
+        if self.check_frame(frame.width(), frame.height()).is_err() {
+            self.measurements.clear();
+            self.budget = Budget::default();
+            return;
+        }
+        self.find(frame, (self.config.min_radius, self.config.max_radius));
         found.extend(self.measurements.iter().map(Measurement::detection));
+    }
+
+    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+        self.config
+            .region
+            .as_ref()
+            .map_or(Ok(()), |region| region.check_frame(width, height))
     }
 }
 

@@ -12,7 +12,7 @@ use std::cell::Cell;
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Acceptance, Canny, CircleDetector, Detection, Heuristic, HeuristicConfig, RandomizedHough,
-    RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
+    RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig, Trusted, TrustedConfig,
 };
 
 #[path = "../scenes/scenes.rs"]
@@ -119,6 +119,29 @@ fn allocations(detector: &mut dyn CircleDetector, frame: &GrayImage, found: &mut
 fn edges(detector: &mut dyn CircleDetector, frame: &GrayImage) -> usize {
     detector.detect(frame);
     detector.stages().unwrap().edges.pixels().len()
+}
+
+#[test]
+fn the_trusted_detector_allocates_nothing_after_the_first_frame_either() {
+    let mut detector = Trusted::new(TrustedConfig::default()).unwrap();
+    let mut found = Vec::new();
+    let crowded = frame(500, 400, 8, 25, 1);
+    assert!(allocations(&mut detector, &crowded, &mut found) > 0);
+    assert!(!found.is_empty());
+    for other in [
+        frame(320, 240, 4, 6, 2),
+        frame(90, 200, 1, 1, 4),
+        GrayImage::new(0, 0),
+        frame(300, 400, 5, 3, 6),
+        crowded.clone(),
+    ] {
+        assert_eq!(allocations(&mut detector, &other, &mut found), 0);
+    }
+    let last = found[0].circle;
+    detector.track(&crowded, &last, 5.0, &mut found);
+    let before = ALLOCATIONS.with(Cell::get);
+    assert!(detector.track(&crowded, &last, 5.0, &mut found));
+    assert_eq!(ALLOCATIONS.with(Cell::get), before);
 }
 
 /// The first frames are the busiest: one has the most edges, one takes all draws. Those after them are new to the detector,

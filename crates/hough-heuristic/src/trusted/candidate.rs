@@ -15,7 +15,6 @@ pub(super) struct Candidate {
     pub(super) r: f32,
     /// Pixels of the frame per pixel of its level.
     pub(super) scale: f32,
-    pub(super) support: Support,
     /// How much speaks for it, to choose among candidates.
     pub(super) weight: f32,
     /// Whether it has been to the proof.
@@ -32,7 +31,6 @@ impl Candidate {
             y: ring.y * scale + corner,
             r: ring.r * scale,
             scale,
-            support,
             tried: false,
             met: 0,
             weight: weight(ring.r, support),

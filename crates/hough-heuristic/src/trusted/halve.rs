@@ -37,3 +37,27 @@ impl Vectorized for Halving<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_way_gives_the_mean(width in 2usize..90, height in 0usize..9, seed: u64) {
+            let grey: Vec<u8> = (0..width * height)
+                .map(|k| (seed.wrapping_mul(2 * k as u64 + 1) >> 32) as u8)
+                .collect();
+            let (mut fast, mut plain) = (Vec::new(), vec![0; (width / 2) * (height / 2)]);
+            prop_assert_eq!(halve(&grey, width, &mut fast), (width / 2, height / 2));
+            Halving { grey: &grey, width, half: &mut plain }.run();
+            prop_assert_eq!(&fast, &plain);
+            for (index, half) in fast.iter().enumerate() {
+                let at = index / (width / 2) * 2 * width + index % (width / 2) * 2;
+                let sum: u16 = [at, at + 1, at + width, at + width + 1].map(|k| u16::from(grey[k])).iter().sum();
+                prop_assert_eq!(u16::from(*half), (sum + 2) / 4);
+            }
+        }
+    }
+}

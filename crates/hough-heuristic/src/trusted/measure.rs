@@ -27,12 +27,37 @@ impl Measured {
         }
     }
 
+    /// Moves the circle by what shading and blur had displaced it, and adds what is uncertain of that to the errors.
+    fn shift_by(&mut self, limb: &Ring) {
+        self.ring.x += limb.x;
+        self.ring.y += limb.y;
+        self.ring.r += limb.r;
+        let both = |chance: f32, model: f32| (chance * chance + model * model).sqrt();
+        let sideways = (limb.x * limb.x + limb.y * limb.y).sqrt();
+        self.centre_error = both(
+            SCATTER * self.centre_error,
+            MODEL_CENTRE + LIMB_CENTRE * limb.r.abs() + sideways,
+        );
+        self.radius_error = both(
+            SCATTER * self.radius_error,
+            MODEL_RADIUS + LIMB_RADIUS * limb.r.abs(),
+        );
+    }
+
     /// Shortest by longest diameter.
     pub(super) fn axis_ratio(&self) -> f32 {
         let flattening = (self.cos2 * self.cos2 + self.sin2 * self.sin2).sqrt() / self.ring.r;
         ((1.0 - flattening) / (1.0 + flattening)).clamp(0.0, 1.0)
     }
 }
+
+/// What the scatter of the rays is worth beyond their number, as found on rendered frames: the errors of neighbours go together.
+const SCATTER: f32 = 2.0;
+/// Errors that no number of rays takes away, pixels: of pixels as squares, and for each pixel that shading had displaced the outline.
+const MODEL_CENTRE: f32 = 0.01;
+const MODEL_RADIUS: f32 = 0.03;
+const LIMB_CENTRE: f32 = 0.5;
+const LIMB_RADIUS: f32 = 1.1;
 
 /// The most directions.
 const MOST: usize = 256;
@@ -69,7 +94,11 @@ pub(super) fn measure<'a>(
             measured.ring = measured.ring.grown(2.0);
         }
         first = false;
-        let rays = circle.rays(if last { (measured.ring.r * 3.0) as usize } else { 64 });
+        let rays = circle.rays(if last {
+            (measured.ring.r * 3.0) as usize
+        } else {
+            64
+        });
         let count = rays.x.len();
         let arc = measured.ring.r * std::f32::consts::TAU / count as f32;
         // Averaged along the outline over a length that grows with the noise.
@@ -78,7 +107,13 @@ pub(super) fn measure<'a>(
         let rounds = if last { ROUNDS } else { 1 };
         for round in 0..rounds {
             let reach = if round == 0 { REACH } else { 3 };
-            polar.sample(frame, rays, &measured.ring, reach.min(measured.ring.r as usize), half);
+            polar.sample(
+                frame,
+                rays,
+                &measured.ring,
+                reach.min(measured.ring.r as usize),
+                half,
+            );
             let focus = if round == 0 { 4.0 } else { 2.5 };
             let steepest = Steepest::on(polar, focus);
             let step = steepest.fit(rays.x, rays.y, focus)?;
@@ -89,13 +124,16 @@ pub(super) fn measure<'a>(
                 return None;
             }
             if last && round + 1 == rounds {
-                let limb = limb_shift(frame, rays, polar, &measured.ring, half, noise);
-                if let Some(shift) = limb {
-                    measured.ring.x += shift.x;
-                    measured.ring.y += shift.y;
-                    measured.ring.r += shift.r;
-                }
-                steepest.errors(rays.x, rays.y, &step, (2 * half + 1) as f32 * arc, arc, &mut measured);
+                steepest.errors(
+                    rays.x,
+                    rays.y,
+                    &step,
+                    (2 * half + 1) as f32 * arc,
+                    arc,
+                    &mut measured,
+                );
+                let limb = limb_shift(frame, rays, polar, &measured.ring, half, noise).unwrap_or_default();
+                measured.shift_by(&limb);
             }
         }
     }
@@ -170,7 +208,12 @@ fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     }
     let (before, behind) = (profile[at - 1], profile[at + 1]);
     let bend = 2.0 * top - before - behind;
-    let place = at as f32 + if bend > 0.0 { (0.5 * (behind - before) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    let place = at as f32
+        + if bend > 0.0 {
+            (0.5 * (behind - before) / bend).clamp(-0.5, 0.5)
+        } else {
+            0.0
+        };
     let value = |place: f32| {
         let place = place.clamp(0.0, (profile.len() - 1) as f32);
         let low = (place as usize).min(profile.len() - 2);
@@ -200,8 +243,8 @@ impl Steepest {
             let (mut best, mut at) = (0.0, 0);
             for step in 0..polar.steps {
                 let off = polar.distance(step as f32) / (focus + 1.5);
-                let strength = slope(step) * (1.0 - off * off).max(0.0)
-                    - 0.5 * polar.along[step * count + ray].abs();
+                let strength =
+                    slope(step) * (1.0 - off * off).max(0.0) - 0.5 * polar.along[step * count + ray].abs();
                 if strength > best {
                     (best, at) = (strength, step);
                 }
@@ -249,16 +292,19 @@ impl Steepest {
     #[inline(always)]
     fn errors(&self, ux: &[f32], uy: &[f32], step: &Ring, averaged: f32, arc: f32, measured: &mut Measured) {
         let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
-        let (mut cos2, mut sin2) = (0.0, 0.0);
+        let (mut cos2, mut sin2, mut oval) = (0.0, 0.0, 0.0);
         for ray in 0..ux.len() {
             let off = self.distance[ray] - step.r - step.x * ux[ray] - step.y * uy[ray];
             let within = (1.0 - (off / 1.5) * (off / 1.5)).max(0.0);
             let weight = self.weight[ray] * within * within;
+            // The oval is sought farther off: it is what makes the outline leave the circle.
+            let loose = self.weight[ray] * f32::from(u8::from(off.abs() < 2.5));
+            oval += loose;
+            cos2 += loose * off * (ux[ray] * ux[ray] - uy[ray] * uy[ray]);
+            sin2 += loose * off * (2.0 * ux[ray] * uy[ray]);
             sum += weight;
             squares += weight * off * off;
             weights += weight * weight;
-            cos2 += weight * off * (ux[ray] * ux[ray] - uy[ray] * uy[ray]);
-            sin2 += weight * off * (2.0 * ux[ray] * uy[ray]);
         }
         if sum <= 0.0 {
             return;
@@ -269,6 +315,6 @@ impl Steepest {
         let effective = (sum * sum / weights / shared).max(3.0);
         measured.radius_error = scatter / effective.sqrt();
         measured.centre_error = scatter * (2.0 / effective).sqrt();
-        (measured.cos2, measured.sin2) = (2.0 * cos2 / sum, 2.0 * sin2 / sum);
+        (measured.cos2, measured.sin2) = (2.0 * cos2 / oval, 2.0 * sin2 / oval);
     }
 }

@@ -115,3 +115,36 @@ impl Vectorized for Proving<'_> {
         proof::prove(self.grey, self.circle, self.polar, self.start, &self.setting)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Luma;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// The same source for any width of vectors gives the same bits.
+        #[test]
+        fn wide_vectors_prove_what_plain_code_proves(
+            x in 10f32..70.0, y in 10f32..70.0, r in 6f32..24.0, noise in 0f32..40.0, seed: u64,
+        ) {
+            let frame = GrayImage::from_fn(80, 80, |px, py| {
+                let (dx, dy) = (px as f32 - x, py as f32 - y);
+                let random = (seed.wrapping_mul(u64::from(2 * (80 * py + px) + 1)) >> 40) as f32 / (1u64 << 24) as f32;
+                let ball = if (dx * dx + dy * dy).sqrt() < r { 60.0 } else { 170.0 };
+                Luma([(ball + noise * (2.0 * random - 1.0)).clamp(0.0, 255.0) as u8])
+            });
+            let circle = UnitCircle::new();
+            let (mut wide, mut plain) = (Polar::default(), Polar::default());
+            let of = |polar| Proving {
+                grey: Pyramid { frame: &frame, sizes: &[] }.grey(0),
+                circle: &circle,
+                polar,
+                start: Ring { x: x + 0.7, y: y - 0.4, r: r + 0.5 },
+                setting: Setting { noise, tests: 5.0 },
+            };
+            let (wide, plain) = (widest(of(&mut wide)), of(&mut plain).run());
+            prop_assert_eq!(format!("{wide:?}"), format!("{plain:?}"));
+        }
+    }
+}

@@ -52,7 +52,8 @@ impl Budget {
     /// Whether no more may be drawn; once it is spent it remains so.
     #[inline(always)]
     pub(super) fn is_spent(&mut self) -> bool {
-        self.spent |= self.draws >= self.most_draws || self.looks >= LOOKS_PER_DRAW * self.most_draws + 10_000;
+        self.spent |=
+            self.draws >= self.most_draws || self.looks >= LOOKS_PER_DRAW * self.most_draws + 10_000;
         self.spent
     }
 
@@ -180,7 +181,8 @@ impl Outline {
             moments.add(&of(&ux), &of(&uy), &of(&residual), &of(&weight));
         }
         let shift = moments.step()?;
-        if !(shift.x.abs() + shift.y.abs() + shift.r.abs() <= 3.0 * reach) {
+        let moved = shift.x.abs() + shift.y.abs() + shift.r.abs();
+        if moved.is_nan() || moved > 3.0 * reach {
             return None;
         }
         let fitted = Ring {
@@ -260,14 +262,14 @@ impl Search<'_> {
                     if budget.is_spent() {
                         return;
                     }
-                    self.from_point(level, transposed, (at, line_end), found, prover, budget);
+                    self.draw_from(level, transposed, (at, line_end), found, prover, budget);
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn from_point(
+    fn draw_from(
         &self,
         level: &mut Level,
         transposed: bool,
@@ -281,7 +283,10 @@ impl Search<'_> {
             return;
         }
         let mut rings = [Ring::default(); PARTNERS];
-        let count = lines.partners((at, line_end), self.radii, self.mirror_slack,
+        let count = lines.partners(
+            (at, line_end),
+            self.radii,
+            self.mirror_slack,
             &level.free,
             &mut rings,
             &mut budget.looks,
@@ -313,10 +318,7 @@ impl Search<'_> {
         budget: &mut Budget,
     ) -> bool {
         budget.draws += 1;
-        let Some(_) = self
-            .outline
-            .support(level, &ring, 0.5, &mut budget.looks)
-        else {
+        let Some(_) = self.outline.support(level, &ring, 0.5, &mut budget.looks) else {
             return false;
         };
         // The same circle is met again and again; a few fits from different pairs are enough.

@@ -15,3 +15,4 @@ mod heuristic;
 mod serde;
 #[cfg(feature = "files")]
 mod stages;
+mod trusted;
