@@ -21,8 +21,8 @@ use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Acceptance, Canny, Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic,
-    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
-    StandardHoughConfig,
+    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StageTimes, StandardHough,
+    StandardHoughConfig, write_stages,
 };
 
 use files::{writable_folder, write_png, write_whole};
@@ -34,7 +34,7 @@ mod overlay;
 /// Find circles in images: PNG, JPEG or PGM files, colour turned to luma, or folders of them.
 ///
 /// Without --csv the circles are printed as a table. Coordinates are pixels, (0,0) being the centre of the top-left pixel. The exit code
-/// is 1 when a file could not be read; the others are processed all the same.
+/// is 1 when a file could not be read or used; the others are processed all the same.
 #[derive(Parser, Debug)]
 struct Options {
     /// Which detector to use
@@ -65,9 +65,14 @@ struct Options {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
-    /// Write file,cpu_us to FILE: CPU time of this thread from gray image to circles
+    /// Write file,cpu_us,edges_us,structure_us,search_us to FILE: CPU time of this thread from gray image to circles, and the wall time
+    /// of each stage of that run
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
+
+    /// Write a picture of each stage (edges, structure D, candidates, accepted circles) to a folder per image in DIR
+    #[arg(long, value_name = "DIR")]
+    stages: Option<PathBuf>,
 
     /// Write every image with its circles drawn in to DIR, as PNG
     #[arg(long, value_name = "DIR")]
@@ -86,6 +91,8 @@ enum DetectorName {
     HeuristicAnywhere,
     /// Randomized Hough transform
     Rht,
+    /// The same, all three pixels from the whole image, as Xu and Oja sample
+    RhtAnywhere,
     /// Standard Hough transform; takes seconds on large images
     Sht,
     /// Standard Hough transform that votes along the gradient
@@ -122,15 +129,14 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         };
         loop {
             match files.grab() {
-                Ok(frame) if frame.is_empty() => {
-                    eprintln!(
-                        "error: {}: the image has no pixels",
-                        files.last_path().unwrap_or(path).display()
-                    );
-                    all_read = false;
-                }
                 Ok(frame) => {
-                    results.add(files.last_path().unwrap_or(path), &frame, &mut *detector, options)?;
+                    let path = files.last_path().unwrap_or(path);
+                    if let Err(reason) = usable(&frame, &*detector) {
+                        eprintln!("error: {}: {reason}", path.display());
+                        all_read = false;
+                    } else {
+                        results.add(path, &frame, &mut *detector, options)?;
+                    }
                 }
                 Err(FrameError::End) => break,
                 Err(error) => {
@@ -144,12 +150,23 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     Ok(all_read)
 }
 
+/// Why the detector cannot work on an image, if it cannot.
+fn usable(frame: &GrayImage, detector: &dyn CircleDetector) -> Result<(), String> {
+    if frame.is_empty() {
+        return Err("the image has no pixels".into());
+    }
+    detector
+        .check_frame(frame.width(), frame.height())
+        .map_err(|error| error.to_string())
+}
+
 /// What has been found so far.
 #[derive(Default)]
 struct Results {
     csv: String,
     times: String,
     overlays: HashSet<String>,
+    stages: HashSet<String>,
     found: Vec<Detection>,
 }
 
@@ -162,20 +179,40 @@ impl Results {
         detector: &mut dyn CircleDetector,
         options: &Options,
     ) -> Result<(), Box<dyn Error>> {
-        let mut least = Duration::MAX;
+        let (mut least, mut stages) = (Duration::MAX, None);
         for _ in 0..options.repeat {
             let before = cpu_time();
             detector.detect_into(frame, &mut self.found);
-            least = least.min(cpu_time().saturating_sub(before));
+            let spent = cpu_time().saturating_sub(before);
+            if spent < least {
+                (least, stages) = (spent, detector.stages().map(|stages| stages.times));
+            }
         }
         let name = path.display().to_string();
         for Detection { circle, score } in &self.found {
             let Circle { x, y, radius } = circle;
             writeln!(self.csv, "{},{x:.3},{y:.3},{radius:.3},{score:.4}", quoted(&name))?;
         }
-        writeln!(self.times, "{},{:.1}", quoted(&name), least.as_secs_f64() * 1e6)?;
+        let micros = |time: Duration| format!("{:.1}", time.as_secs_f64() * 1e6);
+        let [edges, structure, search] = stages.map_or_else(Default::default, |times| {
+            [times.edges, times.structure, times.search].map(micros)
+        });
+        writeln!(
+            self.times,
+            "{},{},{edges},{structure},{search}",
+            quoted(&name),
+            micros(least)
+        )?;
         if options.csv.is_none() {
-            print_table(&name, &self.found, least);
+            print_table(&name, &self.found, least, stages);
+        }
+        if let Some(folder) = &options.stages {
+            let folder = folder.join(unused_name(path, "", &mut self.stages));
+            writable_folder(&folder)?;
+            let stages = detector
+                .stages()
+                .ok_or("this detector does not show its stages")?;
+            write_stages(&folder, frame, &stages, &self.found)?;
         }
         if let Some(folder) = &options.overlay {
             let mut picture = Overlay::new(frame);
@@ -184,7 +221,7 @@ impl Results {
                 .for_each(|detection| picture.circle(&detection.circle));
             picture.caption(&format!("{} circles", self.found.len()));
             write_png(
-                &folder.join(overlay_name(path, &mut self.overlays)),
+                &folder.join(unused_name(path, ".png", &mut self.overlays)),
                 &picture.into_image(),
             )?;
         }
@@ -200,7 +237,10 @@ impl Results {
             None => {}
         }
         match &options.times {
-            Some(path) => write_whole(path, format!("file,cpu_us\n{}", self.times).as_bytes()),
+            Some(path) => write_whole(
+                path,
+                format!("file,cpu_us,edges_us,structure_us,search_us\n{}", self.times).as_bytes(),
+            ),
             None => Ok(()),
         }
     }
@@ -223,6 +263,15 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
             ..HeuristicConfig::default()
         })
     };
+    let randomized = |sampling| {
+        let config = RandomizedHoughConfig {
+            accept,
+            seed: options.seed,
+            sampling,
+            ..RandomizedHoughConfig::default()
+        };
+        RandomizedHough::new(config, Canny::default())
+    };
     let standard = |gradient| {
         let config = StandardHoughConfig {
             accept,
@@ -231,28 +280,35 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
         };
         StandardHough::new(config, Canny::default())
     };
-    Ok(match options.detector {
+    let mut detector: Box<dyn CircleDetector> = match options.detector {
         DetectorName::Heuristic => Box::new(heuristic(Sampling::Near)?),
         DetectorName::HeuristicAnywhere => Box::new(heuristic(Sampling::Anywhere)?),
-        DetectorName::Rht => {
-            let config = RandomizedHoughConfig {
-                accept,
-                seed: options.seed,
-                ..RandomizedHoughConfig::default()
-            };
-            Box::new(RandomizedHough::new(config, Canny::default())?)
-        }
+        DetectorName::Rht => Box::new(randomized(Sampling::Near)?),
+        DetectorName::RhtAnywhere => Box::new(randomized(Sampling::Anywhere)?),
         DetectorName::Sht => Box::new(standard(false)?),
         DetectorName::ShtGradient => Box::new(standard(true)?),
-    })
+    };
+    detector.keep_candidates(options.stages.is_some());
+    Ok(detector)
 }
 
-fn print_table(name: &str, found: &[Detection], cpu: Duration) {
-    let mut table = format!(
-        "{name}: {} circles, {:.1} ms\n",
-        found.len(),
-        cpu.as_secs_f64() * 1e3
-    );
+fn print_table(name: &str, found: &[Detection], cpu: Duration, stages: Option<StageTimes>) {
+    let millis = |time: Duration| time.as_secs_f64() * 1e3;
+    let mut table = format!("{name}: {} circles, {:.2} ms", found.len(), millis(cpu));
+    if let Some(times) = stages {
+        let StageTimes {
+            edges,
+            structure,
+            search,
+        } = times;
+        table.push_str(&format!(
+            " (edges {:.2}, structure {:.2}, search {:.2})",
+            millis(edges),
+            millis(structure),
+            millis(search)
+        ));
+    }
+    table.push('\n');
     for Detection {
         circle: Circle { x, y, radius },
         score,
@@ -279,15 +335,15 @@ fn quoted(name: &str) -> String {
     }
 }
 
-/// A file name for the picture of `path` that no picture of this run has yet.
-fn overlay_name(path: &Path, taken: &mut HashSet<String>) -> String {
+/// A name for what belongs to the image `path` that nothing of this run has yet.
+fn unused_name(path: &Path, ending: &str, taken: &mut HashSet<String>) -> String {
     let stem = path
         .file_stem()
         .map_or("image".into(), |stem| stem.to_string_lossy().into_owned());
-    let mut name = format!("{stem}.png");
+    let mut name = format!("{stem}{ending}");
     let mut number = 2;
     while !taken.insert(name.clone()) {
-        name = format!("{stem}-{number}.png");
+        name = format!("{stem}-{number}{ending}");
         number += 1;
     }
     name

@@ -102,7 +102,8 @@ fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
         .clone())
 }
 
-/// `D` over a dark ground, and one draw of three pixels that is not hopeless, with its circle.
+/// `D` over a dark ground, and the first draw of three pixels whose circle has a radius of 20 to 250 px, with that circle. It
+/// is a draw as most are: not yet the circle that is found.
 fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
     let ground = GrayImage::from_fn(frame.width(), frame.height(), |x, y| {
         Luma([frame.get_pixel(x, y).0[0] / 4])
@@ -151,7 +152,7 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
     )
 }
 
-/// The belonging of a circle, counted pixel by pixel.
+/// The belonging of a circle at the default tolerance of one pixel, counted pixel by pixel.
 fn matched(edges: &EdgeMap, circle: &Circle) -> f64 {
     let lit = |x: i32, y: i32| {
         let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else {

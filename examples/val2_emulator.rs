@@ -9,6 +9,7 @@
 //! `joints`, `restart`, `quit`.
 #![allow(clippy::print_stdout, clippy::print_stderr)] // A program's output.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, BufRead, Write};
@@ -19,7 +20,7 @@ use std::time::Duration;
 use clap::Parser;
 #[cfg(unix)]
 use puma_val2::PtyServer;
-use puma_val2::{Emulator, Event, Profile, PumaParams, ServeConfig, TcpServer, char_time};
+use puma_val2::{Emulator, Profile, PumaParams, ServeConfig, TcpServer, char_time};
 
 /// An emulated VAL II controller with a PUMA 560.
 #[derive(Debug, Parser)]
@@ -46,7 +47,7 @@ struct Arguments {
     /// Write what passes on the line to this file.
     #[arg(long, value_name = "FILE")]
     transcript: Option<PathBuf>,
-    /// The floppy disk: text files of this folder can be loaded, stored files are written to it.
+    /// The floppy disk: text files (NAME.v2) of this folder can be loaded, stored files are written to it, deleted ones removed.
     #[arg(long, value_name = "FOLDER")]
     floppy: Option<PathBuf>,
 }
@@ -86,9 +87,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         profile.char_time = Some(char_time(baud));
     }
     let mut emulator = Emulator::new(PumaParams::unimation(), profile);
-    if let Some(folder) = &arguments.floppy {
-        insert_floppy(&mut emulator, folder)?;
-    }
+    let floppy = match &arguments.floppy {
+        Some(folder) => Some(Floppy::insert(folder, &mut emulator)?),
+        None => None,
+    };
     let config = ServeConfig {
         realtime: arguments.realtime || arguments.baud.is_some(),
         link: arguments.link.clone(),
@@ -102,7 +104,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let server = serve(&arguments, emulator, config)?;
     println!("listening on {}", server.place());
     io::stdout().flush()?;
-    attend(&server, arguments.floppy.as_deref())
+    attend(&server, floppy)
 }
 
 #[cfg(unix)]
@@ -119,23 +121,74 @@ fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> io::
     TcpServer::spawn(address, emulator, config).map(Server::Tcp)
 }
 
-/// Puts the text files of a folder on the disk, each under its name without ending.
-fn insert_floppy(emulator: &mut Emulator, folder: &Path) -> Result<(), Box<dyn Error>> {
-    fs::create_dir_all(folder)?;
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        if let (true, Some(name)) = (
-            path.extension().is_some_and(|e| e == "v2"),
-            path.file_stem().and_then(|n| n.to_str()),
-        ) {
-            emulator.insert_file(name, fs::read_to_string(&path)?);
+/// The floppy disk: a folder of text files, each named as in VAL with `.v2` behind it.
+struct Floppy {
+    folder: PathBuf,
+    /// The file that each name of the disk is kept in; VAL knows upper case only, a file system may not.
+    paths: BTreeMap<String, PathBuf>,
+    /// What the folder holds.
+    kept: BTreeMap<String, String>,
+}
+
+impl Floppy {
+    /// Puts the text files of a folder, which is made if need be, on the disk of `emulator`.
+    fn insert(folder: &Path, emulator: &mut Emulator) -> Result<Self, Box<dyn Error>> {
+        let at = |path: &Path, problem: io::Error| format!("{}: {problem}", path.display());
+        fs::create_dir_all(folder).map_err(|e| at(folder, e))?;
+        let mut paths: BTreeMap<String, PathBuf> = BTreeMap::new();
+        for entry in fs::read_dir(folder).map_err(|e| at(folder, e))? {
+            let path = entry.map_err(|e| at(folder, e))?.path();
+            let Some(name) = path
+                .file_name()
+                .and_then(|name| name.to_str())
+                .and_then(|name| name.strip_suffix(".v2"))
+            else {
+                continue;
+            };
+            let name = name.to_ascii_uppercase();
+            let text = fs::read_to_string(&path).map_err(|e| at(&path, e))?;
+            emulator.insert_file(&name, text);
+            if let Some(other) = paths.insert(name.clone(), path.clone()) {
+                let (one, two) = (other.display(), path.display());
+                return Err(format!("{one} and {two} are both the file {name}").into());
+            }
         }
+        Ok(Self {
+            folder: folder.to_owned(),
+            paths,
+            kept: emulator.floppy().clone(),
+        })
     }
-    Ok(())
+
+    /// Makes the folder hold what the disk does: writes what was stored, removes what was deleted.
+    fn follow(&mut self, server: &Server) -> Result<(), Box<dyn Error>> {
+        let Some(now) = server.with(|e| (*e.floppy() != self.kept).then(|| e.floppy().clone())) else {
+            return Ok(());
+        };
+        for (name, text) in &now {
+            if self.kept.get(name) == Some(text) {
+                continue;
+            }
+            let path = self
+                .paths
+                .entry(name.clone())
+                .or_insert_with(|| self.folder.join(format!("{name}.v2")));
+            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
+            file.write_all(text.as_bytes())?;
+            file.persist(path)?;
+        }
+        for name in self.kept.keys().filter(|name| !now.contains_key(*name)) {
+            if let Some(path) = self.paths.remove(name) {
+                fs::remove_file(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            }
+        }
+        self.kept = now;
+        Ok(())
+    }
 }
 
 /// Follows the panel's lines and the disk until told to quit. Without a panel (input closed) it serves until it is killed.
-fn attend(server: &Server, floppy: Option<&Path>) -> Result<(), Box<dyn Error>> {
+fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Error>> {
     let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || {
         io::stdin()
@@ -144,24 +197,28 @@ fn attend(server: &Server, floppy: Option<&Path>) -> Result<(), Box<dyn Error>> 
             .map_while(Result::ok)
             .try_for_each(|line| sender.send(line))
     });
+    let mut trouble = None;
     loop {
-        match lines.recv_timeout(Duration::from_millis(200)) {
-            Ok(line) if line.trim() == "quit" => return Ok(()),
-            Ok(line) => {
-                if let Err(problem) = panel(server, &line) {
-                    println!("{problem}");
-                }
+        let line = match lines.recv_timeout(Duration::from_millis(200)) {
+            Ok(line) => line,
+            Err(RecvTimeoutError::Timeout) => String::new(),
+            Err(RecvTimeoutError::Disconnected) => {
+                std::thread::sleep(Duration::from_millis(200));
+                String::new()
             }
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => std::thread::sleep(Duration::from_millis(200)),
+        };
+        if let Some(floppy) = &mut floppy {
+            let problem = floppy.follow(server).err().map(|problem| problem.to_string());
+            if let Some(problem) = problem.as_ref().filter(|_| problem != trouble) {
+                println!("the floppy disk cannot be written: {problem}");
+            }
+            trouble = problem;
         }
-        for event in server.with(Emulator::take_events) {
-            if let (Event::FileStored(name), Some(folder)) = (&event, floppy) {
-                let text = server.with(|e| e.floppy().get(name).cloned()).unwrap_or_default();
-                let mut file = tempfile::NamedTempFile::new_in(folder)?;
-                file.write_all(text.as_bytes())?;
-                file.persist(folder.join(name).with_extension("v2"))?;
-            }
+        if line.trim() == "quit" {
+            return Ok(());
+        }
+        if let Err(problem) = panel(server, &line) {
+            println!("{problem}");
         }
     }
 }

@@ -3,12 +3,10 @@
 //! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything, and (y, r, theta 3) is the whole state:
 //! turning arm and ball together about the shoulder changes nothing. Centering has nothing to do here.
 
-use std::collections::VecDeque;
-
 use grasp_agent::{ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace, exploring_start};
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{JointDelta, Joints};
 use qtable::{Action, Progress, TrainConfig};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -208,58 +206,13 @@ fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Optio
     None
 }
 
-/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after each; `None` if there is no way.
-///
-/// The joints can only stand on a lattice around the start, because all steps are multiples of 0.2 and 0.1 degrees.
+/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after each ([`Cell::fewest_moves`]); `None` if
+/// there is no way.
 pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
-    /// What a place of the lattice is known to be.
-    #[derive(Clone, Copy, PartialEq)]
-    enum Place {
-        Unknown,
-        Closed,
-        Open,
-    }
-    const GRID: [f64; 2] = [0.2, 0.1];
-    let [from2, from3] = [joints[Joint::J2].to_degrees(), joints[Joint::J3].to_degrees()];
-    let span = |from: f64, (low, high): (f64, f64), grid: f64| {
-        let below = ((from - low) / grid).floor() as i64;
-        (below, below + 1 + ((high - from) / grid).floor() as i64)
-    };
-    let (below2, size2) = span(from2, (-150.0, -20.0), GRID[0]);
-    let (below3, size3) = span(from3, (120.0, 215.0), GRID[1]);
-    let mut moves: Vec<(i64, i64)> = (0..spec.actions())
-        .map(|action| {
-            let d = spec.delta(Action(action)).degrees();
-            ((d[1] / GRID[0]).round() as i64, (d[2] / GRID[1]).round() as i64)
-        })
+    let moves: Vec<JointDelta> = (0..spec.actions())
+        .map(|action| spec.delta(Action(action)))
         .collect();
-    moves.sort_unstable();
-    moves.dedup();
-    let mut places = vec![Place::Unknown; (size2 * size3).max(1) as usize];
-    let index = |(i, j): (i64, i64)| ((i + below2) * size3 + j + below3) as usize;
-    let mut queue = VecDeque::from([((0, 0), 0)]);
-    places[index((0, 0))] = Place::Closed;
-    while let Some(((i, j), steps)) = queue.pop_front() {
-        for (di, dj) in &moves {
-            let next = (i + di, j + dj);
-            let inside =
-                (-below2..size2 - below2).contains(&next.0) && (-below3..size3 - below3).contains(&next.1);
-            if !inside || places[index(next)] != Place::Unknown {
-                continue;
-            }
-            let mut pose = *joints;
-            pose.0[1] = (from2 + GRID[0] * next.0 as f64).to_radians();
-            pose.0[2] = (from3 + GRID[1] * next.1 as f64).to_radians();
-            let Some(features) = cell.features(&pose) else {
-                places[index(next)] = Place::Closed;
-                continue;
-            };
-            if spec.at_goal(&Percept::new(Features { ..features }, &pose)) {
-                return Some(steps + 1);
-            }
-            places[index(next)] = Place::Open;
-            queue.push_back((next, steps + 1));
-        }
-    }
-    None
+    let reached = |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
+    let fewest = cell.fewest_moves(joints, &moves, reached, MOST_STEPS as u32);
+    Some(fewest.ok()?? as usize)
 }

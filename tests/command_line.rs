@@ -140,3 +140,75 @@ fn detect_circles_names_what_it_cannot_read_and_goes_on() {
         "{ball:?}"
     );
 }
+
+#[test]
+fn detect_circles_shows_the_stages_of_every_detector() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let ball = folder.path().join("ball.png");
+    let bright = |x: u32, y: u32| (f64::from(x) - 90.0).hypot(f64::from(y) - 80.0) < 40.0;
+    image::GrayImage::from_fn(200, 160, |x, y| {
+        image::Luma([if bright(x, y) { 220 } else { 40 }])
+    })
+    .save(&ball)
+    .expect("a file");
+    for detector in [
+        "heuristic",
+        "heuristic-anywhere",
+        "rht",
+        "rht-anywhere",
+        "sht",
+        "sht-gradient",
+    ] {
+        let Some(mut command) = example("detect_circles") else {
+            return;
+        };
+        let (stages, times) = (folder.path().join(detector), folder.path().join("times.csv"));
+        command
+            .args(["--detector", detector])
+            .arg("--stages")
+            .arg(&stages);
+        // The same image twice: the second gets a folder of its own.
+        let (output, errors) = output(command.arg("--times").arg(&times).args([&ball, &ball]));
+        assert!(output.status.success(), "{detector}: {errors}");
+        for name in ["ball", "ball-2"] {
+            let pictures = std::fs::read_dir(stages.join(name)).expect("a folder for the image");
+            assert_eq!(pictures.count(), 4, "{detector}");
+        }
+        let times = std::fs::read_to_string(times).expect("the times are written");
+        assert!(
+            times.starts_with("file,cpu_us,edges_us,structure_us,search_us\n"),
+            "{times}"
+        );
+        for row in times.lines().skip(1) {
+            let fields: Vec<&str> = row.rsplit(',').collect();
+            let micros = fields[..4].iter().map(|field| field.parse::<f64>());
+            assert!(
+                micros.clone().all(|time| time.is_ok_and(|time| time > 0.0)),
+                "{detector}: {row}"
+            );
+        }
+    }
+}
+
+#[test]
+fn detect_circles_names_a_frame_that_is_too_large_and_goes_on() {
+    let Some(mut command) = example("detect_circles") else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (large, small) = (folder.path().join("large.pgm"), folder.path().join("small.pgm"));
+    for (path, width, height) in [(&large, 3840, 2160), (&small, 160, 120)] {
+        image::GrayImage::new(width, height).save(path).expect("a file");
+    }
+    let (output, errors) = output(
+        command
+            .args(["--detector", "sht", "--csv", "-"])
+            .args([&large, &small]),
+    );
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("large.pgm") && errors.contains("max_memory"),
+        "{errors}"
+    );
+    assert!(!errors.contains("small.pgm"), "{errors}");
+}

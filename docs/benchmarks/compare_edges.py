@@ -5,9 +5,14 @@
     cargo build --release -p hough-heuristic --example edges
     venv/bin/python docs/benchmarks/compare_edges.py FOLDER...
 
-For each folder of images: CPU time per frame of both (one thread, the least of the repetitions, the median over frames), and
-the share of each side's edge pixels that have one of the other side within a pixel. Both smooth with a Gaussian of 1.2 px cut off
-after 2 px, measure the gradient's Euclidean length by Sobel's kernels, and have the same two thresholds.
+For each folder of images: CPU time per frame (one thread, the least of the repetitions, the median over frames) of the crate's
+Canny as it is by default, which measures the frame's noise and raises the thresholds accordingly, of the same with the noise factor at 0, that is
+with fixed thresholds, and of OpenCV. All smooth with a Gaussian of 1.2 px cut off after 2 px, measure the gradient's Euclidean
+length by Sobel's kernels, and start from the same two thresholds.
+
+OpenCV runs twice, too: with those two, and with what the crate raised them to for the frame, so that both sides look for the same
+edges. A ratio compares runs with the same thresholds. Agreement is the share of each side's edge pixels that have one of the other side
+within a pixel.
 """
 import argparse, csv, os, subprocess, tempfile, time
 
@@ -23,27 +28,50 @@ parser.add_argument("--reps", type=int, default=15)
 options = parser.parse_args()
 
 cv2.setNumThreads(1)
-near = np.ones((3, 3), np.uint8)
-print("folder,frames,ours_us,opencv_us,ratio,ours_near_opencv,opencv_near_ours")
+NEAR = np.ones((3, 3), np.uint8)
+
+
+def ours(folder, out, noise_factor):
+    """The crate's edges, written to `out`: for each frame its CPU time and thresholds."""
+    os.mkdir(out)
+    settings = [] if noise_factor is None else ["--noise-factor", str(noise_factor)]
+    subprocess.run([options.program, folder, "--edges", out, "--times", f"{out}/times.csv", "--low", str(options.low),
+                    "--high", str(options.high), "--reps", str(options.reps), *settings], check=True, stdout=subprocess.DEVNULL)
+    with open(f"{out}/times.csv", newline="") as file:
+        return {row["file"]: row for row in csv.DictReader(file)}
+
+
+def theirs(grey, low, high):
+    """OpenCV's edges, and the CPU time in microseconds."""
+    best = float("inf")
+    for _ in range(options.reps):
+        start = time.process_time()
+        edges = cv2.Canny(cv2.GaussianBlur(grey, (5, 5), 1.2), low, high, L2gradient=True)
+        best = min(best, time.process_time() - start)
+    return edges > 0, best * 1e6
+
+
+def near(edges, others):
+    """The share of the edge pixels that have one of the others within a pixel; none if there are no edge pixels."""
+    return (edges & (cv2.dilate(others.astype(np.uint8), NEAR) > 0)).sum() / edges.sum() if edges.any() else np.nan
+
+
+print("folder,frames,ours_us,opencv_us,ratio,ours_near_opencv,opencv_near_ours,"
+      "fixed_ours_us,fixed_opencv_us,fixed_ratio,fixed_ours_near_opencv,fixed_opencv_near_ours")
 for folder in options.folders:
+    columns, frames = [], 0
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([options.program, folder, "--edges", out, "--times", f"{out}/times.csv", "--noise-factor", "0",
-                        "--low", str(options.low), "--high", str(options.high), "--reps", str(options.reps)],
-                       check=True, stdout=subprocess.DEVNULL)
-        ours = {row["file"]: float(row["cpu_us"]) for row in csv.DictReader(open(f"{out}/times.csv"))}
-        theirs, precision, recall = [], [], []
-        for name in ours:
-            grey = cv2.imread(f"{folder}/{name}", cv2.IMREAD_GRAYSCALE)
-            best = float("inf")
-            for _ in range(options.reps):
-                start = time.process_time()
-                edges = cv2.Canny(cv2.GaussianBlur(grey, (5, 5), 1.2), options.low, options.high, L2gradient=True)
-                best = min(best, time.process_time() - start)
-            theirs.append(best * 1e6)
-            own = cv2.imread(f"{out}/{os.path.splitext(name)[0]}.png", cv2.IMREAD_GRAYSCALE) > 0
-            other = edges > 0
-            precision.append((own & (cv2.dilate(edges, near) > 0)).sum() / max(1, own.sum()))
-            recall.append((other & (cv2.dilate(own.astype(np.uint8), near) > 0)).sum() / max(1, other.sum()))
-        a, b = np.median(list(ours.values())), np.median(theirs)
-        name = os.path.basename(os.path.normpath(folder))
-        print(f"{name},{len(ours)},{a:.0f},{b:.0f},{a / b:.2f},{np.mean(precision):.4f},{np.mean(recall):.4f}", flush=True)
+        for place, noise_factor in (("default", None), ("fixed", 0)):
+            rows = ours(folder, f"{out}/{place}", noise_factor)
+            opencv, agreement = [], []
+            for name, row in rows.items():
+                grey = cv2.imread(f"{folder}/{name}", cv2.IMREAD_GRAYSCALE)
+                edges, micros = theirs(grey, float(row["low"]), float(row["high"]))
+                own = cv2.imread(f"{out}/{place}/{os.path.splitext(name)[0]}.png", cv2.IMREAD_GRAYSCALE) > 0
+                opencv.append(micros)
+                agreement.append((near(own, edges), near(edges, own)))
+            a, b = np.median([float(row["cpu_us"]) for row in rows.values()]), np.median(opencv)
+            shares = np.nanmean(agreement, axis=0)
+            columns += [f"{a:.0f}", f"{b:.0f}", f"{a / b:.2f}", f"{shares[0]:.4f}", f"{shares[1]:.4f}"]
+            frames = len(rows)
+    print(f"{os.path.basename(os.path.normpath(folder))},{frames},{','.join(columns)}", flush=True)

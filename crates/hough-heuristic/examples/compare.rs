@@ -204,7 +204,7 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .margin(12)
         .x_label_area_size(10)
         .y_label_area_size(50)
-        .build_cartesian_2d(-0.5..columns - 0.5, (0.02f64..3000.0).log_scale())?;
+        .build_cartesian_2d(-0.5..columns - 0.5, (0.02f64..20_000.0).log_scale())?;
     chart.configure_mesh().disable_x_mesh().x_labels(0).draw()?;
     for (index, detector) in contest::DETECTORS.into_iter().enumerate() {
         let colour = Palette99::pick(index).to_rgba();

@@ -7,6 +7,7 @@
 use std::error::Error;
 use std::fmt::Write;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
@@ -24,7 +25,7 @@ struct Options {
     /// Folder, which must exist, to write the edge images to.
     #[arg(long)]
     edges: Option<PathBuf>,
-    /// Where to write the CPU times: file,cpu_us, the least of the repetitions.
+    /// Where to write file,cpu_us,low,high: the least CPU time of the repetitions, and the thresholds of the frame.
     #[arg(long)]
     times: Option<PathBuf>,
     #[arg(long, default_value_t = 5)]
@@ -48,25 +49,49 @@ enum Operator {
     Imageproc,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
-    let Options {
+/// The operator at work.
+enum Edges {
+    Canny(Box<Canny>),
+    Imageproc(ImageprocCanny),
+}
+
+impl Edges {
+    fn operator(&mut self) -> &mut dyn EdgeDetector {
+        match self {
+            Self::Canny(canny) => &mut **canny,
+            Self::Imageproc(canny) => canny,
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let &Options {
         low,
         high,
         noise_factor,
         ..
     } = options;
-    let mut detector: Box<dyn EdgeDetector> = match options.operator {
-        Operator::Canny => Box::new(Canny::new(CannyConfig {
+    let mut detector = match options.operator {
+        Operator::Canny => Edges::Canny(Box::new(Canny::new(CannyConfig {
             low,
             high,
             noise_factor,
             ..CannyConfig::default()
-        })?),
-        Operator::Imageproc => Box::new(ImageprocCanny::new(low, high)?),
+        })?)),
+        Operator::Imageproc => Edges::Imageproc(ImageprocCanny::new(low, high)?),
     };
     let mut files = ImageFiles::open(&options.frames)?;
-    let (mut table, mut all) = (String::from("file,cpu_us\n"), Vec::new());
+    let (mut table, mut all) = (String::from("file,cpu_us,low,high\n"), Vec::new());
     loop {
         let frame = match files.grab() {
             Ok(frame) => frame,
@@ -82,11 +107,16 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .and_then(|path| path.file_name())
                 .unwrap_or_default(),
         );
-        let micros = least_micros(options.reps, &frame, &mut *detector);
+        let micros = least_micros(options.reps, &frame, detector.operator());
         all.push(micros);
-        writeln!(table, "{},{micros:.1}", name.display())?;
+        let (low, high) = match &detector {
+            Edges::Canny(canny) => canny.thresholds(),
+            Edges::Imageproc(_) => (low, high),
+        };
+        writeln!(table, "{},{micros:.1},{low:.2},{high:.2}", name.display())?;
         if let Some(folder) = &options.edges {
             detector
+                .operator()
                 .edges()
                 .image()
                 .save(folder.join(name.with_extension("png")))?;

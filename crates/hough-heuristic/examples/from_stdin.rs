@@ -2,14 +2,17 @@
 //!
 //! ffmpeg -i balls.mp4 -f yuv4mpegpipe -pix_fmt yuv420p - | cargo run --release --features serde --example from_stdin
 
+#![allow(clippy::print_stderr, reason = "a program for the terminal")]
+
 use std::error::Error;
 use std::io::{BufReader, Write, stdin, stdout};
+use std::process::ExitCode;
 
 use clap::Parser;
 use hough_heuristic::{
     CircleDetector, Detection, FrameError, FrameSource, Heuristic, HeuristicConfig, Y4mFrames,
 };
-use serde_json::json;
+use serde::Serialize;
 
 /// Finds circles in Y4M video from standard input; prints JSON lines.
 #[derive(Parser)]
@@ -25,8 +28,26 @@ struct Options {
     max_circles: usize,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
+/// What is printed for a frame.
+#[derive(Serialize)]
+struct Line<'a> {
+    /// Its number in the stream, from 1.
+    frame: u64,
+    /// Best first.
+    circles: &'a [Detection],
+}
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut detector = Heuristic::with_canny(HeuristicConfig {
         min_radius: options.min_radius,
         max_radius: options.max_radius,
@@ -41,9 +62,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             Err(FrameError::End) => break,
             Err(error) => return Err(error.into()),
         };
-        detector.detect_into(&frame, &mut found);
+        detector.try_detect_into(&frame, &mut found)?;
+        let line = serde_json::to_string(&Line {
+            frame: number,
+            circles: &found,
+        })?;
         // A reader that has seen enough closes the pipe.
-        if writeln!(stdout(), "{}", json!({ "frame": number, "circles": found })).is_err() {
+        if writeln!(stdout(), "{line}").is_err() {
             break;
         }
     }

@@ -4,6 +4,7 @@ mod canny;
 mod dispatch;
 mod gradient;
 mod imageproc_canny;
+mod maxima;
 mod noise;
 #[cfg(test)]
 mod plain;
@@ -12,8 +13,12 @@ mod rows;
 use image::GrayImage;
 
 pub use canny::{Canny, CannyConfig};
+pub(crate) use dispatch::{Vectorized, widest};
 pub use gradient::EdgeGradient;
 pub use imageproc_canny::ImageprocCanny;
+pub(crate) use maxima::Maxima;
+pub(crate) use noise::noise_deviation;
+pub(crate) use rows::Candidate;
 
 /// The coordinates of one edge pixel: a record of the paper's structure `D`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -64,6 +64,21 @@ pub enum ConfigError {
         /// Rows of the frame.
         frame_height: u32,
     },
+    /// The accumulator of a Hough transform would take more memory than it may.
+    #[error(
+        "a {frame_width}x{frame_height} px frame needs an accumulator of {needed} bytes, but max_memory is {limit}: narrow \
+         the radius range, or make the cells larger"
+    )]
+    Accumulator {
+        /// Columns of the frame.
+        frame_width: u32,
+        /// Rows of the frame.
+        frame_height: u32,
+        /// The memory it would take, bytes.
+        needed: u64,
+        /// The most it may take, bytes.
+        limit: u64,
+    },
 }
 
 /// Checks one number; NaN fails every test.

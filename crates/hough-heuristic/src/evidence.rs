@@ -80,6 +80,13 @@ impl Acceptance {
         require("min_distance", min_distance, "finite and at least 0 px", usable)
     }
 
+    /// # Errors
+    /// The region of interest, if it does not lie in such a frame.
+    pub(crate) fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+        self.region
+            .map_or(Ok(()), |region| region.check_frame(width, height))
+    }
+
     /// The radius, if only one is allowed.
     pub(crate) fn known_radius(&self) -> Option<f64> {
         (self.min_radius >= self.max_radius).then_some(self.min_radius)
@@ -125,6 +132,9 @@ impl Evidence {
     pub(crate) fn fill(&mut self, edges: &EdgeMap) {
         self.structure.fill(edges.width(), edges.height(), edges.pixels());
         self.near.fill(edges.width(), edges.height(), edges.pixels());
+        // A circle has at most all of them around, so that what is found does not decide who allocates.
+        self.around.clear();
+        self.around.reserve(edges.pixels().len());
     }
 
     /// The circle with its β, if that is above θ.
@@ -179,7 +189,7 @@ impl Evidence {
     }
 
     fn explain(&mut self, circle: &Circle) {
-        let band = self.acceptance.tolerance + 1.5 + 0.01 * circle.radius;
+        let band = explained_band(self.acceptance.tolerance, circle.radius);
         let near = &mut self.near;
         self.structure.remove(|pixel| {
             let explained = circle.distance(pixel.x.into(), pixel.y.into()) <= band;
@@ -203,6 +213,12 @@ impl Evidence {
     pub(crate) fn memory(&self) -> usize {
         self.structure.memory() + self.near.memory() + size_of::<(f64, f64)>() * self.around.capacity()
     }
+}
+
+/// How far from an accepted circle the edge pixels lie that it explains, pixels: what matches it, and what the blur of the
+/// border and a ball that is not quite round leave beside it.
+pub(crate) fn explained_band(tolerance: f64, radius: f64) -> f64 {
+    tolerance + 1.5 + 0.01 * radius
 }
 
 /// Best first; equal scores keep the order in which they were found.

@@ -1,34 +1,17 @@
 //! The paper's detector: sample three edge pixels, look at the edge image itself, keep no accumulator.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use image::GrayImage;
-use rand::rngs::Xoshiro256PlusPlus;
-use rand::{Rng, SeedableRng};
 
 use crate::belonging::Probes;
-use crate::curve::circles_of_radius;
 use crate::error::require;
 use crate::evidence::{Evidence, rank};
-use crate::structure::Structure;
+use crate::sampling::{Draw, Sampler, Sampling};
 use crate::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Curve, Detection, EdgeDetector, EdgeMap, Region,
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, Region,
+    StageTimes, Stages,
 };
-
-/// Where the pixels of a draw come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Sampling {
-    /// All from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all edge pixels, one draw of
-    /// three in `p^-3` hits it.
-    Anywhere,
-    /// The first from the whole of `D`; the others from a window around it that is as wide as a circle of some radius
-    /// between the smallest and the largest can reach, the radius drawn anew each time (small ones more often: its
-    /// logarithm is uniform). Beyond the paper; in clutter it hits a small ball hundreds of times as often.
-    #[default]
-    Near,
-}
 
 /// The settings of [`Heuristic`].
 ///
@@ -111,17 +94,6 @@ impl HeuristicConfig {
     }
 }
 
-/// How long the stages of the last frame took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StageTimes {
-    /// Finding the edges.
-    pub edges: Duration,
-    /// Arranging the edge pixels as the structure `D`, and marking what lies near them.
-    pub structure: Duration,
-    /// Drawing, checking, fitting.
-    pub search: Duration,
-}
-
 /// The heuristic of section 2.1 of the paper, for circles.
 ///
 /// All edge pixels form the structure `D`. Until the budget is spent: draw three of them, solve for the circle through
@@ -142,8 +114,7 @@ pub struct Heuristic<E = Canny> {
     config: HeuristicConfig,
     edge_detector: E,
     probes: Probes,
-    /// The reaches of [`Sampling::Near`], pixels.
-    reaches: Vec<f64>,
+    sampler: Sampler,
     evidence: Evidence,
     candidates: Option<Vec<Circle>>,
     times: StageTimes,
@@ -171,35 +142,21 @@ impl<E: EdgeDetector> Heuristic<E> {
             "at least 1",
             config.iterations > 0,
         )?;
+        let accept = config.acceptance();
         Ok(Self {
-            evidence: Evidence::new(config.acceptance())?,
+            evidence: Evidence::new(accept)?,
             edge_detector,
             probes: Probes::new(config.theta),
-            reaches: reaches(config.min_radius, config.max_radius),
+            sampler: Sampler::new(config.sampling, &accept, config.seed),
             candidates: None,
             times: StageTimes::default(),
             config,
         })
     }
 
-    /// Whether to remember the candidates of each frame from now on, for [`candidates`](Heuristic::candidates).
-    pub fn keep_candidates(&mut self, keep: bool) {
-        self.candidates = keep.then(Vec::new);
-    }
-
     /// The edges of the last frame; empty before the first.
     pub fn edges(&self) -> &EdgeMap {
         self.edge_detector.edges()
-    }
-
-    /// The circles of the last frame that passed the first look, if they are [kept](Heuristic::keep_candidates).
-    pub fn candidates(&self) -> &[Circle] {
-        self.candidates.as_deref().unwrap_or_default()
-    }
-
-    /// How long the stages of the last frame took.
-    pub fn times(&self) -> StageTimes {
-        self.times
     }
 
     /// The settings the detector was built with.
@@ -213,51 +170,12 @@ impl<E: EdgeDetector> Heuristic<E> {
     }
 }
 
-/// A draw that ended the search, or the circle it determines, if it determines one.
-enum Draw {
-    Exhausted,
-    Nothing,
-    Circle(Circle),
-}
-
-/// Draws pixels and solves for the circle: the paper's steps 3a and 3b.
-struct Sampler<'a> {
-    sampling: Sampling,
-    known_radius: Option<f64>,
-    reaches: &'a [f64],
-    rng: Xoshiro256PlusPlus,
-}
-
-impl Sampler<'_> {
-    fn draw(&mut self, structure: &Structure) -> Draw {
-        let circle = match self.known_radius {
-            Some(radius) => self.pixels::<2>(structure).map(|pair| {
-                let side = self.rng.next_u32() as usize % 2;
-                circles_of_radius(pair, radius).map(|both| both[side])
-            }),
-            None => self.pixels::<3>(structure).map(|triple| Circle::through(&triple)),
-        };
-        match circle {
-            None => Draw::Exhausted,
-            Some(None) => Draw::Nothing,
-            Some(Some(circle)) => Draw::Circle(circle),
-        }
-    }
-
-    fn pixels<const N: usize>(&mut self, structure: &Structure) -> Option<[crate::EdgePixel; N]> {
-        match self.sampling {
-            Sampling::Anywhere => structure.draw_anywhere(&mut self.rng),
-            Sampling::Near => {
-                let reach = self.reaches[self.rng.next_u32() as usize % self.reaches.len()];
-                structure.draw_near(reach, &mut self.rng)
-            }
-        }
-    }
-}
-
 impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
         found.clear();
+        if self.check_frame(frame.width(), frame.height()).is_err() {
+            return;
+        }
         let start = Instant::now();
         let edges = self.edge_detector.detect_edges(frame);
         let with_edges = Instant::now();
@@ -268,14 +186,9 @@ impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
         if let Some(candidates) = &mut self.candidates {
             candidates.clear();
         }
-        let mut sampler = Sampler {
-            sampling: self.config.sampling,
-            known_radius: evidence.acceptance.known_radius(),
-            reaches: &self.reaches,
-            rng: Xoshiro256PlusPlus::seed_from_u64(self.config.seed),
-        };
+        self.sampler.restart();
         for _ in 0..self.config.iterations {
-            let circle = match sampler.draw(&evidence.structure) {
+            let circle = match self.sampler.draw(&evidence.structure) {
                 Draw::Exhausted => break,
                 Draw::Nothing => continue,
                 Draw::Circle(circle) => circle,
@@ -301,6 +214,23 @@ impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
             search: with_structure.elapsed(),
         };
     }
+
+    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+        self.evidence.acceptance.check_frame(width, height)
+    }
+
+    fn keep_candidates(&mut self, keep: bool) {
+        self.candidates = keep.then(Vec::new);
+    }
+
+    fn stages(&self) -> Option<Stages<'_>> {
+        Some(Stages {
+            edges: self.edges(),
+            candidates: self.candidates.as_deref().unwrap_or_default(),
+            times: self.times,
+            tolerance: self.config.tolerance,
+        })
+    }
 }
 
 /// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
@@ -322,17 +252,4 @@ pub fn detect_circles(
         ..HeuristicConfig::default()
     };
     Ok(Heuristic::with_canny(config)?.detect(frame))
-}
-
-/// How far the windows reach: 64 diameters, each longer than the one before by the same factor.
-pub(crate) fn reaches(min_radius: f64, max_radius: f64) -> Vec<f64> {
-    // The 64th root by square roots, which have the same bits on every platform.
-    let factor = (0..6).fold(max_radius / min_radius, |root, _| root.sqrt());
-    let mut reach = 2.0 * min_radius;
-    (0..64)
-        .map(|_| {
-            reach *= factor;
-            reach.ceil()
-        })
-        .collect()
 }

@@ -45,8 +45,8 @@
 //! # Conventions
 //!
 //! Coordinates are pixels with `(0, 0)` at the *centre* of the top-left pixel, x to the right and y down; [`Features`] are
-//! units that do not depend on the resolution. A detector owns its buffers, so use one detector for many frames: after one
-//! as busy as those to come it allocates nothing. What it finds depends on its configuration (seed included) and the frame, never on the
+//! units that do not depend on the resolution. A detector owns its buffers, so use one detector for many frames: it allocates only for a frame that is
+//! larger, or has more edges, or takes more draws or votes than all before it. What it finds depends on its configuration (seed included) and the frame, never on the
 //! frames before, and is the same on every machine whose square roots are IEEE's; only [`StandardHough`] goes through sines and
 //! arc tangents, whose last bits differ between platforms.
 //!
@@ -70,27 +70,31 @@ mod frame;
 mod heuristic;
 mod randomized_hough;
 mod region;
+mod sampling;
 #[cfg(feature = "files")]
 mod stages;
 mod standard_hough;
 mod structure;
+mod trusted;
 
 pub use circle::{Circle, Features};
 pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
-pub use detect::{CircleDetector, Detection};
+pub use detect::{CircleDetector, Detection, StageTimes, Stages};
 pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
 pub use error::ConfigError;
 pub use evidence::Acceptance;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
 pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
-pub use heuristic::{Heuristic, HeuristicConfig, Sampling, StageTimes, detect_circles};
+pub use heuristic::{Heuristic, HeuristicConfig, detect_circles};
 pub use image;
 pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;
+pub use sampling::Sampling;
 #[cfg(feature = "files")]
 pub use stages::{StageError, write_stages};
 pub use standard_hough::{StandardHough, StandardHoughConfig};
+pub use trusted::{Effort, Measurement, Trusted, TrustedConfig};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

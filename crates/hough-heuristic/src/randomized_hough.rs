@@ -1,14 +1,15 @@
 //! The randomized Hough transform, the nearer of the paper's two rivals.
 
+use std::time::Instant;
+
 use image::GrayImage;
-use rand::rngs::Xoshiro256PlusPlus;
-use rand::{Rng, SeedableRng};
 
 use crate::error::require;
 use crate::evidence::{Evidence, rank};
-use crate::heuristic::reaches;
+use crate::sampling::{Draw, Sampler, Sampling};
 use crate::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Curve, Detection, EdgeDetector, EdgeMap, Sampling,
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, StageTimes,
+    Stages,
 };
 
 /// The settings of [`RandomizedHough`].
@@ -50,16 +51,19 @@ impl Default for RandomizedHoughConfig {
 /// it. Only cells that got a vote exist, in a hash table. When enough triples have voted for a cell, their mean circle is
 /// verified in the edge image: looked at in a few places as [`Heuristic`](crate::Heuristic) does, fitted to the
 /// edge pixels around it, and accepted if its β is above θ. Then its pixels are
-/// removed and the accumulator is emptied; a cell that fails is emptied alone.
+/// removed and the accumulator is emptied; a cell that fails is emptied alone. Where the radius is known, draws are of two
+/// pixels and one of their two circles, as for [`Heuristic`](crate::Heuristic).
 ///
 /// The score of a [`Detection`] is the β of the circle as reported, counted as [`Heuristic`](crate::Heuristic) counts it.
 #[derive(Clone, Debug)]
 pub struct RandomizedHough<E = Canny> {
     config: RandomizedHoughConfig,
     edge_detector: E,
-    reaches: Vec<f64>,
+    sampler: Sampler,
     evidence: Evidence,
     cells: Cells,
+    candidates: Option<Vec<Circle>>,
+    times: StageTimes,
 }
 
 impl<E: EdgeDetector> RandomizedHough<E> {
@@ -80,9 +84,11 @@ impl<E: EdgeDetector> RandomizedHough<E> {
         require("cell", cell, "0.5..=64 px", (0.5..=64.0).contains(&cell))?;
         Ok(Self {
             evidence: Evidence::new(accept)?,
-            reaches: reaches(accept.min_radius, accept.max_radius),
+            sampler: Sampler::new(config.sampling, &accept, config.seed),
             edge_detector,
-            cells: Cells::default(),
+            cells: Cells::with_room_for(config.iterations),
+            candidates: None,
+            times: StageTimes::default(),
             config,
         })
     }
@@ -94,34 +100,38 @@ impl<E: EdgeDetector> RandomizedHough<E> {
 
     /// The memory that the circle search holds, bytes, edges not included.
     pub fn memory(&self) -> usize {
-        self.evidence.memory() + size_of::<Cell>() * self.cells.slots.capacity()
+        self.evidence.memory() + size_of::<Cell>() * (self.cells.slots.len() + self.cells.moved.len())
     }
 }
 
 impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
         found.clear();
+        if self.check_frame(frame.width(), frame.height()).is_err() {
+            return;
+        }
+        let start = Instant::now();
         let edges = self.edge_detector.detect_edges(frame);
+        let with_edges = Instant::now();
         let evidence = &mut self.evidence;
         evidence.fill(edges);
+        let with_structure = Instant::now();
+
+        if let Some(candidates) = &mut self.candidates {
+            candidates.clear();
+        }
         self.cells.clear();
+        self.sampler.restart();
         let RandomizedHoughConfig {
             accept, votes, cell, ..
         } = self.config;
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.config.seed);
         for _ in 0..self.config.iterations {
-            let pixels = match self.config.sampling {
-                Sampling::Anywhere => evidence.structure.draw_anywhere::<3>(&mut rng),
-                Sampling::Near => {
-                    let reach = self.reaches[rng.next_u32() as usize % self.reaches.len()];
-                    evidence.structure.draw_near(reach, &mut rng)
-                }
+            let circle = match self.sampler.draw(&evidence.structure) {
+                Draw::Exhausted => break,
+                Draw::Nothing => continue,
+                Draw::Circle(circle) => circle,
             };
-            let Some(pixels) = pixels else { break };
-            let Some(circle) = Circle::through(&pixels) else {
-                continue;
-            };
-            // Triples scatter around a known radius, so votes are taken from a cell beyond the range.
+            // Triples scatter around their circle, so votes are taken from a cell beyond the range of radii.
             let radii = accept.min_radius - cell..=accept.max_radius + cell;
             if !radii.contains(&circle.radius) || accept.region.is_some_and(|region| !region.holds(&circle)) {
                 continue;
@@ -135,6 +145,9 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
             };
             if !evidence.might_be(&mean) {
                 continue;
+            }
+            if let Some(candidates) = &mut self.candidates {
+                candidates.push(mean);
             }
             let reach = cell.max(2.0 * accept.tolerance + 1.0);
             let verified = evidence
@@ -150,6 +163,28 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
             }
         }
         rank(found);
+        self.times = StageTimes {
+            edges: with_edges - start,
+            structure: with_structure - with_edges,
+            search: with_structure.elapsed(),
+        };
+    }
+
+    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+        self.config.accept.check_frame(width, height)
+    }
+
+    fn keep_candidates(&mut self, keep: bool) {
+        self.candidates = keep.then(Vec::new);
+    }
+
+    fn stages(&self) -> Option<Stages<'_>> {
+        Some(Stages {
+            edges: self.edges(),
+            candidates: self.candidates.as_deref().unwrap_or_default(),
+            times: self.times,
+            tolerance: self.config.accept.tolerance,
+        })
     }
 }
 
@@ -169,11 +204,29 @@ struct Cell {
 #[derive(Clone, Debug, Default)]
 struct Cells {
     slots: Vec<Cell>,
+    /// Scratch: the cells in use while the table grows.
+    moved: Vec<Cell>,
     used: usize,
     round: u32,
 }
 
+/// The fewest slots of a table that is not empty.
+const SMALLEST: usize = 1024;
+/// The most votes that memory is set aside for beforehand.
+const FORESEEN: u32 = 1 << 16;
+
 impl Cells {
+    /// A table that asks for no memory until more than this many cells have a vote (or 65536, if that is less). What is set
+    /// aside is not touched, so it costs nothing, before the table grows into it.
+    fn with_room_for(votes: u32) -> Self {
+        let slots = (2 * (votes.min(FORESEEN) as usize + 1)).next_power_of_two();
+        Self {
+            slots: Vec::with_capacity(slots.max(SMALLEST)),
+            moved: Vec::with_capacity(slots / 4),
+            ..Self::default()
+        }
+    }
+
     fn clear(&mut self) {
         self.used = 0;
         self.round = self.round.wrapping_add(1);
@@ -231,13 +284,17 @@ impl Cells {
     }
 
     fn grow(&mut self) {
-        let larger = vec![Cell::default(); (2 * self.slots.len()).max(1024)];
-        let old = std::mem::replace(&mut self.slots, larger);
-        for cell in old {
-            if cell.round == self.round {
-                let place = self.place(cell.key);
-                self.slots[place] = cell;
-            }
+        let round = self.round;
+        self.moved.clear();
+        self.moved
+            .extend(self.slots.iter().filter(|cell| cell.round == round));
+        let larger = (2 * self.slots.len()).max(SMALLEST);
+        self.slots.clear();
+        self.slots.resize(larger, Cell::default());
+        for index in 0..self.moved.len() {
+            let cell = self.moved[index];
+            let place = self.place(cell.key);
+            self.slots[place] = cell;
         }
     }
 }

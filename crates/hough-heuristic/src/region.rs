@@ -4,14 +4,43 @@ use crate::{Circle, ConfigError};
 
 /// A rectangle of pixels of a frame, never empty: the *region of interest* for the centre of a circle.
 ///
-/// Only the centre must lie inside; the outline may leave the region, and the frame.
+/// Only the centre must lie inside; the outline may leave the region, and the frame. A detector refuses frames that its
+/// region sticks out of ([`CircleDetector::check_frame`](crate::CircleDetector::check_frame)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Rectangle"))]
 pub struct Region {
     left: u32,
     top: u32,
     width: u32,
     height: u32,
+}
+
+/// A [`Region`] as it was stored, and not yet looked at.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "Region")]
+struct Rectangle {
+    left: u32,
+    top: u32,
+    width: u32,
+    height: u32,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Rectangle> for Region {
+    type Error = ConfigError;
+
+    /// The frame is not known yet, so it is the largest there could be.
+    fn try_from(stored: Rectangle) -> Result<Self, ConfigError> {
+        let Rectangle {
+            left,
+            top,
+            width,
+            height,
+        } = stored;
+        Self::in_frame((left, top), (width, height), (u32::MAX, u32::MAX))
+    }
 }
 
 impl Region {
@@ -24,16 +53,32 @@ impl Region {
         (width, height): (u32, u32),
         (frame_width, frame_height): (u32, u32),
     ) -> Result<Self, ConfigError> {
+        let region = Self {
+            left,
+            top,
+            width,
+            height,
+        };
+        region.check_frame(frame_width, frame_height)?;
+        Ok(region)
+    }
+
+    /// Whether the region lies in frames of this size.
+    ///
+    /// # Errors
+    /// [`ConfigError::Region`] if it is empty or sticks out of them.
+    pub fn check_frame(&self, frame_width: u32, frame_height: u32) -> Result<(), ConfigError> {
+        let &Self {
+            left,
+            top,
+            width,
+            height,
+        } = self;
         let fits = |start: u32, length: u32, end: u32| {
             length > 0 && start.checked_add(length).is_some_and(|stop| stop <= end)
         };
         if fits(left, width, frame_width) && fits(top, height, frame_height) {
-            Ok(Self {
-                left,
-                top,
-                width,
-                height,
-            })
+            Ok(())
         } else {
             Err(ConfigError::Region {
                 left,
@@ -71,6 +116,30 @@ mod tests {
         ] {
             let error = Region::in_frame(corner, size, (768, 576)).unwrap_err();
             assert!(error.to_string().contains("768x576"), "{error}");
+        }
+        let region = Region::in_frame((700, 0), (68, 5), (768, 576)).unwrap();
+        let error = region.check_frame(720, 576).unwrap_err().to_string();
+        assert!(
+            error.contains("68x5 px at (700, 0)") && error.contains("720x576"),
+            "{error}"
+        );
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn a_stored_region_is_checked_too() {
+        let region = Region::in_frame((7, 0), (68, 5), (768, 576)).unwrap();
+        let stored = serde_json::to_string(&region).unwrap();
+        assert_eq!(serde_json::from_str::<Region>(&stored).unwrap(), region);
+        for (stored, value) in [
+            (r#"{"left":1,"top":2,"width":0,"height":5}"#, "0x5 px at (1, 2)"),
+            (
+                r#"{"left":4294967295,"top":2,"width":9,"height":5}"#,
+                "4294967295",
+            ),
+        ] {
+            let error = serde_json::from_str::<Region>(stored).unwrap_err();
+            assert!(error.to_string().contains(value), "{error}");
         }
     }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Rgb, RgbImage};
 
-use crate::{Circle, Curve, Detection, EdgeMap};
+use crate::{Circle, Curve, Detection, Stages};
 
 /// A picture could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -23,22 +23,23 @@ pub struct StageError {
 /// * `3_candidates.png`: the candidates that were looked at closely, over the frame.
 /// * `4_accepted.png`: the circles found, over the frame.
 ///
-/// `candidates` are those of [`Heuristic::candidates`](crate::Heuristic::candidates), or any others. Each file appears
-/// complete or not at all, and replaces one of its name.
+/// The stages are those of any detector ([`CircleDetector::stages`](crate::CircleDetector::stages)), candidates included if
+/// they were [kept](crate::CircleDetector::keep_candidates). Each file appears complete or not at all, and replaces one of its
+/// name.
 ///
 /// # Errors
 /// The first file that cannot be written.
 pub fn write_stages(
     folder: &Path,
     frame: &GrayImage,
-    edges: &EdgeMap,
-    candidates: &[Circle],
+    stages: &Stages<'_>,
     found: &[Detection],
 ) -> Result<[PathBuf; 4], StageError> {
     const LIGHT: Rgb<u8> = Rgb([255, 230, 90]);
     const EXPLAINED: Rgb<u8> = Rgb([80, 150, 255]);
     const CANDIDATE: Rgb<u8> = Rgb([255, 140, 0]);
     const FOUND: Rgb<u8> = Rgb([60, 255, 60]);
+    let edges = stages.edges;
     let colour = |dim: u8| {
         RgbImage::from_fn(frame.width(), frame.height(), |x, y| {
             let grey = frame.get_pixel(x, y).0[0] / dim;
@@ -50,8 +51,9 @@ pub fn write_stages(
     });
     let mut structure = colour(3);
     for pixel in edges.pixels() {
-        let near = |detection: &Detection| detection.circle.distance(pixel.x.into(), pixel.y.into()) <= 2.5;
-        let explained = found.iter().any(near);
+        let explained = found
+            .iter()
+            .any(|detection| stages.explains(&detection.circle, *pixel));
         plot(
             &mut structure,
             pixel.x as i32,
@@ -60,7 +62,7 @@ pub fn write_stages(
         );
     }
     let mut tried = colour(2);
-    for circle in candidates {
+    for circle in stages.candidates {
         draw(&mut tried, circle, CANDIDATE);
     }
     let mut accepted = colour(1);

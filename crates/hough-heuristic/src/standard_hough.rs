@@ -1,10 +1,15 @@
 //! The standard Hough transform for circles, the other of the paper's rivals.
 
+use std::time::Instant;
+
 use image::GrayImage;
 
 use crate::error::require;
 use crate::evidence::{Evidence, rank};
-use crate::{Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap};
+use crate::{
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, StageTimes,
+    Stages,
+};
 
 /// The settings of [`StandardHough`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +28,9 @@ pub struct StandardHoughConfig {
     pub direction_error: f64,
     /// The share of the outline's cells that must have voted before a peak is verified (default 0.4; 0..1).
     pub min_votes: f64,
+    /// The most memory that the accumulator may take, bytes (default 2^29, half a gigabyte; at least 1). A frame that needs more is
+    /// refused: [`StandardHough::check_frame`](CircleDetector::check_frame).
+    pub max_memory: u64,
 }
 
 impl Default for StandardHoughConfig {
@@ -33,6 +41,7 @@ impl Default for StandardHoughConfig {
             gradient: false,
             direction_error: 0.15,
             min_votes: 0.4,
+            max_memory: 1 << 29,
         }
     }
 }
@@ -44,8 +53,9 @@ impl Default for StandardHoughConfig {
 /// the votes that a complete circle of their radius would have, are verified best first: fitted to the edge pixels around,
 /// and accepted if their β is above θ, their pixels then no longer counting for the others.
 ///
-/// Centres outside the frame have no cells. The accumulator's memory is `width height radii / cell^3` counts of 16 bits
-/// ([`memory`](StandardHough::memory)): 33 MB for 768x576 pixels, radii of 15 to 300 px and cells of 2 px.
+/// Centres outside the frame have no cells. The accumulator's memory is `width height radii / cell^3` counts of 16 bits:
+/// 32 MB for 768x576 pixels, radii of 15 to 300 px and cells of 2 px, and 1.1 GB for 3840x2160 pixels and radii of 15 to 1080 px, which
+/// is beyond the default of [`max_memory`](StandardHoughConfig::max_memory).
 ///
 /// The score of a [`Detection`] is the β of the circle as reported, counted as [`Heuristic`](crate::Heuristic) counts it.
 #[derive(Clone, Debug)]
@@ -59,6 +69,8 @@ pub struct StandardHough<E = Canny> {
     peaks: Vec<Peak>,
     /// The directions of the gradients, in turns.
     turns: Vec<f64>,
+    candidates: Option<Vec<Circle>>,
+    times: StageTimes,
 }
 
 /// The cells at one radius from the origin.
@@ -74,6 +86,9 @@ struct Ring {
     /// The votes a complete circle gets in its cell.
     complete: f64,
 }
+
+/// The peaks that memory is set aside for beforehand: many times as many as pictures without dense texture have.
+const FORESEEN_PEAKS: usize = 1 << 14;
 
 /// Votes by radius, then row, then column.
 #[derive(Clone, Debug, Default)]
@@ -122,8 +137,10 @@ impl<E: EdgeDetector> StandardHough<E> {
             evidence,
             edge_detector,
             accumulator: Accumulator::default(),
-            peaks: Vec::new(),
+            peaks: Vec::with_capacity(FORESEEN_PEAKS),
             turns: Vec::new(),
+            candidates: None,
+            times: StageTimes::default(),
             config,
         })
     }
@@ -144,13 +161,31 @@ impl<E: EdgeDetector> StandardHough<E> {
             + rings
             + size_of::<u16>() * self.accumulator.votes.capacity()
             + size_of::<Peak>() * self.peaks.capacity()
+            + size_of::<f64>() * self.turns.capacity()
+    }
+
+    /// How many of the radii a frame can hold.
+    fn fitting(&self, width: u32, height: u32) -> usize {
+        // No circle through a pixel of the frame has its centre in the frame and a larger radius.
+        let (w, h) = (f64::from(width), f64::from(height));
+        let diagonal = (w * w + h * h).sqrt();
+        self.rings
+            .iter()
+            .take_while(|ring| ring.radius <= diagonal + self.config.cell)
+            .count()
     }
 }
 
 impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
         found.clear();
+        if self.check_frame(frame.width(), frame.height()).is_err() {
+            return;
+        }
+        let fitting = self.fitting(frame.width(), frame.height());
+        let start = Instant::now();
         let edges = self.edge_detector.detect_edges(frame);
+        let with_edges = Instant::now();
         let StandardHoughConfig {
             accept,
             cell,
@@ -159,14 +194,8 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             ..
         } = self.config;
         self.evidence.fill(edges);
-        // No circle through a pixel of the frame has its centre in the frame and a larger radius.
-        let (w, h) = (f64::from(edges.width()), f64::from(edges.height()));
-        let diagonal = (w * w + h * h).sqrt();
-        let fitting = self
-            .rings
-            .iter()
-            .take_while(|ring| ring.radius <= diagonal + cell)
-            .count();
+        let with_structure = Instant::now();
+
         let rings = &self.rings[..fitting];
         self.accumulator
             .clear(edges.width(), edges.height(), cell, rings.len());
@@ -193,10 +222,16 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
         self.accumulator
             .find_peaks(rings, min_votes, cell, &mut self.peaks);
 
+        if let Some(candidates) = &mut self.candidates {
+            candidates.clear();
+        }
         let reach = (1.5 * cell).max(2.0 * accept.tolerance + 1.0);
         for peak in &self.peaks {
             if found.len() == accept.max_circles {
                 break;
+            }
+            if let Some(candidates) = &mut self.candidates {
+                candidates.push(peak.circle);
             }
             let evidence = &mut self.evidence;
             let verified = evidence
@@ -208,6 +243,47 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             }
         }
         rank(found);
+        self.times = StageTimes {
+            edges: with_edges - start,
+            structure: with_structure - with_edges,
+            search: with_structure.elapsed(),
+        };
+    }
+
+    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+        let StandardHoughConfig {
+            accept,
+            cell,
+            max_memory,
+            ..
+        } = self.config;
+        accept.check_frame(width, height)?;
+        let layers = self.fitting(width, height) as u64;
+        let side = |pixels: u32| (f64::from(pixels) / cell).ceil() as u64;
+        let cells = side(width).saturating_mul(side(height)).saturating_mul(layers);
+        let needed = cells.saturating_mul(size_of::<u16>() as u64);
+        if needed <= max_memory {
+            return Ok(());
+        }
+        Err(ConfigError::Accumulator {
+            frame_width: width,
+            frame_height: height,
+            needed,
+            limit: max_memory,
+        })
+    }
+
+    fn keep_candidates(&mut self, keep: bool) {
+        self.candidates = keep.then(Vec::new);
+    }
+
+    fn stages(&self) -> Option<Stages<'_>> {
+        Some(Stages {
+            edges: self.edges(),
+            candidates: self.candidates.as_deref().unwrap_or_default(),
+            times: self.times,
+            tolerance: self.config.accept.tolerance,
+        })
     }
 }
 

@@ -1,14 +1,18 @@
 //! A detector allocates nothing for a frame once it has seen one like it.
 
 #![allow(unsafe_code)]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may fail that way, also in a function that several tests share"
+)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Acceptance, Canny, CircleDetector, Heuristic, HeuristicConfig, RandomizedHough, RandomizedHoughConfig,
-    StandardHough, StandardHoughConfig,
+    Acceptance, Canny, CircleDetector, Detection, Heuristic, HeuristicConfig, RandomizedHough,
+    RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
 };
 
 #[path = "../scenes/scenes.rs"]
@@ -44,56 +48,127 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-#[test]
-fn a_frame_after_the_first_allocates_nothing() {
-    let accept = Acceptance {
-        max_circles: 8,
-        max_radius: 60.0,
-        ..Acceptance::default()
-    };
-    let heuristic = HeuristicConfig {
-        max_circles: 8,
-        max_radius: 60.0,
-        ..HeuristicConfig::default()
-    };
-    let rht = RandomizedHoughConfig {
-        accept,
-        ..RandomizedHoughConfig::default()
-    };
-    let sht = StandardHoughConfig {
-        accept,
-        gradient: true,
-        ..StandardHoughConfig::default()
-    };
+const ACCEPT: Acceptance = Acceptance {
+    theta: 0.65,
+    tolerance: 1.0,
+    min_radius: 15.0,
+    max_radius: 60.0,
+    max_circles: 8,
+    min_distance: 8.0,
+    region: None,
+    refine: true,
+};
+
+fn detectors() -> Vec<(String, Box<dyn CircleDetector>)> {
     let canny = Canny::default;
-    let detectors: [(&str, Box<dyn CircleDetector>); 3] = [
-        ("heuristic", Box::new(Heuristic::new(heuristic, canny()).unwrap())),
-        ("rht", Box::new(RandomizedHough::new(rht, canny()).unwrap())),
-        ("sht", Box::new(StandardHough::new(sht, canny()).unwrap())),
-    ];
+    let mut all: Vec<(String, Box<dyn CircleDetector>)> = Vec::new();
+    for sampling in [Sampling::Near, Sampling::Anywhere] {
+        let heuristic = HeuristicConfig {
+            max_radius: ACCEPT.max_radius,
+            max_circles: ACCEPT.max_circles,
+            sampling,
+            ..HeuristicConfig::default()
+        };
+        let rht = RandomizedHoughConfig {
+            accept: ACCEPT,
+            sampling,
+            ..RandomizedHoughConfig::default()
+        };
+        all.push((
+            format!("heuristic, {sampling:?}"),
+            Box::new(Heuristic::new(heuristic, canny()).unwrap()),
+        ));
+        all.push((
+            format!("rht, {sampling:?}"),
+            Box::new(RandomizedHough::new(rht, canny()).unwrap()),
+        ));
+    }
+    for gradient in [false, true] {
+        let config = StandardHoughConfig {
+            accept: ACCEPT,
+            gradient,
+            ..StandardHoughConfig::default()
+        };
+        all.push((
+            format!("sht, gradient {gradient}"),
+            Box::new(StandardHough::new(config, canny()).unwrap()),
+        ));
+    }
+    all
+}
+
+fn frame(width: u32, height: u32, balls: usize, distractors: usize, seed: u64) -> GrayImage {
     let scene = scenes::Scene {
-        width: 320,
-        height: 240,
-        balls: 4,
-        distractors: 6,
+        width,
+        height,
+        balls,
+        distractors,
+        radius: (16.0, 30.0),
+        seed,
         ..scenes::Scene::default()
     };
-    let scene = scenes::Scene {
-        radius: (16.0, 40.0),
-        ..scene
-    };
-    let (frame, balls) = scene.render();
-    for (name, mut detector) in detectors {
+    scene.render().0
+}
+
+fn allocations(detector: &mut dyn CircleDetector, frame: &GrayImage, found: &mut Vec<Detection>) -> usize {
+    let before = ALLOCATIONS.with(Cell::get);
+    detector.detect_into(frame, found);
+    ALLOCATIONS.with(Cell::get) - before
+}
+
+fn edges(detector: &mut dyn CircleDetector, frame: &GrayImage) -> usize {
+    detector.detect(frame);
+    detector.stages().unwrap().edges.pixels().len()
+}
+
+/// The first frames are the busiest: one has the most edges, one takes all draws. Those after them are new to the detector,
+/// differ in size, and come back in another order.
+#[test]
+fn a_frame_after_the_first_allocates_nothing() {
+    let (crowded, futile) = (frame(500, 400, 8, 25, 1), frame(400, 300, 0, 8, 1));
+    let others = [
+        frame(320, 240, 4, 6, 2),
+        frame(400, 300, 3, 4, 3),
+        frame(90, 200, 1, 1, 4),
+        frame(200, 90, 1, 2, 5),
+        GrayImage::new(0, 0),
+        GrayImage::new(400, 1),
+        frame(300, 400, 5, 3, 6),
+    ];
+    for (name, mut detector) in detectors() {
         let mut found = Vec::new();
-        let mut count = |frame: &GrayImage| {
-            let before = ALLOCATIONS.with(Cell::get);
-            detector.detect_into(frame, &mut found);
-            (ALLOCATIONS.with(Cell::get) - before, found.len())
-        };
-        let (first, _) = count(&frame);
+        let first = allocations(&mut *detector, &crowded, &mut found);
         assert!(first > 0, "{name}: the count does not count");
-        let (second, circles) = count(&frame);
-        assert_eq!(circles, balls.len(), "{name}");
-        assert_eq!(second, 0, "{name}");
+        assert!(found.len() >= 5, "{name}: {found:?}");
+        allocations(&mut *detector, &futile, &mut Vec::new());
+        let mut circles = 0;
+        let most = edges(&mut *detector, &crowded);
+        for (index, frame) in others.iter().chain(others.iter().rev()).enumerate() {
+            let count = allocations(&mut *detector, frame, &mut found);
+            assert_eq!(count, 0, "{name}, frame {index}");
+            circles += found.len();
+            let stages = detector.stages().unwrap();
+            assert!(
+                stages.edges.pixels().len() < most,
+                "{name}, frame {index} is the busiest"
+            );
+        }
+        assert!(circles >= 20, "{name}: {circles}");
+    }
+}
+
+#[test]
+fn remembered_candidates_keep_their_memory() {
+    let frames = [frame(320, 240, 4, 6, 2), frame(200, 150, 2, 2, 3)];
+    for (name, mut detector) in detectors() {
+        detector.keep_candidates(true);
+        let mut found = Vec::new();
+        for frame in &frames {
+            allocations(&mut *detector, frame, &mut found);
+        }
+        for frame in frames.iter().rev() {
+            assert_eq!(allocations(&mut *detector, frame, &mut found), 0, "{name}");
+            assert!(!detector.stages().unwrap().candidates.is_empty(), "{name}");
+        }
     }
 }

@@ -49,4 +49,12 @@ impl Holder {
             radius,
         }
     }
+
+    /// Whether `ball` rests on this holder, to a millimetre.
+    pub fn carries(&self, ball: &Ball) -> bool {
+        let sunk = (ball.radius * ball.radius - self.radius * self.radius)
+            .max(0.0)
+            .sqrt();
+        (ball.centre.xy() - self.foot).norm() < 0.001 && (ball.centre.z - sunk - self.top).abs() < 0.001
+    }
 }

@@ -1,7 +1,7 @@
 //! The camera: optics, lens distortion, and the exact outline of a sphere.
 
 use hough_heuristic::Circle;
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Matrix2, Point2, Point3, Vector3};
 
 use crate::{CameraError, Ellipse, ProjectionError};
 
@@ -42,20 +42,77 @@ impl Distortion {
         )
     }
 
-    /// The inverse of [`Distortion::distort`], by fixed-point iteration; exact to about 1e-12 where the lens does not fold.
-    pub fn undistort(&self, p: Point2<f64>) -> Point2<f64> {
+    /// The inverse of [`Distortion::distort`]: what a pinhole would show where the lens shows `p`, to about 1e-13 of its size.
+    ///
+    /// By Newton's method; where that hesitates, followed outward from the axis, so that of several answers it is the one
+    /// before the lens folds. `None` if there is none, or `p` is not finite.
+    pub fn undistort(&self, p: Point2<f64>) -> Option<Point2<f64>> {
         if self.is_none() {
-            return p;
+            return Some(p);
         }
-        let mut q = p;
-        for _ in 0..50 {
-            let error = self.distort(q) - p;
-            q -= error;
-            if error.norm_squared() < 1e-28 {
+        self.newton(p, p, false).or_else(|| {
+            const STAGES: i32 = 32;
+            (1..=STAGES).try_fold(Point2::origin(), |from, stage| {
+                self.newton(p * (f64::from(stage) / f64::from(STAGES)), from, true)
+            })
+        })
+    }
+
+    /// As [`Distortion::undistort`], with the answer for a place nearby as a start.
+    pub(crate) fn undistort_near(
+        &self,
+        p: Point2<f64>,
+        (other, undone): (Point2<f64>, Point2<f64>),
+    ) -> Option<Point2<f64>> {
+        self.newton(p, undone + (p - other), false)
+            .or_else(|| self.undistort(p))
+    }
+
+    /// Newton's method from `start`. It must come nearer with every step; where it does not, the step is halved if `patient`, else that is
+    /// the end of it.
+    fn newton(&self, p: Point2<f64>, start: Point2<f64>, patient: bool) -> Option<Point2<f64>> {
+        let (mut q, mut error) = (start, self.distort(start) - p);
+        let enough = 1e-14 * (1.0 + p.coords.norm());
+        for _ in 0..60 {
+            if error.norm() <= enough {
                 break;
             }
+            let slope = self.jacobian(q);
+            if slope.determinant() <= 0.0 {
+                return None;
+            }
+            let step = slope.try_inverse()? * error;
+            let halvings = if patient { 30 } else { 1 };
+            let nearer = (0..halvings).find_map(|k| {
+                let at = q - step * 0.5_f64.powi(k);
+                let left = self.distort(at) - p;
+                (left.norm() < error.norm()).then_some((at, left))
+            });
+            match nearer {
+                Some(nearer) => (q, error) = nearer,
+                // As near as numbers go.
+                None if error.norm() <= 10.0 * enough => break,
+                None => return None,
+            }
         }
-        q
+        let sound = error.norm() <= 10.0 * enough && self.jacobian(q).determinant() > 0.0;
+        sound.then_some(q)
+    }
+
+    /// Derivatives of [`Distortion::distort`].
+    fn jacobian(&self, q: Point2<f64>) -> Matrix2<f64> {
+        let (x, y) = (q.x, q.y);
+        let s = x * x + y * y;
+        let radial = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
+        // Of the radial factor by s, twice.
+        let growth = 2.0 * (self.k1 + s * (2.0 * self.k2 + s * 3.0 * self.k3));
+        let across = x * y * growth + 2.0 * (self.p1 * x + self.p2 * y);
+        Matrix2::new(
+            radial + x * x * growth + 2.0 * self.p1 * y + 6.0 * self.p2 * x,
+            across,
+            across,
+            radial + y * y * growth + 2.0 * self.p2 * x + 6.0 * self.p1 * y,
+        )
     }
 }
 
@@ -149,6 +206,28 @@ impl Camera {
         Self { principal, ..self }.unfolded()
     }
 
+    /// The same lens before a sensor of `width` x `height` pixels: what the frame showed, the new one shows as large as it can hold all of it;
+    /// a frame of another shape shows more on two sides.
+    ///
+    /// # Errors
+    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::Folds`] if a distorted image would fold.
+    pub fn resized(self, width: u32, height: u32) -> Result<Self, CameraError> {
+        positive("frame width (px)", f64::from(width))?;
+        positive("frame height (px)", f64::from(height))?;
+        let scale =
+            (f64::from(width) / f64::from(self.width)).min(f64::from(height) / f64::from(self.height));
+        let middle = |w: u32, h: u32| Point2::new((f64::from(w) - 1.0) / 2.0, (f64::from(h) - 1.0) / 2.0);
+        let off_middle = self.principal - middle(self.width, self.height);
+        Self {
+            focal_px: self.focal_px * scale,
+            principal: middle(width, height) + off_middle * scale,
+            width,
+            height,
+            distortion: self.distortion,
+        }
+        .unfolded()
+    }
+
     /// The same camera with this lens distortion.
     ///
     /// # Errors
@@ -186,12 +265,26 @@ impl Camera {
         (point.z > 0.0).then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
     }
 
-    /// The direction, in the camera frame and with z = 1, that is seen at a pixel.
+    /// The direction, in the camera frame and with z = 1, that is seen at a pixel. Within the frame there always is one; for
+    /// a pixel outside it where the lens shows nothing, the direction is not a number ([`Camera::try_ray`] says so).
     pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
-        let p = self
-            .distortion
-            .undistort((pixel - self.principal.coords) / self.focal_px);
-        Vector3::new(p.x, p.y, 1.0)
+        self.try_ray(pixel).unwrap_or_else(|_| Vector3::repeat(f64::NAN))
+    }
+
+    /// As [`Camera::ray`].
+    ///
+    /// # Errors
+    /// [`CameraError::NoRay`] for a pixel where the lens shows nothing, which can only be one outside the frame, or one that is not finite.
+    pub fn try_ray(&self, pixel: Point2<f64>) -> Result<Vector3<f64>, CameraError> {
+        let image = (pixel - self.principal.coords) / self.focal_px;
+        let ideal = self.distortion.undistort(image);
+        ideal
+            .filter(|p| p.x.is_finite() && p.y.is_finite())
+            .map(|p| Vector3::new(p.x, p.y, 1.0))
+            .ok_or(CameraError::NoRay {
+                x: pixel.x,
+                y: pixel.y,
+            })
     }
 
     /// The outline of a sphere whose centre is given in the camera frame.
@@ -233,14 +326,14 @@ impl Camera {
     /// [`Camera::project_sphere_to_circle`] for a camera without distortion, and close to it (the distortion at the circle's
     /// centre is undone) for others.
     ///
-    /// `None` if `circle` or `radius` is not finite or not above zero.
+    /// `None` if `circle` or `radius` is not finite or not above zero, or the lens shows nothing at the circle's centre.
     pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
         let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
             && [circle.radius, radius].iter().all(|v| v.is_finite() && *v > 0.0);
         if !usable {
             return None;
         }
-        let ray = self.ray(Point2::new(circle.x, circle.y));
+        let ray = self.try_ray(Point2::new(circle.x, circle.y)).ok()?;
         let (m, r) = (ray.xy().norm(), circle.radius / self.focal_px);
         // Unknown: tan(eta) of the centre's direction, and sin²(alpha). From the formulas of `unit_outline`, with
         // k = cos²(alpha) - sin²(eta): m = sin(eta) cos(eta) / k and r = (sin(alpha) cos(alpha) / k + sin(alpha) / sqrt(k)) / 2.
@@ -272,7 +365,7 @@ impl Camera {
         self.principal + p.coords * self.focal_px
     }
 
-    /// Refuses a radial distortion that turns back before the farthest corner of the frame.
+    /// Refuses a distortion that turns back before the farthest corner of the frame.
     fn unfolded(self) -> Result<Self, CameraError> {
         if self.distortion.is_none() {
             return Ok(self);
@@ -289,9 +382,11 @@ impl Camera {
             let step = reach / self.focal_px / 200.0;
             while last < reach {
                 u += step;
-                let image = self.distortion.distort(Point2::new(u * cos, u * sin));
+                let ideal = Point2::new(u * cos, u * sin);
+                let image = self.distortion.distort(ideal);
                 let out = (image.x * cos + image.y * sin) * self.focal_px;
-                if out.is_nan() || out <= last {
+                let turned = self.distortion.jacobian(ideal).determinant() <= 0.0;
+                if out.is_nan() || out <= last || turned {
                     return Err(CameraError::Folds { radius_px: last });
                 }
                 last = out;
@@ -302,7 +397,7 @@ impl Camera {
 }
 
 /// The outline of a sphere on the plane at unit depth.
-fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
+pub(crate) fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
     if !(radius.is_finite() && radius > 0.0) {
         return Err(ProjectionError::Radius { radius });
     }

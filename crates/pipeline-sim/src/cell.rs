@@ -4,7 +4,7 @@ use hough_heuristic::{Circle, Features};
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joint, Joints, PumaParams};
 
-use crate::{Ball, Camera, Ellipse, Hand, Holder, Mount};
+use crate::{Ball, Camera, Capsule, Ellipse, Hand, Holder, Mount, SightError};
 
 /// When a ball counts as seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,12 +32,50 @@ impl Default for SightRule {
 impl SightRule {
     /// Whether a ball with this outline counts as seen in a frame of `size` pixels.
     pub fn sees(&self, outline: &Ellipse, size: (u32, u32)) -> bool {
+        self.check(outline, size).is_ok()
+    }
+
+    /// As [`SightRule::sees`], with the reason.
+    ///
+    /// # Errors
+    /// What keeps the ball from being seen: [`SightError::LargerThanView`], [`SightError::Radius`], [`SightError::CentreOutside`],
+    /// [`SightError::CutOff`].
+    pub fn check(&self, outline: &Ellipse, size: (u32, u32)) -> Result<(), SightError> {
         let circle = outline.circle();
-        let features = Features::from_circle(&circle, size.0);
-        (self.min_radius..=self.max_radius).contains(&features.r)
-            && (-0.5..=f64::from(size.0) - 0.5).contains(&circle.x)
-            && (-0.5..=f64::from(size.1) - 0.5).contains(&circle.y)
-            && outline.share_inside(size.0, size.1) >= self.min_share
+        let Features { r, .. } = Features::from_circle(&circle, size.0);
+        let (width, height) = (f64::from(size.0), f64::from(size.1));
+        if !(self.min_radius..=self.max_radius).contains(&r) {
+            let (w, h) = outline.half_extent();
+            if 2.0 * w > width || 2.0 * h > height {
+                return Err(SightError::LargerThanView {
+                    width_px: 2.0 * w,
+                    height_px: 2.0 * h,
+                    frame_width: size.0,
+                    frame_height: size.1,
+                });
+            }
+            return Err(SightError::Radius {
+                r,
+                least: self.min_radius,
+                greatest: self.max_radius,
+            });
+        }
+        let inside = (-0.5..=width - 0.5).contains(&circle.x) && (-0.5..=height - 0.5).contains(&circle.y);
+        if !inside {
+            return Err(SightError::CentreOutside {
+                x: circle.x,
+                y: circle.y,
+            });
+        }
+        let share = outline.share_inside(size.0, size.1);
+        if share >= self.min_share {
+            Ok(())
+        } else {
+            Err(SightError::CutOff {
+                share,
+                least: self.min_share,
+            })
+        }
     }
 
     /// Whether a round outline with these features counts as seen in the paper's frame of 192x144 units.
@@ -173,6 +211,23 @@ impl Cell {
             .map(|circle| Features::from_circle(&circle, self.camera.size().0))
     }
 
+    /// As [`Cell::features`], with the reason why there are none.
+    ///
+    /// # Errors
+    /// [`SightError`]: joints that are not finite; a ball without an outline (behind the camera, around it, nowhere); an outline larger than the
+    /// view; otherwise what [`Cell::sight`] asks for and does not get.
+    pub fn try_features(&self, joints: &Joints) -> Result<Features, SightError> {
+        if let Some(joint) = joints.non_finite() {
+            return Err(SightError::JointNotFinite { joint });
+        }
+        let centre = self
+            .camera_pose(joints)
+            .inverse_transform_point(&self.ball.centre);
+        let outline = self.camera.project_sphere(&centre, self.ball.radius)?;
+        self.sight.check(&outline, self.camera.size())?;
+        Ok(Features::from_circle(&outline.circle(), self.camera.size().0))
+    }
+
     /// The point between the finger pads, world frame, metres.
     pub fn tool_point(&self, joints: &Joints) -> Point3<f64> {
         self.params.wrist(joints) * Point3::new(0.0, 0.0, self.params.d6 + self.hand.tool)
@@ -263,21 +318,31 @@ impl Cell {
     /// The ball may be between the open fingers, that is what they are for: it counts when a finger, the palm or the camera comes
     /// nearer to its surface than the sensors' range, which does not happen in a correct reach and grip. A held ball does not count.
     pub fn proximity(&self, joints: &Joints) -> bool {
+        self.hand_bodies(joints).iter().any(|body| self.is_near(body))
+    }
+
+    /// What each of the pair of sensors says, the one on the left finger (the hand's +y) first: whether its finger is about to touch
+    /// table, holder or ball, as [`Cell::proximity`] has it for the whole hand.
+    pub fn proximity_pair(&self, joints: &Joints) -> [bool; 2] {
+        let [left, right, ..] = self.hand_bodies(joints);
+        [left, right].map(|finger| self.is_near(&finger))
+    }
+
+    /// Whether a part of the hand is within the sensors' range of something.
+    fn is_near(&self, body: &Capsule) -> bool {
         let range = self.hand.sensor_range;
-        let holder = self.holder.map(|h| crate::Capsule {
+        let holder = self.holder.map(|h| Capsule {
             from: Point3::new(h.foot.x, h.foot.y, self.table),
             to: Point3::new(h.foot.x, h.foot.y, h.top - h.radius),
             radius: h.radius,
         });
-        self.hand_bodies(joints).iter().any(|body| {
-            body.gap_to_plane(self.table) < range
-                || (self.held.is_none() && body.gap_to_sphere(&self.ball.centre, self.ball.radius) < range)
-                || holder.is_some_and(|h| body.gap_to(&h) < range)
-        })
+        body.gap_to_plane(self.table) < range
+            || (self.held.is_none() && body.gap_to_sphere(&self.ball.centre, self.ball.radius) < range)
+            || holder.is_some_and(|h| body.gap_to(&h) < range)
     }
 
     /// Fingers, palm and camera, in the world frame. Closed fingers stand as far apart as the ball is wide if they hold it.
-    pub fn hand_bodies(&self, joints: &Joints) -> [crate::Capsule; 4] {
+    pub fn hand_bodies(&self, joints: &Joints) -> [Capsule; 4] {
         let wrist = self.params.wrist(joints);
         let apart = match self.jaws {
             Gripper::Open => self.hand.half_opening,

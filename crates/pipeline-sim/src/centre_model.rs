@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Fit, Rows};
+use crate::least_squares::{Entry, Fit, Rows};
 use crate::{CentreSample, FitError, Quality, SightRule};
 
 /// The change of x on 1, d1 and r d1, with d1 the move of `JT1` in degrees.
@@ -45,7 +45,8 @@ impl CentreModel {
                 ("d1", s.d1),
                 ("x after", s.after.x),
             ] {
-                if !value.is_finite() {
+                let usable = value.is_finite() && (quantity != "r before" || value > 0.0);
+                if !usable {
                     return Err(FitError::NotFinite {
                         index,
                         quantity,
@@ -53,7 +54,15 @@ impl CentreModel {
                     });
                 }
             }
-            rows.push(&terms(&s.before, s.d1)[..needed], &[s.after.x - s.before.x], 1.0);
+            rows.push(&terms(&s.before, s.d1)[..needed], &[s.after.x - s.before.x], 1.0)
+                .map_err(|(entry, value)| FitError::NotFinite {
+                    index,
+                    quantity: match entry {
+                        Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
+                        Entry::Target(_) => "the change of x",
+                    },
+                    value,
+                })?;
         }
         let place = "centring".to_owned();
         if samples.len() < needed {
@@ -89,6 +98,12 @@ impl CentreModel {
         self.fit.residual[0] * (1.0 + self.fit.leverage(&terms[..self.fit.terms()])).sqrt()
     }
 
+    /// What the fit leaves of the changes of x on its samples: standard deviation in feature units, with the degrees of freedom that
+    /// are left.
+    pub fn residual_noise(&self) -> f64 {
+        self.fit.residual[0]
+    }
+
     /// How well dx is reproduced on the samples the model was fitted to.
     pub fn quality(&self) -> Vec<Quality> {
         self.quality.clone()
@@ -96,9 +111,9 @@ impl CentreModel {
 
     /// How well dx is reproduced on other samples.
     pub fn quality_on(&self, samples: &[CentreSample]) -> Vec<Quality> {
-        let pairs: Vec<(f64, f64)> = samples
+        let pairs: Vec<(f64, Option<f64>)> = samples
             .iter()
-            .map(|s| (s.after.x - s.before.x, self.change(&s.before, s.d1)))
+            .map(|s| (s.after.x - s.before.x, Some(self.change(&s.before, s.d1))))
             .collect();
         vec![Quality::of("dx", &pairs)]
     }

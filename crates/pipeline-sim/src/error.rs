@@ -1,5 +1,7 @@
 //! What can be wrong with optics, scenes and poses.
 
+use puma_val2::Joint;
+
 /// Why a camera cannot be built as asked.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -27,6 +29,14 @@ pub enum CameraError {
     Folds {
         /// Distance from the principal point at which the image turns back, pixels.
         radius_px: f64,
+    },
+    /// The lens shows nothing at this pixel: it lies outside the frame, beyond where the distortion folds the image over.
+    #[error("no ray leads to the pixel ({x:.1}, {y:.1}): the lens shows nothing there")]
+    NoRay {
+        /// Column asked for, pixels.
+        x: f64,
+        /// Row asked for, pixels.
+        y: f64,
     },
 }
 
@@ -59,4 +69,100 @@ pub enum ProjectionError {
         /// Radius, metres.
         radius: f64,
     },
+}
+
+/// Why a ball does not count as seen.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SightError {
+    /// A joint angle is NaN or infinite.
+    #[error("the angle of {joint} is not a finite number")]
+    JointNotFinite {
+        /// The joint.
+        joint: Joint,
+    },
+    /// The ball has no outline in the image.
+    #[error(transparent)]
+    Projection(#[from] ProjectionError),
+    /// The outline does not fit into the frame, wherever it lies.
+    #[error(
+        "the ball is larger than the view: its outline is {width_px:.0} x {height_px:.0} px in a frame of {frame_width} x {frame_height} px"
+    )]
+    LargerThanView {
+        /// Width of the outline, pixels.
+        width_px: f64,
+        /// Height of the outline, pixels.
+        height_px: f64,
+        /// Width of the frame, pixels.
+        frame_width: u32,
+        /// Height of the frame, pixels.
+        frame_height: u32,
+    },
+    /// The radius is out of the range in which a ball counts as seen.
+    #[error(
+        "the ball's radius of {r:.2} units is out of the range {least}..{greatest} in which it counts as seen"
+    )]
+    Radius {
+        /// Radius, feature units.
+        r: f64,
+        /// Smallest radius.
+        least: f64,
+        /// Greatest radius.
+        greatest: f64,
+    },
+    /// The centre lies outside the frame.
+    #[error("the centre of the ball is outside the frame, at ({x:.1}, {y:.1}) px")]
+    CentreOutside {
+        /// Column of the centre, pixels.
+        x: f64,
+        /// Row of the centre, pixels.
+        y: f64,
+    },
+    /// Too much of the outline lies outside the frame.
+    #[error("only {:.0} % of the ball's outline is inside the frame, at least {:.0} % must be", 100.0 * share, 100.0 * least)]
+    CutOff {
+        /// Share of the outline inside the frame, 0..=1.
+        share: f64,
+        /// Least share at which a ball counts as seen.
+        least: f64,
+    },
+}
+
+/// A quantity of the cell that cannot be worked with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum QuantityError {
+    /// A range whose ends are not finite, or the wrong way round.
+    #[error("the range of {quantity} must be finite and ascending, but is {low}..{high}")]
+    Range {
+        /// What it is the range of.
+        quantity: &'static str,
+        /// Its lower end.
+        low: f64,
+        /// Its upper end.
+        high: f64,
+    },
+    /// A quantity is NaN or infinite.
+    #[error("{quantity} must be a finite number, but is {value}")]
+    NotFinite {
+        /// Which quantity.
+        quantity: String,
+        /// What was given.
+        value: f64,
+    },
+    /// A search over moves can follow one or two joints, not more.
+    #[error("the moves turn {count} joints; a search can follow one or two")]
+    Joints {
+        /// Number of joints that any of the moves turns.
+        count: usize,
+    },
+}
+
+/// Refuses a range that is not finite and ascending.
+pub(crate) fn ascending(quantity: &'static str, (low, high): (f64, f64)) -> Result<(), QuantityError> {
+    if low.is_finite() && high.is_finite() && low <= high {
+        Ok(())
+    } else {
+        Err(QuantityError::Range { quantity, low, high })
+    }
 }

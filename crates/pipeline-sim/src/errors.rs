@@ -3,10 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use puma_val2::Joints;
+use puma_val2::{ArmError, Joints};
 use rand::{Rng, RngExt};
 
-use crate::{CameraError, Cell, Mount};
+use crate::{CameraError, Cell, Holder, Mount};
 
 /// The ways in which a real cell differs from the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +86,39 @@ impl Errors {
             .with_principal_point(principal)?;
         cell.mount = Mount::displaced(&nominal.mount, self.camera_shift, self.roll, self.pitch, self.yaw);
         cell.ball.radius = radius;
+        if nominal.holder.is_some_and(|holder| holder.carries(&nominal.ball)) {
+            cell.holder = Some(Holder::under(&cell.ball));
+        }
         Ok(cell)
+    }
+}
+
+impl Errors {
+    /// Whether an arm can have this play and these encoders.
+    ///
+    /// # Errors
+    /// [`ArmError::Setting`] names the quantity that is not finite, or below zero.
+    pub(crate) fn check_drive(&self) -> Result<(), ArmError> {
+        const STEPS: [&str; 6] = [
+            "the encoder step of JT1",
+            "the encoder step of JT2",
+            "the encoder step of JT3",
+            "the encoder step of JT4",
+            "the encoder step of JT5",
+            "the encoder step of JT6",
+        ];
+        let steps = STEPS.into_iter().zip(self.encoder_step);
+        for (what, value) in steps.chain([("the backlash", self.backlash)]) {
+            // A turn and more could not be told from none.
+            if !(0.0..=std::f64::consts::PI).contains(&value) {
+                return Err(ArmError::Setting {
+                    what,
+                    value: format!("{value} rad"),
+                    allowed: "a finite angle of zero or above, at most half a turn",
+                });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -193,8 +225,9 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
+    /// `errors` must have passed [`Errors::check_drive`].
     pub(crate) fn new(joints: Joints, errors: &Errors) -> Self {
-        let (backlash, encoder_step) = (errors.backlash.max(0.0), errors.encoder_step);
+        let (backlash, encoder_step) = (errors.backlash, errors.encoder_step);
         let mut drive = Self {
             backlash,
             encoder_step,

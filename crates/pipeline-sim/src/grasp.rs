@@ -1,7 +1,7 @@
 //! Touching the ball: gripping it, carrying it, pushing it.
 
 use hough_heuristic::Features;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joints};
 
 use crate::{Cell, Holder};
@@ -41,20 +41,24 @@ impl Cell {
     ///
     /// The jaws open along the hand's y axis. Held: the ball's middle lies between the jaws and within [`crate::Hand::pad_tolerance`] of the
     /// pads' middle across them; the jaws then pull it to the middle. Pushed: it lies between the jaws but farther out than that, so
-    /// that the pads slide off and press it away until they miss it. Missed: otherwise; the ball stays.
+    /// that the pads slide off and press it away along the table until they miss it. Missed: otherwise, and always for a ball that is wider than the
+    /// jaws open and for jaws that were closed before; the ball stays.
     pub fn close_gripper(&mut self, joints: &Joints) -> Grasp {
-        let wrist = self.params.wrist(joints);
+        if self.held.is_some() {
+            self.jaws = Gripper::Closed;
+            return Grasp::Held;
+        }
+        let were_open = self.jaws == Gripper::Open;
         self.jaws = Gripper::Closed;
+        let wrist = self.params.wrist(joints);
         let ball = wrist.inverse_transform_point(&self.ball.centre);
         let pads = self.params.d6 + self.hand.tool;
         let across = Vector3::new(ball.x, 0.0, ball.z - pads);
         let miss = across.norm();
         let gap = self.hand.half_opening - self.hand.finger_radius;
         let reach = self.ball.radius + self.hand.finger_radius;
-        if self.held.is_some() {
-            return Grasp::Held;
-        }
-        if ball.y.abs() > gap || miss > reach {
+        let between = were_open && self.ball.radius <= gap && ball.y.abs() <= gap && miss <= reach;
+        if !between {
             return Grasp::Missed;
         }
         if miss <= self.hand.pad_tolerance {
@@ -63,18 +67,14 @@ impl Cell {
             self.ball.centre = wrist * place;
             return Grasp::Held;
         }
-        let by = reach - miss;
-        let out = wrist * (across * (by / miss));
-        self.slide_ball(
-            Vector3::new(out.x, out.y, 0.0)
-                .try_normalize(1e-9)
-                .unwrap_or_else(Vector3::x)
-                * by,
-        );
+        let Some((aside, by)) = way_out(&wrist, &across, reach) else {
+            return Grasp::Missed;
+        };
+        self.slide_ball(aside * by);
         Grasp::Pushed { by }
     }
 
-    /// Opens the jaws. A ball that they held falls straight down, onto its holder if that is below, else onto the table.
+    /// Opens the jaws. A ball that they held falls straight down, onto its holder if that is below, else onto the table, beside the holder if need be.
     pub fn open_gripper(&mut self) {
         self.jaws = Gripper::Open;
         if self.held.take().is_none() {
@@ -86,7 +86,16 @@ impl Cell {
                 let sunk = (ball.radius * ball.radius - h.radius * h.radius).max(0.0).sqrt();
                 ball.centre = Point3::new(h.foot.x, h.foot.y, h.top + sunk);
             }
-            _ => ball.centre.z = self.table + ball.radius,
+            holder => {
+                ball.centre.z = self.table + ball.radius;
+                // It cannot lie where the holder stands: it slides off.
+                let Some(h) = holder else { return };
+                let aside = ball.centre.xy() - h.foot;
+                let missing = h.radius + ball.radius - aside.norm();
+                if let Some(out) = aside.try_normalize(1e-9).filter(|_| missing > 0.0) {
+                    ball.centre += Vector3::new(out.x, out.y, 0.0) * missing;
+                }
+            }
         }
     }
 
@@ -134,8 +143,9 @@ impl Cell {
 
     /// Moves the ball, with the holder if it stands on it.
     fn slide_ball(&mut self, by: Vector3<f64>) {
+        let carried = self.holder.is_some_and(|h| h.carries(&self.ball));
         self.ball.centre += by;
-        if let Some(Holder { foot, .. }) = &mut self.holder {
+        if let Some(Holder { foot, .. }) = self.holder.as_mut().filter(|_| carried) {
             *foot += by.xy();
         }
     }
@@ -155,4 +165,31 @@ impl Cell {
             _ => false,
         }
     }
+}
+
+/// The horizontal direction, and how far along it, a ball must go to be `reach` away from the pads' middle; `across` is how it lies to it now
+/// in the hand's frame, without the part along the jaws.
+fn way_out(wrist: &Isometry3<f64>, across: &Vector3<f64>, reach: f64) -> Option<(Vector3<f64>, f64)> {
+    let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0);
+    // Straight away if that is not straight down or up; else along whichever axis of the hand is the more level.
+    let axes = [Vector3::x(), Vector3::z()].map(|axis| level(wrist * axis));
+    let away = level(wrist * across);
+    let aside = if away.norm() > 0.1 * across.norm() {
+        away
+    } else if axes[0].norm() > axes[1].norm() {
+        axes[0]
+    } else {
+        axes[1]
+    }
+    .try_normalize(1e-9)?;
+    // |across + by * along| = reach, with only what is across the jaws counting.
+    let turned = wrist.rotation.inverse() * aside;
+    let along = Vector3::new(turned.x, 0.0, turned.z);
+    let (a, b, c) = (
+        along.norm_squared(),
+        across.dot(&along),
+        across.norm_squared() - reach * reach,
+    );
+    let by = (-b + (b * b - a * c).max(0.0).sqrt()) / a;
+    by.is_finite().then_some((aside, by))
 }

@@ -113,20 +113,44 @@ pub(crate) struct Rows {
     count: usize,
 }
 
+/// One of the numbers of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Entry {
+    /// A term, by position.
+    Term(usize),
+    /// A target, by position.
+    Target(usize),
+}
+
+/// Greatest number in a row: squares of it can be summed. Columns shorter than its reciprocal count as zero.
+const GREATEST: f64 = 1e120;
+
 impl Rows {
     /// One more observation; `weight` multiplies the row (the square root of its statistical weight).
-    pub(crate) fn push(&mut self, terms: &[f64], targets: &[f64], weight: f64) {
+    ///
+    /// # Errors
+    /// The first number that is not finite, or is too large to be squared; nothing has been added then.
+    pub(crate) fn push(&mut self, terms: &[f64], targets: &[f64], weight: f64) -> Result<(), (Entry, f64)> {
+        let entries = (terms.iter().enumerate().map(|(i, t)| (Entry::Term(i), t)))
+            .chain(targets.iter().enumerate().map(|(i, t)| (Entry::Target(i), t)));
+        for (entry, value) in entries {
+            let usable = |v: f64| v.abs() <= GREATEST;
+            if !usable(*value) || !usable(value * weight) {
+                return Err((entry, *value));
+            }
+        }
         self.targets.resize_with(targets.len(), Vec::new);
         self.terms.extend(terms.iter().map(|t| t * weight));
         for (column, target) in self.targets.iter_mut().zip(targets) {
             column.push(target * weight);
         }
         self.count += 1;
+        Ok(())
     }
 
     /// Solves by QR of the column-scaled design matrix and a singular value decomposition of its triangle.
     ///
-    /// `observations` is how many of the rows are real ones (a prior adds rows that are not).
+    /// The first `observations` rows are real ones; a prior adds rows that are not.
     pub(crate) fn solve(&self, place: &str, observations: usize) -> Result<Fit, FitError> {
         let n = self.terms.len().checked_div(self.count).unwrap_or(0);
         if self.count < n || self.count == 0 {
@@ -140,11 +164,13 @@ impl Rows {
         let mut design = DMatrix::from_row_slice(self.count, n, &self.terms);
         let scales: Vec<f64> = design.column_iter().map(|c| c.norm()).collect();
         for (mut column, scale) in design.column_iter_mut().zip(&scales) {
-            if *scale > 0.0 {
+            if *scale > 1.0 / GREATEST {
                 column /= *scale;
+            } else {
+                column.fill(0.0);
             }
         }
-        let qr = design.qr();
+        let qr = design.clone().qr();
         let (q, svd) = (qr.q(), qr.r().svd(true, true));
         let greatest = svd.singular_values.max();
         let floor = greatest * 1e-9;
@@ -167,13 +193,16 @@ impl Rows {
         // R^-1 of the scaled system, from its singular vectors.
         let inverse = v_t.transpose() * DMatrix::from_diagonal(&inverse_singular) * u.transpose();
         let gram = &inverse * inverse.transpose();
-        let freedom = observations.saturating_sub(n).max(1) as f64;
+        // What the coefficients take from the real rows: their number, or less where a prior holds them.
+        let real = design.rows(0, observations.min(self.count));
+        let taken = (real * &gram).component_mul(&real).sum();
+        let freedom = (observations as f64 - taken).max(1.0);
         let (mut coefficients, mut residual) = (Vec::new(), Vec::new());
         for target in &self.targets {
             let y = DVector::from_column_slice(target);
-            let projected = q.transpose() * &y;
-            let scaled = &inverse * &projected;
-            residual.push(((y.norm_squared() - projected.norm_squared()).max(0.0) / freedom).sqrt());
+            let scaled = &inverse * (q.transpose() * &y);
+            let missed = y.rows(0, real.nrows()) - real * &scaled;
+            residual.push((missed.norm_squared() / freedom).sqrt());
             coefficients.push(scaled.iter().zip(&scales).map(|(c, s)| c / s).collect());
         }
         let inverse_gram = (0..n * n)
@@ -195,23 +224,34 @@ impl Rows {
 pub struct Quality {
     /// The output: `dx`, `dy` or `dr`, feature units.
     pub output: String,
-    /// Coefficient of determination: the share of the output's variance that the model explains, at most 1.
+    /// Coefficient of determination: the share of the output's variance that the model explains, at most 1; 0 where the output does not
+    /// vary.
     pub r2: f64,
     /// Root of the mean squared error, feature units.
     pub rmse: f64,
+    /// Number of samples.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub samples: usize,
+    /// How many of them the model has no prediction for (it places the ball behind the camera). They count with all of their change
+    /// as error.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub unpredicted: usize,
 }
 
 impl Quality {
     /// From pairs of (observed, predicted) changes.
-    pub(crate) fn of(output: &str, pairs: &[(f64, f64)]) -> Self {
+    pub(crate) fn of(output: &str, pairs: &[(f64, Option<f64>)]) -> Self {
         let n = pairs.len() as f64;
         let mean = pairs.iter().map(|p| p.0).sum::<f64>() / n;
         let spread: f64 = pairs.iter().map(|p| (p.0 - mean).powi(2)).sum();
-        let error: f64 = pairs.iter().map(|p| (p.0 - p.1).powi(2)).sum();
+        let error: f64 = pairs.iter().map(|p| (p.0 - p.1.unwrap_or(0.0)).powi(2)).sum();
         Self {
             output: output.to_owned(),
-            r2: 1.0 - error / spread,
+            // Where nothing varies there is nothing to explain.
+            r2: if spread > 0.0 { 1.0 - error / spread } else { 0.0 },
             rmse: (error / n).sqrt(),
+            samples: pairs.len(),
+            unpredicted: pairs.iter().filter(|p| p.1.is_none()).count(),
         }
     }
 }

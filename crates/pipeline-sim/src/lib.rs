@@ -16,6 +16,7 @@
 //! 192x144 ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
 
 mod ball;
+mod benchmark_kind;
 mod camera;
 mod cell;
 mod centre_model;
@@ -30,7 +31,9 @@ mod mount;
 mod open_loop;
 mod optimum;
 mod overview;
+mod reach_form;
 mod reach_model;
+mod reach_noise;
 mod render;
 mod samples;
 mod scene;
@@ -40,11 +43,12 @@ mod workspace;
 mod y4m;
 
 pub use ball::{Ball, Holder};
+pub use benchmark_kind::BenchmarkKind;
 pub use camera::{Camera, Distortion};
 pub use cell::{Cell, SightRule, WorkingLimits};
 pub use centre_model::CentreModel;
 pub use ellipse::Ellipse;
-pub use error::{CameraError, ProjectionError};
+pub use error::{CameraError, ProjectionError, QuantityError, SightError};
 pub use errors::{ErrorLevel, Errors, UnknownName};
 pub use grasp::{Contact, Grasp};
 pub use hand::{Capsule, Hand};
@@ -53,7 +57,8 @@ pub use motion::BallPath;
 pub use mount::Mount;
 pub use open_loop::OpenLoopError;
 pub use optimum::GoalBox;
-pub use reach_model::{ReachForm, ReachModel};
+pub use reach_form::ReachForm;
+pub use reach_model::ReachModel;
 pub use render::{Renderer, Round, Shot, Sighting};
 pub use samples::{CentreSample, MoveLists, ReachSample, exploring_start, sample_moves, with_noise};
 pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};

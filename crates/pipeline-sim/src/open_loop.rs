@@ -13,6 +13,8 @@ pub struct OpenLoopError {
     pub moves: usize,
     /// Runs that were counted.
     pub runs: usize,
+    /// Runs that ended before because the model had no prediction (it placed the ball behind the camera).
+    pub lost: usize,
     /// Mean absolute error of y.
     pub y_mean: f64,
     /// Mean absolute error of r.
@@ -38,6 +40,7 @@ impl ReachModel {
     ) -> Vec<OpenLoopError> {
         let lists = MoveLists::paper();
         let mut errors: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); moves];
+        let mut lost = vec![0; moves];
         for _ in 0..runs {
             let Some((start, mut joints)) = exploring_start(cell, rng) else {
                 break;
@@ -45,7 +48,7 @@ impl ReachModel {
             let Some(mut believed) = start.features(&joints) else {
                 continue;
             };
-            for (y, r) in &mut errors {
+            for (k, (y, r)) in errors.iter_mut().enumerate() {
                 let Some((d2, d3, there)) = (0..100).find_map(|_| {
                     let (d2, d3) = (
                         lists.jt2[rng.random_range(0..9)],
@@ -62,6 +65,7 @@ impl ReachModel {
                 };
                 let Some(after) = self.predict_unbounded(&believed, joints[Joint::J3].to_degrees(), d2, d3)
                 else {
+                    lost[k..].iter_mut().for_each(|runs| *runs += 1);
                     break;
                 };
                 believed = after;
@@ -84,6 +88,7 @@ impl ReachModel {
                 OpenLoopError {
                     moves: k + 1,
                     runs,
+                    lost: lost[k],
                     y_mean,
                     r_mean,
                     y_median,

@@ -2,109 +2,9 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Fit, Rows};
-use crate::{FitError, Quality, ReachSample, SightRule};
-
-/// Which terms a [`ReachModel`] is made of.
-///
-/// With d2, d3 the moves in degrees, a = d2 / 20, b = d3 / 16, Z = 33 / r, V = (y - 72) / r, E = (`JT3` - 140) / 40 before the move. In
-/// the arm's plane (Z, V) is, up to a scale, the ball's place as the camera sees it, and a move of the arm turns and
-/// shifts it rigidly; that is why the `Rigid` forms, which fit the changes of Z and V, need far fewer terms than the image's own
-/// coordinates would.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum ReachForm {
-    /// Changes of y and r on 1, d2, d3: the paper's own reading of linear regression, per elbow interval.
-    Linear,
-    /// Changes of Z and V on 1, a, b, Za, Zb, Va, Vb, Ea.
-    Rigid8,
-    /// Changes of Z and V on 1, and a, b, a², ab, b² each times 1, Z, V, E, and E²a.
-    Rigid22,
-    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists of: with c, s cosine and sine
-    /// of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`: (c23 - 1) and s23 times Z and V; (c3 - c23) and (s3 - s23) times 1, cos e,
-    /// sin e; 1 - c3; s3. No further terms exist: what is left is the outline's slight ellipticity.
-    RigidBody,
-}
-
-impl ReachForm {
-    /// Number of terms.
-    pub fn terms(self) -> usize {
-        match self {
-            Self::Linear => 3,
-            Self::Rigid8 => 8,
-            Self::Rigid22 => 22,
-            Self::RigidBody => 12,
-        }
-    }
-
-    /// Writes the terms and returns them as a slice of `buffer`.
-    fn fill<'a>(
-        self,
-        before: &Features,
-        jt3_degrees: f64,
-        d2: f64,
-        d3: f64,
-        buffer: &'a mut [f64; 22],
-    ) -> &'a [f64] {
-        let (a, b) = (d2 / 20.0, d3 / 16.0);
-        let (z, v, e) = (
-            33.0 / before.r,
-            (before.y - 72.0) / before.r,
-            (jt3_degrees - 140.0) / 40.0,
-        );
-        match self {
-            Self::Linear => buffer[..3].copy_from_slice(&[1.0, d2, d3]),
-            Self::Rigid8 => buffer[..8].copy_from_slice(&[1.0, a, b, z * a, z * b, v * a, v * b, e * a]),
-            Self::Rigid22 => {
-                buffer[0] = 1.0;
-                for (i, moved) in [a, b, a * a, a * b, b * b].into_iter().enumerate() {
-                    for (j, place) in [1.0, z, v, e].into_iter().enumerate() {
-                        buffer[1 + 4 * i + j] = moved * place;
-                    }
-                }
-                buffer[21] = e * e * a;
-            }
-            Self::RigidBody => {
-                let ((s3, c3), (s23, c23)) = (d3.to_radians().sin_cos(), (d2 + d3).to_radians().sin_cos());
-                let (sin_e, cos_e) = jt3_degrees.to_radians().sin_cos();
-                let (c, s) = (c3 - c23, s3 - s23);
-                let turned = c23 - 1.0;
-                buffer[..12].copy_from_slice(&[
-                    turned * z,
-                    turned * v,
-                    s23 * z,
-                    s23 * v,
-                    c,
-                    c * cos_e,
-                    c * sin_e,
-                    s,
-                    s * cos_e,
-                    s * sin_e,
-                    1.0 - c3,
-                    s3,
-                ]);
-            }
-        }
-        &buffer[..self.terms()]
-    }
-
-    /// The two quantities that are fitted, from image features: (y, r), or (Z, V).
-    fn outputs(self, features: &Features) -> [f64; 2] {
-        match self {
-            Self::Linear => [features.y, features.r],
-            _ => [33.0 / features.r, (features.y - 72.0) / features.r],
-        }
-    }
-
-    /// (y, r) from the fitted quantities; `None` where they belong to no ball in front of the camera.
-    fn image(self, outputs: [f64; 2]) -> Option<(f64, f64)> {
-        match self {
-            Self::Linear => Some((outputs[0], outputs[1])),
-            _ => (outputs[0] > 0.0).then(|| (72.0 + 33.0 * outputs[1] / outputs[0], 33.0 / outputs[0])),
-        }
-    }
-}
+use crate::least_squares::{Entry, Fit, Rows};
+use crate::reach_noise::Noise;
+use crate::{FitError, Quality, ReachForm, ReachSample, SightRule};
 
 /// A regression simulator of the approaching behaviour, fitted to samples of real or simulated moves.
 ///
@@ -126,6 +26,8 @@ pub struct ReachModel {
     form: ReachForm,
     edges: Vec<f64>,
     pieces: Vec<Fit>,
+    /// Of each piece: how far observations of y and of r lie from predictions.
+    noise: Vec<[Noise; 2]>,
     quality: Vec<Quality>,
 }
 
@@ -148,40 +50,29 @@ impl ReachModel {
         if !edges.iter().all(|e| e.is_finite()) || !edges.windows(2).all(|w| w[0] < w[1]) {
             return Err(FitError::Edges { edges });
         }
-        let (pieces, quality) = (Vec::new(), Vec::new());
         let mut model = Self {
             form,
             edges,
-            pieces,
-            quality,
+            pieces: Vec::new(),
+            noise: Vec::new(),
+            quality: Vec::new(),
         };
-        let mut rows = vec![Rows::default(); model.edges.len() + 1];
-        let mut counts = vec![0; rows.len()];
-        let mut buffer = [0.0; 22];
-        for (index, sample) in samples.iter().enumerate() {
-            check(index, sample)?;
-            let piece = model.piece(sample.jt3_degrees);
-            let (from, to) = (form.outputs(&sample.before), form.outputs(&sample.after));
-            let terms = form.fill(
-                &sample.before,
-                sample.jt3_degrees,
-                sample.d2,
-                sample.d3,
-                &mut buffer,
-            );
-            rows[piece].push(terms, &[to[0] - from[0], to[1] - from[1]], 1.0);
-            counts[piece] += 1;
-        }
-        for (i, rows) in rows.iter().enumerate() {
+        for (i, group) in model.groups(samples)?.iter().enumerate() {
             let place = model.place(i);
-            if counts[i] < form.terms() {
+            if group.len() < form.terms() {
                 return Err(FitError::TooFewSamples {
                     place,
-                    got: counts[i],
+                    got: group.len(),
                     needed: form.terms(),
                 });
             }
-            model.pieces.push(rows.solve(&place, counts[i])?);
+            let mut rows = Rows::default();
+            for (index, sample) in group {
+                push(form, &mut rows, *index, sample, 1.0)?;
+            }
+            model.pieces.push(rows.solve(&place, group.len())?);
+            model.noise.push(Default::default());
+            model.noise[i] = model.noise_of(i, group, |_| 1.0);
         }
         model.quality = model.quality_on(samples);
         Ok(model)
@@ -192,25 +83,22 @@ impl ReachModel {
     ///
     /// For each elbow interval and output the coefficients c minimise the mean of w (change - terms · c)² plus `ridge` · |c - c0|², with
     /// c0 this model's coefficients and w = r before to the power `radius_power`, normalised to mean 1 (the fitted quantities of the
-    /// `Rigid` forms are the noisier the smaller the ball; 2 to 4 is right for them, 0 for `Linear`). An interval without samples stays as it is.
+    /// `Rigid` forms are the noisier the smaller the ball; 2 to 4 is right for them, 0 for `Linear`). An interval without samples stays as it
+    /// is, and so does the whole model without any.
     ///
     /// # Errors
-    /// [`FitError::Prior`] for a `ridge` or power that is not a finite number of zero or above; otherwise as for [`ReachModel::fit`] (with
-    /// a ridge above zero neither too few samples nor a lack of rank is an error).
+    /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or is so large that nothing else counts (above 1e100),
+    /// and for a power that is not finite; otherwise as for [`ReachModel::fit`] (with a ridge of 1e-12 or above neither too few samples nor
+    /// a lack of rank is an error).
     pub fn refit(&self, samples: &[ReachSample], ridge: f64, radius_power: f64) -> Result<Self, FitError> {
-        if !(ridge.is_finite() && ridge >= 0.0 && radius_power.is_finite()) {
+        if !((0.0..=1e100).contains(&ridge) && radius_power.is_finite()) {
             let what = format!(
-                "a refit needs a finite ridge of zero or above and a finite power, not {ridge} and {radius_power}"
+                "a refit needs a ridge of 0..=1e100 and a finite power, not {ridge} and {radius_power}"
             );
             return Err(FitError::Prior { what });
         }
-        let mut groups = vec![Vec::new(); self.pieces.len()];
-        for (index, sample) in samples.iter().enumerate() {
-            check(index, sample)?;
-            groups[self.piece(sample.jt3_degrees)].push(sample);
-        }
         let mut model = self.clone();
-        let mut buffer = [0.0; 22];
+        let groups = self.groups(samples)?;
         for (i, group) in groups.iter().enumerate().filter(|(_, group)| !group.is_empty()) {
             let count = group.len();
             if ridge == 0.0 && count < self.form.terms() {
@@ -220,44 +108,77 @@ impl ReachModel {
                     needed: self.form.terms(),
                 });
             }
-            let weigh = |sample: &ReachSample| sample.before.r.powf(radius_power);
-            let mean = group.iter().map(|s| weigh(s)).sum::<f64>() / count as f64;
+            // By way of logarithms, and relative to the greatest: no power is too large to be taken.
+            let log_weight = |sample: &ReachSample| radius_power * sample.before.r.ln();
+            let greatest = group
+                .iter()
+                .map(|(_, s)| log_weight(s))
+                .fold(f64::NEG_INFINITY, f64::max);
+            let relative = |sample: &ReachSample| (log_weight(sample) - greatest).exp();
+            let mean = group.iter().map(|(_, s)| relative(s)).sum::<f64>() / count as f64;
+            let weigh = |sample: &ReachSample| relative(sample) / mean;
             let mut rows = Rows::default();
-            for sample in group {
-                let (from, to) = (
-                    self.form.outputs(&sample.before),
-                    self.form.outputs(&sample.after),
-                );
-                let terms = self.form.fill(
-                    &sample.before,
-                    sample.jt3_degrees,
-                    sample.d2,
-                    sample.d3,
-                    &mut buffer,
-                );
-                rows.push(
-                    terms,
-                    &[to[0] - from[0], to[1] - from[1]],
-                    (weigh(sample) / mean).sqrt(),
-                );
+            for (index, sample) in group {
+                push(self.form, &mut rows, *index, sample, weigh(sample).sqrt())?;
             }
             if ridge > 0.0 {
-                let pull = (ridge * count as f64).sqrt();
-                let mut unit = vec![0.0; self.form.terms()];
-                for (k, (c0, c1)) in self.pieces[i].coefficients[0]
-                    .iter()
-                    .zip(&self.pieces[i].coefficients[1])
-                    .enumerate()
-                {
-                    unit[k] = 1.0;
-                    rows.push(&unit, &[*c0, *c1], pull);
-                    unit[k] = 0.0;
-                }
+                self.pull(i, (ridge * count as f64).sqrt(), &mut rows)?;
             }
             model.pieces[i] = rows.solve(&self.place(i), count)?;
+            model.noise[i] = model.noise_of(i, group, weigh);
         }
-        model.quality = model.quality_on(samples);
+        if !samples.is_empty() {
+            model.quality = model.quality_on(samples);
+        }
         Ok(model)
+    }
+
+    /// Rows that draw the coefficients of piece `i` toward what they are.
+    fn pull(&self, i: usize, strength: f64, rows: &mut Rows) -> Result<(), FitError> {
+        let [first, second] = [&self.pieces[i].coefficients[0], &self.pieces[i].coefficients[1]];
+        let mut unit = vec![0.0; self.form.terms()];
+        for k in 0..unit.len() {
+            unit[k] = 1.0;
+            rows.push(&unit, &[first[k], second[k]], strength)
+                .map_err(|(_, value)| FitError::Prior {
+                    what: format!("the prior is too strong to be reckoned with ({value})"),
+                })?;
+            unit[k] = 0.0;
+        }
+        Ok(())
+    }
+
+    /// The samples by elbow interval, each with its position.
+    fn groups<'a>(&self, samples: &'a [ReachSample]) -> Result<Vec<Vec<(usize, &'a ReachSample)>>, FitError> {
+        let mut groups = vec![Vec::new(); self.edges.len() + 1];
+        for (index, sample) in samples.iter().enumerate() {
+            check(index, sample)?;
+            groups[self.piece(sample.jt3_degrees)].push((index, sample));
+        }
+        Ok(groups)
+    }
+
+    /// How far the samples of piece `i` lie from what it predicts for them.
+    fn noise_of(
+        &self,
+        i: usize,
+        group: &[(usize, &ReachSample)],
+        weight: impl Fn(&ReachSample) -> f64,
+    ) -> [Noise; 2] {
+        let mut buffer = [0.0; 22];
+        let (mut y, mut r, mut fitted) = (Vec::new(), Vec::new(), 0.0);
+        for (_, s) in group {
+            let terms = self.form.fill(&s.before, s.jt3_degrees, s.d2, s.d3, &mut buffer);
+            fitted += weight(s) * self.pieces[i].leverage(terms);
+            if let Some(after) = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3) {
+                let [of_y, of_r] = self.form.shares(&s.before, &after, s.d2, s.d3);
+                y.push((of_y, (s.after.y - after.y).powi(2)));
+                r.push((of_r, (s.after.r - after.r).powi(2)));
+            }
+        }
+        // What the coefficients have taken from the samples is missing in the residuals.
+        let left = (group.len() as f64 - fitted).max(1.0) / group.len() as f64;
+        [Noise::of(&y, left), Noise::of(&r, left)]
     }
 
     /// The form the model was fitted in.
@@ -297,25 +218,42 @@ impl ReachModel {
     }
 
     /// The standard deviations of y and r, feature units, that the fit expects of [`ReachModel::predict_unbounded`] around what a
-    /// new observation would show: residual noise and the uncertainty of the coefficients together. `None` as there.
+    /// new observation would show: noise of both observations, what the form cannot express, and the uncertainty of the coefficients
+    /// together. `None` as there.
+    ///
+    /// Noise of `before` is carried along: what comes four times as near shows it four times (in y) and sixteen times (in r) as large.
     pub fn uncertainty(&self, before: &Features, jt3_degrees: f64, d2: f64, d3: f64) -> Option<(f64, f64)> {
         let after = self.predict_unbounded(before, jt3_degrees, d2, d3)?;
         let mut buffer = [0.0; 22];
         let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
-        let fit = &self.pieces[self.piece(jt3_degrees)];
-        let widened = (1.0 + fit.leverage(terms)).sqrt();
-        let (first, second) = (fit.residual[0] * widened, fit.residual[1] * widened);
-        Some(match self.form {
+        let piece = self.piece(jt3_degrees);
+        let fit = &self.pieces[piece];
+        let [of_y, of_r] = self.form.shares(before, &after, d2, d3);
+        let [noise_y, noise_r] = &self.noise[piece];
+        let leverage = fit.leverage(terms);
+        let [first, second] = [0, 1].map(|i| leverage * fit.residual[i].powi(2));
+        let (from_y, from_r) = match self.form {
             ReachForm::Linear => (first, second),
             // r = 33 / Z and y = 72 + r V: first order in the errors of Z and V.
             _ => {
                 let r_of_z = after.r * after.r / 33.0;
+                let v = (after.y - 72.0) / after.r;
                 (
-                    (after.r * second).hypot((after.y - 72.0) / after.r * r_of_z * first),
-                    r_of_z * first,
+                    after.r.powi(2) * second + (v * r_of_z).powi(2) * first,
+                    r_of_z.powi(2) * first,
                 )
             }
-        })
+        };
+        Some((
+            (noise_y.variance(of_y) + from_y).sqrt(),
+            (noise_r.variance(of_r) + from_r).sqrt(),
+        ))
+    }
+
+    /// What the fit leaves of the changes of y and r on its samples, a pair for each elbow interval: standard deviations in feature
+    /// units, with the degrees of freedom that are left.
+    pub fn residual_noise(&self) -> Vec<(f64, f64)> {
+        self.noise.iter().map(|[y, r]| (y.residual, r.residual)).collect()
     }
 
     /// How well the changes of y and r are reproduced on the samples the model was fitted to.
@@ -323,18 +261,21 @@ impl ReachModel {
         self.quality.clone()
     }
 
-    /// How well the changes of y and r are reproduced on other samples.
+    /// How well the changes of y and r are reproduced on other samples. A sample for which the model has no prediction counts as one
+    /// for which it predicts no change, and in [`Quality::unpredicted`].
     pub fn quality_on(&self, samples: &[ReachSample]) -> Vec<Quality> {
-        let (mut y, mut r) = (
-            Vec::with_capacity(samples.len()),
-            Vec::with_capacity(samples.len()),
-        );
-        for s in samples {
-            if let Some(after) = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3) {
-                y.push((s.after.y - s.before.y, after.y - s.before.y));
-                r.push((s.after.r - s.before.r, after.r - s.before.r));
-            }
-        }
+        let predicted = samples.iter().map(|s| {
+            let after = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3);
+            (s, after)
+        });
+        let (y, r): (Vec<_>, Vec<_>) = predicted
+            .map(|(s, after)| {
+                (
+                    (s.after.y - s.before.y, after.map(|a| a.y - s.before.y)),
+                    (s.after.r - s.before.r, after.map(|a| a.r - s.before.r)),
+                )
+            })
+            .unzip();
         vec![Quality::of("dy", &y), Quality::of("dr", &r)]
     }
 
@@ -360,6 +301,34 @@ impl ReachModel {
             (i, _) => format!("JT3 {}..{}", edge(i - 1), edge(i)),
         }
     }
+}
+
+/// One more sample in the rows of its piece.
+fn push(
+    form: ReachForm,
+    rows: &mut Rows,
+    index: usize,
+    sample: &ReachSample,
+    weight: f64,
+) -> Result<(), FitError> {
+    let mut buffer = [0.0; 22];
+    let (from, to) = (form.outputs(&sample.before), form.outputs(&sample.after));
+    let terms = form.fill(
+        &sample.before,
+        sample.jt3_degrees,
+        sample.d2,
+        sample.d3,
+        &mut buffer,
+    );
+    rows.push(terms, &[to[0] - from[0], to[1] - from[1]], weight)
+        .map_err(|(entry, value)| FitError::NotFinite {
+            index,
+            quantity: match entry {
+                Entry::Term(i) => form.term_names()[i],
+                Entry::Target(i) => form.output_names()[i],
+            },
+            value,
+        })
 }
 
 /// Refuses samples that cannot be fitted to.
@@ -390,13 +359,14 @@ fn check(index: usize, sample: &ReachSample) -> Result<(), FitError> {
 mod stored {
     //! A stored model is believed only after its shape has been checked.
 
-    use super::{Fit, Quality, ReachForm, ReachModel};
+    use super::{Fit, Noise, Quality, ReachForm, ReachModel};
 
     #[derive(serde::Deserialize)]
     pub(super) struct ReachModelData {
         form: ReachForm,
         edges: Vec<f64>,
         pieces: Vec<Fit>,
+        noise: Vec<[Noise; 2]>,
         quality: Vec<Quality>,
     }
 
@@ -408,6 +378,7 @@ mod stored {
                 form,
                 edges,
                 pieces,
+                noise,
                 quality,
             } = data;
             let ascending = edges.iter().all(|e| e.is_finite()) && edges.windows(2).all(|w| w[0] < w[1]);
@@ -417,10 +388,16 @@ mod stored {
             if pieces.len() != edges.len() + 1 || !pieces.iter().all(|p| p.fits(2, form.terms())) {
                 return Err("the stored model has the wrong number of coefficients, or some are not finite");
             }
+            if noise.len() != pieces.len() || !noise.iter().flatten().all(Noise::is_sound) {
+                return Err(
+                    "the noise of the stored model is not a finite number of zero or above for each piece",
+                );
+            }
             Ok(Self {
                 form,
                 edges,
                 pieces,
+                noise,
                 quality,
             })
         }

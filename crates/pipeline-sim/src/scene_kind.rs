@@ -10,8 +10,8 @@ use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 
 use crate::{
-    Ball, Camera, Cell, Distortion, Light, Look, Occluder, Renderer, Scene, Sensor, Shape, Shot, Sighting,
-    Thing, UnknownName, Workspace,
+    Ball, Camera, CameraError, Cell, Distortion, Light, Look, Occluder, Renderer, Scene, Sensor, Shape, Shot,
+    Sighting, Thing, UnknownName, Workspace,
 };
 
 /// What makes a frame difficult.
@@ -105,7 +105,7 @@ impl Scene {
     /// A random scene of a kind: lamps, table, ball's surface, things all over the workspace.
     pub fn generate<R: Rng + ?Sized>(kind: SceneKind, rng: &mut R) -> Self {
         let mut scene = Self {
-            lights: lamps(rng),
+            lights: lamps(1.1, rng),
             ambient: rng.random_range(0.15..0.30),
             table: Look {
                 albedo: rng.random_range(0.25..0.50),
@@ -158,14 +158,15 @@ impl Scene {
     }
 }
 
-fn lamps<R: Rng + ?Sized>(rng: &mut R) -> Vec<Light> {
+/// One to three lamps, at most `steepest` (tangent) off the vertical.
+pub(crate) fn lamps<R: Rng + ?Sized>(steepest: f64, rng: &mut R) -> Vec<Light> {
     let count = rng.random_range(1..=3);
     let total = rng.random_range(0.65..0.95);
     (0..count)
         .map(|_| {
             let (angle, slant) = (
                 rng.random_range(0.0..std::f64::consts::TAU),
-                rng.random_range(0.1..1.1),
+                rng.random_range(0.1..steepest),
             );
             Light {
                 toward: Vector3::new(slant * f64::cos(angle), slant * f64::sin(angle), 1.0),
@@ -364,6 +365,15 @@ impl Snapshot {
             self.cell,
             self.joints + JointDelta(self.speed.0.map(|v| v * seconds)),
         )
+    }
+
+    /// The same moment, taken with [`Camera::resized`].
+    ///
+    /// # Errors
+    /// As for [`Camera::resized`].
+    pub fn resized(mut self, width: u32, height: u32) -> Result<Self, CameraError> {
+        self.cell.camera = self.cell.camera.resized(width, height)?;
+        Ok(self)
     }
 
     /// Takes the frame.

@@ -159,8 +159,9 @@ impl SimulatedArm {
     /// [`Errors::apply`].)
     ///
     /// # Errors
-    /// As for [`SimulatedArm::new`].
+    /// As for [`SimulatedArm::new`]; [`ArmError::Setting`] for backlash or an encoder step that no arm can have (not finite, below zero).
     pub fn with_errors(cell: SharedCell, joints: Joints, errors: &Errors) -> Result<Self, ArmError> {
+        errors.check_drive()?;
         cell.with(|cell| cell.params.check(&joints))?;
         let drive = Arc::new(Mutex::new(Drive::new(joints, errors)));
         Ok(Self {

@@ -3,7 +3,8 @@
 use puma_val2::Joints;
 use rand::{Rng, RngExt};
 
-use crate::{Ball, Cell};
+use crate::error::ascending;
+use crate::{Ball, Cell, QuantityError};
 
 /// The part of the world in which balls lie: a sector of a ring around the waist axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,8 +42,32 @@ impl Workspace {
             .map(|pan| Joints([pan, self.search_elbow.0, self.search_elbow.1, 0.0, jt5, 0.0]))
     }
 
-    /// A ball somewhere in the workspace, uniform in volume.
+    /// Whether balls can lie in this workspace.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the range that is not finite and ascending (a distance from the waist must not be below zero either), or
+    /// the angle of the search poses that is not finite.
+    pub fn check(&self) -> Result<(), QuantityError> {
+        ascending("the distance from the waist (m)", self.rho)?;
+        ascending("the distance from the waist (m), from zero,", (0.0, self.rho.0))?;
+        ascending("the azimuth (rad)", self.azimuth)?;
+        ascending("the height (m)", self.height)?;
+        let elbow = [self.search_elbow.0, self.search_elbow.1];
+        match self.search_pans.into_iter().chain(elbow).find(|a| !a.is_finite()) {
+            Some(value) => Err(QuantityError::NotFinite {
+                quantity: "an angle of the search poses (rad)".to_owned(),
+                value,
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// A ball somewhere in the workspace, uniform in volume. In a workspace that [`Workspace::check`] refuses, a ball nowhere: its
+    /// coordinates are not numbers, and no camera sees it.
     pub fn sample_ball<R: Rng + ?Sized>(&self, rng: &mut R) -> Ball {
+        if self.check().is_err() {
+            return Ball::at(f64::NAN, f64::NAN, f64::NAN);
+        }
         let rho = rng.random_range(self.rho.0.powi(2)..=self.rho.1.powi(2)).sqrt();
         let azimuth = rng.random_range(self.azimuth.0..=self.azimuth.1);
         let z = rng.random_range(self.height.0..=self.height.1);
@@ -51,9 +76,11 @@ impl Workspace {
 
     /// A ball that at least one of the search poses sees in `cell` (93 % of all balls are), and the first such pose.
     ///
-    /// `None` if 10 000 balls in a row cannot be seen: a camera that does not see the workspace.
+    /// `None` if 10 000 balls in a row cannot be seen (a camera that does not see the workspace), and in a workspace that
+    /// [`Workspace::check`] refuses.
     pub fn sample_seen_ball<R: Rng + ?Sized>(&self, cell: &Cell, rng: &mut R) -> Option<(Ball, Joints)> {
         let poses = self.search_poses();
+        self.check().ok()?;
         (0..10_000).find_map(|_| {
             let ball = self.sample_ball(rng);
             let cell = Cell { ball, ..*cell };

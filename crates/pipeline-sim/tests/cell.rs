@@ -1,7 +1,7 @@
 //! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
 
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, Workspace};
+use pipeline_sim::{Ball, Cell, ProjectionError, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -161,5 +161,80 @@ fn features_and_places_invert_each_other() {
             .max((shown.y - y).abs())
             .max((shown.r - r).abs());
         assert!(error < 1e-9, "{wanted:?} {shown:?}");
+    }
+}
+
+#[test]
+fn what_keeps_a_ball_from_being_seen_is_named() {
+    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+    let goal = cell.goal_pose(45.0).expect("within reach");
+    assert_eq!(cell.try_features(&goal).ok(), cell.features(&goal));
+    let shown = |x: f64, y: f64, r: f64| -> SightError {
+        let mut shown = cell;
+        let wanted = Features { x, y, r };
+        shown.ball.centre = cell.ball_showing(&goal, &wanted).expect("some place shows it");
+        assert_eq!(shown.features(&goal), None);
+        shown.try_features(&goal).expect_err("out of sight")
+    };
+    assert!(matches!(
+        shown(96.0, 72.0, 90.0),
+        SightError::LargerThanView { .. }
+    ));
+    assert!(matches!(
+        shown(96.0, 72.0, 70.0),
+        SightError::Radius { greatest: 68.0, .. }
+    ));
+    assert!(matches!(
+        shown(96.0, 72.0, 4.0),
+        SightError::Radius { least: 5.0, .. }
+    ));
+    assert!(matches!(
+        shown(-3.0, 72.0, 30.0),
+        SightError::CentreOutside { .. }
+    ));
+    assert!(matches!(shown(1.0, 72.0, 30.0), SightError::CutOff { .. }));
+    // Inside the camera, behind it, nowhere.
+    let camera = cell.camera_pose(&goal);
+    let at = |x, y, z| {
+        let mut put = cell;
+        put.ball.centre = camera * nalgebra::Point3::new(x, y, z);
+        put.try_features(&goal).expect_err("out of sight")
+    };
+    let projection = |error| match error {
+        SightError::Projection(error) => error,
+        other => panic!("{other}"),
+    };
+    assert!(matches!(
+        projection(at(0.0, 0.0, 0.01)),
+        ProjectionError::Inside { .. }
+    ));
+    assert!(matches!(
+        projection(at(0.0, 0.0, -0.3)),
+        ProjectionError::Behind { .. }
+    ));
+    assert!(matches!(
+        projection(at(f64::NAN, 0.0, 0.3)),
+        ProjectionError::CentreNotFinite
+    ));
+    let mut nowhere = goal;
+    nowhere.0[2] = f64::INFINITY;
+    let refused = cell.try_features(&nowhere).expect_err("nowhere").to_string();
+    assert!(refused.contains("JT3"), "{refused}");
+}
+
+#[test]
+fn each_finger_feels_for_itself() {
+    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+    let goal = cell.goal_pose(45.0).expect("within reach");
+    let mut grip = goal;
+    grip.0[4] = cell.grip_angle(&goal);
+    assert_eq!(cell.proximity_pair(&grip), [false, false], "straddled");
+    for (side, expected) in [(1.0, [true, false]), (-1.0, [false, true])] {
+        let mut near = cell;
+        // Two millimetres short of the finger on this side.
+        let gap = cell.hand.half_opening - cell.hand.finger_radius - cell.ball.radius - 0.002;
+        near.ball.centre += cell.params.wrist(&grip) * nalgebra::Vector3::y() * (side * gap);
+        assert_eq!(near.proximity_pair(&grip), expected, "{side}");
+        assert!(near.proximity(&grip));
     }
 }

@@ -4,8 +4,8 @@
 use hough_heuristic::image::GrayImage;
 use nalgebra::Point2;
 use pipeline_sim::{
-    Ball, Cell, Distortion, Ellipse, Light, Look, Occluder, Renderer, Round, Scene, SceneKind, Sensor, Shape,
-    Shot, Snapshot, Thing, Workspace,
+    Ball, Cell, Distortion, Light, Look, Renderer, Round, Scene, SceneKind, Sensor, Shape, Shot, Snapshot,
+    Workspace,
 };
 use puma_val2::{JointDelta, Joints};
 use rand::SeedableRng;
@@ -149,103 +149,6 @@ fn also_through_a_distorting_lens() {
             .expect("does not fold"),
         2,
     );
-}
-
-#[test]
-fn truth_knows_what_hides_the_ball() {
-    let (cell, goal) = cell_at_goal();
-    let target = |scene: &Scene| {
-        let truth = Renderer::new(scene, 1).truth(&cell, &goal);
-        assert_eq!(truth[0].what, Round::Target);
-        truth[0]
-    };
-    let free = target(&Scene::plain());
-    assert!(free.visible > 0.99, "{}", free.visible);
-    assert_eq!(Some(free.ellipse.circle()), cell.circle(&goal));
-    // A strip of 20 units over the middle of a circle of radius 33.
-    let Ellipse { centre, .. } = free.ellipse;
-    let (x, y) = ((centre.x + 0.5) / 4.0, (centre.y + 0.5) / 4.0);
-    let strip = Occluder {
-        from: Point2::new(x, y - 100.0),
-        to: Point2::new(x, y + 100.0),
-        width: 20.0,
-        softness: 2.0,
-        albedo: 0.2,
-    };
-    let hidden = target(&Scene {
-        occluders: vec![strip],
-        ..Scene::plain()
-    });
-    let t = 10.0_f64 / 33.0;
-    let expected = 1.0 - 2.0 / std::f64::consts::PI * (t.asin() + t * (1.0 - t * t).sqrt());
-    assert!(
-        (hidden.visible - expected).abs() < 0.02,
-        "{} against {expected}",
-        hidden.visible
-    );
-    // Half out of the frame.
-    let mut cut = goal;
-    let mut share = 1.0;
-    while share > 0.6 {
-        cut = cut + JointDelta::from_degrees([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        share = Renderer::truth(&Renderer::new(&Scene::plain(), 1), &cell, &cut)
-            .first()
-            .map_or(0.0, |s| s.visible);
-    }
-    assert!((0.5..=0.6).contains(&share), "{share}");
-}
-
-#[test]
-fn nearer_things_hide_farther_ones() {
-    // A tall cylinder between the camera and a low ball on the table.
-    let (cell, _) = cell_at_goal();
-    let pose = Workspace::paper().search_poses()[3];
-    let look = Look {
-        albedo: 0.5,
-        texture: 0.0,
-        gloss: 0.0,
-    };
-    let thing = |shape, x, y| Thing {
-        shape,
-        x,
-        y,
-        turn: 0.0,
-        look,
-    };
-    let ball = thing(Shape::Ball { radius: 0.03 }, 0.80, 0.0);
-    let visible = |things: Vec<Thing>| {
-        let truth = Renderer::new(
-            &Scene {
-                things,
-                ..Scene::plain()
-            },
-            1,
-        )
-        .truth(&cell, &pose);
-        truth.iter().find(|s| s.what == Round::Ball).map(|s| s.visible)
-    };
-    assert!(visible(vec![ball]).expect("in the frame") > 0.95);
-    let camera = cell.camera_pose(&pose).translation.vector;
-    let (x, y) = (0.80 - 0.053, 0.053 * camera.y / (0.80 - camera.x));
-    let post = thing(
-        Shape::Cylinder {
-            radius: 0.02,
-            height: 0.10,
-        },
-        x,
-        y,
-    );
-    let beside = thing(
-        Shape::Cylinder {
-            radius: 0.02,
-            height: 0.10,
-        },
-        0.80 + 0.09,
-        y,
-    );
-    let (before, behind) = (visible(vec![post, ball]), visible(vec![beside, ball]));
-    assert!(before.is_none_or(|v| v < 0.7), "{before:?}");
-    assert!(behind.expect("in the frame") > 0.95, "{behind:?}");
 }
 
 /// Mean absolute difference of neighbouring pixels along the two axes.

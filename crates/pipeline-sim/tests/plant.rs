@@ -89,6 +89,159 @@ fn a_grasp_beside_the_ball_pushes_it_or_misses() {
 }
 
 #[test]
+fn pads_that_slide_off_leave_the_ball_where_they_miss_it() {
+    let (cell, goal) = at_goal();
+    // The pads stand above, below, before and behind the ball.
+    for (up, ahead) in [
+        (0.02, 0.0),
+        (-0.02, 0.0),
+        (0.0, 0.02),
+        (0.0, -0.02),
+        (0.012, 0.012),
+    ] {
+        let mut off = cell;
+        let grip = goal + swing();
+        let level = off.params.wrist(&grip) * Vector3::x();
+        let level = Vector3::new(level.x, level.y, 0.0).normalize();
+        off.ball.centre += Vector3::z() * up + level * ahead;
+        let before = off.ball.centre;
+        let Grasp::Pushed { by } = off.close_gripper(&grip) else {
+            panic!("{up} {ahead}: not pushed");
+        };
+        assert!(((off.ball.centre - before).norm() - by).abs() < 1e-12);
+        assert!((off.ball.centre.z - before.z).abs() < 1e-12, "along the table");
+        let ball = off.params.wrist(&grip).inverse_transform_point(&off.ball.centre);
+        let miss = ball.x.hypot(ball.z - off.params.d6 - off.hand.tool);
+        let touching = off.ball.radius + off.hand.finger_radius;
+        assert!((miss - touching).abs() < 1e-9, "{up} {ahead}: {miss}");
+    }
+}
+
+#[test]
+fn jaws_hold_only_what_they_straddle_and_only_when_they_close() {
+    let (cell, goal) = at_goal();
+    let grip = goal + swing();
+    let mut closed = cell;
+    closed.jaws = Gripper::Closed;
+    assert_eq!(closed.close_gripper(&grip), Grasp::Missed, "they were closed");
+    assert_eq!(closed.ball, cell.ball);
+    let mut wide = cell;
+    wide.ball.radius = 0.031;
+    assert_eq!(
+        wide.close_gripper(&grip),
+        Grasp::Missed,
+        "wider than the jaws open"
+    );
+    let mut twice = cell;
+    assert_eq!(twice.close_gripper(&grip), Grasp::Held);
+    assert_eq!(twice.close_gripper(&grip), Grasp::Held);
+}
+
+#[test]
+fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
+    let (cell, goal) = at_goal();
+    let mut cell = cell;
+    let holder = cell.holder.expect("on a holder");
+    assert!(holder.carries(&cell.ball));
+    let grip = goal + swing();
+    assert_eq!(cell.close_gripper(&grip), Grasp::Held);
+    // A little aside, where it falls past the holder, then far away.
+    for degrees in [2.0, 12.0] {
+        let mut aside = cell;
+        let there = grip + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(aside.follow(&there), Contact::Carried);
+        aside.open_gripper();
+        assert!(!holder.carries(&aside.ball));
+        let apart = (aside.ball.centre.xy() - holder.foot).norm();
+        assert!(
+            apart > holder.radius + aside.ball.radius - 1e-9,
+            "{degrees}: {apart}"
+        );
+        // A finger meets it from the side.
+        let [finger, ..] = aside.hand_bodies(&there);
+        aside.ball.centre = nalgebra::center(&finger.from, &finger.to) + Vector3::new(0.01, 0.0, 0.0);
+        assert!(matches!(aside.follow(&there), Contact::Pushed { by } if by > 0.005));
+        assert_eq!(aside.holder, Some(holder), "the holder stays where it is");
+    }
+    // With another ball than one believes the holder still carries it.
+    let bigger = Errors {
+        radius_factor: 1.2,
+        ..Errors::none()
+    };
+    let wrong = bigger.apply(&at_goal().0).expect("sound errors");
+    assert!(wrong.holder.expect("on a holder").carries(&wrong.ball));
+}
+
+#[test]
+fn play_and_encoders_that_cannot_be_are_refused_by_name() {
+    let start = Workspace::paper().search_poses()[2];
+    let arm = |errors: Errors| SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors);
+    for bad in [f64::INFINITY, f64::NAN, -0.001, 4.0] {
+        let mut errors = Errors::none();
+        errors.encoder_step[3] = bad;
+        let refused = arm(errors).expect_err("no such encoder").to_string();
+        assert!(refused.contains("the encoder step of JT4"), "{refused}");
+        let errors = Errors {
+            backlash: bad,
+            ..Errors::none()
+        };
+        let refused = arm(errors).expect_err("no such gear").to_string();
+        assert!(refused.contains("the backlash"), "{refused}");
+    }
+}
+
+#[test]
+fn a_workspace_that_cannot_be_is_refused_by_name_and_has_no_balls() {
+    let (cell, _) = at_goal();
+    let paper = Workspace::paper();
+    assert_eq!(paper.check(), Ok(()));
+    let nan = f64::NAN;
+    for (broken, name) in [
+        (
+            Workspace {
+                rho: (0.8, 0.5),
+                ..paper
+            },
+            "distance",
+        ),
+        (
+            Workspace {
+                rho: (-0.5, 0.5),
+                ..paper
+            },
+            "distance",
+        ),
+        (
+            Workspace {
+                azimuth: (0.0, f64::INFINITY),
+                ..paper
+            },
+            "azimuth",
+        ),
+        (
+            Workspace {
+                height: (nan, 0.0),
+                ..paper
+            },
+            "height",
+        ),
+        (
+            Workspace {
+                search_elbow: (nan, 0.0),
+                ..paper
+            },
+            "search poses",
+        ),
+    ] {
+        let refused = broken.check().expect_err("no such workspace").to_string();
+        assert!(refused.contains(name), "{refused}");
+        assert!(broken.sample_ball(&mut rng(1)).centre.x.is_nan());
+        assert_eq!(broken.sample_seen_ball(&cell, &mut rng(1)), None);
+        assert_eq!(broken.coverage(&cell, 10, &mut rng(1)).seen, 0);
+    }
+}
+
+#[test]
 fn running_into_the_ball_pushes_it_out_of_the_way() {
     let (cell, goal) = at_goal();
     let shared = SharedCell::new(cell);
@@ -213,7 +366,8 @@ fn balls_are_pushed_jump_and_drift() {
         .expect("there is room");
     assert!(workspace.contains(&to) && ((to - Point3::new(0.65, 0.1, -0.1)).norm() - 0.15).abs() < 1e-9);
     let drift = workspace.sample_drift(&from, 0.02, &mut rng(6));
-    assert!((drift.at(3.0).expect("always") - from).norm() - 0.06 < 1e-12);
+    let drifted = (drift.at(3.0).expect("always") - from).norm();
+    assert!((drifted - 0.06).abs() < 1e-12, "{drifted}");
     let jumps = BallPath::Jumps(vec![(0.0, from), (2.0, to)]);
     assert_eq!(
         (jumps.at(-1.0), jumps.at(1.9), jumps.at(2.0)),

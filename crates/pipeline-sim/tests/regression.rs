@@ -1,4 +1,5 @@
 //! The regression simulators against the geometry they imitate.
+#![allow(clippy::print_stdout)] // Measured qualities, shown with --nocapture.
 
 use pipeline_sim::{Ball, Cell, CentreModel, FitError, ReachForm, ReachModel, ReachSample, sample_moves};
 use rand::SeedableRng;
@@ -112,13 +113,230 @@ fn the_expected_error_of_a_prediction_is_the_one_that_occurs() {
     assert!((0.8..1.25).contains(&y) && (0.7..1.4).contains(&r), "{y} {r}");
 }
 
+/// Mean squared errors of y and of r over the expected variance, for each third of `samples` ordered by `key`.
+fn calibration(
+    model: &ReachModel,
+    samples: &[ReachSample],
+    key: impl Fn(&ReachSample) -> f64,
+) -> Vec<(f64, f64)> {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    let third = sorted.len() / 3;
+    let of = |part: &[ReachSample]| {
+        let mut sums = (0.0, 0.0);
+        for s in part {
+            let after = model
+                .predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3)
+                .expect("finite");
+            let (sy, sr) = model
+                .uncertainty(&s.before, s.jt3_degrees, s.d2, s.d3)
+                .expect("finite");
+            sums.0 += ((after.y - s.after.y) / sy).powi(2) / part.len() as f64;
+            sums.1 += ((after.r - s.after.r) / sr).powi(2) / part.len() as f64;
+        }
+        sums
+    };
+    sorted.chunks_exact(third).take(3).map(of).collect()
+}
+
+#[test]
+fn it_is_so_near_and_far_whatever_the_form() {
+    let mut wrong = Vec::new();
+    for noise in [0.125, 0.5] {
+        let (_, training) = samples(5, 3000, noise);
+        let (_, fresh) = samples(6, 3000, noise);
+        let edges = ReachModel::PAPER_ELBOW_EDGES;
+        for (form, edges, least, most) in [
+            // What this form cannot express is not noise; its size is told, its pattern only roughly.
+            (ReachForm::Rigid8, &edges[..], 0.15, 2.5),
+            (ReachForm::Rigid22, &edges[..], 0.5, 2.0),
+            (ReachForm::RigidBody, &[][..], 0.5, 2.0),
+        ] {
+            let model = ReachModel::fit(&training, form, edges).expect("enough samples");
+            let near = calibration(&model, &fresh, |s| s.before.r);
+            let nearer = calibration(&model, &fresh, |s| s.after.r / s.before.r);
+            println!("{form:?} {noise}: by r {near:.2?} by approach {nearer:.2?}");
+            for (y, r) in near.into_iter().chain(nearer) {
+                let sound = (least..most).contains(&y) && (least..most).contains(&r);
+                wrong.extend((!sound).then_some((form, noise, y, r)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn what_a_fit_leaves_is_reported() {
+    let (centring, reaching) = samples(12, 2000, 0.125);
+    let linear = ReachModel::fit(&reaching, ReachForm::Linear, &[]).expect("enough samples");
+    let [(y, r)] = linear.residual_noise()[..] else {
+        panic!("one interval");
+    };
+    let q = linear.quality();
+    // The same residuals, but for three degrees of freedom out of two thousand.
+    assert!((y / q[0].rmse - 1.0).abs() < 0.002 && y > q[0].rmse, "{y} {q:?}");
+    assert!((r / q[1].rmse - 1.0).abs() < 0.002 && r > q[1].rmse, "{r} {q:?}");
+    let by_elbow = ReachModel::fit(&reaching, ReachForm::Rigid22, &ReachModel::PAPER_ELBOW_EDGES);
+    assert_eq!(by_elbow.expect("enough samples").residual_noise().len(), 3);
+    let centre = CentreModel::fit(&centring).expect("enough samples");
+    let rmse = centre.quality()[0].rmse;
+    assert!((centre.residual_noise() / rmse - 1.0).abs() < 0.002 && centre.residual_noise() > rmse);
+}
+
+#[test]
+fn numbers_too_large_or_too_small_are_named() {
+    let (centring, reaching) = samples(4, 60, 0.0);
+    let quantity = |change: &dyn Fn(&mut ReachSample), form| {
+        let mut broken = reaching.clone();
+        change(&mut broken[9]);
+        let refused = ReachModel::fit(&broken, form, &[]).expect_err("not usable");
+        let FitError::NotFinite {
+            index: 9, quantity, ..
+        } = refused
+        else {
+            panic!("{refused}");
+        };
+        quantity
+    };
+    assert_eq!(
+        quantity(&|s| s.before.r = 1e-310, ReachForm::Rigid8),
+        "the term Za"
+    );
+    assert_eq!(quantity(&|s| s.d2 = 1e200, ReachForm::Linear), "the term d2");
+    assert_eq!(quantity(&|s| s.d3 = -1e80, ReachForm::Rigid22), "the term b²");
+    assert_eq!(
+        quantity(&|s| s.after.y = 1e300, ReachForm::Linear),
+        "the change of y"
+    );
+    assert_eq!(
+        quantity(&|s| s.after.r = 1e-200, ReachForm::RigidBody),
+        "the change of Z = 33 / r"
+    );
+    let mut broken = centring;
+    broken[5].before.r = 1e200;
+    broken[5].d1 = 1.0;
+    assert!(matches!(
+        CentreModel::fit(&broken),
+        Err(FitError::NotFinite {
+            index: 5,
+            quantity: "the term r d1",
+            ..
+        })
+    ));
+    broken[5].before.r = -1.0;
+    assert!(matches!(
+        CentreModel::fit(&broken),
+        Err(FitError::NotFinite {
+            quantity: "r before",
+            ..
+        })
+    ));
+    // So small that its square is nothing: a column that does not vary.
+    let mut tiny = reaching;
+    for s in &mut tiny {
+        s.d2 *= 1e-200;
+    }
+    assert!(matches!(
+        ReachModel::fit(&tiny, ReachForm::Linear, &[]),
+        Err(FitError::RankDeficient { rank: 2, .. })
+    ));
+}
+
+#[test]
+fn no_power_of_the_radius_and_no_ridge_is_too_much_for_a_refit() {
+    let (_, nominal) = samples(9, 800, 0.125);
+    let (_, few) = samples(10, 100, 0.5);
+    let model = ReachModel::fit(&nominal, ReachForm::Rigid22, &[]).expect("enough samples");
+    let s = few[0];
+    let y = |model: &ReachModel| {
+        model
+            .predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3)
+            .expect("finite")
+            .y
+    };
+    for power in [0.0, 4.0, 200.0, 1e6, -1e6, 1e300] {
+        let refitted = model.refit(&few, 0.01, power).expect("a prior helps out");
+        assert!(
+            (y(&refitted) - y(&model)).abs() < 20.0,
+            "{power}: {}",
+            y(&refitted)
+        );
+        let (sy, sr) = refitted
+            .uncertainty(&s.before, s.jt3_degrees, s.d2, s.d3)
+            .expect("finite");
+        assert!(sy.is_finite() && sr.is_finite() && sy > 0.0, "{power}: {sy} {sr}");
+    }
+    // Powers only tell samples apart: a thousandfold radius throughout would change nothing.
+    let [a, b] = [1.0, 8.0].map(|power| y(&model.refit(&few, 0.01, power).expect("a prior helps out")));
+    assert!((a - b).abs() > 1e-6, "weights do count");
+    for (ridge, power) in [
+        (f64::INFINITY, 2.0),
+        (-1.0, 2.0),
+        (1e200, 2.0),
+        (0.1, f64::INFINITY),
+    ] {
+        assert!(matches!(
+            model.refit(&few, ridge, power),
+            Err(FitError::Prior { .. })
+        ));
+    }
+    let same = model.refit(&[], 0.01, 2.0).expect("nothing to learn from");
+    assert_eq!(same, model);
+}
+
+#[test]
+fn samples_without_a_prediction_count_as_errors() {
+    let (_, training) = samples(1, 2000, 0.125);
+    let model = ReachModel::fit(&training, ReachForm::Rigid8, &[]).expect("enough samples");
+    // Large balls that come nearer still: the model soon has them behind the camera.
+    let lost: Vec<ReachSample> = training
+        .iter()
+        .filter(|s| s.before.r > 20.0)
+        .map(|s| ReachSample {
+            d2: 200.0,
+            after: hough_heuristic::Features {
+                y: s.before.y + 10.0,
+                ..s.before
+            },
+            ..*s
+        })
+        .filter(|s| {
+            model
+                .predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3)
+                .is_none()
+        })
+        .take(100)
+        .collect();
+    assert_eq!(lost.len(), 100);
+    let q = model.quality_on(&lost);
+    assert_eq!((q[0].samples, q[0].unpredicted), (100, 100));
+    assert!((q[0].rmse - 10.0).abs() < 1e-9, "{q:?}");
+    let mixed: Vec<ReachSample> = training[..900].iter().chain(&lost).copied().collect();
+    let (with, without) = (model.quality_on(&mixed), model.quality_on(&training[..900]));
+    assert_eq!((with[1].samples, with[1].unpredicted), (1000, 100));
+    assert_eq!(without[0].unpredicted, 0);
+    assert!(
+        (with[0].rmse - without[0].rmse).abs() > 0.01,
+        "{with:?} {without:?}"
+    );
+}
+
 #[test]
 fn a_model_believed_for_several_moves_drifts_as_its_form_lets_expect() {
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (_, training) = samples(7, 2083, 0.125);
     let mut last = f64::MAX;
-    for form in [ReachForm::Linear, ReachForm::Rigid8, ReachForm::Rigid22] {
-        let model = ReachModel::fit(&training, form, &ReachModel::PAPER_ELBOW_EDGES).expect("enough samples");
+    for form in [
+        ReachForm::Linear,
+        ReachForm::Rigid8,
+        ReachForm::Rigid22,
+        ReachForm::RigidBody,
+    ] {
+        let edges = match form {
+            ReachForm::RigidBody => &[][..],
+            _ => &ReachModel::PAPER_ELBOW_EDGES[..],
+        };
+        let model = ReachModel::fit(&training, form, edges).expect("enough samples");
         let errors = model.open_loop_error(&cell, 5, 400, &mut Xoshiro256PlusPlus::seed_from_u64(8));
         for e in [errors[0], errors[2], errors[4]] {
             println!("{form:?}: {e:?}");
@@ -127,9 +345,10 @@ fn a_model_believed_for_several_moves_drifts_as_its_form_lets_expect() {
             errors[4].y_mean > errors[0].y_mean && errors[4].y_mean < last,
             "{form:?}"
         );
+        assert!(errors.iter().all(|e| e.runs + e.lost <= 400));
         last = errors[4].y_mean;
     }
-    assert!(last < 2.0, "{last}");
+    assert!(last < 1.0, "{last}");
 }
 
 #[test]

@@ -78,6 +78,12 @@ fn the_ways_to_move_by_their_cost() {
         let quick = cost(&mut client(way, 5), joints, meter).2;
         row(name, slow, quick);
     }
+    let guarded = |quiet| {
+        let mut client = client(MoveWay::Ppoint, quiet);
+        client.arm_proximity(1001).unwrap();
+        cost(&mut client, 3, meter)
+    };
+    row("three joints, guarded", guarded(30), guarded(5).2);
     let resident = |quiet| {
         let mut client = client(MoveWay::Ppoint, quiet);
         let mut resident = client.resident().unwrap();
@@ -91,8 +97,14 @@ fn the_ways_to_move_by_their_cost() {
     };
     row("three joints, resident program", resident(30), resident(5).2);
     // What the automatic choice rests on.
-    let [_, two_drives, three_drives, point, ppoint, resident] = rates[..] else {
-        panic!("six ways")
+    let [_, two_drives, three_drives, point, ppoint, guarded, resident] = rates[..] else {
+        panic!("seven ways")
     };
-    assert!(ppoint > two_drives && two_drives > three_drives && ppoint > point && resident > 2.0 * ppoint);
+    assert!(
+        ppoint > two_drives
+            && two_drives > three_drives
+            && ppoint > point
+            && point > guarded
+            && resident > 2.0 * ppoint
+    );
 }

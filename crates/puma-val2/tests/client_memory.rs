@@ -281,6 +281,88 @@ fn any_dialogue_is_left_at_connection() {
     }
 }
 
+/// A program of somebody else's that asks for numbers is not fed with zeros, which it might move by.
+#[test]
+fn a_program_that_asks_for_values_is_aborted_and_not_answered() {
+    for words in ["angles? ", "angles "] {
+        let asking = || {
+            let mut emulator = emulator(Profile::val2());
+            let text = format!(".PROGRAM ASK\n PROMPT \"{words}\",A,B,C\n MOVE #PPOINT(A,B,C)\n.END");
+            emulator.load_text(&text).unwrap();
+            emulator
+        };
+        let mut waiting = asking();
+        waiting.feed(b"N\rN\rCAL\rY\r", Duration::ZERO);
+        waiting.feed(b"EXECUTE ASK\r", Duration::from_secs(10));
+        let mut client = Val2Client::connect(MemoryLine::new(waiting), ClientConfig::default()).unwrap();
+        client.joints().unwrap();
+        assert_at(&client, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+
+        let line = MemoryLine::new(asking());
+        let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
+        client.calibrate().unwrap();
+        let outcome = client.execute("ASK");
+        assert!(
+            matches!(outcome, Err(ArmError::Garbled { .. } | ArmError::Silence { .. })),
+            "{outcome:?}"
+        );
+        assert!(client.last_known().is_none());
+        client
+            .move_by(JointDelta::from_degrees([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+            .unwrap();
+        assert_at(&client, [1.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    }
+}
+
+#[test]
+fn a_program_without_end_is_aborted_in_time() {
+    let mut client = client(Profile::val2());
+    let chatter = ["10 TYPE \"on and on and on and on and on\"", "GOTO 10"].map(str::to_owned);
+    client.store_program("CHAT", &chatter).unwrap();
+    let quiet = ["10 DELAY 0.2", "GOTO 10"].map(str::to_owned);
+    client.store_program("QUIET", &quiet).unwrap();
+    for name in ["CHAT", "QUIET"] {
+        let outcome = client.execute(name);
+        assert!(
+            matches!(outcome, Err(ArmError::Garbled { .. } | ArmError::Silence { .. })),
+            "{name}: {outcome:?}"
+        );
+        client.joints().unwrap();
+        client.set_gripper(Gripper::Closed).unwrap();
+    }
+}
+
+/// Calibration changes what the arm shows: a move after it starts from what it shows then.
+#[test]
+fn calibration_forgets_where_the_arm_was() {
+    let mut client = client(Profile::val2());
+    client.joints().unwrap();
+    let pushed = Joints::from_degrees([20.0, -80.0, 90.0, 0.0, 0.0, 0.0]);
+    client.line_mut().emulator_mut().place_arm(pushed);
+    client.calibrate().unwrap();
+    assert!(client.last_known().is_none());
+    client
+        .move_by(JointDelta::from_degrees([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        .unwrap();
+    assert_at(&client, [21.0, -80.0, 90.0, 0.0, 0.0, 0.0]);
+}
+
+/// A step that the editor does not take is reported, and the editor left.
+#[test]
+fn a_step_that_is_refused_leaves_the_editor() {
+    let mut client = client(Profile::val2());
+    for bad in ["FROBNICATE 3", "IF 1 GOTO"] {
+        let steps = ["TYPE 1".to_owned(), bad.to_owned()];
+        let outcome = client.store_program("BAD", &steps);
+        assert!(
+            matches!(&outcome, Err(ArmError::Refused { sent, .. }) if sent == bad),
+            "{outcome:?}"
+        );
+        client.joints().unwrap();
+        client.set_gripper(Gripper::Open).unwrap();
+    }
+}
+
 #[test]
 fn what_passes_is_written_down() {
     let line = puma_val2::Recorded::new(MemoryLine::new(emulator(Profile::val2())), Vec::new());

@@ -55,7 +55,36 @@ fn angle_between(a: f64, b: f64) -> f64 {
 }
 
 fn apart(a: &Joints, b: &Joints) -> f64 {
-    (0..6).map(|i| angle_between(a.0[i], b.0[i])).fold(0.0, f64::max)
+    (0..6).fold(0.0, |most, i| greater(most, angle_between(a.0[i], b.0[i])))
+}
+
+/// The greater of two differences. What is no number is as far off as can be: `f64::max` would overlook it.
+fn greater(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() {
+        f64::INFINITY
+    } else {
+        a.max(b)
+    }
+}
+
+/// The greatest element, whatever its sign; infinite if one is no number.
+fn amax<R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<f64, R, C>>(
+    matrix: &nalgebra::Matrix<f64, R, C, S>,
+) -> f64 {
+    matrix
+        .iter()
+        .fold(0.0, |most, element| greater(most, element.abs()))
+}
+
+#[test]
+fn what_is_no_number_is_a_difference() {
+    assert!(greater(0.0, f64::NAN).is_infinite() && greater(f64::NAN, 1.0).is_infinite());
+    let mut matrix = Matrix4::<f64>::identity();
+    assert!(amax(&matrix) < 1.1);
+    matrix[(2, 1)] = f64::NAN;
+    assert!(amax(&matrix).is_infinite());
+    let nowhere = Joints([0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0]);
+    assert!(apart(&nowhere, &Joints::default()).is_infinite());
 }
 
 #[test]
@@ -66,8 +95,8 @@ fn forward_kinematics_agree_with_the_toolbox() {
     let arm = PumaParams::corke();
     let worst = rows
         .iter()
-        .map(|row| (toolbox_pose(&arm.forward(&val(row))) - Matrix4::from_row_slice(&row[6..22])).amax())
-        .fold(0.0, f64::max);
+        .map(|row| amax(&(toolbox_pose(&arm.forward(&val(row))) - Matrix4::from_row_slice(&row[6..22]))))
+        .fold(0.0, greater);
     println!(
         "forward kinematics: {} rows, greatest difference {worst:.1e}",
         rows.len()
@@ -91,7 +120,7 @@ fn all_solutions_of_the_inverse_agree_with_the_toolbox() {
             .iter()
             .map(|s| apart(&s.joints, &wanted))
             .fold(f64::MAX, f64::min);
-        worst = worst.max(best);
+        worst = greater(worst, best);
     }
     println!(
         "inverse kinematics: {} solutions, greatest difference {worst:.1e} rad",
@@ -112,7 +141,8 @@ fn jacobians_agree_with_the_toolbox() {
         let joints = val(row);
         let (world, tool) = (arm.jacobian(&joints), arm.jacobian_tool(&joints));
         for (ours, theirs) in [(world, &row[6..42]), (tool, &row[42..78])] {
-            worst = worst.max((turned * ours - nalgebra::Matrix6::from_row_slice(theirs)).amax());
+            let difference = turned * ours - nalgebra::Matrix6::from_row_slice(theirs);
+            worst = greater(worst, amax(&difference));
         }
     }
     println!("Jacobians: {} rows, greatest difference {worst:.1e}", rows.len());
@@ -133,11 +163,14 @@ fn torques_agree_with_the_toolbox() {
         let gravity = dynamics.gravity_torques(&arm, &joints);
         let mass = dynamics.mass_matrix(&arm, &joints);
         for i in 0..6 {
-            worst[0] = worst[0].max((gravity[i] - row[18 + i]).abs());
-            worst[1] = worst[1].max((free[i] - row[24 + i]).abs());
-            worst[2] = worst[2].max((free[i] + friction[i] - row[30 + i]).abs());
+            worst[0] = greater(worst[0], (gravity[i] - row[18 + i]).abs());
+            worst[1] = greater(worst[1], (free[i] - row[24 + i]).abs());
+            worst[2] = greater(worst[2], (free[i] + friction[i] - row[30 + i]).abs());
         }
-        worst[3] = worst[3].max((mass - nalgebra::Matrix6::from_row_slice(&row[36..72])).amax());
+        worst[3] = greater(
+            worst[3],
+            amax(&(mass - nalgebra::Matrix6::from_row_slice(&row[36..72]))),
+        );
     }
     println!(
         "dynamics: {} rows, greatest difference gravity {:.1e}, free {:.1e}, with friction {:.1e} N m, mass matrix {:.1e}",
@@ -166,13 +199,13 @@ fn oat_angles_agree_with_the_table() {
         let exact = Isometry3::from_parts(pose.translation, rotation);
         let shown = Xyzoat::from_pose(&exact).val();
         for (i, angle) in shown.iter().enumerate().skip(3) {
-            worst = worst.max(angle_between(angle.to_radians(), row[6 + i].to_radians()));
+            worst = greater(worst, angle_between(angle.to_radians(), row[6 + i].to_radians()));
         }
         for (i, length) in shown.iter().enumerate().take(3) {
-            table_error = table_error.max((length - row[6 + i]).abs());
+            table_error = greater(table_error, (length - row[6 + i]).abs());
         }
         let again = Xyzoat::from_val(six(&row[6..])).pose();
-        worst = worst.max(again.rotation.angle_to(&rotation));
+        worst = greater(worst, again.rotation.angle_to(&rotation));
     }
     println!(
         "O A T: {} rows, greatest difference {worst:.1e} rad; positions within {table_error:.1e} mm",
@@ -222,14 +255,14 @@ fn an_independent_inverse_finds_the_same_solutions() {
                 .iter()
                 .map(|s| apart(&s.joints, &wanted))
                 .fold(f64::MAX, f64::min);
-            worst = worst.max(best);
+            worst = greater(worst, best);
         }
         lost += usize::from(theirs.len() != ours.len());
         let own = ours
             .iter()
             .map(|s| apart(&s.joints, &joints))
             .fold(f64::MAX, f64::min);
-        worst = worst.max(own);
+        worst = greater(worst, own);
     }
     println!(
         "rs-opw-kinematics: {compared} poses, greatest difference {worst:.1e} rad, {lost} with another count"

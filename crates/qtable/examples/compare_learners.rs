@@ -197,7 +197,7 @@ fn draw(path: &Path, curves: &[Vec<Vec<Record>>]) -> Result<(), Box<dyn Error>> 
         .map(|runs| Estimate::of_curves(runs, |record| record.mean_return))
         .collect();
     let at: Vec<f64> = curves[0][0].iter().map(|record| record.actions as f64).collect();
-    // From the median on, so that the first wild records do not press all else together.
+    // Without the lowest fifth, so that the first wild records do not press all else together.
     let mut means: Vec<f64> = estimates
         .iter()
         .flatten()

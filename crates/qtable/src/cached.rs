@@ -1,8 +1,10 @@
 //! Boltzmann exploration at the speed of the cache.
 
+use std::f64::consts::LOG2_E;
+
 use rand::Rng;
 
-use crate::elementary::exp_single;
+use crate::elementary::{PARTS, exp2_parts};
 use crate::error::check_setting;
 use crate::{Action, Boltzmann, Error, QTable, State, Status, Step, Value};
 
@@ -17,8 +19,8 @@ const DRIFT: f64 = 30.0;
 /// each *update* instead of one for each action of each choice.
 ///
 /// The weights `exp((Q - c) / T)` are kept beside the values, with one offset c for each state and running sums over
-/// the eight blocks of a row and within each block. A choice compares them with one random number, which needs no branch and no
-/// sum; an update writes one weight and sums its block anew, so that nothing drifts. While T stands still this is the
+/// the eight blocks of a row and within each block. A choice compares them with one random number, which needs no branch
+/// and no sum; an update writes one weight and sums its block anew, so that nothing drifts. While T stands still this is the
 /// distribution of [`Boltzmann`] to the rounding of `f32`: no probability is off by more than 1e-6. The draws are not the
 /// same ones. A change of the temperature rebuilds all weights, so it is made in blocks of many actions:
 /// [`train_in_blocks`](crate::train_in_blocks).
@@ -27,15 +29,20 @@ const DRIFT: f64 = 30.0;
 #[derive(Clone, Debug)]
 pub struct CachedBoltzmann {
     actions: usize,
-    /// Groups of a row.
+    shape: Shape,
+    temperature: f64,
+    /// What the exponent of a weight grows by with the value, in parts of an octave.
+    slope: f64,
+    heads: Vec<Head>,
+    groups: Vec<Group>,
+}
+
+/// How the groups of a row make up its blocks.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
     groups_per_row: usize,
     /// Groups of a block, as a power of two: 0 for up to 128 actions.
     block_shift: u32,
-    temperature: f64,
-    /// 1 / T.
-    inverse: f64,
-    heads: Vec<Head>,
-    groups: Vec<Group>,
 }
 
 /// What there is once for each state. Here and below the alignment is that of a cache line, so that no vector lies
@@ -43,14 +50,18 @@ pub struct CachedBoltzmann {
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Head {
-    /// The offset c.
-    offset: f64,
+    /// The sum of the weights of all blocks before each.
+    starts: [f32; BLOCKS],
+    /// The sum of all weights.
+    total: f32,
     max: f32,
     best: u32,
+    /// The value beyond which the offset has to follow.
+    ceiling: f32,
+    /// The offset c.
+    offset: f64,
     /// The sum of the weights of each block.
     sums: [f32; BLOCKS],
-    /// The sum of the weights up to the end of each block; the last is the sum of all.
-    ends: [f32; BLOCKS],
 }
 
 /// What there is for each action, 16 of them.
@@ -62,14 +73,24 @@ struct Group {
     /// Weights; 0 for the padding and for forbidden actions.
     weights: [f32; GROUP],
     /// The sum of the weights of the block up to and with each.
-    running: [f32; GROUP],
+    ends: [f32; GROUP],
     visits: [u32; GROUP],
 }
+
+const NO_STATE: Head = Head {
+    starts: [0.0; BLOCKS],
+    total: 0.0,
+    max: 0.0,
+    best: 0,
+    ceiling: 0.0,
+    offset: 0.0,
+    sums: [0.0; BLOCKS],
+};
 
 const NO_ACTIONS: Group = Group {
     values: [f32::NEG_INFINITY; GROUP],
     weights: [0.0; GROUP],
-    running: [0.0; GROUP],
+    ends: [0.0; GROUP],
     visits: [0; GROUP],
 };
 
@@ -85,20 +106,15 @@ impl CachedBoltzmann {
             .div_ceil(BLOCKS)
             .next_power_of_two()
             .trailing_zeros();
-        let head = Head {
-            offset: 0.0,
-            max: 0.0,
-            best: 0,
-            sums: [0.0; BLOCKS],
-            ends: [0.0; BLOCKS],
-        };
         let mut cached = Self {
             actions,
-            groups_per_row,
-            block_shift,
+            shape: Shape {
+                groups_per_row,
+                block_shift,
+            },
             temperature: 1.0,
-            inverse: 1.0,
-            heads: vec![head; states],
+            slope: 1.0,
+            heads: vec![NO_STATE; states],
             groups: vec![NO_ACTIONS; states * groups_per_row],
         };
         for state in (0..states).map(State) {
@@ -122,7 +138,7 @@ impl CachedBoltzmann {
         let valid = (Boltzmann::COLDEST..=Boltzmann::HOTTEST).contains(&temperature);
         check_setting("the temperature", temperature, valid, "in 1e-6..=1e6")?;
         self.temperature = temperature;
-        self.inverse = 1.0 / temperature;
+        self.slope = PARTS as f64 * LOG2_E / temperature;
         for state in 0..self.heads.len() {
             self.rebuild(State(state));
         }
@@ -144,60 +160,76 @@ impl CachedBoltzmann {
         alpha: f64,
         gamma: f64,
     ) -> Result<f64, Error> {
-        let states = self.heads.len();
-        if state.0 >= states || step.observation.0 >= states {
-            let state = if state.0 >= states {
-                state
-            } else {
-                step.observation
-            };
-            return Err(Error::StateOutOfRange { state, states });
-        }
-        if action.0 >= self.actions {
-            return Err(Error::ActionOutOfRange {
-                action,
-                actions: self.actions,
-            });
-        }
-        let group = &mut self.groups[state.0 * self.groups_per_row + action.0 / GROUP];
+        let at = state.0 * self.shape.groups_per_row + action.0 / GROUP;
+        let next = self.heads.get(step.observation.0).map(|head| head.max);
+        let (true, Some(next), Some(head), Some(group)) = (
+            action.0 < self.actions,
+            next,
+            self.heads.get_mut(state.0),
+            self.groups.get_mut(at),
+        ) else {
+            return Err(self.fault(state, action, step, f64::NAN));
+        };
         let lane = action.0 % GROUP;
         let old = group.values[lane];
-        if old == f32::NEG_INFINITY {
-            return Err(Error::ActionNotAllowed { state, action });
+        let next = match step.status {
+            Status::Terminated => 0.0,
+            Status::Continuing | Status::Truncated => gamma * f64::from(next),
+        };
+        let error = step.reward + next - f64::from(old);
+        let wanted = f64::from(old) + alpha * error;
+        let value = wanted as f32;
+        // Neither is it finite where the reward is not, nor where the action is forbidden.
+        if !value.is_finite() {
+            return Err(self.fault(state, action, step, wanted));
         }
-        if !step.reward.is_finite() {
-            return Err(Error::RewardNotFinite {
+        group.values[lane] = value;
+        group.visits[lane] = group.visits[lane].saturating_add(1);
+
+        // Selected, not branched to: the best action may be taken now and then, which no processor foresees.
+        let index = action.0 as u32;
+        let falls = (index == head.best) & (value < old);
+        let leads = (value > head.max) | ((value >= head.max) & (index < head.best));
+        head.max = if value > head.max { value } else { head.max };
+        head.best = if leads { index } else { head.best };
+
+        group.weights[lane] = exp2_parts((f64::from(value) - head.offset) * self.slope);
+        if self.shape.block_shift == 0 {
+            head.sums[(action.0 / GROUP) % BLOCKS] = group.sum(-0.0);
+        } else {
+            let block = (action.0 / GROUP) >> self.shape.block_shift;
+            head.sums[block % BLOCKS] = self.shape.sum_block(&mut self.groups, state, block);
+        }
+        head.sum();
+        if falls | (value > head.ceiling) {
+            self.follow(state, falls);
+        }
+        Ok(error)
+    }
+
+    /// What was wrong with an update that cannot be made.
+    #[cold]
+    #[inline(never)]
+    fn fault(&self, state: State, action: Action, step: &Step, value: f64) -> Error {
+        let outside = |state: State| self.check_state(state).err();
+        if let Some(error) = outside(state).or_else(|| outside(step.observation)) {
+            error
+        } else if action.0 >= self.actions {
+            Error::ActionOutOfRange {
+                action,
+                actions: self.actions,
+            }
+        } else if self.value(state, action) == f32::NEG_INFINITY {
+            Error::ActionNotAllowed { state, action }
+        } else if !step.reward.is_finite() {
+            Error::RewardNotFinite {
                 state,
                 action,
                 reward: step.reward,
-            });
-        }
-        let next = match step.status {
-            Status::Terminated => 0.0,
-            Status::Continuing | Status::Truncated => gamma * f64::from(self.heads[step.observation.0].max),
-        };
-        let error = step.reward + next - f64::from(old);
-        let value = finite(state, action, f64::from(old) + alpha * error)?;
-        group.values[lane] = value;
-        group.visits[lane] = group.visits[lane].saturating_add(1);
-        let head = &mut self.heads[state.0];
-        group.weights[lane] = exp_single((f64::from(value) - head.offset) * self.inverse);
-
-        if value > head.max {
-            head.max = value;
-            head.best = action.0 as u32;
-        } else if head.best == action.0 as u32 && value < old {
-            self.find_best(state);
-        } else if value >= head.max && (action.0 as u32) < head.best {
-            head.best = action.0 as u32;
-        }
-        let head = &self.heads[state.0];
-        if (f64::from(head.max) - head.offset).abs() > DRIFT * self.temperature {
-            self.rebuild(state);
+            }
         } else {
-            self.sum_block(state, (action.0 / GROUP) >> self.block_shift);
+            Error::ValueNotFinite { state, action, value }
         }
-        Ok(error)
     }
 
     /// Writes values and visits back into a table of the same shape and mask.
@@ -208,7 +240,7 @@ impl CachedBoltzmann {
         table.check_shape("the cached table", self.heads.len(), self.actions)?;
         for state in (0..self.heads.len()).map(State) {
             for action in (0..self.actions).map(Action) {
-                let group = &self.groups[state.0 * self.groups_per_row + action.0 / GROUP];
+                let group = &self.groups[state.0 * self.shape.groups_per_row + action.0 / GROUP];
                 let (value, visits) = (group.values[action.0 % GROUP], group.visits[action.0 % GROUP]);
                 if value > f32::NEG_INFINITY {
                     table.set(state, action, V::from_f64(f64::from(value)))?;
@@ -228,28 +260,33 @@ impl CachedBoltzmann {
         // As many random bits as an f32 holds; all that is drawn is below the total.
         let uniform = (rng.next_u64() >> 40) as u32 as i32 as f32 * (1.0 / (1u32 << 24) as f32);
         let head = &self.heads[state.0];
-        let drawn = uniform * head.ends[BLOCKS - 1];
-        let block = count_up_to(&head.ends, drawn);
-        let rest = drawn
-            - if block == 0 {
-                0.0
-            } else {
-                head.ends[(block - 1) % BLOCKS]
-            };
-        let (first, last) = self.groups_of(block);
-        let start = state.0 * self.groups_per_row;
-        let mut action = first * GROUP;
-        if self.block_shift == 0 {
-            // The usual case in a straight line: it is the latency of this that limits the speed.
-            action += count_up_to(&self.groups[start + first].running, rest);
-        } else {
-            for group in &self.groups[start + first..start + last] {
-                action += count_up_to(&group.running, rest);
-            }
+        let drawn = uniform * head.total;
+        // The first block starts at 0, so it is counted always.
+        let block = count_up_to(&head.starts[1..], drawn) % BLOCKS;
+        let rest = drawn - head.starts[block];
+        if self.shape.block_shift > 0 {
+            return self.choose_within(state, block, rest);
         }
+        let lane = count_up_to(
+            &self.groups[state.0 * self.shape.groups_per_row + block].ends,
+            rest,
+        );
         // Rounding may lead past the last weight.
-        if action < last * GROUP {
-            Action(action)
+        if lane < GROUP {
+            Action(block * GROUP + lane)
+        } else {
+            self.best(state)
+        }
+    }
+
+    /// The action within a block of several groups.
+    #[inline(never)]
+    fn choose_within(&self, state: State, block: usize, rest: f32) -> Action {
+        let (first, last) = self.shape.groups_of(block);
+        let groups = &self.row(state)[first..last];
+        let place: usize = groups.iter().map(|group| count_up_to(&group.ends, rest)).sum();
+        if place < groups.len() * GROUP {
+            Action(first * GROUP + place)
         } else {
             self.best(state)
         }
@@ -335,20 +372,13 @@ impl CachedBoltzmann {
         }
     }
 
-    /// The first group of a block, and the one after its last; the row's last group for a block beyond the row.
-    #[inline(always)]
-    fn groups_of(&self, block: usize) -> (usize, usize) {
-        let first = (block << self.block_shift).min(self.groups_per_row - 1);
-        (first, (first + (1 << self.block_shift)).min(self.groups_per_row))
-    }
-
     fn row(&self, state: State) -> &[Group] {
-        &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row]
+        &self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row]
     }
 
     #[inline(never)]
     fn find_best(&mut self, state: State) {
-        let row = &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row];
+        let row = &self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row];
         // Lane by lane, so that it is done with vectors.
         let mut lanes = [f32::NEG_INFINITY; GROUP];
         for group in row {
@@ -367,47 +397,92 @@ impl CachedBoltzmann {
         }
     }
 
+    /// Finds the maximum after it fell, and moves the offset if it is far.
+    #[inline(never)]
+    fn follow(&mut self, state: State, falls: bool) {
+        if falls {
+            self.find_best(state);
+        }
+        let head = &self.heads[state.0];
+        if (f64::from(head.max) - head.offset).abs() > DRIFT * self.temperature {
+            self.rebuild(state);
+        }
+    }
+
     /// Moves the offset to the maximum and computes the whole row.
-    #[cold]
     fn rebuild(&mut self, state: State) {
         let head = &mut self.heads[state.0];
         head.offset = f64::from(head.max);
-        for group in &mut self.groups[state.0 * self.groups_per_row..][..self.groups_per_row] {
+        let ceiling = head.offset + DRIFT * self.temperature;
+        head.ceiling = ceiling as f32;
+        if f64::from(head.ceiling) > ceiling {
+            head.ceiling = head.ceiling.next_down();
+        }
+        for group in &mut self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row] {
             for (weight, value) in group.weights.iter_mut().zip(group.values) {
-                *weight = exp_single((f64::from(value) - head.offset) * self.inverse);
+                *weight = exp2_parts((f64::from(value) - head.offset) * self.slope);
             }
         }
-        for block in 0..self.groups_per_row.div_ceil(1 << self.block_shift) {
-            self.sum_block(state, block);
+        for block in 0..self.shape.groups_per_row.div_ceil(1 << self.shape.block_shift) {
+            head.sums[block] = self.shape.sum_block(&mut self.groups, state, block);
         }
-    }
-
-    /// Sums a block anew, and the ends of all blocks of the row. Nothing is added to an old sum, so no error builds up.
-    #[inline(always)]
-    fn sum_block(&mut self, state: State, block: usize) {
-        let (first, last) = self.groups_of(block);
-        let start = state.0 * self.groups_per_row;
-        let mut sum = 0.0;
-        for group in &mut self.groups[start + first..start + last] {
-            for (running, weight) in group.running.iter_mut().zip(group.weights) {
-                sum += weight;
-                *running = sum;
-            }
-        }
-        let head = &mut self.heads[state.0];
-        head.sums[block % BLOCKS] = sum;
-        let mut total = 0.0;
-        for (end, sum) in head.ends.iter_mut().zip(head.sums) {
-            total += sum;
-            *end = total;
-        }
+        head.sum();
     }
 }
 
-/// How many of ascending sums are not beyond a point.
+impl Shape {
+    /// The first group of a block, and the one after its last.
+    fn groups_of(self, block: usize) -> (usize, usize) {
+        let first = block << self.block_shift;
+        (first, (first + (1 << self.block_shift)).min(self.groups_per_row))
+    }
+
+    /// Sums a block anew.
+    #[inline(never)]
+    fn sum_block(self, groups: &mut [Group], state: State, block: usize) -> f32 {
+        let (first, last) = self.groups_of(block);
+        let start = state.0 * self.groups_per_row;
+        groups[start + first..start + last]
+            .iter_mut()
+            .fold(-0.0, |sum, group| group.sum(sum))
+    }
+}
+
+// Nothing is added to an old sum, so no error builds up. One weight after the other, not as a tree: so sums never fall
+// along a row, and those before and after a weight of 0 are equal, so that it cannot be drawn.
+impl Group {
+    /// Sums the weights anew, beyond the sum of those before; -0 if there is none, which changes no number.
+    #[inline(always)]
+    fn sum(&mut self, before: f32) -> f32 {
+        let mut sum = before;
+        for (end, weight) in self.ends.iter_mut().zip(self.weights) {
+            sum += weight;
+            *end = sum;
+        }
+        sum
+    }
+}
+
+impl Head {
+    /// Sums the blocks anew.
+    #[inline(always)]
+    fn sum(&mut self) {
+        let mut sum = self.sums[0];
+        for (start, block) in self.starts.iter_mut().zip(self.sums).skip(1) {
+            *start = sum;
+            sum += block;
+        }
+        self.total = sum;
+    }
+}
+
+/// How many of some sums, none of them negative, are not beyond a point that is not negative either. Such floating-point
+/// numbers are ordered as their bits are, and integers are compared fast with vectors and without.
 #[inline(always)]
-fn count_up_to<const N: usize>(sums: &[f32; N], point: f32) -> usize {
-    sums.iter().map(|&sum| u32::from(sum <= point)).sum::<u32>() as usize
+fn count_up_to(sums: &[f32], point: f32) -> usize {
+    let point = point.to_bits() as i32;
+    let beyond: i32 = sums.iter().map(|sum| (point - sum.to_bits() as i32) >> 31).sum();
+    (sums.len() as i32 + beyond) as usize
 }
 
 /// A value as `f32`, if that is finite.

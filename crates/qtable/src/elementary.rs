@@ -27,9 +27,15 @@ const MOST: f64 = 709.0;
 
 /// `e^x` to 2 units in the last place for `x` in -708..=709, without a branch.
 #[inline(always)]
-pub(crate) fn exp_within(x: f64) -> f64 {
-    let (r, scale) = reduce(x);
-    // Taylor series on |r| <= ln(2)/2; the first term left out is below 5e-18.
+pub(crate) const fn exp_within(x: f64) -> f64 {
+    // x = r + n ln 2 with |r| <= ln(2)/2.
+    let x = if x > LEAST { x } else { LEAST };
+    let x = if x < MOST { x } else { MOST };
+    let shifted = x * LOG2_E + ROUND;
+    let n = shifted - ROUND;
+    let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;
+    let scale = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
+    // Taylor series of (e^r - 1 - r) / r^2; the first term left out is below 5e-18.
     const C: [f64; 12] = [
         0.5,
         1.0 / 6.0,
@@ -44,32 +50,45 @@ pub(crate) fn exp_within(x: f64) -> f64 {
         1.0 / 479_001_600.0,
         1.0 / 6_227_020_800.0,
     ];
-    let (r2, c) = (r * r, |k: usize| C[k] + C[k + 1] * r);
+    const fn pair(k: usize, r: f64) -> f64 {
+        C[k] + C[k + 1] * r
+    }
+    let r2 = r * r;
     let r4 = r2 * r2;
-    let series = (c(0) + c(2) * r2) + r4 * ((c(4) + c(6) * r2) + r4 * (c(8) + c(10) * r2));
+    let series = (pair(0, r) + pair(2, r) * r2)
+        + r4 * ((pair(4, r) + pair(6, r) * r2) + r4 * (pair(8, r) + pair(10, r) * r2));
     (1.0 + (r + r2 * series)) * scale
 }
 
-/// `e^x` to a part in 10^8 for `x` in -708..=709, without a branch: as much as an `f32` holds.
+/// Parts of an octave, the unit of [`exp2_parts`].
+pub(crate) const PARTS: usize = 1 << PART_BITS;
+const PART_BITS: u32 = 7;
+
+/// `2^(x / PARTS)` to a part in 10^8, without a branch: as much as an `f32` holds. 0 if that is below `2^-1022`;
+/// whatever if it is above `2^1023`.
 #[inline(always)]
-pub(crate) fn exp_single(x: f64) -> f32 {
-    let (r, scale) = reduce(x);
-    let r2 = r * r;
-    let low = 1.0 + r + r2 * (0.5 + r * (1.0 / 6.0));
-    let high = (1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0 + r * (1.0 / 5_040.0));
-    ((low + r2 * r2 * high) * scale) as f32
+pub(crate) fn exp2_parts(x: f64) -> f32 {
+    const LEAST: f64 = -1022.0 * PARTS as f64;
+    const STEP: f64 = LN_2 / PARTS as f64;
+    let x = if x > LEAST { x } else { LEAST };
+    let shifted = x + ROUND;
+    let (r, k) = (x - (shifted - ROUND), shifted.to_bits());
+    let power = f64::from_bits(POWERS[k as usize % PARTS].wrapping_add(k << (52 - PART_BITS)));
+    // On |r| <= 1/2 the first term left out is below 4e-9.
+    ((1.0 + r * STEP + (r * r) * (STEP * STEP / 2.0)) * power) as f32
 }
 
-/// `x = r + n ln 2` with |r| <= ln(2)/2, as r and 2^n.
-#[inline(always)]
-fn reduce(x: f64) -> (f64, f64) {
-    let x = if x > LEAST { x } else { LEAST };
-    let x = if x < MOST { x } else { MOST };
-    let shifted = x * LOG2_E + ROUND;
-    let n = shifted - ROUND;
-    let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;
-    (r, f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52))
-}
+/// The bits of `2^(k / PARTS)` less those of k, which in [`exp2_parts`] come with the exponent.
+static POWERS: [u64; PARTS] = {
+    let mut powers = [0; PARTS];
+    let mut k = 0;
+    while k < PARTS {
+        let power = exp_within(k as f64 * (LN_2 / PARTS as f64));
+        powers[k] = power.to_bits() - ((k as u64) << (52 - PART_BITS));
+        k += 1;
+    }
+    powers
+};
 
 /// Natural logarithm of a positive, finite, normal `x`, to 2 units in the last place.
 pub(crate) fn ln(x: f64) -> f64 {
@@ -113,7 +132,7 @@ mod tests {
         }
         for i in -70_000..=30_000 {
             let x = f64::from(i) * 0.001_234_5;
-            let (ours, theirs) = (f64::from(exp_single(x)), x.exp());
+            let (ours, theirs) = (f64::from(exp2_parts(x * LOG2_E * PARTS as f64)), x.exp());
             assert!(
                 (ours - theirs).abs() <= theirs * 7e-8 + 1e-38,
                 "exp({x}) = {ours}, not {theirs}"

@@ -224,6 +224,16 @@ fn faults_are_refused_and_what_was_learned_stays() {
         update(0, 0, &step(0, 1e39)),
         Err(Error::ValueNotFinite { .. })
     ));
+    // Not even where the learning rate lets nothing in.
+    let mut update = |action, step: &Step| cached.update(State(0), Action(action), step, 0.0, 1.0);
+    assert!(matches!(
+        update(1, &step(0, 0.0)),
+        Err(Error::ActionNotAllowed { .. })
+    ));
+    assert!(matches!(
+        update(0, &step(0, f64::INFINITY)),
+        Err(Error::RewardNotFinite { .. })
+    ));
     let mut same = table.clone();
     cached.write_to(&mut same).unwrap();
     assert_eq!(same, table);
@@ -280,4 +290,24 @@ fn an_action_out_of_range_is_no_padding() {
         assert!(std::panic::catch_unwind(|| cached.value(State(0), action)).is_err());
         assert!(std::panic::catch_unwind(|| cached.visits(State(0), action)).is_err());
     }
+}
+
+#[test]
+fn of_equals_the_lowest_index_is_best() {
+    let mut cached = CachedBoltzmann::new(&QTable::new(1, 40).unwrap(), 1.0).unwrap();
+    let mut learn = |action, reward| {
+        let step = Step {
+            observation: State(0),
+            reward,
+            status: Status::Terminated,
+        };
+        cached.update(State(0), Action(action), &step, 1.0, 0.0).unwrap();
+        cached.best(State(0)).0
+    };
+    // Risen above, level from below and from above, and fallen.
+    let best = [(30, 2.0), (7, 2.0), (20, 2.0), (7, 1.0), (30, 0.0), (20, -1.0)];
+    assert_eq!(
+        best.map(|(action, reward)| learn(action, reward)),
+        [30, 7, 7, 20, 20, 7]
+    );
 }

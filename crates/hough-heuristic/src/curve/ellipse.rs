@@ -3,6 +3,7 @@ use crate::EdgePixel;
 
 /// An ellipse.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ellipse {
     /// Centre, pixels from the centre of the leftmost column.
     pub x: f64,

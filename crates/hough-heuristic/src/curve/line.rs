@@ -5,6 +5,7 @@ use crate::EdgePixel;
 ///
 /// Its outline is the part inside the frame, so that β is the share of the whole chord of the frame that is edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Line {
     /// Cosine of the direction of the normal.
     pub cos: f64,

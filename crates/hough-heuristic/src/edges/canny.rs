@@ -55,6 +55,7 @@ impl Default for CannyConfig {
 #[derive(Clone, Debug)]
 pub struct Canny {
     config: CannyConfig,
+    thresholds: (f32, f32),
     passes: Passes,
     /// Deviation of each part of the gradient, in grey levels, under noise of deviation 1.
     noise_gain: f32,
@@ -90,6 +91,7 @@ impl Canny {
         let weights = smoothing_weights(config.sigma);
         Self {
             config,
+            thresholds: (config.low, config.high),
             noise_gain: noise_gain(&weights),
             passes: Passes {
                 weights,
@@ -103,7 +105,13 @@ impl Canny {
         }
     }
 
-    /// The thresholds for a frame with this noise, squared, in the units of the passes.
+    /// The thresholds `(low, high)` of the last frame, in the units of [`CannyConfig`], as its noise raised them; before
+    /// the first frame those of the configuration.
+    pub fn thresholds(&self) -> (f32, f32) {
+        self.thresholds
+    }
+
+    /// Sets the thresholds for a frame with this noise.
     fn set_thresholds(&mut self, noise: f32) {
         let CannyConfig {
             low,
@@ -114,6 +122,8 @@ impl Canny {
         let floor = noise_factor * noise * self.noise_gain;
         let high = high.max(floor).min(MAX_THRESHOLD);
         let low = low.max(LOW_FLOOR * floor).min(high);
+        self.thresholds = (low, high);
+        // The passes compare squares, in units of their own.
         let square = |threshold: f32| {
             let threshold = threshold * UNITS;
             (threshold * threshold) as i32
@@ -155,6 +165,10 @@ impl EdgeDetector for Canny {
         candidates.clear();
         self.edges.repaint(width, height, |image, pixels, gradients| {
             dispatch::candidates(passes, grey, columns, rows, image, candidates);
+            // At most all of them are open; so the shape of the edges does not decide whether memory is asked for.
+            open.reserve(candidates.len());
+            pixels.reserve(candidates.len());
+            gradients.reserve(candidates.len());
             follow(image, columns, candidates, open);
             for candidate in candidates {
                 let kept = &mut image[candidate.pixel.y as usize * columns + candidate.pixel.x as usize];
@@ -210,7 +224,7 @@ pub(super) fn check_thresholds(low: f32, high: f32) -> Result<(), ConfigError> {
 }
 
 /// Half of a sampled Gaussian in whole numbers; with the mirrored half they sum up to exactly [`WEIGHT_SUM`].
-fn smoothing_weights(sigma: f32) -> Vec<u16> {
+pub(super) fn smoothing_weights(sigma: f32) -> Vec<u16> {
     let reach = match sigma {
         0.0 => 0,
         ..=1.25 => 2,
@@ -240,7 +254,7 @@ fn smoothing_weights(sigma: f32) -> Vec<u16> {
 }
 
 /// What smoothing and Sobel's kernel make of white noise of deviation 1.
-fn noise_gain(weights: &[u16]) -> f32 {
+pub(super) fn noise_gain(weights: &[u16]) -> f32 {
     let reach = weights.len() - 1;
     let line: Vec<f32> = (0..=2 * reach)
         .map(|k| f32::from(weights[k.abs_diff(reach)]) / f32::from(WEIGHT_SUM))
@@ -361,15 +375,26 @@ mod tests {
             let mut canny = Canny::new(CannyConfig { sigma, low, high: low * ratio, noise_factor: 0.0 }).unwrap();
             canny.set_thresholds(0.0);
             let (grey, width) = (frame.as_raw(), frame.width() as usize);
-            let expected = plain::marks(&canny.passes, grey, width);
+            let expected = plain::maxima(&canny.passes, grey, width);
+            let mut expected_marks = vec![0; grey.len()];
+            for maximum in &expected {
+                expected_marks[maximum.index] = maximum.mark;
+            }
             for path in [dispatch::candidates, dispatch::candidates_baseline] {
                 let mut marks = vec![77; grey.len()];
                 let mut found = Vec::new();
                 path(&canny.passes, grey, width, &mut canny.rows, &mut marks, &mut found);
-                prop_assert_eq!(&marks, &expected);
+                prop_assert_eq!(&marks, &expected_marks);
                 let listed: Vec<_> = found.iter().map(|c| c.pixel.y as usize * width + c.pixel.x as usize).collect();
-                let marked: Vec<_> = (0..marks.len()).filter(|&index| marks[index] != 0).collect();
-                prop_assert_eq!(listed, marked);
+                let indices: Vec<_> = expected.iter().map(|maximum| maximum.index).collect();
+                prop_assert_eq!(listed, indices);
+                for (candidate, maximum) in found.iter().zip(&expected) {
+                    let gradient = candidate.gradient;
+                    prop_assert_eq!(gradient.vector(), maximum.vector);
+                    prop_assert!((gradient.strength() - maximum.strength).abs() < 1e-9);
+                    let ((x, y), (u, v)) = (gradient.offset(), maximum.offset);
+                    prop_assert!((x - u).abs() < 1e-9 && (y - v).abs() < 1e-9, "{:?} {:?}", candidate, maximum);
+                }
             }
         }
 
@@ -432,13 +457,24 @@ mod tests {
                 (estimate / deviation - 1.0).abs() < 0.1,
                 "{deviation}: {estimate}"
             );
-            let count = |noise_factor| {
+            let operator = |noise_factor| {
                 let config = CannyConfig {
                     noise_factor,
                     ..CannyConfig::default()
                 };
-                Canny::new(config).unwrap().detect_edges(&frame).pixels().len()
+                let mut canny = Canny::new(config).unwrap();
+                canny.detect_edges(&frame);
+                canny
             };
+            assert_eq!(operator(0.0).thresholds(), (30.0, 70.0));
+            let raised = operator(5.0);
+            let high = 5.0 * estimate * raised.noise_gain;
+            assert_eq!(
+                raised.thresholds().1.to_bits(),
+                high.max(70.0).to_bits(),
+                "{deviation}"
+            );
+            let count = |noise_factor| operator(noise_factor).edges().pixels().len();
             assert!(count(5.0) < 60, "{deviation}: {}", count(5.0));
             assert!(
                 deviation < 20.0 || count(0.0) > 3000,

@@ -6,6 +6,31 @@
 
 use super::rows::{self, Candidate, Passes, Rows};
 
+/// Work that is worth compiling for wider vectors: whatever [`run`](Vectorized::run) and the functions inlined into it do.
+pub(crate) trait Vectorized {
+    /// What it gives.
+    type Output;
+
+    /// Does the work; to be inlined always.
+    fn run(self) -> Self::Output;
+}
+
+/// Does `work` by the fastest code for this machine. There are no fused multiplications, so the result is always the same.
+pub(crate) fn widest<W: Vectorized>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the function needs nothing but AVX2, which has just been detected.
+        return unsafe { with_avx2(work) };
+    }
+    work.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn with_avx2<W: Vectorized>(work: W) -> W::Output {
+    work.run()
+}
+
 /// [`rows::candidates`] by the fastest code for this machine.
 pub(super) fn candidates(
     passes: &Passes,

@@ -43,6 +43,31 @@ impl EdgeGradient {
         (along * f64::from(dx), along * f64::from(dy))
     }
 
+    /// Squared length, in units of its own.
+    #[inline]
+    pub(crate) fn square(&self) -> i32 {
+        self.squares[1]
+    }
+
+    /// The gradient in units of its own, and the [`offset`](EdgeGradient::offset), in single precision.
+    #[inline]
+    pub(crate) fn level_geometry(&self) -> (f32, f32, f32, f32) {
+        let [before, here, behind] = self.squares.map(|square| (square as f32).sqrt());
+        let bend = 2.0 * here - before - behind;
+        let along = if bend > 0.0 {
+            (0.5 * (behind - before) / bend).clamp(-0.5, 0.5)
+        } else {
+            0.0
+        };
+        let (dx, dy) = self.sector();
+        (
+            f32::from(self.x),
+            f32::from(self.y),
+            along * f32::from(dx),
+            along * f32::from(dy),
+        )
+    }
+
     /// The step from the pixel to the neighbour behind.
     fn sector(&self) -> (i8, i8) {
         let (ax, ay) = (i32::from(self.x).abs(), i32::from(self.y).abs());

@@ -10,7 +10,7 @@ const COLUMN_STEP: usize = 3;
 /// The median of the absolute response of the mask `1 -2 1; -2 4 -2; 1 -2 1`, which planes and straight edges along the axes do not
 /// move and noise of deviation σ gives the deviation 6 σ (Immerkær, 1996). The median leaves corners and texture out of account as long as
 /// they cover less than about a third of the frame; where they cover more, they count as noise.
-pub(super) fn noise_deviation(grey: &[u8], width: usize) -> f32 {
+pub(crate) fn noise_deviation(grey: &[u8], width: usize) -> f32 {
     let height = grey.len().checked_div(width).unwrap_or(0);
     if width < 3 || height < 3 {
         return 0.0;

@@ -2,8 +2,22 @@
 
 use super::rows::{Passes, STRONG, WEAK};
 
-/// The marks of every pixel of a frame of at least 3x3 pixels.
-pub(super) fn marks(passes: &Passes, grey: &[u8], width: usize) -> Vec<u8> {
+/// A candidate, with all that is known of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Maximum {
+    /// Place in the frame, row by row.
+    pub(super) index: usize,
+    pub(super) mark: u8,
+    /// The gradient in grey levels.
+    pub(super) vector: (f64, f64),
+    /// Its length.
+    pub(super) strength: f64,
+    /// From the pixel's centre to the steepest point, pixels.
+    pub(super) offset: (f64, f64),
+}
+
+/// The candidates of a frame of at least 3x3 pixels, row by row.
+pub(super) fn maxima(passes: &Passes, grey: &[u8], width: usize) -> Vec<Maximum> {
     let (w, h) = (width as isize, (grey.len() / width) as isize);
     let at = |x: isize, y: isize| (y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize;
     let plane = |value: &dyn Fn(isize, isize) -> i32| -> Vec<i32> {
@@ -40,36 +54,45 @@ pub(super) fn marks(passes: &Passes, grey: &[u8], width: usize) -> Vec<u8> {
     });
     let square = plane(&|x, y| gx[at(x, y)].pow(2) + gy[at(x, y)].pow(2));
 
-    plane(&|x, y| {
-        if x == 0 || y == 0 || x == w - 1 || y == h - 1 {
-            return 0;
-        }
-        let (dx, dy) = (f64::from(gx[at(x, y)]), f64::from(gy[at(x, y)]));
-        // The tangent of 22.5 degrees as the passes have it.
-        let tangent = 13573.0 / 32768.0;
-        let (step_x, step_y) = if dy.abs() < dx.abs() * tangent {
-            (1, 0)
-        } else if dx.abs() < dy.abs() * tangent {
-            (0, 1)
-        } else if (dx < 0.0) == (dy < 0.0) {
-            (1, 1)
-        } else {
-            (-1, 1)
-        };
-        let here = square[at(x, y)];
-        let (before, behind) = (
-            square[at(x - step_x, y - step_y)],
-            square[at(x + step_x, y + step_y)],
-        );
-        if here <= passes.low || here <= before || here < behind {
-            0
-        } else if here > passes.high {
-            STRONG.into()
-        } else {
-            WEAK.into()
-        }
-    })
-    .into_iter()
-    .map(|mark| mark as u8)
-    .collect()
+    let inner = (1..h - 1).flat_map(|y| (1..w - 1).map(move |x| (x, y)));
+    inner
+        .filter_map(|(x, y)| {
+            let index = at(x, y);
+            let (dx, dy) = (f64::from(gx[index]), f64::from(gy[index]));
+            // The tangent of 22.5 degrees as the passes have it.
+            let tangent = 13573.0 / 32768.0;
+            let (step_x, step_y) = if dy.abs() < dx.abs() * tangent {
+                (1, 0)
+            } else if dx.abs() < dy.abs() * tangent {
+                (0, 1)
+            } else if (dx < 0.0) == (dy < 0.0) {
+                (1, 1)
+            } else {
+                (-1, 1)
+            };
+            let here = square[index];
+            let (before, behind) = (
+                square[at(x - step_x, y - step_y)],
+                square[at(x + step_x, y + step_y)],
+            );
+            if here <= passes.low || here <= before || here < behind {
+                return None;
+            }
+            let [a, b, c] = [before, here, behind].map(|square| f64::from(square).sqrt());
+            // The top of the parabola through the three lengths at -1, 0 and 1.
+            let (slope, curvature) = ((c - a) / 2.0, a + c - 2.0 * b);
+            let top = if curvature < 0.0 {
+                (-slope / curvature).clamp(-0.5, 0.5)
+            } else {
+                0.0
+            };
+            Some(Maximum {
+                index,
+                mark: if here > passes.high { STRONG } else { WEAK },
+                vector: (dx / 16.0, dy / 16.0),
+                strength: dx.hypot(dy) / 16.0,
+                offset: (top * step_x as f64, top * step_y as f64),
+            })
+        })
+        .collect()
 }

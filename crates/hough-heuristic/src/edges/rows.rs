@@ -47,9 +47,9 @@ struct GradientRow {
 
 /// A pixel that is a maximum across its edge, and above the low threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Candidate {
-    pub(super) pixel: EdgePixel,
-    pub(super) gradient: EdgeGradient,
+pub(crate) struct Candidate {
+    pub(crate) pixel: EdgePixel,
+    pub(crate) gradient: EdgeGradient,
 }
 
 /// The marks that [`maxima`] leaves in the edge image.

@@ -2,16 +2,22 @@
 
 use hough_heuristic::image::{GrayImage, Luma, imageops};
 use hough_heuristic::{
-    Acceptance, Canny, Circle, CircleDetector, Heuristic, HeuristicConfig, ImageprocCanny, RandomizedHough,
-    RandomizedHoughConfig, Region, Sampling, StandardHough, StandardHoughConfig,
+    Acceptance, Canny, CannyConfig, Circle, CircleDetector, ConfigError, Detection, Heuristic,
+    HeuristicConfig, ImageprocCanny, RandomizedHough, RandomizedHoughConfig, Region, Sampling, StandardHough,
+    StandardHoughConfig,
 };
 use proptest::prelude::*;
 
 use crate::scenes::{Scene, same};
 
 /// All detectors with these settings, by name.
-fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
-    let canny = Canny::default;
+pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
+    all_on(accept, CannyConfig::default())
+}
+
+/// All detectors with these settings on edges with those, by name.
+fn all_on(accept: Acceptance, edges: CannyConfig) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
+    let canny = || Canny::new(edges).unwrap();
     let rht = |sampling| RandomizedHoughConfig {
         accept,
         sampling,
@@ -147,6 +153,144 @@ fn the_region_bounds_the_centre() {
     }
 }
 
+const TINY: Circle = Circle {
+    x: 1.0,
+    y: 1.0,
+    radius: 1.0,
+};
+
+#[test]
+fn a_frame_that_the_region_sticks_out_of_is_refused() {
+    let (frame, _) = SCENE.render();
+    let region = Region::in_frame((200, 100), (40, 80), (240, 180)).unwrap();
+    let accept = Acceptance {
+        region: Some(region),
+        ..ACCEPT
+    };
+    for (name, mut detector) in all(accept) {
+        detector.check_frame(240, 180).unwrap();
+        let mut found = Vec::new();
+        detector.try_detect_into(&frame, &mut found).unwrap();
+        for (width, height) in [(239, 180), (240, 179), (192, 144), (0, 0)] {
+            let small = imageops::crop_imm(&frame, 0, 0, width, height).to_image();
+            let stale = Detection {
+                circle: TINY,
+                score: 1.0,
+            };
+            let mut found = vec![stale; 2];
+            let error = detector.try_detect_into(&small, &mut found).unwrap_err();
+            assert!(matches!(error, ConfigError::Region { .. }), "{name}: {error}");
+            let (error, size) = (error.to_string(), format!("{width}x{height}"));
+            assert!(
+                error.contains("40x80 px at (200, 100)") && error.contains(&size),
+                "{name}: {error}"
+            );
+            assert_eq!(found, [], "{name}");
+            assert_eq!(detector.detect(&small), [], "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_accumulator_is_bounded() {
+    let mut detector = StandardHough::new(
+        StandardHoughConfig {
+            accept: Acceptance {
+                max_radius: 2000.0,
+                ..ACCEPT
+            },
+            ..StandardHoughConfig::default()
+        },
+        Canny::default(),
+    )
+    .unwrap();
+    detector.check_frame(1280, 960).unwrap();
+    // 1920 x 1080 centres, 995 radii and two bytes each.
+    let error = detector.check_frame(3840, 2160).unwrap_err();
+    assert_eq!(
+        error,
+        ConfigError::Accumulator {
+            frame_width: 3840,
+            frame_height: 2160,
+            needed: 2 * 1920 * 1080 * 995,
+            limit: 1 << 29,
+        }
+    );
+    let mut found = Vec::new();
+    let before = detector.memory();
+    let large = GrayImage::from_fn(3840, 2160, |x, y| Luma([((x / 40 + y / 40) % 2 * 200) as u8]));
+    assert_eq!(detector.try_detect_into(&large, &mut found), Err(error));
+    assert_eq!(detector.detect(&large), []);
+    assert_eq!(detector.memory(), before, "a refused frame takes no memory");
+    // No size overflows the reckoning.
+    assert!(detector.check_frame(u32::MAX, u32::MAX).is_err());
+
+    let tight = StandardHoughConfig {
+        accept: ACCEPT,
+        max_memory: 120 * 90 * 17 * 2,
+        ..StandardHoughConfig::default()
+    };
+    let detector = StandardHough::new(tight, Canny::default()).unwrap();
+    detector.check_frame(240, 180).unwrap();
+    assert!(detector.check_frame(241, 180).is_err());
+}
+
+#[test]
+fn the_memory_told_holds_all_tables() {
+    let (frame, _) = SCENE.render();
+    let memory = |gradient| {
+        let config = StandardHoughConfig {
+            accept: ACCEPT,
+            gradient,
+            ..StandardHoughConfig::default()
+        };
+        let mut detector = StandardHough::new(config, Canny::default()).unwrap();
+        detector.detect(&frame);
+        (detector.memory(), detector.edges().pixels().len())
+    };
+    let ((plain, _), (with_turns, edges)) = (memory(false), memory(true));
+    // The direction of each edge pixel; peaks and accumulator take about the same in both.
+    assert!(
+        with_turns + 2000 > plain + 8 * edges,
+        "{plain} {with_turns} {edges}"
+    );
+    // Accumulator alone: 120 x 90 centres, 17 radii.
+    assert!(plain > 2 * 120 * 90 * 17);
+}
+
+/// Of a circle that owns the share p of the edges a draw of two hits p^2, of three p^3.
+#[test]
+fn a_known_radius_needs_pairs_only() {
+    let radius = 24.0;
+    let accept = Acceptance {
+        min_radius: radius,
+        max_radius: radius,
+        max_circles: 1,
+        ..ACCEPT
+    };
+    let mut found = 0;
+    for seed in 0..20 {
+        let (frame, balls) = Scene {
+            balls: 1,
+            distractors: 12,
+            radius: (radius, radius),
+            seed,
+            ..SCENE
+        }
+        .render();
+        let config = RandomizedHoughConfig {
+            accept,
+            sampling: Sampling::Anywhere,
+            iterations: 300,
+            ..RandomizedHoughConfig::default()
+        };
+        let mut detector = RandomizedHough::new(config, Canny::default()).unwrap();
+        let circles = detector.detect(&frame);
+        found += usize::from(circles.iter().any(|f| same(&f.circle, &balls[0], 0.5)));
+    }
+    assert!(found >= 16, "found {found} of 20 balls");
+}
+
 #[test]
 fn turned_frames_give_turned_circles() {
     let (frame, balls) = SCENE.render();
@@ -216,6 +360,35 @@ fn what_lies_in_the_buffers_does_not_matter() {
     }
 }
 
+/// Thresholds that noise does not raise, so that noise is full of edges.
+const FIXED: CannyConfig = CannyConfig {
+    low: 30.0,
+    high: 70.0,
+    sigma: 1.2,
+    noise_factor: 0.0,
+};
+
+/// Black and white at random.
+fn saturated_noise(width: u32, height: u32, seed: u32) -> GrayImage {
+    let mut state = seed;
+    GrayImage::from_fn(width, height, |_, _| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        Luma([if state >> 31 == 0 { 0 } else { 255 }])
+    })
+}
+
+/// How many edge pixels a detector had to search.
+trait EdgesOf {
+    fn edges_of(&mut self, frame: &GrayImage) -> usize;
+}
+
+impl EdgesOf for Box<dyn CircleDetector> {
+    fn edges_of(&mut self, frame: &GrayImage) -> usize {
+        self.detect(frame);
+        self.stages().unwrap().edges.pixels().len()
+    }
+}
+
 #[test]
 fn every_small_size_and_every_flat_frame_passes() {
     let small = Acceptance {
@@ -225,27 +398,19 @@ fn every_small_size_and_every_flat_frame_passes() {
         min_distance: 0.0,
         ..ACCEPT
     };
-    for (name, mut detector) in all(small) {
+    for (name, mut detector) in all_on(small, FIXED) {
         for width in 0..9 {
             for height in 0..9 {
-                let mut state = width * 31 + height;
-                let noisy = GrayImage::from_fn(width, height, |_, _| {
-                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    Luma([if state >> 31 == 0 { 0 } else { 255 }])
-                });
-                detector.detect(&noisy);
+                let edges = detector.edges_of(&saturated_noise(width, height, width * 31 + height));
+                assert!(edges > 0 || width < 6 || height < 6, "{name} {width}x{height}");
                 for grey in [0, 255] {
                     let flat = GrayImage::from_pixel(width, height, Luma([grey]));
                     assert_eq!(detector.detect(&flat), [], "{name} {width}x{height}");
                 }
             }
         }
-        let mut state = 7u32;
-        let saturated = GrayImage::from_fn(120, 90, |_, _| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            Luma([if state >> 31 == 0 { 0 } else { 255 }])
-        });
-        detector.detect(&saturated);
+        let edges = detector.edges_of(&saturated_noise(120, 90, 7));
+        assert!(edges > 1000, "{name}: only {edges} edge pixels");
         for (width, height) in [(1, 700), (700, 1), (2, 700), (3, 700), (700, 3)] {
             let frame = GrayImage::from_fn(width, height, |x, y| Luma([((x ^ y) * 85) as u8]));
             detector.detect(&frame);
@@ -338,8 +503,10 @@ proptest! {
             theta: 0.3,
             ..ACCEPT
         };
-        for (name, mut detector) in all(accept) {
+        for (name, mut detector) in all_on(accept, FIXED) {
             let found = detector.detect(&frame);
+            let edges = detector.stages().unwrap().edges.pixels().len();
+            prop_assert!(edges > 0 || width < 12 || height < 12, "{}: no edges in {}x{}", name, width, height);
             for f in &found {
                 let Circle { x, y, radius } = f.circle;
                 prop_assert!(x.is_finite() && y.is_finite(), "{}", name);

@@ -11,5 +11,7 @@ mod scenes;
 mod curves;
 mod detectors;
 mod heuristic;
+#[cfg(feature = "serde")]
+mod serde;
 #[cfg(feature = "files")]
 mod stages;

@@ -1,40 +1,103 @@
-use hough_heuristic::image;
-use hough_heuristic::{CircleDetector, Heuristic, HeuristicConfig, write_stages};
+use hough_heuristic::{
+    Acceptance, Circle, Detection, EdgeMap, EdgePixel, StageTimes, Stages, image, write_stages,
+};
 
+use crate::detectors;
 use crate::scenes::Scene;
 
 #[test]
-fn each_stage_has_its_picture() {
+fn each_stage_of_each_detector_has_its_picture() {
     let (frame, _) = Scene {
         width: 192,
         height: 144,
         ..Scene::default()
     }
     .render();
-    let mut detector = Heuristic::with_canny(HeuristicConfig::default()).unwrap();
-    detector.keep_candidates(true);
-    let found = detector.detect(&frame);
-    assert!(!found.is_empty() && !detector.candidates().is_empty());
+    for (name, mut detector) in detectors::all(Acceptance::default()) {
+        detector.keep_candidates(true);
+        let found = detector.detect(&frame);
+        assert!(!found.is_empty(), "{name}");
+        let stages = detector.stages().unwrap();
+        assert!(!stages.edges.pixels().is_empty(), "{name}");
+        let near = |circle: &Circle| {
+            let best = found[0].circle;
+            (circle.x - best.x).hypot(circle.y - best.y) < 8.0 && (circle.radius - best.radius).abs() < 8.0
+        };
+        assert!(
+            stages.candidates.iter().any(near),
+            "{name}: {:?}",
+            stages.candidates
+        );
+        assert!(
+            stages.times.search.as_nanos() > 0 && stages.times.edges.as_nanos() > 0,
+            "{name}"
+        );
 
-    let folder = tempfile::tempdir().unwrap();
-    let paths = write_stages(
-        folder.path(),
-        &frame,
-        detector.edges(),
-        detector.candidates(),
-        &found,
-    )
-    .unwrap();
-    for path in &paths {
-        assert_eq!(image::open(path).unwrap().to_rgb8().dimensions(), (192, 144));
+        let folder = tempfile::tempdir().unwrap();
+        let paths = write_stages(folder.path(), &frame, &stages, &found).unwrap();
+        for path in &paths {
+            assert_eq!(image::open(path).unwrap().to_rgb8().dimensions(), (192, 144));
+        }
+        assert_eq!(
+            image::open(&paths[0]).unwrap().to_luma8(),
+            *stages.edges.image(),
+            "{name}"
+        );
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+
+        let nowhere = folder.path().join("missing");
+        let error = write_stages(&nowhere, &frame, &stages, &[]).unwrap_err();
+        assert!(error.to_string().contains("1_edges.png"), "{error}");
+
+        // The next frame has its own candidates, and without the wish for them there are none.
+        detector.detect(&image::GrayImage::new(64, 64));
+        assert_eq!(detector.stages().unwrap().candidates, [], "{name}");
+        detector.keep_candidates(false);
+        detector.detect(&frame);
+        assert_eq!(detector.stages().unwrap().candidates, [], "{name}");
     }
-    assert_eq!(
-        image::open(&paths[0]).unwrap().to_luma8(),
-        *detector.edges().image()
-    );
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+}
 
-    let nowhere = folder.path().join("missing");
-    let error = write_stages(&nowhere, &frame, detector.edges(), &[], &[]).unwrap_err();
-    assert!(error.to_string().contains("1_edges.png"), "{error}");
+/// The picture of `D` shows as explained what an accepted circle takes out of `D`: a band that widens with the tolerance and
+/// with the radius.
+#[test]
+fn the_picture_explains_what_the_detectors_explain() {
+    let circle = Circle {
+        x: 10.0,
+        y: 10.0,
+        radius: 200.0,
+    };
+    // Edge pixels at 0, 1, .. 9 px beyond the outline, along the row of the centre.
+    let edges = EdgeMap::from_image(&image::GrayImage::from_fn(240, 20, |x, y| {
+        image::Luma([if y == 10 && (210..220).contains(&x) {
+            255
+        } else {
+            0
+        }])
+    }));
+    let found = [Detection { circle, score: 0.9 }];
+    let frame = image::GrayImage::new(240, 20);
+    // tolerance + 1.5 px + 1 % of the radius
+    for (tolerance, last) in [(0.0, 213), (1.0, 214), (4.0, 217)] {
+        let stages = Stages {
+            edges: &edges,
+            candidates: &[],
+            times: StageTimes::default(),
+            tolerance,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let [_, structure, ..] = write_stages(folder.path(), &frame, &stages, &found).unwrap();
+        let picture = image::open(structure).unwrap().to_rgb8();
+        for x in 210..220 {
+            let explained = x <= last;
+            assert_eq!(
+                stages.explains(&circle, EdgePixel { x, y: 10 }),
+                explained,
+                "{tolerance} {x}"
+            );
+            // Blue is explained, yellow is not.
+            let [red, _, blue] = picture.get_pixel(x, 10).0;
+            assert_eq!(blue > red, explained, "{tolerance} {x}");
+        }
+    }
 }

@@ -371,8 +371,8 @@ impl Studio<'_> {
 
     /// Draws a strip right before the lens: too near to be sharp, so its edges are soft.
     pub(super) fn occluder(&self, canvas: &mut Canvas, strip: &Occluder) {
-        let unit = self.view.width as f64 / hough_heuristic::Features::WIDTH;
-        let pixel = |p: Point2<f64>| p.coords * unit - nalgebra::Vector2::new(0.5, 0.5);
+        let unit = self.view.unit;
+        let pixel = |p: Point2<f64>| p.coords * unit + self.view.corner;
         let (from, to) = (pixel(strip.from), pixel(strip.to));
         let Some(along) = (to - from).try_normalize(1e-9) else {
             return;

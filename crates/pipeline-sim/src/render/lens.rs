@@ -16,7 +16,8 @@ pub(super) struct Warp {
 }
 
 impl Warp {
-    /// `None` for a camera without distortion, or one so distorted that the ideal frame would be more than four times as wide.
+    /// `None` for a camera without distortion. For any other the ideal frame is larger, but not endless: a radial distortion of three terms that does
+    /// not fold squeezes by less than three.
     pub(super) fn new(camera: &Camera) -> Option<Self> {
         if camera.distortion().is_none() {
             return None;
@@ -36,19 +37,18 @@ impl Warp {
             (low, high) = (low.inf(&p), high.sup(&p));
         }
         let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
-        let (ideal_width, ideal_height) = (high.x - low.x + 1.0, high.y - low.y + 1.0);
-        if ideal_width.is_nan()
-            || ideal_width > 4.0 * f64::from(width)
-            || ideal_height > 4.0 * f64::from(height)
-        {
-            return None;
-        }
-        let (w, h) = (ideal_width as u32, ideal_height as u32);
+        let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
         let large = Camera::ideal(focal, Point2::from(principal - low), w, h);
+        // From pixel to pixel the answer changes little: the last one is where to look for the next.
+        let image = |x: u32, y: u32| (Point2::new(f64::from(x), f64::from(y)) - principal) / focal;
+        let mut last = (Point2::origin(), Point2::origin());
         let sources = (0..height)
             .flat_map(|y| (0..width).map(move |x| (x, y)))
             .map(|(x, y)| {
-                let p = ideal(x, y) - low;
+                let shown = Point2::from(image(x, y));
+                let undone = camera.distortion().undistort_near(shown, last);
+                last = (shown, undone.unwrap_or(last.1));
+                let p = principal + last.1.coords * focal - low;
                 let (i, j) = (p.x.floor(), p.y.floor());
                 ((j as u32) * w + i as u32, (p.x - i) as f32, (p.y - j) as f32)
             })

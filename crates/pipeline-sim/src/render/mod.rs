@@ -12,7 +12,7 @@ mod truth;
 mod view;
 
 use hough_heuristic::image::GrayImage;
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -214,29 +214,61 @@ impl Renderer {
     ///
     /// What lies flat comes first; then what stands, far things before near ones; occluders, which are before the lens, last. Circles that
     /// do not overlap are in the right order when sorted by power (squared distance less squared radius): their radical axes
-    /// separate them.
+    /// separate them. A ball above a thing, or on its holder, overlaps it as seen from above: a level plane separates the two, and the one
+    /// on the far side of it comes first.
     fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
         let eye = view.eye();
         let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
         let ball = cell.ball.centre;
-        let foot = cell.holder.map_or(ball.xy(), |h| h.foot);
+        let bottom = ball.z - cell.ball.radius;
+        let overlaps = |x: f64, y: f64, r: f64| (x - ball.x).hypot(y - ball.y) < r + cell.ball.radius;
         // A thing where the holder stands, or in a ball that lies or is carried low, is left out.
         let in_the_way = |t: &Thing| {
-            let low = cell.holder.is_some() || ball.z - cell.ball.radius < cell.table + t.shape.height();
-            low && (t.x - foot.x).hypot(t.y - foot.y) <= t.shape.footprint() + cell.ball.radius
+            let foot = t.shape.footprint();
+            let at_holder = cell.holder.is_some_and(|h| {
+                (t.x - h.foot.x).hypot(t.y - h.foot.y) <= foot + h.radius.max(cell.ball.radius)
+            });
+            at_holder || (bottom < cell.table + t.shape.height() && overlaps(t.x, t.y, foot))
         };
         let things = || self.scene.things.iter().enumerate();
         let mut items: Vec<Item> = things()
             .filter(|(_, t)| t.shape.is_flat())
             .map(|(i, _)| Item::Thing(i))
             .collect();
-        let mut standing: Vec<(f64, Item)> = things()
+        // Each with its power, its top, and whether the ball is above it.
+        let mut standing: Vec<(f64, f64, bool, Item)> = things()
             .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t))
-            .map(|(i, t)| (power(t.x, t.y, t.shape.footprint()), Item::Thing(i)))
+            .map(|(i, t)| {
+                let (foot, top) = (t.shape.footprint(), cell.table + t.shape.height());
+                (
+                    power(t.x, t.y, foot),
+                    top,
+                    overlaps(t.x, t.y, foot),
+                    Item::Thing(i),
+                )
+            })
             .collect();
-        standing.push((power(ball.x, ball.y, cell.ball.radius), Item::Ball));
+        standing.extend(cell.holder.map(|h| {
+            let under = ball.z > h.top && overlaps(h.foot.x, h.foot.y, h.radius);
+            (power(h.foot.x, h.foot.y, h.radius), h.top, under, Item::Holder)
+        }));
         standing.sort_by(|a, b| b.0.total_cmp(&a.0));
-        items.extend(standing.into_iter().map(|(_, item)| item));
+        // Where the ball goes among them: by power, but after what it is above, and before what it is above as seen from below.
+        let of_ball = power(ball.x, ball.y, cell.ball.radius);
+        let by_power = standing.iter().filter(|(power, ..)| *power >= of_ball).count();
+        let seen_from_above = |top: f64| eye.z > top;
+        let after = standing
+            .iter()
+            .rposition(|(_, top, under, _)| *under && seen_from_above(*top))
+            .map_or(0, |i| i + 1);
+        let before = standing
+            .iter()
+            .position(|(_, top, under, _)| *under && !seen_from_above(*top))
+            .unwrap_or(standing.len());
+        let place = by_power.min(before).max(after);
+        items.extend(standing[..place].iter().map(|s| s.3));
+        items.push(Item::Ball);
+        items.extend(standing[place..].iter().map(|s| s.3));
         items.extend((0..self.scene.occluders.len()).map(Item::Occluder));
         items
     }
@@ -244,47 +276,37 @@ impl Renderer {
     fn draw_item(&self, canvas: &mut Canvas, studio: &Studio<'_>, cell: &Cell, item: &Item) {
         match item {
             Item::Thing(i) => studio.thing(canvas, &self.scene.things[*i]),
-            Item::Ball => ball_on_holder(canvas, studio, cell),
+            Item::Ball => {
+                studio.sphere(canvas, &cell.ball.centre, cell.ball.radius, &studio.scene.ball);
+            }
+            Item::Holder => {
+                if let Some(h) = cell.holder {
+                    studio.cylinder(canvas, h.foot, h.radius, cell.table, h.top, &ROD);
+                }
+            }
             Item::Occluder(i) => studio.occluder(canvas, &self.scene.occluders[*i]),
         }
     }
 }
 
+/// How the holder looks.
+const ROD: Look = Look {
+    albedo: 0.35,
+    texture: 0.0,
+    gloss: 0.3,
+};
+
 /// Something drawn over the table.
 #[derive(Clone, Copy, Debug)]
 enum Item {
-    /// The ball with its holder.
+    /// The ball.
     Ball,
+    /// What it stands on, or stood on.
+    Holder,
     /// A thing of the scene.
     Thing(usize),
     /// An occluder of the scene.
     Occluder(usize),
-}
-
-/// Ball and holder, the farther one first.
-fn ball_on_holder(canvas: &mut Canvas, studio: &Studio<'_>, cell: &Cell) {
-    let rod = Look {
-        albedo: 0.35,
-        texture: 0.0,
-        gloss: 0.3,
-    };
-    let from_above = cell.holder.is_some_and(|h| studio.view.eye().z > h.top);
-    if !from_above {
-        studio.sphere(canvas, &cell.ball.centre, cell.ball.radius, &studio.scene.ball);
-    }
-    if let Some(h) = cell.holder {
-        studio.cylinder(
-            canvas,
-            Point2::new(h.foot.x, h.foot.y),
-            h.radius,
-            cell.table,
-            h.top,
-            &rod,
-        );
-    }
-    if from_above {
-        studio.sphere(canvas, &cell.ball.centre, cell.ball.radius, &studio.scene.ball);
-    }
 }
 
 /// Whether every ray of the frame meets the table.

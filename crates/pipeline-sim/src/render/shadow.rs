@@ -53,10 +53,10 @@ pub(super) fn cast_things(map: &mut CoarseMap, scene: &Scene) {
                 if distance > reach {
                     continue;
                 }
-                // Things also hide part of the sky from the table near their feet.
-                let mut factor = 1.0 - 0.35 * (-(distance - foot).max(0.0) / 0.012).exp();
                 let (sin, cos) = thing.turn.sin_cos();
                 let from = Point3::new(dx * cos + dy * sin, dy * cos - dx * sin, 0.0);
+                // Things also hide part of the sky from the table near their feet.
+                let mut factor = 1.0 - 0.35 * (-gap(&thing.shape, &from) / 0.012).exp();
                 for (share, points) in &lamps {
                     let blocked = points
                         .iter()
@@ -67,6 +67,17 @@ pub(super) fn cast_things(map: &mut CoarseMap, scene: &Scene) {
                 map.values[j * map.side + i] *= factor.max(0.02) as f32;
             }
         }
+    }
+}
+
+/// Distance from a point of the table to the foot of a shape that stands at the origin; 0 under it.
+fn gap(shape: &Shape, from: &Point3<f64>) -> f64 {
+    match *shape {
+        Shape::Box { length, width, .. } => {
+            let beyond = |at: f64, side: f64| (at.abs() - 0.5 * side).max(0.0);
+            beyond(from.x, length).hypot(beyond(from.y, width))
+        }
+        _ => (from.x.hypot(from.y) - shape.footprint()).max(0.0),
     }
 }
 
@@ -254,4 +265,48 @@ fn overlap(body: f64, lamp: f64, across: f64) -> f64 {
     let t = ((body + lamp - across) / (2.0 * lamp.min(body))).clamp(0.0, 1.0);
     let depth = (body / lamp).min(1.0);
     t * t * (3.0 - 2.0 * t) * depth * depth.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Look, Thing};
+
+    #[test]
+    fn the_gloom_at_the_foot_of_a_box_has_the_shape_of_the_box() {
+        let look = Look {
+            albedo: 0.5,
+            texture: 0.0,
+            gloss: 0.0,
+        };
+        let scene = Scene {
+            lights: Vec::new(),
+            things: vec![Thing {
+                shape: Shape::Box {
+                    length: 0.10,
+                    width: 0.02,
+                    height: 0.01,
+                },
+                x: 0.0,
+                y: 0.0,
+                turn: 0.5,
+                look,
+            }],
+            ..Scene::plain()
+        };
+        let mut map = CoarseMap {
+            side: 401,
+            corner: (-0.2, -0.2),
+            size: 0.4,
+            values: vec![1.0; 401 * 401],
+        };
+        cast_things(&mut map, &scene);
+        let (sin, cos) = 0.5_f64.sin_cos();
+        // Ahead of an end, and as far from the middle but beside the box.
+        let (end, beside) = (
+            map.at(0.053 * cos, 0.053 * sin),
+            map.at(-0.053 * sin, 0.053 * cos),
+        );
+        assert!(end < 0.76 && beside > 0.98, "{end} {beside}");
+    }
 }

@@ -1,13 +1,14 @@
 //! What a frame really shows: every round outline, and how much of it can be seen.
 
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Point3, Vector3};
 use puma_val2::Joints;
 
+use crate::camera::unit_outline;
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
 use crate::render::view::View;
 use crate::render::{Item, Renderer};
-use crate::{Camera, Cell, Ellipse, Scene, Shape};
+use crate::{Cell, Ellipse, Scene, Shape};
 
 /// What a round outline belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,8 +36,18 @@ pub struct Sighting {
     pub visible: f64,
 }
 
-/// The frame is looked at this much smaller to see what hides what.
-const REDUCTION: f64 = 3.0;
+/// Pixels along the longer side of what is looked at to see what hides an outline, however small or large it is in the frame.
+const CLOSE_UP: f64 = 96.0;
+
+/// Points of an outline.
+const OUTLINE: i32 = 96;
+
+/// A round outline: what it is, the exact ellipse in the frame, and the outline in directions (x, y, 1) of the camera frame.
+struct Outline {
+    what: Round,
+    ellipse: Ellipse,
+    points: Vec<Point2<f64>>,
+}
 
 impl Renderer {
     /// Every round outline that the frame of `cell` with the arm at `joints` shows, the ball's first; outlines of which nothing is
@@ -46,37 +57,23 @@ impl Renderer {
         if pose.translation.vector.iter().any(|v| !v.is_finite()) {
             return Vec::new();
         }
-        let view = View::new(&cell.camera, pose).reduced(REDUCTION);
+        let view = View::new(&cell.camera, pose);
         // With all lamps off, whatever is drawn is black: it hides what was white before.
         let dark = Scene {
             lights: Vec::new(),
             ambient: 0.0,
             ..self.scene.clone()
         };
-        let studio = Studio {
-            view: &view,
-            scene: &dark,
-            texture: &self.wood,
-            table: cell.table,
-            bounce: 0.0,
-        };
-        let mut canvas = Canvas::new(view.width, view.height);
         let items = self.items(cell, &view);
         let mut found = Vec::new();
         for (rank, item) in items.iter().enumerate() {
-            for (what, ellipse, outline) in self.rounds(cell, &view, item) {
-                canvas.light.fill(0.0);
-                canvas.fill(&outline, |_, _, row| row.fill(1.0));
-                for nearer in &items[rank + 1..] {
-                    self.draw_item(&mut canvas, &studio, cell, nearer);
-                }
-                let seen: f64 = canvas.light.iter().map(|v| f64::from(*v)).sum();
-                let whole = area(&outline);
-                if seen > 0.0 && whole > 0.0 {
+            for outline in self.rounds(cell, &view, item) {
+                let visible = self.visible(cell, &view, &dark, &outline.points, &items[rank + 1..]);
+                if visible > 0.0 {
                     found.push(Sighting {
-                        what,
-                        ellipse,
-                        visible: (seen / whole).min(1.0),
+                        what: outline.what,
+                        ellipse: outline.ellipse,
+                        visible,
                     });
                 }
             }
@@ -85,53 +82,119 @@ impl Renderer {
         found
     }
 
-    /// The round outlines of one item: the exact ellipse in the full frame, and a polygon of it in the reduced one.
-    fn rounds(&self, cell: &Cell, view: &View, item: &Item) -> Vec<(Round, Ellipse, Vec<Point2<f64>>)> {
-        let reduced = |points: &dyn Fn(f64) -> Option<Point2<f64>>| -> Option<Vec<Point2<f64>>> {
-            (0..96)
-                .map(|i| points(f64::from(i) * std::f64::consts::TAU / 96.0))
+    /// The share of the outlined area that is inside the frame and that none of the `nearer` things hides.
+    fn visible(
+        &self,
+        cell: &Cell,
+        view: &View,
+        dark: &Scene,
+        outline: &[Point2<f64>],
+        nearer: &[Item],
+    ) -> f64 {
+        let spots: Vec<Point2<f64>> = outline.iter().map(|p| view.spot(p)).collect();
+        let least = spots.iter().fold(spots[0], |a, b| a.inf(b));
+        let most = spots.iter().fold(spots[0], |a, b| a.sup(b));
+        // Without distortion, what is outside the frame need not be looked at.
+        let straight = cell.camera.distortion().is_none();
+        let (frame_width, frame_height) = (view.width as f64, view.height as f64);
+        let (least, most) = if straight {
+            (
+                least.sup(&Point2::new(-0.5, -0.5)),
+                most.inf(&Point2::new(frame_width - 0.5, frame_height - 0.5)),
+            )
+        } else {
+            (least, most)
+        };
+        let extent = most - least;
+        let longest = extent.x.max(extent.y);
+        if !(extent.x > 0.0 && extent.y > 0.0 && longest.is_finite()) {
+            return 0.0;
+        }
+        let scale = CLOSE_UP / longest;
+        let size = (
+            ((extent.x * scale).ceil() as usize).max(1),
+            ((extent.y * scale).ceil() as usize).max(1),
+        );
+        let close = view.part(least.coords, scale, size);
+        let studio = Studio {
+            view: &close,
+            scene: dark,
+            texture: &self.wood,
+            table: cell.table,
+            bounce: 0.0,
+        };
+        let mut canvas = Canvas::new(size.0, size.1);
+        let polygon: Vec<Point2<f64>> = outline.iter().map(|p| close.spot(p)).collect();
+        canvas.fill(&polygon, |_, _, row| row.fill(1.0));
+        for item in nearer {
+            self.draw_item(&mut canvas, &studio, cell, item);
+        }
+        // A pixel that reaches beyond the border of the frame by rounding is worth what is inside; a distorted frame's border is bent.
+        let worth = |k: usize| {
+            let (x, y) = ((k % size.0) as f64, (k / size.0) as f64);
+            if straight {
+                (extent.x * scale - x).min(1.0) * (extent.y * scale - y).min(1.0)
+            } else {
+                let direction = Vector3::new(
+                    (x - close.principal.x) / close.focal,
+                    (y - close.principal.y) / close.focal,
+                    1.0,
+                );
+                let shown = cell.camera.project(&Point3::from(direction));
+                let inside = shown.is_some_and(|p| {
+                    (-0.5..=frame_width - 0.5).contains(&p.x) && (-0.5..=frame_height - 0.5).contains(&p.y)
+                });
+                f64::from(u8::from(inside))
+            }
+        };
+        let light = canvas.light.iter().enumerate();
+        let seen: f64 = light.map(|(k, v)| f64::from(*v) * worth(k)).sum();
+        (seen / area(&polygon)).min(1.0)
+    }
+
+    /// The round outlines of one item.
+    fn rounds(&self, cell: &Cell, view: &View, item: &Item) -> Vec<Outline> {
+        let around = |points: &dyn Fn(f64) -> Point2<f64>| -> Vec<Point2<f64>> {
+            (0..OUTLINE)
+                .map(|i| points(f64::from(i) * std::f64::consts::TAU / f64::from(OUTLINE)))
                 .collect()
         };
         let sphere = |what, centre: &Point3<f64>, radius: f64| {
             let seen = view.seen(centre);
-            let exact = cell.camera.project_sphere(&seen, radius).ok()?;
-            let small = Camera::ideal(view.focal, view.principal, view.width as u32, view.height as u32)
-                .project_sphere(&seen, radius)
-                .ok()?;
-            Some((what, exact, reduced(&|t| Some(small.point(t)))?))
+            let directions = unit_outline(&seen, radius).ok()?;
+            Some(Outline {
+                what,
+                ellipse: cell.camera.project_sphere(&seen, radius).ok()?,
+                points: around(&|t| directions.point(t)),
+            })
         };
         let ring = |what, centre: Point3<f64>, radius: f64| {
-            let at = |t: f64| view.seen(&(centre + nalgebra::Vector3::new(t.cos(), t.sin(), 0.0) * radius));
+            let at = |t: f64| view.seen(&(centre + Vector3::new(t.cos(), t.sin(), 0.0) * radius));
             let ahead = (0..96).all(|i| at(f64::from(i) * std::f64::consts::TAU / 96.0).z > 0.01);
-            if !ahead || radius <= 0.0 {
-                return None;
-            }
-            let small = Camera::ideal(view.focal, view.principal, view.width as u32, view.height as u32);
-            let exact = Ellipse::of_outline(|t| cell.camera.project(&at(t)).unwrap_or_else(Point2::origin));
-            Some((what, exact, reduced(&|t| small.project(&at(t)))?))
+            (ahead && radius > 0.0).then(|| Outline {
+                what,
+                ellipse: Ellipse::of_outline(|t| cell.camera.project(&at(t)).unwrap_or_else(Point2::origin)),
+                points: around(&|t| Point2::from(at(t).xy() / at(t).z)),
+            })
         };
-        let mut found = Vec::new();
-        match item {
-            Item::Ball => found.extend(sphere(Round::Target, &cell.ball.centre, cell.ball.radius)),
-            Item::Occluder(_) => {}
-            Item::Thing(i) => {
-                let thing = &self.scene.things[*i];
-                let at = |z: f64| Point3::new(thing.x, thing.y, cell.table + z);
-                let above = view.eye().z > cell.table + thing.shape.height();
-                match thing.shape {
-                    Shape::Ball { radius } => found.extend(sphere(Round::Ball, &at(radius), radius)),
-                    Shape::Disc { radius, inner } if above => {
-                        found.extend(ring(Round::Disc, at(0.0), radius));
-                        found.extend(ring(Round::Disc, at(0.0), inner));
-                    }
-                    Shape::Cylinder { radius, height } if above => {
-                        found.extend(ring(Round::Top, at(height), radius));
-                    }
-                    _ => {}
-                }
-            }
-        }
-        found
+        let Item::Thing(i) = item else {
+            let target = matches!(item, Item::Ball).then(|| (cell.ball.centre, cell.ball.radius));
+            let outline = target.and_then(|(centre, radius)| sphere(Round::Target, &centre, radius));
+            return outline.into_iter().collect();
+        };
+        let thing = &self.scene.things[*i];
+        let at = |z: f64| Point3::new(thing.x, thing.y, cell.table + z);
+        let above = view.eye().z > cell.table + thing.shape.height();
+        let found = match thing.shape {
+            Shape::Ball { radius } => vec![sphere(Round::Ball, &at(radius), radius)],
+            Shape::Disc { radius, inner } if above => vec![
+                ring(Round::Disc, at(0.0), radius),
+                ring(Round::Disc, at(0.0), inner),
+            ],
+            Shape::Cylinder { radius, height } if above => vec![ring(Round::Top, at(height), radius)],
+            _ => Vec::new(),
+        };
+        found.into_iter().flatten().collect()
     }
 }
 

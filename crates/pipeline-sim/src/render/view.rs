@@ -1,6 +1,7 @@
 //! From the world to pixels and back, for an ideal pinhole, in the renderer's single precision.
 
-use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
+use hough_heuristic::Features;
+use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector2, Vector3};
 
 use crate::Camera;
 
@@ -13,6 +14,10 @@ pub(super) struct View {
     pub(super) principal: Point2<f64>,
     pub(super) width: usize,
     pub(super) height: usize,
+    /// Pixels of this view for a feature unit of the camera's frame.
+    pub(super) unit: f64,
+    /// Where this view has the upper left corner of the camera's frame, pixels.
+    pub(super) corner: Vector2<f64>,
 }
 
 /// Nothing nearer than this to the camera's plane is drawn, metres.
@@ -27,18 +32,29 @@ impl View {
             principal: camera.principal_point(),
             width: width as usize,
             height: height as usize,
+            unit: f64::from(width) / Features::WIDTH,
+            corner: Vector2::new(-0.5, -0.5),
         }
     }
 
-    /// The same view in a frame that is smaller by `factor`.
-    pub(super) fn reduced(&self, factor: f64) -> Self {
+    /// A part of the view, drawn larger by `scale`: `size` pixels wide and high, with its upper left corner at `corner` (pixels of this
+    /// view).
+    pub(super) fn part(&self, corner: Vector2<f64>, scale: f64, size: (usize, usize)) -> Self {
+        let there = |p: Vector2<f64>| (p - corner) * scale - Vector2::new(0.5, 0.5);
         Self {
             pose: self.pose,
-            focal: self.focal / factor,
-            principal: self.principal.map(|v| (v + 0.5) / factor - 0.5),
-            width: (self.width as f64 / factor).ceil() as usize,
-            height: (self.height as f64 / factor).ceil() as usize,
+            focal: self.focal * scale,
+            principal: Point2::from(there(self.principal.coords)),
+            width: size.0,
+            height: size.1,
+            unit: self.unit * scale,
+            corner: there(self.corner),
         }
+    }
+
+    /// Where this view has what lies in the direction (p, 1) of the camera frame.
+    pub(super) fn spot(&self, p: &Point2<f64>) -> Point2<f64> {
+        self.principal + p.coords * self.focal
     }
 
     /// A world point in the camera frame.
@@ -90,7 +106,7 @@ impl View {
     }
 
     fn pixel(&self, p: &Point3<f64>) -> Point2<f64> {
-        self.principal + nalgebra::Vector2::new(p.x, p.y) * (self.focal / p.z)
+        self.principal + Vector2::new(p.x, p.y) * (self.focal / p.z)
     }
 
     /// The matrix that takes a pixel (x, y, 1) to homogeneous coordinates on the plane through `origin` spanned by `u` and `v`

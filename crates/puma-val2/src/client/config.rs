@@ -89,6 +89,11 @@ impl ClientConfig {
             ..Self::default()
         }
     }
+
+    /// Longest time for a reply that waits for no motion: a few of its silences.
+    pub(super) fn patience(&self) -> Duration {
+        self.reply_timeout.saturating_mul(4)
+    }
 }
 
 /// How a motion of several joints is commanded.

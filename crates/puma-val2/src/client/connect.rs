@@ -1,6 +1,6 @@
 //! Getting hold of the monitor, and calibrating the arm.
 
-use super::wire::{SPOIL, is_boot_question, is_doubt, last_line, refusal, shortened};
+use super::wire::{NUDGE, SPOIL, is_boot_question, is_doubt, last_line, shortened, way_out};
 use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
 use crate::{ArmError, Transport};
 
@@ -13,11 +13,7 @@ impl<T: Transport> Val2Client<T> {
     pub fn connect(transport: T, config: ClientConfig) -> Result<Self, ArmError> {
         check(&config)?;
         let mut client = Self {
-            wire: Wire {
-                line: transport,
-                echo: None,
-                notices: Vec::new(),
-            },
+            wire: Wire::new(transport),
             config,
             last_known: None,
             lacks_ppoint: false,
@@ -48,11 +44,18 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn reach_monitor(&mut self) -> Result<(), ArmError> {
+        self.wire.nudge = SPOIL;
+        let outcome = self.find_prompt();
+        self.wire.nudge = NUDGE;
+        outcome
+    }
+
+    fn find_prompt(&mut self) -> Result<(), ArmError> {
         let begun = self.wire.line.clock();
         let until = begun.saturating_add(self.config.connect_timeout);
         // Something that is no command and no answer: a half-typed line is spoilt by it, a question asked again.
         self.wire.send(SPOIL, "connecting")?;
-        let mut questions = 0;
+        let (mut questions, mut ways) = (0, 0);
         loop {
             let left = until.saturating_sub(self.wire.line.clock());
             let expected = "the prompt `.` of the VAL monitor or a start-up question";
@@ -72,7 +75,11 @@ impl<T: Transport> Val2Client<T> {
                 Err(other) => return Err(other),
             };
             let answer: &[u8] = match reply.ending {
-                Ending::Idle => return Ok(()),
+                Ending::Idle => {
+                    self.wire.half_typed = false;
+                    self.wire.restarted = false;
+                    return Ok(());
+                }
                 Ending::Running if self.config.abort_running_program => b"ABORT\r",
                 Ending::Running => {
                     let heard = "the prompt of a monitor under which a program runs";
@@ -87,8 +94,10 @@ impl<T: Transport> Val2Client<T> {
                     };
                     if yes { b"Y\r" } else { b"N\r" }
                 }
-                Ending::Question if questions % 2 == 0 && !last_line(&reply.text).contains("Y/N") => b"\r",
-                Ending::Question => refusal(&reply.text),
+                Ending::Question => {
+                    ways += 1;
+                    way_out(&reply.text, ways - 1)
+                }
             };
             questions += 1;
             if questions > 20 || left.is_zero() {
@@ -105,7 +114,7 @@ impl<T: Transport> Val2Client<T> {
             self.wire.send(b"WHERE", "WHERE")?;
             let mut buffer = [0; 64];
             let mut heard = Vec::new();
-            let wait = self.config.quiet * 3;
+            let wait = self.config.quiet.saturating_mul(3);
             loop {
                 match self.wire.line.receive(&mut buffer, wait) {
                     Ok(Some(count)) => heard.extend_from_slice(&buffer[..count]),
@@ -126,7 +135,7 @@ impl<T: Transport> Val2Client<T> {
             self.wire.send(b"\r", "WHERE")?;
             match self
                 .wire
-                .read_reply("WHERE", self.config.reply_timeout * 4, &self.config)
+                .read_reply("WHERE", self.config.patience(), &self.config)
             {
                 Ok(reply) => {
                     if Location::parse(&reply.text).is_some() || !reader::messages(&reply.text).is_empty() {
@@ -148,8 +157,12 @@ impl<T: Transport> Val2Client<T> {
     /// Lets the arm find its joint angles: `CALIBRATE`, the answer yes, and up to `config.motion_timeout` for the small moves.
     ///
     /// # Errors
-    /// [`ArmError::Refused`] with the controller's message, arm power off for instance, after `config.power_retries` further tries.
+    /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch these moves; [`ArmError::Refused`] with the controller's message,
+    /// arm power off for instance, after `config.power_retries` further tries.
     pub fn calibrate(&mut self) -> Result<(), ArmError> {
+        self.refuse_under_guard("calibration")?;
+        // What the arm has shown until now was counted from another zero.
+        self.last_known = None;
         let (mut doubts, mut refusals) = (0, 0);
         loop {
             match self.calibrate_once() {
@@ -171,7 +184,7 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn calibrate_once(&mut self) -> Result<(), ArmError> {
-        let patience = self.config.reply_timeout * 4;
+        let patience = self.config.patience();
         let reply = self
             .wire
             .exchange("CAL", patience, &self.config)

@@ -2,7 +2,9 @@
 
 mod config;
 mod connect;
+mod hand;
 mod motion;
+mod point;
 mod proximity;
 mod reader;
 mod resident;
@@ -36,7 +38,8 @@ pub struct Val2Client<T: Transport> {
     last_known: Option<Joints>,
     /// Whether the controller has turned out not to know `#PPOINT`.
     lacks_ppoint: bool,
-    guard: Option<proximity::Guard>,
+    /// The signal that stops the next motions.
+    guard: Option<u16>,
 }
 
 impl<T: Transport> Val2Client<T> {
@@ -60,9 +63,9 @@ impl<T: Transport> Val2Client<T> {
         self.wire.line
     }
 
-    /// The joint angles that the arm reported last, without asking it.
+    /// The joint angles that the arm reported last, without asking it; `None` if it may have moved since, or the controller was started again.
     pub fn last_known(&self) -> Option<Joints> {
-        self.last_known
+        self.last_known.filter(|_| !self.wire.restarted)
     }
 
     /// Whether the controller echoes what is typed.
@@ -79,7 +82,7 @@ impl<T: Transport> Val2Client<T> {
     fn command(&mut self, line: &str) -> Result<String, ArmError> {
         let mut tries = 0;
         loop {
-            match self.command_once(line, self.config.reply_timeout * 4) {
+            match self.command_once(line, self.config.patience()) {
                 Ok(text) => return Ok(text),
                 Err(failed) if is_doubt(&failed.error) && tries < self.config.retries => {
                     tries += 1;
@@ -137,7 +140,7 @@ impl<T: Transport> Val2Client<T> {
     pub fn where_(&mut self) -> Result<Location, ArmError> {
         let mut before: Option<Location> = None;
         let mut last_error = None;
-        for _ in 0..self.config.retries + 3 {
+        for _ in 0..self.config.retries.saturating_add(3) {
             match self.where_once() {
                 Ok(location) => {
                     if location.agrees(&self.config.params) || before.is_some_and(|b| b == location) {
@@ -157,7 +160,7 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn where_once(&mut self) -> Result<Location, ArmError> {
-        let timeout = self.config.reply_timeout * 4;
+        let timeout = self.config.patience();
         let reply = self
             .wire
             .exchange("WHERE", timeout, &self.config)
@@ -190,19 +193,41 @@ impl<T: Transport> Val2Client<T> {
     /// # Errors
     /// What the line or the controller said; [`ArmError::Garbled`] if the answer is no number.
     pub fn signal(&mut self, number: u16) -> Result<bool, ArmError> {
-        let line = format!("DO TYPE SIG({number})");
-        let mut tries = 0;
-        loop {
-            let text = self.command(&line)?;
-            let answer = text
+        self.truth(&format!("SIG({number})"))
+    }
+
+    /// The value of a condition, -1 for true and 0 for false.
+    ///
+    /// No single character that changes, gets lost or comes twice makes one of the other. Whatever else is shown counts when it is shown twice
+    /// in a row.
+    fn truth(&mut self, condition: &str) -> Result<bool, ArmError> {
+        let line = format!("DO TYPE {condition}");
+        let mut before = None;
+        let mut heard = String::new();
+        for _ in 0..self.config.retries.saturating_add(3) {
+            heard = self.command(&line)?;
+            let shown = heard
                 .split(['\r', '\n'])
                 .filter_map(|l| l.trim().parse::<f64>().ok())
-                .next_back();
-            match answer {
-                Some(value) => return Ok(value != 0.0),
-                None if tries < self.config.retries => tries += 1,
-                None => return Err(self.wire.garbled(&line, "-1 or 0", &shortened(&text))),
+                .rfind(|value| value.is_finite());
+            let is = |value: f64| shown.is_some_and(|s| s.total_cmp(&value).is_eq());
+            if is(-1.0) || is(0.0) || shown.is_some() && shown == before {
+                return Ok(shown.is_some_and(|value| value != 0.0));
             }
+            before = shown;
+        }
+        Err(self.wire.garbled(&line, "-1 or 0", &shortened(&heard)))
+    }
+
+    /// Refuses what would move the arm without the guard that is armed.
+    fn refuse_under_guard(&self, what: &'static str) -> Result<(), ArmError> {
+        match self.guard {
+            None => Ok(()),
+            Some(signal) => Err(ArmError::Setting {
+                what,
+                value: format!("started while signal {signal} guards the motions"),
+                allowed: "disarm the proximity guard first",
+            }),
         }
     }
 

@@ -1,65 +1,92 @@
 //! The proximity sensors: read, and set up to stop the arm.
 
-use super::wire::is_doubt;
-use super::{Ending, Val2Client, shortened};
+use super::wire::{Failed, NUDGE, Reply, is_doubt};
+use super::{Ending, Val2Client, plain, shortened};
 use crate::{ArmError, Joints, ProximitySensor, Transport};
 
-/// Names of the two programs that guard a motion where the monitor itself does not watch signals.
+/// The program in which the client's moves run under guard, one for a single move of another kind, and the one that the signal calls.
 const RUN: &str = "PGRUN";
+const ONCE: &str = "PGONCE";
 const HIT: &str = "PGHIT";
 
-/// A signal that stops the arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Guard {
-    pub(super) signal: u16,
-    /// Whether motions have to run inside a program for the controller to watch the signal.
-    pub(super) by_program: bool,
-}
+/// The variable in which the last of them keeps that it was called: a signal that has come and gone again leaves nothing else behind.
+const LATCH: &str = "PGH";
 
 impl<T: Transport> Val2Client<T> {
     /// Lets the controller itself stop the next motions as soon as input `signal` comes on, without waiting for us (`REACTI`).
     ///
-    /// A move that is stopped so ends in [`ArmError::ProximityStop`] and uses the guard up: the way back is free until it is armed again. Where
-    /// the monitor does not take `DO REACTI`, two small programs are stored in the controller (`PGRUN`, `PGHIT`; older ones of these names are
-    /// replaced) and moves run inside them. While armed, moves of several joints are always coordinated.
+    /// A move during which the signal comes, be it for a moment only, ends in [`ArmError::ProximityStop`] and uses the guard up: the way back is
+    /// free until it is armed again. Motions run inside small programs that are stored in the controller (`PGRUN`, `PGONCE`, `PGHIT`; older ones
+    /// of these names are replaced), for whether a monitor watches signals while no program runs is not known.
+    ///
+    /// While armed, every motion that this client commands is guarded: moves of several joints are always coordinated, and
+    /// [`Val2Client::drive`], [`Val2Client::ready`] and [`Val2Client::move_hand`] run inside a program as well. What cannot be guarded is refused
+    /// with [`ArmError::Setting`]: [`Val2Client::calibrate`], [`Val2Client::execute`] and [`Val2Client::resident`].
     ///
     /// # Errors
-    /// What the line or the controller said.
+    /// What the line or the controller said, that there is no such signal for instance.
     pub fn arm_proximity(&mut self, signal: u16) -> Result<(), ArmError> {
-        let by_program = match self.command(&format!("DO REACTI {signal}")) {
-            Ok(_) => false,
-            Err(ArmError::Refused { .. }) => {
-                self.store_guard(signal)?;
-                true
-            }
-            Err(error) => return Err(error),
-        };
-        self.guard = Some(Guard { signal, by_program });
+        self.signal(signal)?;
+        self.store_program(HIT, &[format!("{LATCH} = -1"), "HALT".to_owned()])?;
+        let to_goal = format!("MOVE #{}", self.config.point_name);
+        self.store_program(RUN, &guarded_steps(signal, &[to_goal]))?;
+        self.command(&format!("DO {LATCH} = 0"))?;
+        if self.truth(LATCH)? {
+            return Err(self.wire.garbled(LATCH, "0, as it was set", "-1"));
+        }
+        self.guard = Some(signal);
         Ok(())
     }
 
     /// Undoes [`Val2Client::arm_proximity`].
     ///
     /// # Errors
-    /// What the line or the controller said.
+    /// None at present: the controller watches the signal only while a guarded move runs.
     pub fn disarm_proximity(&mut self) -> Result<(), ArmError> {
-        match self.guard.take() {
-            Some(Guard {
-                signal,
-                by_program: false,
-            }) => self.command(&format!("DO IGNORE {signal}")).map(drop),
-            _ => Ok(()),
+        self.guard = None;
+        Ok(())
+    }
+
+    /// A motion to the point that has been defined, under guard.
+    pub(super) fn run_guarded(&mut self, speed: Option<f64>) -> Result<(), Failed> {
+        match (speed, self.guard) {
+            (Some(speed), Some(signal)) => {
+                let to_goal = format!("MOVE #{}", self.config.point_name);
+                self.run_guarded_once(signal, &[format!("SPEED {}", plain(speed)), to_goal])
+            }
+            _ => self.run(&format!("EXECUTE {RUN}")).map(drop),
         }
     }
 
-    fn store_guard(&mut self, signal: u16) -> Result<(), ArmError> {
-        self.store_program(HIT, &["HALT".to_owned()])?;
-        let steps = [
-            format!("REACTI {signal},{HIT}"),
-            format!("MOVE #{}", self.config.point_name),
-            "BREAK".to_owned(),
-        ];
-        self.store_program(RUN, &steps)
+    /// These steps, which move the arm to a place that does not depend on where it stands, under guard.
+    pub(super) fn run_guarded_once(&mut self, signal: u16, motion: &[String]) -> Result<(), Failed> {
+        self.store_program(ONCE, &guarded_steps(signal, motion))
+            .map_err(|error| Failed {
+                error,
+                maybe_done: false,
+            })?;
+        self.run(&format!("EXECUTE {ONCE}")).map(drop)
+    }
+
+    /// The arm stands after a motion: if that was under guard, whether the signal has come, even if it has gone again. Where the program may still
+    /// be running it is ended. Returns where the arm stands then.
+    pub(super) fn check_guard(&mut self, mut stands: Joints, doubtful: bool) -> Result<Joints, ArmError> {
+        let Some(signal) = self.guard else {
+            return Ok(stands);
+        };
+        if doubtful {
+            self.end_program().map_err(|error| self.lost(error))?;
+            stands = self.where_().map_err(|error| self.lost(error))?.joints;
+        }
+        if !self.truth(LATCH)? {
+            return Ok(stands);
+        }
+        self.guard = None;
+        Err(ArmError::ProximityStop {
+            port: self.wire.port(),
+            signal,
+            joints: stands,
+        })
     }
 
     /// Types a program into the controller's editor, replacing one of the same name, and compares it with what the controller lists.
@@ -70,9 +97,13 @@ impl<T: Transport> Val2Client<T> {
         let mut tries = 0;
         loop {
             match self.store_once(name, steps) {
-                Err(error) if is_doubt(&error) && tries < self.config.retries => {
-                    tries += 1;
+                Err(error) if is_doubt(&error) || matches!(error, ArmError::Refused { .. }) => {
+                    // Out of the editor in any case.
                     self.wire.settle(&self.config)?;
+                    if tries >= self.config.retries || !is_doubt(&error) {
+                        return Err(error);
+                    }
+                    tries += 1;
                 }
                 outcome => return outcome,
             }
@@ -80,48 +111,56 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn store_once(&mut self, name: &str, steps: &[String]) -> Result<(), ArmError> {
-        let patience = self.config.reply_timeout * 4;
-        let mut say = |line: &str| {
-            self.wire
-                .exchange(line, patience, &self.config)
-                .map_err(|failed| failed.error)
-        };
         // An old program of this name, if there is one; that there is none is no fault.
-        if say(&format!("DELETEP {name}"))?.ending == Ending::Question {
-            say("Y")?;
+        if self.say(&format!("DELETEP {name}"))?.ending == Ending::Question {
+            self.say("Y")?;
         }
-        let mut last = say(&format!("EDIT {name}"))?;
-        for step in steps {
-            last = say(step)?;
+        // Steps belong into the editor: at the monitor some of them would be carried out.
+        let edit = format!("EDIT {name}");
+        for line in std::iter::once(&edit).chain(steps) {
+            let reply = self.say(line)?;
+            self.without_message(line, &reply)
+                .map_err(|failed| failed.error)?;
+            if reply.ending != Ending::Question {
+                let heard = shortened(&reply.text);
+                return Err(self.wire.garbled(line, "the editor's prompt", &heard));
+            }
         }
-        if last.ending != Ending::Question {
-            let heard = shortened(&last.text);
-            return Err(self.wire.garbled(name, "the editor's prompt", &heard));
-        }
-        say("E")?;
-        let listed = say(&format!("LISTP {name}"))?.text.to_ascii_uppercase();
-        let all_there = steps.iter().all(|step| {
-            let step = step.to_ascii_uppercase();
-            listed
-                .split(['\r', '\n'])
-                .any(|line| line.trim_end().ends_with(&step))
-        });
-        if all_there {
+        self.say("E")?;
+        let listed = self.say(&format!("LISTP {name}"))?.text.to_ascii_uppercase();
+        if holds(&listed, steps) {
             return Ok(());
         }
         let heard = shortened(&listed);
         Err(self.wire.garbled(name, "a listing of what was typed", &heard))
     }
 
-    /// Runs a stored program to its end and returns what it printed. A program that asks for values is aborted.
+    fn say(&mut self, line: &str) -> Result<Reply, ArmError> {
+        self.wire
+            .exchange(line, self.config.patience(), &self.config)
+            .map_err(|failed| failed.error)
+    }
+
+    /// Runs a stored program to its end and returns what it printed. A program that asks for values gets none: it is aborted, at once if what it asks
+    /// ends with a question mark, else after `config.motion_timeout`.
     ///
     /// # Errors
-    /// What the line or the controller said, its messages in asterisks included; [`ArmError::Silence`] after `config.motion_timeout`, the program
-    /// aborted.
+    /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch what other programs do; what the line or the controller said, its
+    /// messages in asterisks included; [`ArmError::Silence`] after `config.motion_timeout`, the program aborted.
     pub fn execute(&mut self, program: &str) -> Result<String, ArmError> {
-        let line = format!("EXECUTE {program}");
+        self.refuse_under_guard("a program")?;
         self.last_known = None;
-        self.run(&line).map_err(|failed| failed.error)
+        self.wire.nudge = b"";
+        let outcome = self.run(&format!("EXECUTE {program}"));
+        self.wire.nudge = NUDGE;
+        match outcome {
+            Ok(text) => Ok(text),
+            Err(failed) if failed.maybe_done && is_doubt(&failed.error) => match self.end_program() {
+                Ok(()) => Err(failed.error),
+                Err(error) => Err(self.lost(error)),
+            },
+            Err(failed) => Err(failed.error),
+        }
     }
 
     /// Aborts the program that runs, if one does.
@@ -129,59 +168,76 @@ impl<T: Transport> Val2Client<T> {
     /// # Errors
     /// What the line said.
     pub fn abort(&mut self) -> Result<(), ArmError> {
+        self.last_known = None;
+        self.end_program()
+    }
+
+    fn end_program(&mut self) -> Result<(), ArmError> {
         let patience = self.config.motion_timeout;
-        match self.wire.exchange_to_end("ABORT", patience, &self.config) {
-            Ok(_) => Ok(()),
-            Err(failed) => Err(failed.error),
+        let mut tries = 0;
+        loop {
+            let error = match self.wire.exchange_to_end("ABORT", patience, &self.config) {
+                Ok(reply) if reply.ending == Ending::Idle => return Ok(()),
+                Ok(reply) => {
+                    let heard = shortened(&reply.text);
+                    self.wire.garbled("ABORT", "the idle monitor's prompt", &heard)
+                }
+                Err(failed) if is_doubt(&failed.error) => failed.error,
+                Err(failed) => return Err(failed.error),
+            };
+            if tries >= self.config.retries {
+                return Err(error);
+            }
+            tries += 1;
+            // A program that asks for values is left here.
+            self.wire.settle(&self.config)?;
         }
     }
 
-    pub(super) fn run(&mut self, line: &str) -> Result<String, super::Failed> {
+    /// Runs a program until it ends. One that asks for something leaves doubt.
+    fn run(&mut self, line: &str) -> Result<String, Failed> {
         let patience = self.config.motion_timeout;
-        let after = |error| super::Failed {
-            error,
-            maybe_done: true,
-        };
-        let reply = match self.wire.exchange_to_end(line, patience, &self.config) {
-            Err(failed) if failed.maybe_done && matches!(failed.error, ArmError::Silence { .. }) => {
-                self.abort().map_err(after)?;
-                return Err(failed);
-            }
-            reply => reply?,
-        };
+        let reply = self.wire.exchange_to_end(line, patience, &self.config)?;
         self.without_message(line, &reply)?;
         if reply.ending == Ending::Question {
-            self.abort().map_err(after)?;
             let heard = shortened(&reply.text);
-            return Err(after(self.wire.garbled(
-                line,
-                "a program that asks for nothing",
-                &heard,
-            )));
+            return Err(Failed {
+                error: self.wire.garbled(line, "a program that asks for nothing", &heard),
+                maybe_done: true,
+            });
         }
         Ok(reply.text)
     }
+}
 
-    /// A motion under guard of a program: the point is defined already.
-    pub(super) fn run_guarded(&mut self) -> Result<(), super::Failed> {
-        self.run(&format!("EXECUTE {RUN}")).map(drop)
-    }
+/// The steps of a program that moves the arm under guard. A signal that is on already lets it stand.
+fn guarded_steps(signal: u16, motion: &[String]) -> Vec<String> {
+    let before = [
+        format!("REACTI {signal},{HIT}"),
+        format!("IF SIG({signal}) THEN"),
+        format!("{LATCH} = -1"),
+        "ELSE".to_owned(),
+    ];
+    let after = ["BREAK".to_owned(), "END".to_owned()];
+    before.iter().chain(motion).chain(&after).cloned().collect()
+}
 
-    /// The arm stands short of its goal: whether that is the guard's doing.
-    pub(super) fn stopped_by_guard(&mut self, stands: Joints) -> Result<(), ArmError> {
-        let Some(Guard { signal, .. }) = self.guard else {
-            return Ok(());
-        };
-        if !self.signal(signal)? {
-            return Ok(());
-        }
-        self.guard = None;
-        Err(ArmError::ProximityStop {
-            port: self.wire.port(),
-            signal,
-            joints: stands,
+/// Whether a listing shows these steps, all of them, in their order, and no further one like them.
+fn holds(listing: &str, steps: &[String]) -> bool {
+    let steps: Vec<String> = steps.iter().map(|step| step.to_ascii_uppercase()).collect();
+    let shown: Vec<&str> = listing
+        .split(['\r', '\n'])
+        .map(str::trim)
+        // `.PROGRAM`, `.END` and prompts are not steps.
+        .filter(|line| {
+            !line.starts_with(['.', '*']) && steps.iter().any(|step| line.ends_with(step.as_str()))
         })
-    }
+        .collect();
+    shown.len() == steps.len()
+        && shown
+            .iter()
+            .zip(&steps)
+            .all(|(line, step)| line.ends_with(step.as_str()))
 }
 
 impl<T: Transport> ProximitySensor for Val2Client<T> {

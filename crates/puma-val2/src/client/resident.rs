@@ -1,25 +1,37 @@
 //! A program that stays in the controller and moves the arm as it is told: the fewest characters per move.
 
-use super::motion::{furthest, shown_values};
-use super::wire::{Failed, is_doubt};
+use super::motion::{AS_SENT, STILL, furthest};
+use super::point::shown_values;
+use super::wire::{Reply, is_doubt};
 use super::{Ending, Val2Client, degrees, plain, shortened};
 use crate::{ArmError, Gripper, JointDelta, Joints, Manipulator, Transport};
 
 /// Its name.
 const NAME: &str = "PGLOOP";
 
-/// It asks for a key and six angles. Only the key 7 moves the arm: an empty or damaged answer asks again.
+/// What it asks.
+pub(super) const QUESTION: &str = "GO? ";
+
+/// Keys of the program. A changed bit can make a carriage return of a character, and its line two: so what a line begins with after an angle
+/// (no angle is as large as these numbers) is no key, and a move ends with its key once more.
+const MOVE: &str = "7";
+const OPEN: &str = "508";
+const CLOSE: &str = "609";
+const WHERE: &str = "817";
+const END: &str = "914";
+
+/// It asks for a key, six angles and the key again. An empty, cut or damaged answer makes it ask anew.
 const STEPS: [&str; 17] = [
-    "10 PROMPT \"GO? \",PGK,PGA,PGB,PGC,PGD,PGE,PGF",
-    "IF PGK == 9 GOTO 20",
-    "IF PGK == 8 GOTO 15",
-    "IF PGK == 5 THEN",
+    "10 PROMPT \"GO? \",PGK,PGA,PGB,PGC,PGD,PGE,PGF,PGZ",
+    "IF PGK == 914 GOTO 20",
+    "IF PGK == 817 GOTO 15",
+    "IF PGK == 508 THEN",
     "OPENI",
     "END",
-    "IF PGK == 6 THEN",
+    "IF PGK == 609 THEN",
     "CLOSEI",
     "END",
-    "IF PGK <> 7 GOTO 10",
+    "IF PGK <> 7 OR PGZ <> 7 GOTO 10",
     "MOVE #PPOINT(PGA,PGB,PGC,PGD,PGE,PGF)",
     "BREAK",
     "15 HERE #PGN",
@@ -29,10 +41,19 @@ const STEPS: [&str; 17] = [
     "20 TYPE \"BYE\"",
 ];
 
+/// The line that ends the program.
+pub(super) const LEAVE: &[u8] = b"914\r";
+
 /// The arm through a program that runs in its controller. While this lives, the monitor is not used.
 ///
-/// A move is one short line and its answer, the joint angles reached. Angles are absolute, so that a move can be commanded again after doubt. The
+/// The controller must know `#PPOINT`. A move is one short line and its answer, the joint angles reached. Angles are absolute, so that a move can be commanded again after doubt. The
 /// program ends with [`Resident::end`] or when this is dropped.
+///
+/// One line shows the angles once, and nothing else with it that would betray a changed digit. They are believed when they are those that the arm was
+/// sent to; otherwise the program is asked until it shows the same twice in a row.
+///
+/// A motion that the controller refuses ends the program, and so does a restart or a line that is lost in mid-move. Every further call is then an
+/// [`ArmError::Setting`]; [`Val2Client::last_known`] says where the arm stands if it could still be asked.
 #[derive(Debug)]
 pub struct Resident<'a, T: Transport> {
     client: &'a mut Val2Client<T>,
@@ -55,24 +76,21 @@ impl<T: Transport> Val2Client<T> {
         }
         self.store_program(NAME, &STEPS.map(str::to_owned))?;
         let line = format!("EXECUTE {NAME}");
-        let timeout = self.config.reply_timeout * 4;
+        let timeout = self.config.patience();
         let reply = self
             .wire
             .exchange_to_end(&line, timeout, &self.config)
             .map_err(|f| f.error)?;
         self.without_message(&line, &reply).map_err(|f| f.error)?;
+        if reply.ending != Ending::Question {
+            let heard = shortened(&reply.text);
+            return Err(self.wire.garbled(&line, "the program's question", &heard));
+        }
         let mut resident = Resident {
             client: self,
-            ended: reply.ending != Ending::Question,
+            ended: false,
         };
-        if resident.ended {
-            return Err(resident.client.wire.garbled(
-                &line,
-                "the program's question",
-                &shortened(&reply.text),
-            ));
-        }
-        resident.ask("8")?;
+        resident.joints()?;
         Ok(resident)
     }
 }
@@ -102,70 +120,127 @@ impl<T: Transport> Resident<'_, T> {
         }
         let wire = &mut self.client.wire;
         let config = &self.client.config;
-        let patience = config.reply_timeout * 4;
         let mut ending = Ending::Question;
         for _ in 0..=config.retries {
-            ending = match wire.exchange_to_end("9", patience, config) {
+            ending = match wire.exchange_to_end(END, config.patience(), config) {
                 Ok(reply) => reply.ending,
-                Err(failed) if is_doubt(&failed.error) => wire.spoil(config)?,
+                Err(failed) if is_doubt(&failed.error) => wire.spoil(config)?.ending,
                 Err(failed) => return Err(failed.error),
             };
             if ending == Ending::Idle {
                 return Ok(());
             }
         }
-        Err(wire.garbled("9", "the monitor's prompt", &format!("{ending:?}")))
+        Err(wire.garbled(END, "the monitor's prompt", &format!("{ending:?}")))
     }
 
-    /// Gives the program a line and reads the joint angles that it shows, again after doubt: nothing in a line is relative.
-    fn ask(&mut self, answer: &str) -> Result<Joints, ArmError> {
+    fn check_alive(&self) -> Result<(), ArmError> {
+        if !self.ended {
+            return Ok(());
+        }
+        Err(ArmError::Setting {
+            what: "a resident program",
+            value: "used after it has ended".into(),
+            allowed: "start another one",
+        })
+    }
+
+    /// Gives the program a line until it has answered with its question again, and returns what it said before. Nothing in a line is relative.
+    fn give(&mut self, answer: &str) -> Result<Reply, ArmError> {
+        self.check_alive()?;
         let mut tries = 0;
         loop {
-            match self.ask_once(answer) {
-                Ok(joints) => {
-                    self.client.last_known = Some(joints);
-                    return Ok(joints);
-                }
-                Err(failed) if is_doubt(&failed.error) && tries < self.client.config.retries => {
-                    tries += 1;
-                    match self.client.wire.spoil(&self.client.config) {
-                        Ok(Ending::Question) => {}
-                        Ok(_) => {
-                            self.ended = true;
-                            return Err(failed.error);
+            let client = &mut *self.client;
+            let timeout = client.config.motion_timeout;
+            let failed = match client.wire.exchange_to_end(answer, timeout, &client.config) {
+                Ok(reply) if reply.ending == Ending::Question => return Ok(reply),
+                Ok(reply) => {
+                    // A refused motion ends the program.
+                    let error = match client.without_message(answer, &reply) {
+                        Err(failed) => failed.error,
+                        Ok(()) => {
+                            let heard = shortened(&reply.text);
+                            client.wire.garbled(answer, "the program's question", &heard)
                         }
-                        Err(error) => return Err(self.lost(error)),
-                    }
+                    };
+                    return Err(self.over(error));
                 }
-                Err(failed) if failed.maybe_done => return Err(self.lost(failed.error)),
-                Err(failed) => return Err(failed.error),
+                Err(failed) => failed,
+            };
+            if !is_doubt(&failed.error) {
+                return Err(if failed.maybe_done || self.client.wire.restarted {
+                    self.lost(failed.error)
+                } else {
+                    failed.error
+                });
+            }
+            // Also before giving up: what comes next must find the program asking.
+            match self.regain() {
+                Ok(Ending::Question) if tries < self.client.config.retries => tries += 1,
+                Ok(Ending::Question) => return Err(failed.error),
+                Ok(_) => return Err(self.over(failed.error)),
+                Err(error) => return Err(self.lost(error)),
             }
         }
     }
 
-    fn ask_once(&mut self, answer: &str) -> Result<Joints, Failed> {
+    /// Waits until the program asks again, or is no more.
+    fn regain(&mut self) -> Result<Ending, ArmError> {
         let client = &mut *self.client;
-        let reply = client
+        let until = client
             .wire
-            .exchange_to_end(answer, client.config.motion_timeout, &client.config)?;
-        if reply.ending != Ending::Question {
-            // A refused motion ends the program.
-            self.ended = true;
-            client.without_message(answer, &reply)?;
+            .line
+            .clock()
+            .saturating_add(client.config.motion_timeout);
+        let mut ending = client.wire.spoil(&client.config)?.ending;
+        while ending == Ending::Running {
+            let left = until.saturating_sub(client.wire.line.clock());
+            ending = client
+                .wire
+                .read_reply("an empty line", left, &client.config)?
+                .ending;
         }
-        let shown = reply
-            .text
-            .split(['\r', '\n'])
-            .filter_map(shown_values)
-            .next_back();
-        match shown {
-            Some(values) => Ok(Joints::from_degrees(values.map(|(value, _)| value))),
-            None => Err(Failed {
-                error: client
-                    .wire
-                    .garbled(answer, "six joint angles", &shortened(&reply.text)),
-                maybe_done: true,
-            }),
+        Ok(ending)
+    }
+
+    /// Gives the program a line and reads the joint angles that it shows, once.
+    fn ask(&mut self, answer: &str) -> Result<Joints, ArmError> {
+        let mut heard = String::new();
+        for _ in 0..=self.client.config.retries {
+            let reply = self.give(answer)?;
+            let shown = reply
+                .text
+                .split(['\r', '\n'])
+                .filter_map(shown_values)
+                .next_back();
+            if let Some(values) = shown {
+                return Ok(Joints::from_degrees(values.map(|(value, _)| value)));
+            }
+            heard = shortened(&reply.text);
+        }
+        Err(self.client.wire.garbled(answer, "six joint angles", &heard))
+    }
+
+    /// Where the arm stands: what the program shows twice in a row. The arm moves only while a line that says so is answered.
+    fn stands(&mut self, mut before: Option<Joints>) -> Result<Joints, ArmError> {
+        for _ in 0..self.client.config.retries.saturating_add(3) {
+            let joints = self.ask(WHERE)?;
+            if before.is_some_and(|before| furthest(&before, &joints).1 < STILL) {
+                return Ok(joints);
+            }
+            before = Some(joints);
+        }
+        let expected = "the same joint angles twice in a row";
+        let heard = before.map(|joints| joints.to_string()).unwrap_or_default();
+        Err(self.client.wire.garbled(WHERE, expected, &heard))
+    }
+
+    /// The program has ended, the monitor has its prompt: it can say where the arm stands.
+    fn over(&mut self, error: ArmError) -> ArmError {
+        self.ended = true;
+        match self.client.stand_anywhere() {
+            Ok(_) => error,
+            Err(_) => self.client.lost(error),
         }
     }
 
@@ -175,79 +250,75 @@ impl<T: Transport> Resident<'_, T> {
     }
 
     fn go(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let client = &mut *self.client;
-        client.config.params.check(&target)?;
         let values = target.degrees().map(plain).join(",");
-        let answer = format!("7,{}", values.trim_end_matches(",0"));
-        let mut reached = self.ask(&answer)?;
-        let is_off = |joints: &Joints, tolerance| furthest(joints, &target).1 > tolerance;
-        let tolerance = self.client.config.tolerance;
-        if is_off(&reached, tolerance) {
-            // A digit may have changed on its way back.
-            reached = self.ask("8")?;
+        let shown = self.ask(&format!("{MOVE},{values},{MOVE}"))?;
+        if furthest(&shown, &target).1 <= AS_SENT {
+            return Ok(shown);
         }
-        if is_off(&reached, tolerance) {
-            let (joint, _) = furthest(&reached, &target);
-            return Err(ArmError::NotReached {
-                port: self.client.wire.port(),
-                joint,
-                wanted_degrees: degrees(&target, joint),
-                reported_degrees: degrees(&reached, joint),
-            });
+        let reached = self.stands(Some(shown))?;
+        let (joint, off) = furthest(&reached, &target);
+        if off <= self.client.config.tolerance {
+            return Ok(reached);
         }
-        Ok(reached)
+        // Where it stands is certain, if not where it should.
+        self.client.last_known = Some(reached);
+        Err(ArmError::NotReached {
+            port: self.client.wire.port(),
+            joint,
+            wanted_degrees: degrees(&target, joint),
+            reported_degrees: degrees(&reached, joint),
+        })
+    }
+
+    /// Keeps where the arm is known to stand after a call that may have moved it.
+    fn kept(&mut self, call: impl FnOnce(&mut Self) -> Result<Joints, ArmError>) -> Result<Joints, ArmError> {
+        self.check_alive()?;
+        let before = self.client.last_known.take();
+        match call(self) {
+            Ok(joints) => {
+                self.client.last_known = Some(joints);
+                Ok(joints)
+            }
+            Err(ArmError::Unconfirmed { port, cause, .. }) => Err(ArmError::Unconfirmed {
+                port,
+                last_known: before,
+                cause,
+            }),
+            Err(error) => Err(error),
+        }
     }
 }
 
 impl<T: Transport> Manipulator for Resident<'_, T> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        self.ask("8")
+        self.kept(|resident| resident.stands(None))
     }
 
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
-        let start = match self.client.last_known {
+        let start = match self.client.last_known() {
             Some(joints) => joints,
-            None => self.ask("8")?,
+            None => self.joints()?,
         };
-        self.go(start + delta)
+        self.move_to(start + delta)
     }
 
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        self.go(target)
+        self.client.config.params.check(&target)?;
+        self.kept(|resident| resident.go(target))
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         // The keys of the hand show nothing; the question after them is the answer.
-        let key = match gripper {
-            Gripper::Open => "5",
-            Gripper::Closed => "6",
-        };
-        let client = &mut *self.client;
-        let mut tries = 0;
-        loop {
-            match client
-                .wire
-                .exchange_to_end(key, client.config.motion_timeout, &client.config)
-            {
-                Ok(reply) if reply.ending == Ending::Question => return Ok(()),
-                Ok(reply) => {
-                    self.ended = true;
-                    return Err(client
-                        .wire
-                        .garbled(key, "the program's question", &shortened(&reply.text)));
-                }
-                Err(failed) if is_doubt(&failed.error) && tries < client.config.retries => {
-                    tries += 1;
-                    client.wire.spoil(&client.config)?;
-                }
-                Err(failed) => return Err(failed.error),
-            }
-        }
+        self.give(match gripper {
+            Gripper::Open => OPEN,
+            Gripper::Closed => CLOSE,
+        })
+        .map(drop)
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {
         self.ended = true;
-        self.client.abort().and(self.client.panic_stop())
+        self.client.panic_stop().and(self.client.abort())
     }
 }
 

@@ -46,7 +46,13 @@ pub(super) fn is_doubt(error: &ArmError) -> bool {
 pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
 
 /// Asks for the prompt.
-const NUDGE: &[u8] = b"\x11\r";
+pub(super) const NUDGE: &[u8] = b"\x11\r";
+
+/// Cancels a dialogue, where control characters are known.
+const CANCEL: &[u8] = b"\x03";
+
+/// Most characters that mean nothing (NUL, bell) that an echo may be strewn with.
+const FILLERS: usize = 256;
 
 #[derive(Debug)]
 pub(super) struct Wire<T> {
@@ -55,9 +61,26 @@ pub(super) struct Wire<T> {
     pub(super) echo: Option<bool>,
     /// Messages that came without having been asked for.
     pub(super) notices: Vec<String>,
+    /// Whether a line has been begun at the other end that was neither ended nor deleted.
+    pub(super) half_typed: bool,
+    /// What a reply that does not come is asked for with. A program of somebody else's may take an empty line for an answer.
+    pub(super) nudge: &'static [u8],
+    /// Whether the start-up dialogue has been met since the monitor was last reached.
+    pub(super) restarted: bool,
 }
 
 impl<T: Transport> Wire<T> {
+    pub(super) fn new(line: T) -> Self {
+        Self {
+            line,
+            echo: None,
+            notices: Vec::new(),
+            half_typed: false,
+            nudge: NUDGE,
+            restarted: false,
+        }
+    }
+
     pub(super) fn port(&self) -> String {
         self.line.name().to_owned()
     }
@@ -94,6 +117,15 @@ impl<T: Transport> Wire<T> {
         ReplyReader::new(config.reply_limit.max(256), config.idle_prompt, config.run_prompt)
     }
 
+    /// The controller asks its start-up questions in mid-session.
+    fn restart(&mut self, text: &str) -> ArmError {
+        self.restarted = true;
+        ArmError::Restarted {
+            port: self.port(),
+            heard: shortened(text),
+        }
+    }
+
     /// Types `line` at a prompt or question, ends it and reads the reply, waiting up to `timeout` for it.
     pub(super) fn exchange(
         &mut self,
@@ -102,14 +134,18 @@ impl<T: Transport> Wire<T> {
         config: &ClientConfig,
     ) -> Result<Reply, Failed> {
         self.take_unasked(config).map_err(Failed::before)?;
+        if self.half_typed {
+            // Left by a call that failed: what is typed now must not be added to it.
+            self.spoil(config).map_err(Failed::before)?;
+        }
         let mut tries = 0;
         loop {
             match self.type_text(line, config) {
                 Ok(()) => break,
                 Err(error) if is_doubt(&error) && tries < config.retries => {
                     tries += 1;
-                    let ending = self.spoil(config).map_err(Failed::before)?;
-                    if ending == Ending::Question {
+                    let reply = self.spoil(config).map_err(Failed::before)?;
+                    if reply.ending == Ending::Question {
                         // The dialogue that the line belongs to has to begin again.
                         return Err(Failed::before(error));
                     }
@@ -118,12 +154,10 @@ impl<T: Transport> Wire<T> {
             }
         }
         self.send(b"\r", line).map_err(Failed::after)?;
+        self.half_typed = false;
         let reply = self.read_reply(line, timeout, config).map_err(Failed::after)?;
         if reply.ending == Ending::Question && is_boot_question(&reply.text) {
-            return Err(Failed::after(ArmError::Restarted {
-                port: self.port(),
-                heard: shortened(&reply.text),
-            }));
+            return Err(Failed::after(self.restart(&reply.text)));
         }
         Ok(reply)
     }
@@ -139,10 +173,7 @@ impl<T: Transport> Wire<T> {
             }
         }
         if reader.ending() == Some(Ending::Question) && is_boot_question(reader.text()) {
-            return Err(ArmError::Restarted {
-                port: self.port(),
-                heard: shortened(reader.text()),
-            });
+            return Err(self.restart(reader.text()));
         }
         self.notice(reader.text());
         Ok(())
@@ -156,22 +187,32 @@ impl<T: Transport> Wire<T> {
 
     /// Sends the text and, where there is an echo, waits until it has come back unchanged. The line is not ended.
     fn type_text(&mut self, text: &str, config: &ClientConfig) -> Result<(), ArmError> {
+        self.half_typed = true;
         self.send(text.as_bytes(), text)?;
         if self.echo != Some(true) || !config.check_echo {
             return Ok(());
         }
+        let patience = config.patience().saturating_mul(1 + text.len() as u32 / 16);
+        let until = self.line.clock().saturating_add(patience);
         let mut heard = Vec::new();
+        let mut fillers = 0;
         while heard.len() < text.len() {
-            match self.receive(config.reply_timeout, text)? {
-                Some(bytes) => heard.extend(bytes.into_iter().filter(|b| !matches!(b, 0 | 0x07))),
-                None => break,
+            let Some(bytes) = self.receive(config.reply_timeout, text)? else {
+                break;
+            };
+            let count = bytes.len();
+            let before = heard.len();
+            heard.extend(bytes.into_iter().filter(|b| !matches!(b, 0 | 0x07)));
+            fillers += count - (heard.len() - before);
+            if fillers > FILLERS || self.line.clock() >= until {
+                break;
             }
         }
         if heard.eq_ignore_ascii_case(text.as_bytes()) {
             return Ok(());
         }
         let heard_text = shortened(&String::from_utf8_lossy(&heard));
-        if heard.len() < text.len() {
+        if heard.len() < text.len() && fillers <= FILLERS {
             return Err(self.silence(text, "its echo", &heard_text, config.reply_timeout));
         }
         Err(self.garbled(text, "its echo", &heard_text))
@@ -180,7 +221,7 @@ impl<T: Transport> Wire<T> {
     /// Reads until a prompt or question is followed by silence.
     ///
     /// When nothing comes for `config.reply_timeout` an empty line is sent: if only the prompt was lost this brings it back, and if the controller
-    /// is still busy it is answered later.
+    /// is still busy it is answered later. A line that says more than a reply may be long, or something all the time, is given up.
     pub(super) fn read_reply(
         &mut self,
         sent: &str,
@@ -188,8 +229,9 @@ impl<T: Transport> Wire<T> {
         config: &ClientConfig,
     ) -> Result<Reply, ArmError> {
         let mut reader = Self::reader(config);
-        let begun = self.line.clock();
-        let until = begun.saturating_add(timeout);
+        let until = self.line.clock().saturating_add(timeout);
+        let at_the_latest = until.saturating_add(config.reply_timeout.max(config.quiet.saturating_mul(4)));
+        let mut taken = 0;
         loop {
             let ending = reader.ending();
             let left = until.saturating_sub(self.line.clock());
@@ -199,10 +241,11 @@ impl<T: Transport> Wire<T> {
             };
             if let Some(bytes) = self.receive(wait, sent)? {
                 reader.push(&bytes);
-                if reader.overflowed() {
+                taken += bytes.len();
+                if reader.overflowed() || taken > config.reply_limit.max(256) {
                     return Err(self.garbled(sent, "a reply of bounded length", &shortened(reader.text())));
                 }
-                if left.is_zero() && ending.is_none() {
+                if left.is_zero() && ending.is_none() || self.line.clock() >= at_the_latest {
                     return Err(self.garbled(sent, "a reply that ends", &shortened(reader.text())));
                 }
                 continue;
@@ -217,7 +260,9 @@ impl<T: Transport> Wire<T> {
                 let expected = format!("the prompt `{}`", config.idle_prompt);
                 return Err(self.silence(sent, &expected, &shortened(reader.text()), timeout));
             }
-            self.send(NUDGE, sent)?;
+            if !self.nudge.is_empty() {
+                self.send(self.nudge, sent)?;
+            }
         }
     }
 
@@ -230,46 +275,65 @@ impl<T: Transport> Wire<T> {
     ) -> Result<Reply, Failed> {
         let until = self.line.clock().saturating_add(timeout);
         let mut reply = self.exchange(line, timeout, config)?;
-        while reply.ending == Ending::Running && reply.text.len() <= config.reply_limit {
+        while reply.ending == Ending::Running {
             let left = until.saturating_sub(self.line.clock());
             let more = self.read_reply(line, left, config).map_err(Failed::after)?;
             reply.text.push_str(&more.text);
             reply.ending = more.ending;
+            if reply.text.len() > config.reply_limit {
+                let heard = shortened(&reply.text);
+                return Err(Failed::after(self.garbled(
+                    line,
+                    "output of bounded length",
+                    &heard,
+                )));
+            }
         }
         Ok(reply)
     }
 
     /// Makes a half-typed line harmless and reads what the controller says to it.
-    pub(super) fn spoil(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
-        while self.receive(config.quiet, "clearing the line")?.is_some() {}
-        self.send(SPOIL, "clearing the line")?;
-        let reply = self.read_reply("an empty line", config.reply_timeout * 4, config)?;
-        if reply.ending == Ending::Question && is_boot_question(&reply.text) {
-            return Err(ArmError::Restarted {
-                port: self.port(),
-                heard: shortened(&reply.text),
-            });
+    pub(super) fn spoil(&mut self, config: &ClientConfig) -> Result<Reply, ArmError> {
+        let doing = "clearing the line";
+        let patience = config.patience();
+        let until = self.line.clock().saturating_add(patience);
+        let mut reader = Self::reader(config);
+        let mut taken = 0;
+        while let Some(bytes) = self.receive(config.quiet, doing)? {
+            reader.push(&bytes);
+            taken += bytes.len();
+            if taken > config.reply_limit.max(256).saturating_mul(2) || self.line.clock() >= until {
+                return Err(self.garbled("an empty line", "silence", &shortened(reader.text())));
+            }
         }
-        Ok(reply.ending)
+        self.send(SPOIL, doing)?;
+        let reply = self.read_reply("an empty line", patience, config)?;
+        self.half_typed = false;
+        if reply.ending == Ending::Question && is_boot_question(&reply.text) {
+            return Err(self.restart(&reply.text));
+        }
+        Ok(reply)
     }
 
     /// Gets back to the monitor's prompt from whatever dialogue the line is in, saying no to everything.
     pub(super) fn settle(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
-        let mut ending = self.spoil(config)?;
-        for _ in 0..4 {
-            if ending != Ending::Question {
-                return Ok(ending);
+        let patience = config.patience();
+        let mut reply = self.spoil(config)?;
+        for attempt in 0..8 {
+            if reply.ending != Ending::Question {
+                return Ok(reply.ending);
             }
-            self.send(b"\r", "leaving a dialogue")?;
-            let reply = self.read_reply("an empty line", config.reply_timeout * 4, config)?;
-            ending = reply.ending;
-            if ending != Ending::Question {
-                return Ok(ending);
-            }
-            let answer = refusal(&reply.text);
+            let answer = way_out(&reply.text, attempt);
             self.send(answer, "leaving a dialogue")?;
-            let reply = self.read_reply("a refusal", config.reply_timeout * 4, config)?;
-            ending = reply.ending;
+            reply = self.read_reply("a refusal", patience, config)?;
+            if answer == CANCEL && reply.ending == Ending::Running {
+                // The program that asked would wait for ever.
+                self.send(b"ABORT\r", "leaving a dialogue")?;
+                reply = self.read_reply("ABORT", patience, config)?;
+            }
+            if reply.ending == Ending::Question && is_boot_question(&reply.text) {
+                return Err(self.restart(&reply.text));
+            }
         }
         Err(self.garbled(
             "an empty line",
@@ -304,20 +368,26 @@ pub(super) fn is_boot_question(text: &str) -> bool {
     question.contains("(Y/N)") && (question.contains("LOAD") || question.contains("INIT"))
 }
 
-/// The line that a dialogue of any kind is left with.
-pub(super) fn refusal(text: &str) -> &'static [u8] {
+/// What leaves a dialogue, tried in turn.
+///
+/// An empty line ends those that ask for changes or for yes and no. It is not the first thing that an unknown question is answered with: a program
+/// that asks for numbers would take it for zeros and go on with them.
+pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     let question = last_line(text).to_ascii_uppercase();
     let words = question.trim_end_matches(['?', ' ']);
-    if words.trim_end_matches('.').trim().parse::<u32>().is_ok() {
-        b"E\r"
-    } else if question.starts_with("GO?") {
-        // Our own resident program.
-        b"9\r"
-    } else if question.contains("Y/N") {
-        b"N\r"
+    let of_editor = words.trim_end_matches('.').trim().parse::<u32>().is_ok();
+    let yes_or_no = question.contains("Y/N");
+    let first = attempt.is_multiple_of(2);
+    if question.starts_with(super::resident::QUESTION.trim_end()) {
+        super::resident::LEAVE
+    } else if of_editor {
+        if first { b"\r" } else { b"E\r" }
+    } else if yes_or_no {
+        if first { b"\r" } else { b"N\r" }
+    } else if first != question.contains("CHANGE") {
+        CANCEL
     } else {
-        // An empty line has been tried.
-        b"\x03\r"
+        b"\r"
     }
 }
 

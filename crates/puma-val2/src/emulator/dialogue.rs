@@ -5,6 +5,7 @@ use super::expr::Variable;
 use super::job::Job;
 use super::lexer::{Cursor, Token, tokens};
 use super::place::Place;
+use super::terminal::Line;
 use super::{Emulator, Event, Fault, Message, display};
 use crate::Joints;
 
@@ -85,6 +86,7 @@ impl Emulator {
         match self.profile.boot.get(question) {
             Some(asked) => {
                 let text = asked.text.clone();
+                self.terminal.resume();
                 self.mode = Mode::Boot(question);
                 self.print(&text);
             }
@@ -139,12 +141,17 @@ impl Emulator {
     }
 
     /// Works on a line.
-    pub(super) fn line(&mut self, line: &str) {
+    pub(super) fn line(&mut self, line: &Line) {
         self.sense();
         for _ in 0..self.profile.blank_lines.min(8) {
             self.print(self.profile.eol);
         }
-        match std::mem::replace(&mut self.mode, Mode::Monitor) {
+        let mode = std::mem::replace(&mut self.mode, Mode::Monitor);
+        if line.too_long {
+            return self.line_too_long(mode);
+        }
+        let line = line.text.as_str();
+        match mode {
             Mode::Boot(question) => self.answer_boot(question, line),
             Mode::Monitor => self.command(line),
             Mode::Confirm(confirm) => self.answer_confirm(confirm, line),
@@ -153,6 +160,26 @@ impl Emulator {
             Mode::Answer(variables) => self.answer_prompt(variables, line),
             Mode::Busy => self.mode = Mode::Busy,
         }
+    }
+
+    /// A line of which the end is missing is not worked on: its beginning may mean something else.
+    fn line_too_long(&mut self, mode: Mode) {
+        self.refuse(Message::LineTooLong.into());
+        match mode {
+            Mode::Boot(question) => self.boot(question),
+            Mode::Monitor => self.prompt(),
+            Mode::Confirm(confirm) => self.ask(confirm),
+            Mode::Change { key, place } => self.ask_change(key, place),
+            Mode::Editor(editing) => self.editor_prompt(editing),
+            Mode::Answer(variables) => self.ask_again(variables),
+            Mode::Busy => self.mode = Mode::Busy,
+        }
+    }
+
+    fn ask_again(&mut self, variables: Vec<Variable>) {
+        self.mode = Mode::Answer(variables);
+        self.terminal.resume();
+        self.print("? ");
     }
 
     fn answer_boot(&mut self, question: usize, line: &str) {
@@ -174,6 +201,7 @@ impl Emulator {
 
     pub(super) fn ask(&mut self, confirm: Confirm) {
         let text = format!("{} (Y/N)? ", self.profile.text(Message::AreYouSure));
+        self.terminal.resume();
         self.terminal.fresh_line(&self.profile, self.now);
         self.print(&text);
         self.mode = Mode::Confirm(confirm);
@@ -195,14 +223,21 @@ impl Emulator {
         match confirm {
             Confirm::Calibrate => return self.calibrate(),
             Confirm::Zero => self.forget_everything(),
-            Confirm::Format => self.floppy.clear(),
+            Confirm::Format => {
+                for name in std::mem::take(&mut self.floppy).into_keys() {
+                    self.note(Event::FileDeleted(name));
+                }
+            }
             Confirm::Delete(names) => {
                 for (kind, name) in names {
                     match kind {
                         Kind::Program => drop(self.memory.programs.remove(&name)),
                         Kind::Place => drop(self.memory.places.remove(&name)),
                         Kind::Real => drop(self.memory.reals.remove(&name)),
-                        Kind::File => drop(self.floppy.remove(&name)),
+                        Kind::File => {
+                            self.floppy.remove(&name);
+                            self.note(Event::FileDeleted(name));
+                        }
                     }
                 }
             }
@@ -221,6 +256,7 @@ impl Emulator {
         let heading = display::place_heading(&self.profile);
         let values = display::place_values(&place, &self.profile);
         let question = self.profile.change_text.clone();
+        self.terminal.resume();
         self.print_line(&heading);
         self.print_line(&values);
         self.print_line(&question);
@@ -262,8 +298,7 @@ impl Emulator {
             }
             Err(fault) => {
                 self.refuse(fault);
-                self.mode = Mode::Answer(variables);
-                self.print("? ");
+                self.ask_again(variables);
             }
         }
     }

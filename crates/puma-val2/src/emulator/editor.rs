@@ -58,7 +58,8 @@ impl Emulator {
         Ok(())
     }
 
-    fn editor_prompt(&mut self, editing: Editing) {
+    pub(super) fn editor_prompt(&mut self, editing: Editing) {
+        self.terminal.resume();
         if let Some(step) = editing.program.steps.get(editing.at)
             && !editing.inserting
         {

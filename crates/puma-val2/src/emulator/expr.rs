@@ -147,7 +147,7 @@ impl Expr {
             if binds < loosest {
                 break;
             }
-            cursor.next();
+            cursor.operator()?;
             let right = Self::parse_from(cursor, binds + 1)?;
             left = Self::Binary(operator, Box::new(left), Box::new(right));
         }

@@ -164,7 +164,17 @@ fn parsed(text: &str, mut memory: Memory, profile: &Profile) -> Result<Memory, T
     }
 }
 
+/// Longest line that is no step of a program; six numbers with names need less.
+const DATA_LINE: usize = 512;
+
 fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &Profile) -> Result<(), Fault> {
+    let limit = match section {
+        Section::Program(..) => profile.max_line,
+        _ => DATA_LINE,
+    };
+    if line.len() > limit {
+        return Err(Message::LineTooLong.into());
+    }
     let upper = line.to_ascii_uppercase();
     let words: Vec<&str> = upper.split_whitespace().collect();
     match section {
@@ -192,7 +202,7 @@ fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &P
             let [name, values] = words[..] else {
                 return Err(Message::InvalidArgument.into());
             };
-            let values: Vec<f64> = values.split(',').filter_map(|v| v.parse().ok()).collect();
+            let values: Vec<f64> = values.split(',').map(number).collect::<Result<_, _>>()?;
             let values: [f64; 6] = values.try_into().map_err(|_| Message::InvalidArgument)?;
             let (place, plain) = match name.strip_prefix('#') {
                 Some(plain) => (Place::PrecisionPoint(Joints::from_degrees(values)), plain),
@@ -205,14 +215,22 @@ fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &P
             let [name, value] = words[..] else {
                 return Err(Message::InvalidArgument.into());
             };
-            let value: f64 = value.parse().map_err(|_| Message::InvalidArgument)?;
-            if !value.is_finite() {
-                return Err(Message::InvalidArgument.into());
-            }
+            let value = number(value)?;
             memory.set_real(sound_name(name, profile)?, value, profile)?;
         }
     }
     Ok(())
+}
+
+/// A number as it is written into files: no words for what is none.
+fn number(text: &str) -> Result<f64, Fault> {
+    let plain = text
+        .bytes()
+        .all(|b| b.is_ascii_digit() || b"+-.E".contains(&b.to_ascii_uppercase()));
+    let value = plain.then(|| text.parse::<f64>().ok()).flatten();
+    value
+        .filter(|v| v.is_finite())
+        .ok_or(Message::InvalidArgument.into())
 }
 
 /// A name as it is kept, possibly with an index.

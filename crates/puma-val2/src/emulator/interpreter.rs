@@ -283,6 +283,7 @@ impl Emulator {
     }
 
     fn ask_values(&mut self, text: &str, variables: Vec<Variable>) -> Flow {
+        self.terminal.resume();
         self.terminal.fresh_line(&self.profile, self.now);
         self.print(text);
         self.mode = Mode::Answer(variables);

@@ -69,11 +69,22 @@ pub(super) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
 pub(super) struct Cursor<'a> {
     tokens: &'a [Token],
     depth: usize,
+    operators: usize,
 }
+
+/// Deepest nesting of brackets, signs and indices. No line of sense reaches it.
+const DEPTH: usize = 24;
+
+/// Most operators of a line. A chain of them is as deep as it is long.
+const OPERATORS: usize = 128;
 
 impl<'a> Cursor<'a> {
     pub(super) fn new(tokens: &'a [Token]) -> Self {
-        Self { tokens, depth: 0 }
+        Self {
+            tokens,
+            depth: 0,
+            operators: 0,
+        }
     }
 
     pub(super) fn peek(&self) -> Option<&'a Token> {
@@ -143,10 +154,20 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Goes one bracket deeper, up to a bound that no line of sense reaches.
+    /// Goes one bracket deeper.
     pub(super) fn descend(&mut self) -> Result<(), Fault> {
         self.depth += 1;
-        if self.depth > 24 {
+        if self.depth > DEPTH {
+            return Err(Message::InvalidArgument.into());
+        }
+        Ok(())
+    }
+
+    /// Takes an operator, which makes what is parsed one deeper.
+    pub(super) fn operator(&mut self) -> Result<(), Fault> {
+        self.next();
+        self.operators += 1;
+        if self.operators > OPERATORS {
             return Err(Message::InvalidArgument.into());
         }
         Ok(())

@@ -18,6 +18,8 @@ pub enum Message {
     InvalidArgument,
     /// An abbreviation that more than one word answers to.
     AmbiguousName,
+    /// A line longer than the controller's line buffer.
+    LineTooLong,
     /// A name longer than the controller keeps.
     NameTooLong,
     /// A location or variable that has no value.
@@ -73,6 +75,7 @@ impl Message {
             Self::UnknownInstruction => "Unknown instruction",
             Self::InvalidArgument => "Invalid argument",
             Self::AmbiguousName => "Ambiguous name",
+            Self::LineTooLong => "Line too long",
             Self::NameTooLong => "Name too long",
             Self::UndefinedValue => "Undefined value",
             Self::UndefinedProgram => "Undefined program",

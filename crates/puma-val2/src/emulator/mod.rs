@@ -76,6 +76,8 @@ pub enum Event {
     ProgramEnded(Message),
     /// A file was written to the floppy disk.
     FileStored(String),
+    /// A file was deleted from the floppy disk.
+    FileDeleted(String),
     /// A character was lost because the input buffer was full.
     CharacterLost,
 }

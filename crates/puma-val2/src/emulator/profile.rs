@@ -86,7 +86,8 @@ pub struct Profile {
     pub messages: BTreeMap<Message, String>,
     /// Longest name of a program, location or variable (default: 15).
     pub max_name: usize,
-    /// Longest line that can be typed (default: 128); further characters are refused with a bell.
+    /// Longest line (default: 128). Further characters are refused with a bell and the line with a message, for its beginning alone may mean something
+    /// else; a program's step in a file cannot be longer either.
     pub max_line: usize,
     /// Most entries of each kind (programs, locations, variables) and most steps of a program (default: 1000).
     pub max_entries: usize,
@@ -94,7 +95,8 @@ pub struct Profile {
     pub char_time: Option<Duration>,
     /// Time the monitor takes to digest a line (default: 0). Characters that arrive meanwhile wait in `input_buffer`.
     pub line_time: Duration,
-    /// Characters that can wait while the monitor is busy (default: 256); further ones are lost.
+    /// Characters that can wait behind a line that the monitor has not come to (default: 256), those lines and their ends counted; further ones are
+    /// lost.
     pub input_buffer: usize,
     /// Time one program step takes (default: 2 ms), at least 0.1 ms.
     pub step_time: Duration,

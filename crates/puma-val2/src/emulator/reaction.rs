@@ -34,9 +34,17 @@ impl Emulator {
         }
         let Some(name) = reaction.program else { return };
         let called = self.frame(&name, 0);
+        if let Some(job) = &self.job
+            && job.kind == JobKind::Program
+            && job.wait == Wait::Answer
+            && called.is_ok()
+        {
+            // The terminal is the monitor's again until the values are asked for anew.
+            self.prompt();
+        }
         match (&mut self.job, called) {
             (Some(job), Ok(frame)) if job.kind == JobKind::Program && job.frames.len() < CALL_DEPTH => {
-                if matches!(job.wait, Wait::Until(_) | Wait::Condition(_)) {
+                if matches!(job.wait, Wait::Until(_) | Wait::Condition(_) | Wait::Answer) {
                     // What was waited for is waited for again after the reaction.
                     if let Some(waiting) = job.frames.last_mut() {
                         waiting.step = waiting.step.saturating_sub(1);

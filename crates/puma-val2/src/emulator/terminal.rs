@@ -26,13 +26,29 @@ const OUTPUT_LIMIT: usize = 1 << 20;
 /// Most characters on their way in; what is sent faster than the line takes it is lost beyond it.
 const INPUT_LIMIT: usize = 1 << 16;
 
+/// Longest line whatever the profile allows.
+const LONGEST_LINE: usize = 4096;
+
+/// Most complete lines that wait, whatever their length.
+const LINE_LIMIT: usize = 64;
+
+/// A complete line.
+#[derive(Clone, Debug)]
+pub(super) struct Line {
+    pub(super) text: String,
+    /// Whether more of it was typed than the line buffer holds.
+    pub(super) too_long: bool,
+}
+
 #[derive(Debug)]
 pub(super) struct Terminal {
     arriving: VecDeque<(Duration, u8)>,
     line_busy_until: Duration,
     typed: String,
-    lines: VecDeque<String>,
-    waiting: usize,
+    /// Whether what is being typed has outgrown the line buffer.
+    too_long: bool,
+    /// Complete lines, in the order they came.
+    lines: VecDeque<Line>,
     sending: VecDeque<u8>,
     sent_at: Duration,
     at_line_start: bool,
@@ -46,8 +62,8 @@ impl Terminal {
             arriving: VecDeque::new(),
             line_busy_until: Duration::ZERO,
             typed: String::new(),
+            too_long: false,
             lines: VecDeque::new(),
-            waiting: 0,
             sending: VecDeque::new(),
             sent_at: Duration::ZERO,
             at_line_start: true,
@@ -96,16 +112,18 @@ impl Terminal {
                     // The terminal's own local echo is off too: the cursor still stands behind the prompt.
                     self.at_line_start = false;
                 }
-                self.waiting += 1;
-                self.lines.push_back(std::mem::take(&mut self.typed));
-                if self.lines.len() > 64 {
-                    self.lines.pop_front();
+                let line = Line {
+                    text: std::mem::take(&mut self.typed),
+                    too_long: std::mem::take(&mut self.too_long),
+                };
+                if self.lines.len() >= LINE_LIMIT {
                     return Typed::Lost;
                 }
+                self.lines.push_back(line);
                 Typed::Line
             }
             0x03 if control => {
-                self.typed.clear();
+                self.clear_typed();
                 self.forget_lines();
                 self.echo("^C", now, profile);
                 self.fresh_line(profile, now);
@@ -116,12 +134,13 @@ impl Terminal {
                 Typed::EndOfInput
             }
             0x15 if control => {
-                self.typed.clear();
+                self.clear_typed();
                 self.echo("^U", now, profile);
                 self.fresh_line(profile, now);
                 Typed::Nothing
             }
             0x08 | 0x7f if control => {
+                self.too_long = false;
                 if self.typed.pop().is_some() {
                     self.echo("\x08 \x08", now, profile);
                 }
@@ -141,9 +160,8 @@ impl Terminal {
             }
             b'\t' => self.character(b' ', now, profile),
             0x20..=0x7e => {
-                let room = self.typed.len() < profile.max_line
-                    && self.waiting + self.typed.len() < profile.input_buffer;
-                if room {
+                self.too_long |= self.typed.len() >= profile.max_line.min(LONGEST_LINE);
+                if !self.too_long && self.has_room(profile) {
                     self.typed.push(byte as char);
                     let mut text = [0; 4];
                     self.echo((byte as char).encode_utf8(&mut text), now, profile);
@@ -158,16 +176,25 @@ impl Terminal {
         }
     }
 
+    fn clear_typed(&mut self) {
+        self.typed.clear();
+        self.too_long = false;
+    }
+
+    /// Whether a further character can wait behind the lines that do, each of which takes its characters and its end.
+    fn has_room(&self, profile: &Profile) -> bool {
+        let waiting: usize = self.lines.iter().map(|line| line.text.len() + 1).sum();
+        self.lines.is_empty() || waiting + self.typed.len() < profile.input_buffer
+    }
+
     /// The oldest complete line that has not been worked on.
-    pub(super) fn next_line(&mut self) -> Option<String> {
-        let line = self.lines.pop_front()?;
-        self.waiting = self.lines.iter().map(String::len).sum();
-        Some(line)
+    pub(super) fn next_line(&mut self) -> Option<Line> {
+        self.lines.pop_front()
     }
 
     /// The newest complete line, without taking it.
     pub(super) fn newest_line(&self) -> Option<&str> {
-        self.lines.back().map(String::as_str)
+        self.lines.back().map(|line| line.text.as_str())
     }
 
     /// Whether complete lines wait.
@@ -178,7 +205,6 @@ impl Terminal {
     /// Drops the lines typed ahead.
     pub(super) fn forget_lines(&mut self) {
         self.lines.clear();
-        self.waiting = 0;
     }
 
     fn echo(&mut self, text: &str, now: Duration, profile: &Profile) {
@@ -208,7 +234,7 @@ impl Terminal {
         }
     }
 
-    /// Output that Ctrl-O has suppressed resumes with the next prompt.
+    /// Output that Ctrl-O has suppressed resumes with the next prompt or question.
     pub(super) fn resume(&mut self) {
         self.dropped = false;
     }

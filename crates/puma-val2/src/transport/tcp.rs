@@ -30,6 +30,10 @@ impl TcpLine {
             match TcpStream::connect_timeout(&address, timeout.max(Duration::from_millis(1))) {
                 Ok(stream) => {
                     stream.set_nodelay(true).map_err(fail)?;
+                    // A line that takes no byte for this long is not one any more.
+                    stream
+                        .set_write_timeout(Some(Duration::from_secs(2)))
+                        .map_err(fail)?;
                     return Ok(Self {
                         stream,
                         name: addr.to_owned(),

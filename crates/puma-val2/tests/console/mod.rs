@@ -119,12 +119,11 @@ impl Console {
     }
 
     pub fn assert_at(&self, degrees: [f64; 6]) {
-        let off = self
+        let near = self
             .degrees()
             .iter()
             .zip(degrees)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        assert!(off < 1e-6, "{} instead of {degrees:?}", self.emulator.joints());
+            .all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(near, "{} instead of {degrees:?}", self.emulator.joints());
     }
 }

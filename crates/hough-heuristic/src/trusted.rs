@@ -1,0 +1,395 @@
+//! The detector whose score can be trusted.
+
+mod candidate;
+mod config;
+mod directions;
+mod fit;
+mod halve;
+mod level;
+mod measure;
+mod polar;
+mod proof;
+mod prover;
+mod search;
+mod track;
+
+use std::time::{Duration, Instant};
+
+use image::GrayImage;
+
+pub use config::TrustedConfig;
+
+use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
+use crate::{Circle, CircleDetector, ConfigError, Detection};
+use candidate::Collected;
+use directions::UnitCircle;
+use level::Level;
+use measure::Measured;
+use polar::{Grey, Polar, Ring};
+use proof::{Proof, log10};
+use prover::{Prover, Pyramid, Size};
+use search::{Budget, Outline, Search};
+
+/// Finds an unknown number of circles, and says of each how sure it is and how exact.
+///
+/// It keeps the paper's idea: draw edge points, solve for the circle, look at the image itself; no accumulator. What is drawn
+/// are *pairs* on one row or column whose gradients mirror one another, at a half, a quarter and further halves of the frame, the
+/// smallest first. A circle whose outline runs along edges is fitted and becomes a candidate.
+///
+/// **Proof.** A candidate is looked at where its radius is 12 to 24 px (8 to 12 px: the frame itself). On 64 rays across its outline
+/// the strongest edge that runs along it is sought within 6 px on either side. If there were no circle, that edge would lie
+/// anywhere: within the tolerance by a known chance, be the picture as textured as it may. The number of false alarms
+/// is the number of circles that differ noticeably in the frame, times the probability that chance alone puts so many of
+/// the edges on the outline (Hoeffding's bound of the binomial tail, over samples that do not overlap). The
+/// score is `c / (c + 4)` with `c` minus its decimal logarithm: 0.5 stands for one false alarm in 10000 frames of
+/// pure chance, 0.6 for one in a million. Chance is not all there is: lamps, wheels and letters are round, and score high.
+///
+/// **Measurement.** The circle is then followed down to the full size and fitted there, weighted by the slope; the inward
+/// bias that blur gives a ball that darkens towards its limb is taken out.
+///
+/// ```
+/// use hough_heuristic::image::{GrayImage, Luma};
+/// use hough_heuristic::{CircleDetector, Trusted, TrustedConfig};
+///
+/// let frame = GrayImage::from_fn(320, 240, |x, y| {
+///     let inside = |cx: f64, cy: f64, r: f64| (f64::from(x) - cx).hypot(f64::from(y) - cy) < r;
+///     Luma([if inside(100.0, 70.0, 28.0) || inside(220.5, 150.2, 14.0) { 40 } else { 200 }])
+/// });
+/// let mut detector = Trusted::new(TrustedConfig::default())?;
+/// assert_eq!(detector.detect(&frame).len(), 2);
+/// let ball = detector.measurements()[0];
+/// assert!((ball.circle.x - 100.0).abs() < 0.1 && ball.score > 0.8 && ball.centre_error < 0.1);
+/// # Ok::<(), hough_heuristic::ConfigError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Trusted {
+    config: TrustedConfig,
+    circle: UnitCircle,
+    outline: Outline,
+    maxima: Maxima,
+    sizes: Vec<Size>,
+    level: Level,
+    collected: Collected,
+    polar: Polar,
+    proofs: Vec<Proof>,
+    measurements: Vec<Measurement>,
+    budget: Budget,
+    /// What [`Trusted::track`] looks at.
+    window: GrayImage,
+}
+
+/// All that is known of a circle found by [`Trusted`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Measurement {
+    /// The circle, in pixels of the frame.
+    pub circle: Circle,
+    /// The score of its [`Detection`], 0..=1.
+    pub score: f64,
+    /// Decimal logarithm of the number of false alarms.
+    pub log_false_alarms: f64,
+    /// Standard error of the centre along x and along y, pixels.
+    pub centre_error: f64,
+    /// Standard error of the radius, pixels.
+    pub radius_error: f64,
+    /// Shortest by longest diameter of the outline, 0..=1.
+    pub axis_ratio: f64,
+    /// Share of the outline that lies in the frame, 0..=1.
+    pub visible: f64,
+    /// Share of that on which the strongest edge nearby is the outline, 0..=1.
+    pub covered: f64,
+}
+
+/// What the last frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Pairs drawn.
+    pub draws: u64,
+    /// Places looked at: about what the time is proportional to, apart from finding the edges.
+    pub looks: u64,
+    /// Whether the budget ended the search, so that there may be more circles.
+    pub ended_by_budget: bool,
+}
+
+impl Trusted {
+    /// A detector with these settings.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn new(config: TrustedConfig) -> Result<Self, ConfigError> {
+        config.check()?;
+        let circle = UnitCircle::new();
+        Ok(Self {
+            outline: Outline::new(&circle),
+            circle,
+            maxima: Maxima::new(SMOOTHING),
+            sizes: Vec::new(),
+            level: Level::default(),
+            collected: Collected::default(),
+            polar: Polar::default(),
+            proofs: Vec::new(),
+            measurements: Vec::new(),
+            budget: Budget::default(),
+            window: GrayImage::default(),
+            config,
+        })
+    }
+
+    /// The settings the detector was built with.
+    pub fn config(&self) -> &TrustedConfig {
+        &self.config
+    }
+
+    /// What is known of the circles found last, in the order of the detections.
+    pub fn measurements(&self) -> &[Measurement] {
+        &self.measurements
+    }
+
+    /// What the last frame took.
+    pub fn effort(&self) -> Effort {
+        Effort {
+            draws: self.budget.draws,
+            looks: self.budget.looks,
+            ended_by_budget: self.budget.spent,
+        }
+    }
+
+    /// Finds the circles of a frame with radii in this range into `measurements`.
+    fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
+        self.proofs.clear();
+        self.measurements.clear();
+        self.collected.clear(CANDIDATES);
+        self.budget = Budget::default();
+        if frame.width() < LEAST_SIDE || frame.height() < LEAST_SIDE {
+            return;
+        }
+        let megapixels = frame.len() as f64 * 1e-6;
+        self.budget.most_draws = (f64::from(self.config.draws_per_megapixel) * megapixels).ceil() as u64;
+        self.budget.deadline = self
+            .config
+            .milliseconds_per_megapixel
+            .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3));
+        let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
+        self.shrink(frame, radii.1);
+        self.prove(frame, radii, noise);
+        self.report(frame, radii, noise);
+    }
+
+    /// Halves the frame until the largest circles are small.
+    fn shrink(&mut self, frame: &GrayImage, max_radius: f64) {
+        let mut depth = 0;
+        let mut side = frame.width().min(frame.height());
+        while side >= 80 && f64::from(1 << depth) * 8.0 <= max_radius && depth < DEEPEST {
+            depth += 1;
+            side /= 2;
+        }
+        self.sizes.resize(depth, Size::default());
+        for index in 0..depth {
+            let (before, rest) = self.sizes.split_at_mut(index);
+            let (grey, width) = before
+                .last()
+                .map_or((frame.as_raw(), frame.width() as usize), |size| {
+                    (&size.grey, size.width)
+                });
+            let size = &mut rest[0];
+            (size.width, size.height) = halve::halve(grey, width, &mut size.grey);
+        }
+    }
+
+    /// Collects candidates from the smallest size to the largest, and proves them.
+    fn prove(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
+        let pyramid = Pyramid {
+            frame,
+            sizes: &self.sizes,
+        };
+        let mut prover = Prover {
+            pyramid,
+            circle: &self.circle,
+            polar: &mut self.polar,
+            noise,
+            tests: log10(frame.len() as f32 * CIRCLES_PER_PIXEL),
+            proofs: &mut self.proofs,
+        };
+        let smallest = pyramid.depth();
+        let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
+        for depth in (finest..=smallest).rev() {
+            let scale = (1 << depth) as f32;
+            let Grey { pixels, width, height } = pyramid.grey(depth);
+            let threshold = (STEP_GAIN * self.config.contrast as f32)
+                .max(NOISE_FACTOR * (noise / scale + ROUNDING) * self.maxima.noise_gain());
+            let points = self
+                .maxima
+                .find(pixels, width, threshold, width * height / PIXELS_PER_POINT);
+            self.level.fill(width, height, points);
+            for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
+                let ring = proof.in_frame().shrunk(scale);
+                self.outline
+                    .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
+            }
+            let least = if depth == finest { 3.2 } else { 8.0 };
+            let most = if depth == smallest { f32::MAX } else { 20.0 };
+            widest(Searching {
+                search: Search {
+                    circle: &self.circle,
+                    outline: &self.outline,
+                    radii: (
+                        (radii.0 as f32 / scale).max(least),
+                        (radii.1 as f32 / scale).min(most),
+                    ),
+                    scale,
+                    seed: self.config.seed,
+                    mirror_slack: if noise > 12.0 { 0.35 } else { 0.28 },
+                },
+                prover: &mut prover,
+                level: &mut self.level,
+                collected: &mut self.collected,
+                budget: &mut self.budget,
+            });
+        }
+        for candidate in self.collected.candidates.iter().filter(|candidate| !candidate.tried) {
+            if self.budget.is_late() {
+                break;
+            }
+            self.budget.looks += search::PROOF;
+            prover.prove(candidate);
+        }
+    }
+
+    /// Measures the best of the proven circles, each place once.
+    fn report(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
+        let pyramid = Pyramid {
+            frame,
+            sizes: &self.sizes,
+        };
+        self.proofs.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
+        for proof in &self.proofs {
+            let score = proof.score();
+            if score < self.config.min_score || self.measurements.len() == self.config.max_circles {
+                break;
+            }
+            let rough = circle_of(&proof.in_frame());
+            if self.measurements.iter().any(|other| is_same(&rough, &other.circle)) {
+                continue;
+            }
+            self.budget.looks += 4 * search::PROOF;
+            let measured = widest(Measuring {
+                pyramid,
+                proof,
+                circle: &self.circle,
+                polar: &mut self.polar,
+                noise,
+            });
+            let scale = (1 << proof.depth) as f32;
+            let measured = measured.unwrap_or_else(|| Measured::roughly(proof.in_frame(), scale));
+            let circle = circle_of(&measured.ring);
+            let fits = (radii.0..=radii.1).contains(&circle.radius);
+            let placed = self
+                .config
+                .region
+                .as_ref()
+                .is_none_or(|region| region.holds(&circle));
+            if fits && placed {
+                self.measurements.push(Measurement {
+                    circle,
+                    score,
+                    log_false_alarms: -f64::from(proof.certainty),
+                    centre_error: measured.centre_error.into(),
+                    radius_error: measured.radius_error.into(),
+                    axis_ratio: measured.axis_ratio().into(),
+                    visible: proof.visible.into(),
+                    covered: proof.covered.into(),
+                });
+            }
+        }
+    }
+}
+
+impl CircleDetector for Trusted {
+    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
+        self.find(frame, (self.config.min_radius, self.config.max_radius));
+        found.clear();
+        found.extend(self.measurements.iter().map(Measurement::detection));
+    }
+}
+
+impl Measurement {
+    fn detection(&self) -> Detection {
+        Detection {
+            circle: self.circle,
+            score: self.score,
+        }
+    }
+}
+
+/// Frames with a shorter side hold nothing, pixels.
+const LEAST_SIDE: u32 = 12;
+/// Deviation of the Gaussian that smooths each size, its pixels.
+const SMOOTHING: f32 = 0.8;
+/// How often a frame is halved at the most.
+const DEEPEST: usize = 5;
+/// The most candidates of a frame.
+const CANDIDATES: usize = 192;
+/// One point of this many pixels may be an edge; of more the strongest are taken.
+const PIXELS_PER_POINT: usize = 8;
+/// What the operator makes of a step of one grey level.
+const STEP_GAIN: f32 = 2.3;
+/// The threshold in deviations of the noise.
+const NOISE_FACTOR: f32 = 3.5;
+/// What rounding adds to the noise of each size, grey levels.
+const ROUNDING: f32 = 0.3;
+/// Circles that differ noticeably, for each pixel of the frame: a dozen radii for each place, over all sizes.
+const CIRCLES_PER_PIXEL: f32 = 16.0;
+
+/// Whether two circles are two accounts of one thing.
+fn is_same(a: &Circle, b: &Circle) -> bool {
+    let off = ((a.x - b.x).powi(2) + (a.y - b.y).powi(2)).sqrt();
+    let (small, large) = (a.radius.min(b.radius), a.radius.max(b.radius));
+    off < 0.5 * small && large - small < 0.4 * large
+}
+
+fn circle_of(ring: &Ring) -> Circle {
+    Circle {
+        x: ring.x.into(),
+        y: ring.y.into(),
+        radius: ring.r.into(),
+    }
+}
+
+/// The search of a level.
+struct Searching<'a, 'b> {
+    search: Search<'a>,
+    prover: &'a mut Prover<'b>,
+    level: &'a mut Level,
+    collected: &'a mut Collected,
+    budget: &'a mut Budget,
+}
+
+impl Vectorized for Searching<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.search
+            .run(self.level, self.collected, self.prover, self.budget);
+    }
+}
+
+/// The measurement of a proven circle.
+struct Measuring<'a> {
+    pyramid: Pyramid<'a>,
+    proof: &'a Proof,
+    circle: &'a UnitCircle,
+    polar: &'a mut Polar,
+    noise: f32,
+}
+
+impl Vectorized for Measuring<'_> {
+    type Output = Option<Measured>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let pyramid = self.pyramid;
+        let frames = (0..=self.proof.depth).rev().map(|depth| pyramid.grey(depth));
+        measure::measure(frames, self.circle, self.polar, self.proof.ring, self.noise)
+    }
+}

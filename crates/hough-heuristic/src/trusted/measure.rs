@@ -1,0 +1,274 @@
+//! The last step: a proven circle measured at the full size of the frame, with the error to be expected.
+
+use super::directions::{Rays, UnitCircle};
+use super::fit::Moments;
+use super::polar::{Grey, LANES, Polar, Ring};
+
+/// A circle as measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Measured {
+    pub(super) ring: Ring,
+    /// Standard errors, pixels.
+    pub(super) centre_error: f32,
+    pub(super) radius_error: f32,
+    /// Amplitude of the second harmonic of the outline, pixels: `r + cos2 cos(2 a) + sin2 sin(2 a)`.
+    pub(super) cos2: f32,
+    pub(super) sin2: f32,
+}
+
+impl Measured {
+    /// A circle that was not measured, known to a fraction of a pixel of the size it was proven at.
+    pub(super) fn roughly(ring: Ring, scale: f32) -> Self {
+        Self {
+            ring,
+            centre_error: 0.5 * scale,
+            radius_error: 0.5 * scale,
+            ..Self::default()
+        }
+    }
+
+    /// Shortest by longest diameter.
+    pub(super) fn axis_ratio(&self) -> f32 {
+        let flattening = (self.cos2 * self.cos2 + self.sin2 * self.sin2).sqrt() / self.ring.r;
+        ((1.0 - flattening) / (1.0 + flattening)).clamp(0.0, 1.0)
+    }
+}
+
+/// The most directions.
+const MOST: usize = 256;
+/// How far on either side of the outline edges are sought, pixels.
+const REACH: usize = 4;
+
+/// How often the circle is fitted at the full size.
+const ROUNDS: usize = 3;
+
+/// The steepest place along each ray.
+struct Steepest {
+    distance: [f32; MOST],
+    weight: [f32; MOST],
+}
+
+/// Measures the ring on ever finer frames, the finest last; `None` where it gets lost.
+#[inline(always)]
+pub(super) fn measure<'a>(
+    frames: impl Iterator<Item = Grey<'a>>,
+    circle: &UnitCircle,
+    polar: &mut Polar,
+    start: Ring,
+    noise: f32,
+) -> Option<Measured> {
+    let mut measured = Measured {
+        ring: start,
+        ..Measured::default()
+    };
+    let mut frames = frames.peekable();
+    let mut first = true;
+    while let Some(frame) = frames.next() {
+        let last = frames.peek().is_none();
+        if !first {
+            measured.ring = measured.ring.grown(2.0);
+        }
+        first = false;
+        let rays = circle.rays(if last { (measured.ring.r * 3.0) as usize } else { 64 });
+        let count = rays.x.len();
+        let arc = measured.ring.r * std::f32::consts::TAU / count as f32;
+        // Averaged along the outline over a length that grows with the noise.
+        let length = (0.35 * noise).clamp(1.0, (0.3 * measured.ring.r).max(1.0));
+        let half = ((0.5 * length / arc) as usize).min(8);
+        let rounds = if last { ROUNDS } else { 1 };
+        for round in 0..rounds {
+            let reach = if round == 0 { REACH } else { 3 };
+            polar.sample(frame, rays, &measured.ring, reach.min(measured.ring.r as usize), half);
+            let focus = if round == 0 { 4.0 } else { 2.5 };
+            let steepest = Steepest::on(polar, focus);
+            let step = steepest.fit(rays.x, rays.y, focus)?;
+            measured.ring.x += step.x;
+            measured.ring.y += step.y;
+            measured.ring.r += step.r;
+            if !(step.x.abs() + step.y.abs() + step.r.abs() < 6.0 && measured.ring.r > 2.0) {
+                return None;
+            }
+            if last && round + 1 == rounds {
+                let limb = limb_shift(frame, rays, polar, &measured.ring, half, noise);
+                if let Some(shift) = limb {
+                    measured.ring.x += shift.x;
+                    measured.ring.y += shift.y;
+                    measured.ring.r += shift.r;
+                }
+                steepest.errors(rays.x, rays.y, &step, (2 * half + 1) as f32 * arc, arc, &mut measured);
+            }
+        }
+    }
+    Some(measured)
+}
+
+/// Parts of the outline that are looked at on their own.
+const SECTORS: usize = 8;
+/// How far the profile across the outline is looked at, pixels.
+const PROFILE: usize = 8;
+
+/// How far the outline of a shaded ball lies outside of the steepest place.
+///
+/// A ball that darkens towards its limb has slopes inside of the outline but none outside, and blur moves the steepest place
+/// inward. Where the profile of the slope has the half width `w` on the outside, and two half widths inside of its top it is
+/// higher than outside by the part `A` of the top, that is by about `w A`: to 4 % of `w`, for shading between none and all, radii of
+/// 12 to 100 px and blur of 0.6 to 1.8 px.
+#[inline(always)]
+fn limb_shift(
+    frame: Grey<'_>,
+    rays: Rays<'_>,
+    polar: &mut Polar,
+    ring: &Ring,
+    half: usize,
+    noise: f32,
+) -> Option<Ring> {
+    let count = rays.x.len();
+    polar.sample(frame, rays, ring, PROFILE.min(ring.r as usize), half);
+    let steps = polar.steps;
+    let middle = steps / 2;
+    let mut profiles = [[0.0f32; 2 * PROFILE + 1]; SECTORS];
+    let mut used = [0.0f32; SECTORS];
+    for ray in 0..count {
+        if polar.visible[ray] == 0.0 {
+            continue;
+        }
+        let slope = |step: usize| polar.outward[step * count + ray];
+        let top = slope(middle - 1) + slope(middle) + slope(middle + 1);
+        let sector = ray * SECTORS / count;
+        let sign = 1f32.copysign(top);
+        used[sector] += 1.0;
+        for (step, sum) in profiles[sector][..steps].iter_mut().enumerate() {
+            *sum += sign * slope(step);
+        }
+    }
+    let mut whole = [0.0f32; 2 * PROFILE + 1];
+    for profile in &profiles {
+        whole.iter_mut().zip(profile).for_each(|(sum, part)| *sum += part);
+    }
+    let visible: f32 = used.iter().sum();
+    let common = shift_of(&whole[..steps], 6.0 * noise * visible.sqrt()).unwrap_or(0.0);
+    let mut moments = Moments::default();
+    for block in 0..count / LANES {
+        let sector = block * LANES * SECTORS / count;
+        let own = shift_of(&profiles[sector][..steps], 12.0 * noise * used[sector].sqrt());
+        let shift = own.unwrap_or(common);
+        let weight = if used[sector] > 0.0 { 1.0 } else { 0.0 };
+        let (ux, uy) = (&rays.x.as_chunks().0[block], &rays.y.as_chunks().0[block]);
+        moments.add(ux, uy, &[shift; LANES], &[weight; LANES]);
+    }
+    moments.step()
+}
+
+/// How far outside of its top a profile has its outline; None where the top is not above `least`.
+#[inline(always)]
+fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
+    let middle = profile.len() / 2;
+    let at = (middle.saturating_sub(1)..=middle + 1).max_by(|&a, &b| profile[a].total_cmp(&profile[b]))?;
+    let top = profile[at];
+    if at < 1 || at + 2 > profile.len() || top <= least {
+        return None;
+    }
+    let (before, behind) = (profile[at - 1], profile[at + 1]);
+    let bend = 2.0 * top - before - behind;
+    let place = at as f32 + if bend > 0.0 { (0.5 * (behind - before) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    let value = |place: f32| {
+        let place = place.clamp(0.0, (profile.len() - 1) as f32);
+        let low = (place as usize).min(profile.len() - 2);
+        profile[low] + (profile[low + 1] - profile[low]) * (place - low as f32)
+    };
+    // The half width on the outside.
+    let next = (at + 1..profile.len()).find(|&step| profile[step] < 0.5 * top)?;
+    let (high, low) = (profile[next - 1], profile[next]);
+    let width = (next - 1) as f32 + (high - 0.5 * top) / (high - low).max(1e-6) - place;
+    let excess = (value(place - 2.0 * width) - value(place + 2.0 * width)) / top;
+    Some(width * excess.clamp(0.0, 0.5))
+}
+
+impl Steepest {
+    #[inline(always)]
+    fn on(polar: &Polar, focus: f32) -> Self {
+        let count = polar.rays;
+        let mut steepest = Self {
+            distance: [0.0; MOST],
+            weight: [0.0; MOST],
+        };
+        for ray in 0..count.min(MOST) {
+            if polar.visible[ray] == 0.0 {
+                continue;
+            }
+            let slope = |step: usize| polar.outward[step * count + ray].abs();
+            let (mut best, mut at) = (0.0, 0);
+            for step in 0..polar.steps {
+                let off = polar.distance(step as f32) / (focus + 1.5);
+                let strength = slope(step) * (1.0 - off * off).max(0.0)
+                    - 0.5 * polar.along[step * count + ray].abs();
+                if strength > best {
+                    (best, at) = (strength, step);
+                }
+            }
+            let here = slope(at);
+            let mut place = at as f32;
+            if at > 0 && at + 1 < polar.steps {
+                let (before, behind) = (slope(at - 1), slope(at + 1));
+                let bend = 2.0 * here - before - behind;
+                if bend > 0.0 {
+                    place += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
+                }
+            }
+            steepest.distance[ray] = polar.distance(place);
+            steepest.weight[ray] = if best > 0.0 { here.min(30.0) } else { 0.0 };
+        }
+        steepest
+    }
+
+    /// The robust step to the best circle.
+    #[inline(always)]
+    fn fit(&self, ux: &[f32], uy: &[f32], focus: f32) -> Option<Ring> {
+        let mut step = Ring::default();
+        for focus in [focus, 0.7 * focus, 0.5 * focus, 0.5 * focus] {
+            let mut moments = Moments::default();
+            for block in 0..ux.len() / LANES {
+                let ux = &ux.as_chunks::<LANES>().0[block];
+                let uy = &uy.as_chunks::<LANES>().0[block];
+                let distance = &self.distance.as_chunks::<LANES>().0[block];
+                let slope = &self.weight.as_chunks::<LANES>().0[block];
+                let mut weight = [0.0; LANES];
+                for lane in 0..LANES {
+                    let off = (distance[lane] - step.r - step.x * ux[lane] - step.y * uy[lane]) / focus;
+                    let within = (1.0 - off * off).max(0.0);
+                    weight[lane] = slope[lane] * within * within;
+                }
+                moments.add(ux, uy, distance, &weight);
+            }
+            step = moments.step()?;
+        }
+        Some(step)
+    }
+
+    /// The scatter about the circle after `step`, and what it means.
+    #[inline(always)]
+    fn errors(&self, ux: &[f32], uy: &[f32], step: &Ring, averaged: f32, arc: f32, measured: &mut Measured) {
+        let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
+        let (mut cos2, mut sin2) = (0.0, 0.0);
+        for ray in 0..ux.len() {
+            let off = self.distance[ray] - step.r - step.x * ux[ray] - step.y * uy[ray];
+            let within = (1.0 - (off / 1.5) * (off / 1.5)).max(0.0);
+            let weight = self.weight[ray] * within * within;
+            sum += weight;
+            squares += weight * off * off;
+            weights += weight * weight;
+            cos2 += weight * off * (ux[ray] * ux[ray] - uy[ray] * uy[ray]);
+            sin2 += weight * off * (2.0 * ux[ray] * uy[ray]);
+        }
+        if sum <= 0.0 {
+            return;
+        }
+        let scatter = (squares / sum).sqrt();
+        // Neighbouring rays share pixels: so many of them are worth one.
+        let shared = (averaged.max(1.5) / arc).max(1.0);
+        let effective = (sum * sum / weights / shared).max(3.0);
+        measured.radius_error = scatter / effective.sqrt();
+        measured.centre_error = scatter * (2.0 / effective).sqrt();
+        (measured.cos2, measured.sin2) = (2.0 * cos2 / sum, 2.0 * sin2 / sum);
+    }
+}

@@ -1,0 +1,188 @@
+//! A frame around a circle, unrolled: a column of values for each direction, a row for each distance from the outline.
+//!
+//! All directions of a row lie together, so that the loops over them become vector code.
+
+use super::directions::Rays;
+
+/// A grey frame of any size of the pyramid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grey<'a> {
+    pub(super) pixels: &'a [u8],
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// A circle in pixels of some size of the pyramid.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Ring {
+    pub(super) x: f32,
+    pub(super) y: f32,
+    pub(super) r: f32,
+}
+
+impl Ring {
+    /// The circle in a frame whose pixels are `factor` times as large.
+    pub(super) fn shrunk(&self, factor: f32) -> Self {
+        let corner = 0.5 * (factor - 1.0);
+        Self {
+            x: (self.x - corner) / factor,
+            y: (self.y - corner) / factor,
+            r: self.r / factor,
+        }
+    }
+
+    /// The circle in a frame whose pixels are `factor` times as small.
+    pub(super) fn grown(&self, factor: f32) -> Self {
+        let corner = 0.5 * (factor - 1.0);
+        Self {
+            x: self.x * factor + corner,
+            y: self.y * factor + corner,
+            r: self.r * factor,
+        }
+    }
+}
+
+/// Derivatives outward and along the outline, on a grid of directions and distances.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Polar {
+    /// Directions, a multiple of [`LANES`].
+    pub(super) rays: usize,
+    /// Distances.
+    pub(super) steps: usize,
+    /// Grey levels, one row more than distances; a row begins and ends with [`MARGIN`] values of the other end.
+    grey: Vec<f32>,
+    /// Derivative outward per pixel, averaged along the outline; `rays` values a row.
+    pub(super) outward: Vec<f32>,
+    /// Derivative along the outline per pixel; `rays` values a row.
+    pub(super) along: Vec<f32>,
+    /// 1 where the outline is inside the frame, 0 elsewhere.
+    pub(super) visible: Vec<f32>,
+}
+
+/// Directions that are worked on together.
+pub(super) const LANES: usize = 8;
+/// How many directions at the most are averaged on either side.
+const MARGIN: usize = 8;
+
+impl Polar {
+    /// How far a row lies outside of the outline, pixels; fractions lie between rows.
+    #[inline(always)]
+    pub(super) fn distance(&self, row: f32) -> f32 {
+        row - 0.5 * (self.steps - 1) as f32
+    }
+
+    /// Samples the frame along the rays, up to `reach` pixels on either side of the outline, and averages the outward
+    /// slopes over `2 half + 1` neighbouring directions (`half` at most 8).
+    #[inline(always)]
+    pub(super) fn sample(&mut self, frame: Grey<'_>, rays: Rays<'_>, ring: &Ring, reach: usize, half: usize) {
+        let Rays { x: ux, y: uy } = rays;
+        let count = ux.len();
+        let stride = count + 2 * MARGIN;
+        self.rays = count;
+        self.steps = 2 * reach + 1;
+        self.grey.resize((self.steps + 1) * stride, 0.0);
+        self.outward.resize(self.steps * count, 0.0);
+        self.along.resize(self.steps * count, 0.0);
+        self.visible.resize(count, 0.0);
+
+        let Grey {
+            pixels,
+            width,
+            height,
+        } = frame;
+        let (right, bottom) = ((width - 1) as f32, (height - 1) as f32);
+        // Just inside of the last pixels, so that there is always a neighbour.
+        let (most_x, most_y) = (right - 0.001, bottom - 0.001);
+        let inside = |at: f32, end: f32| f32::from(u8::from(at >= 0.5 && at <= end - 0.5));
+        for (visible, (&ux, &uy)) in self.visible.iter_mut().zip(ux.iter().zip(uy)) {
+            *visible = inside(ring.x + ring.r * ux, right) * inside(ring.y + ring.r * uy, bottom);
+        }
+        for (step, row) in self.grey.chunks_exact_mut(stride).enumerate() {
+            let r = ring.r - reach as f32 - 0.5 + step as f32;
+            let out = &mut row[MARGIN..MARGIN + count];
+            let (ux, uy) = (ux.as_chunks::<LANES>().0, uy.as_chunks::<LANES>().0);
+            for ((out, ux), uy) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(ux).zip(uy) {
+                *out = bilinear(pixels, width, ring, r, (most_x, most_y), ux, uy);
+            }
+            row.copy_within(count..MARGIN + count, 0);
+            row.copy_within(MARGIN..2 * MARGIN, MARGIN + count);
+        }
+        self.differentiate(ring.r, half.min(MARGIN));
+    }
+
+    #[inline(always)]
+    fn differentiate(&mut self, r: f32, half: usize) {
+        let count = self.rays;
+        let stride = count + 2 * MARGIN;
+        let arc = r * std::f32::consts::TAU / count as f32;
+        // The slope along the outline is taken over at least two pixels.
+        let lag = ((1.0 / arc.max(0.1)) as usize + 1).max(half).min(MARGIN);
+        let (share, slope) = (1.0 / (2 * half + 1) as f32, 0.25 / (lag as f32 * arc));
+        for step in 0..self.steps {
+            let (near, far) = self.grey[step * stride..][..2 * stride].split_at(stride);
+            let out = &mut self.outward[step * count..][..count];
+            out.fill(0.0);
+            for shift in MARGIN - half..=MARGIN + half {
+                let (near, far) = (&near[shift..][..count], &far[shift..][..count]);
+                for index in 0..count {
+                    out[index] += (far[index] - near[index]) * share;
+                }
+            }
+            let out = &mut self.along[step * count..][..count];
+            let (ahead, behind) = (MARGIN + lag, MARGIN - lag);
+            let (near_ahead, near_behind) = (&near[ahead..][..count], &near[behind..][..count]);
+            let (far_ahead, far_behind) = (&far[ahead..][..count], &far[behind..][..count]);
+            for index in 0..count {
+                out[index] = slope
+                    * ((near_ahead[index] + far_ahead[index]) - (near_behind[index] + far_behind[index]));
+            }
+        }
+    }
+}
+
+/// The grey levels at distance `r` from the centre of the ring in eight directions.
+#[inline(always)]
+fn bilinear(
+    pixels: &[u8],
+    width: usize,
+    ring: &Ring,
+    r: f32,
+    (most_x, most_y): (f32, f32),
+    ux: &[f32; LANES],
+    uy: &[f32; LANES],
+) -> [f32; LANES] {
+    let (mut fx, mut fy, mut at) = ([0.0; LANES], [0.0; LANES], [0i32; LANES]);
+    for lane in 0..LANES {
+        let x = (ring.x + r * ux[lane]).max(0.0).min(most_x);
+        let y = (ring.y + r * uy[lane]).max(0.0).min(most_y);
+        let (left, top) = (x as i32, y as i32);
+        fx[lane] = x - left as f32;
+        fy[lane] = y - top as f32;
+        at[lane] = top * width as i32 + left;
+    }
+    // Four neighbouring pixels as the four bytes of a word.
+    let mut squares = [0i32; LANES];
+    for lane in 0..LANES {
+        // Always there; the check is cheaper than a proof.
+        if let Some(square) = pixels
+            .get(at[lane] as usize..)
+            .and_then(|rest| rest.get(..width + 2))
+        {
+            squares[lane] = i32::from_le_bytes([square[0], square[1], square[width], square[width + 1]]);
+        }
+    }
+    let (mut a, mut b, mut c, mut d) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for lane in 0..LANES {
+        a[lane] = (squares[lane] & 0xff) as f32;
+        b[lane] = ((squares[lane] >> 8) & 0xff) as f32;
+        c[lane] = ((squares[lane] >> 16) & 0xff) as f32;
+        d[lane] = ((squares[lane] >> 24) & 0xff) as f32;
+    }
+    let mut grey = [0.0; LANES];
+    for lane in 0..LANES {
+        let upper = a[lane] + (b[lane] - a[lane]) * fx[lane];
+        let lower = c[lane] + (d[lane] - c[lane]) * fx[lane];
+        grey[lane] = upper + (lower - upper) * fy[lane];
+    }
+    grey
+}

@@ -1,0 +1,283 @@
+//! The evidence for a candidate, weighed where its radius is one or two dozen pixels: the same at every size.
+
+use super::directions::{Rays, UnitCircle};
+use super::fit::Moments;
+use super::polar::{Grey, LANES, Polar, Ring};
+
+/// Directions that are looked in.
+const RAYS: usize = 64;
+/// How far on either side of the outline the strongest edge is sought, pixels.
+const REACH: usize = 6;
+
+/// Fewer rays than these do not make a circle.
+const LEAST_NEAR: usize = 20;
+
+/// What a candidate proved to be.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Proof {
+    /// In pixels of the level, or of the frame once it has been measured.
+    pub(super) ring: Ring,
+    /// Minus the decimal logarithm of the number of false alarms.
+    pub(super) certainty: f32,
+    /// How many times the frame was halved for the proof.
+    pub(super) depth: usize,
+    /// Share of the outline in the frame whose strongest edge lies on the outline.
+    pub(super) covered: f32,
+    /// Share of the outline that lies in the frame.
+    pub(super) visible: f32,
+}
+
+impl Proof {
+    /// Whether it explains the edge points on it.
+    pub(super) fn is_beyond_doubt(&self) -> bool {
+        self.certainty >= 6.0
+    }
+
+    /// The circle in pixels of the frame.
+    pub(super) fn in_frame(&self) -> Ring {
+        self.ring.grown((1 << self.depth) as f32)
+    }
+
+    /// 0..1: the certainty, so that a number of false alarms of 1 in 10000 frames gives one half.
+    pub(super) fn score(&self) -> f64 {
+        let certainty = f64::from(self.certainty.max(0.0));
+        certainty / (certainty + HALF_SURE)
+    }
+}
+
+/// The certainty that gives a score of one half.
+const HALF_SURE: f64 = 4.0;
+
+/// What the proof needs to know of the level.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Setting {
+    /// Deviation of the noise at this level, grey levels.
+    pub(super) noise: f32,
+    /// Decimal logarithm of the number of circles that might have been tested.
+    pub(super) tests: f32,
+}
+
+/// The strongest edge along each ray.
+#[derive(Clone, Debug)]
+struct Edges {
+    /// How far outside the outline, pixels.
+    distance: [f32; RAYS],
+    /// Slope without its sign; 0 where there is no edge.
+    slope: [f32; RAYS],
+}
+
+impl Edges {
+    /// Finds the strongest edge along the outline's normal on each ray.
+    #[inline(always)]
+    fn around(
+        ring: &Ring,
+        grey: Grey<'_>,
+        rays: Rays<'_>,
+        polar: &mut Polar,
+        half: usize,
+        least: f32,
+    ) -> Self {
+        let reach = REACH.min((ring.r - 1.5) as usize).max(2);
+        polar.sample(grey, rays, ring, reach, half);
+        let mut edges = Self {
+            distance: [0.0; RAYS],
+            slope: [0.0; RAYS],
+        };
+        let mut at = [0i32; RAYS];
+        for (block, at) in at.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let visible = polar.visible.as_chunks::<LANES>().0[block];
+            let (mut best, mut place) = ([least; LANES], [0i32; LANES]);
+            let rows = polar
+                .outward
+                .chunks_exact(RAYS)
+                .zip(polar.along.chunks_exact(RAYS));
+            for (step, (outward, along)) in rows.enumerate() {
+                let outward = outward.as_chunks::<LANES>().0[block];
+                let along = along.as_chunks::<LANES>().0[block];
+                for lane in 0..LANES {
+                    let strength = (outward[lane].abs() - 0.7 * along[lane].abs()) * visible[lane];
+                    let better = -i32::from(strength > best[lane]);
+                    place[lane] = (better & (step as i32 + 1)) | (!better & place[lane]);
+                    best[lane] = strength.max(best[lane]);
+                }
+            }
+            *at = place;
+        }
+        for ray in 0..RAYS {
+            let Some(step) = (at[ray] as usize).checked_sub(1) else {
+                edges.distance[ray] = 0.0;
+                edges.slope[ray] = 0.0;
+                continue;
+            };
+            let slope = |step: usize| polar.outward[step * RAYS + ray].abs();
+            let here = slope(step);
+            let mut place = step as f32;
+            if step > 0 && step + 1 < polar.steps {
+                let (before, behind) = (slope(step - 1), slope(step + 1));
+                let bend = 2.0 * here - before - behind;
+                if bend > 0.0 {
+                    place += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
+                }
+            }
+            edges.distance[ray] = polar.distance(place);
+            edges.slope[ray] = here;
+        }
+        edges
+    }
+}
+
+#[inline(always)]
+pub(super) fn prove(
+    grey: Grey<'_>,
+    circle: &UnitCircle,
+    polar: &mut Polar,
+    start: Ring,
+    setting: &Setting,
+) -> Option<Proof> {
+    let rays = circle.rays(RAYS);
+    // Slopes are averaged along the outline over some three pixels where there is noise.
+    let arc = start.r * std::f32::consts::TAU / RAYS as f32;
+    let half = if setting.noise > 3.0 {
+        ((1.5 / arc) as usize).clamp(1, 5)
+    } else {
+        0
+    };
+    let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
+    let mut ring = start;
+    for round in 0..4 {
+        let edges = Edges::around(&ring, grey, rays, polar, half, least);
+        let foci = if round == 0 {
+            [4.0, 3.0, 2.0]
+        } else {
+            [3.0, 2.0, 1.5]
+        };
+        let (better, near) = improve(rays, &edges, ring, foci)?;
+        let apart = |other: &Ring| {
+            let (dx, dy) = (better.x - other.x, better.y - other.y);
+            (dx * dx + dy * dy).sqrt() + (better.r - other.r).abs()
+        };
+        if near < LEAST_NEAR || !(apart(&start) <= 6.0 && better.r >= 3.0) {
+            return None;
+        }
+        let moved = apart(&ring);
+        ring = better;
+        if moved < 0.7 {
+            break;
+        }
+    }
+    let edges = Edges::around(&ring, grey, rays, polar, half, least);
+    Some(weigh(polar, &edges, ring, setting))
+}
+
+/// Moves the outline to the edges, in steps that look at those within the foci, pixels; also tells how many there were.
+#[inline(always)]
+fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option<(Ring, usize)> {
+    let mut ring = start;
+    let mut near = 0.0;
+    for focus in foci {
+        let mut moments = Moments::default();
+        let mut count = [0.0f32; LANES];
+        let (shift_x, shift_y, shift_r) = (ring.x - start.x, ring.y - start.y, ring.r - start.r);
+        for block in 0..RAYS / LANES {
+            let ux = &rays.x.as_chunks::<LANES>().0[block];
+            let uy = &rays.y.as_chunks::<LANES>().0[block];
+            let distance = &edges.distance.as_chunks::<LANES>().0[block];
+            let slope = &edges.slope.as_chunks::<LANES>().0[block];
+            let (mut residual, mut weight) = ([0.0; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                residual[lane] = distance[lane] - shift_r - shift_x * ux[lane] - shift_y * uy[lane];
+                let off = residual[lane] / focus;
+                let within = (1.0 - off * off).max(0.0);
+                weight[lane] = slope[lane].min(30.0) * within;
+                count[lane] += f32::from(u8::from(weight[lane] > 0.0));
+            }
+            moments.add(ux, uy, &residual, &weight);
+        }
+        near = count.iter().sum();
+        if near < 12.0 {
+            return None;
+        }
+        let step = moments.step()?;
+        ring = Ring {
+            x: ring.x + step.x,
+            y: ring.y + step.y,
+            r: ring.r + step.r,
+        };
+    }
+    Some((ring, near as usize))
+}
+
+/// Weighs how many of the strongest edges lie on the outline.
+fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting) -> Proof {
+    let visible: f32 = polar.visible.iter().sum();
+    let independent = (ring.r * std::f32::consts::TAU / 2.5).min(RAYS as f32) / RAYS as f32 * visible;
+    let mut best = Proof {
+        ring,
+        certainty: f32::NEG_INFINITY,
+        ..Proof::default()
+    };
+    for slack in [0.25f32, 0.5, 0.8, 1.2] {
+        let on = |(distance, slope): (&f32, &f32)| *slope > 0.0 && distance.abs() <= slack;
+        let hits = edges
+            .distance
+            .iter()
+            .zip(&edges.slope)
+            .filter(|&edge| on(edge))
+            .count();
+        let p = (2.0 * slack + 0.2) / polar.steps as f32;
+        let share = hits as f32 / visible.max(1.0);
+        let certainty = independent * divergence(share, p) - setting.tests;
+        if certainty > best.certainty {
+            best.certainty = certainty;
+            best.covered = share;
+            best.visible = visible / RAYS as f32;
+        }
+    }
+    best
+}
+
+/// The divergence of the share found from the share expected, in decimal digits per sample; 0 unless more is found.
+fn divergence(share: f32, p: f32) -> f32 {
+    if share <= p {
+        return 0.0;
+    }
+    let term = |q: f32, p: f32| if q > 0.0 { q * log10(q / p) } else { 0.0 };
+    term(share, p) + term(1.0 - share, 1.0 - p)
+}
+
+/// The decimal logarithm of a normal number above 0, by the four operations alone: the same bits on every machine.
+pub(super) fn log10(x: f32) -> f32 {
+    let bits = f64::from(x).to_bits();
+    let exponent = (bits >> 52) as i64 - 1023;
+    // The mantissa, 1..2.
+    let m = f64::from_bits((bits & ((1 << 52) - 1)) | (1023 << 52));
+    // ln m = 2 artanh z, with z up to 1/3.
+    let z = (m - 1.0) / (m + 1.0);
+    let mut power = z;
+    let mut sum = 0.0;
+    for k in 0..14 {
+        sum += power / f64::from(2 * k + 1);
+        power *= z * z;
+    }
+    let natural = 2.0 * sum + exponent as f64 * std::f64::consts::LN_2;
+    (natural * std::f64::consts::LOG10_E) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logarithms_are_those_of_the_library() {
+        for x in [1e-30f32, 0.001, 0.3, 0.999, 1.0, 1.5, 1.999, 2.0, 10.0, 1e7] {
+            assert!((log10(x) - x.log10()).abs() <= 1e-6 * x.log10().abs().max(1.0), "{x}");
+        }
+    }
+
+    #[test]
+    fn only_more_than_expected_is_evidence() {
+        assert!(divergence(0.1, 0.2) <= 0.0 && divergence(0.2, 0.2) <= 0.0);
+        assert!((divergence(1.0, 0.1) - 1.0).abs() < 1e-6);
+        assert!(divergence(0.6, 0.1) > divergence(0.5, 0.1));
+    }
+}

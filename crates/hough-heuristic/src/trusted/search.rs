@@ -1,0 +1,440 @@
+//! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps 3a to 3c.
+
+use std::time::Instant;
+
+use super::candidate::{Candidate, Collected};
+use super::directions::{CODES, UnitCircle, code};
+use super::fit::Moments;
+use super::level::{EDGE, Level, Lines};
+use super::polar::{LANES, Ring};
+use super::prover::Prover;
+
+/// Points of a circle's outline that are looked at.
+pub(super) const LOOKS: usize = 32;
+/// How far the direction of an edge may be off that of the outline, in codes of 2.8 degrees.
+pub(super) const DIRECTION_SLACK: u8 = 7;
+/// The least part of a normal along the line that the pair lies on.
+const LEAST_ALONG: f32 = 0.58;
+/// What a proof costs, in looks.
+pub(super) const PROOF: u64 = 400;
+/// How many mirrored partners of a point are tried.
+const PARTNERS: usize = 6;
+
+/// What a ring's outline shows.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Support {
+    /// Points of the outline that lie on an edge along it.
+    pub(super) hits: u32,
+    /// Points of the outline that lie in the frame.
+    pub(super) visible: u32,
+}
+
+impl Support {
+    pub(super) fn share(&self) -> f32 {
+        self.hits as f32 / self.visible.max(1) as f32
+    }
+}
+
+/// Looks that a draw takes at most, in the mean.
+const LOOKS_PER_DRAW: u64 = 25;
+
+/// What may be spent, and what has been.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Budget {
+    pub(super) draws: u64,
+    pub(super) looks: u64,
+    pub(super) most_draws: u64,
+    pub(super) deadline: Option<Instant>,
+    pub(super) spent: bool,
+}
+
+impl Budget {
+    /// Whether no more may be drawn; once it is spent it remains so.
+    #[inline(always)]
+    pub(super) fn is_spent(&mut self) -> bool {
+        self.spent |= self.draws >= self.most_draws || self.looks >= LOOKS_PER_DRAW * self.most_draws + 10_000;
+        self.spent
+    }
+
+    /// Looks at the clock, if there is one to be looked at.
+    pub(super) fn is_late(&mut self) -> bool {
+        self.spent |= self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        self.spent
+    }
+}
+
+/// The points of the outline in the order in which they are looked at, each with the lowest code that its edge may have.
+#[derive(Clone, Debug)]
+pub(super) struct Outline {
+    x: [f32; LOOKS],
+    y: [f32; LOOKS],
+    lowest: [u8; LOOKS],
+}
+
+/// Points that are looked at together.
+const BLOCK: usize = 8;
+
+impl Outline {
+    pub(super) fn new(circle: &UnitCircle) -> Self {
+        // Bits reversed: any first part of the order is spread over the whole outline.
+        let order: [usize; LOOKS] = std::array::from_fn(|index| {
+            (index as u32).reverse_bits() as usize >> (32 - LOOKS.trailing_zeros())
+        });
+        let points = order.map(|index| circle.point(index, LOOKS));
+        Self {
+            x: points.map(|(x, _)| x),
+            y: points.map(|(_, y)| y),
+            lowest: points.map(|(x, y)| code(x, y).wrapping_sub(DIRECTION_SLACK) % CODES),
+        }
+    }
+
+    /// Looks at the outline until it is plain that there is no circle; None then.
+    #[inline(always)]
+    pub(super) fn support(&self, level: &Level, ring: &Ring, least: f32, looks: &mut u64) -> Option<Support> {
+        let (width, height) = (level.width as f32, level.height as f32);
+        let inside = ring.x - ring.r >= 0.0
+            && ring.y - ring.r >= 0.0
+            && ring.x + ring.r <= width - 1.0
+            && ring.y + ring.r <= height - 1.0;
+        let mut support = Support::default();
+        for block in 0..LOOKS / BLOCK {
+            let (x, y) = (
+                &self.x.as_chunks::<BLOCK>().0[block],
+                &self.y.as_chunks::<BLOCK>().0[block],
+            );
+            let lowest = &self.lowest.as_chunks::<BLOCK>().0[block];
+            let mut marks = [0u8; BLOCK];
+            if inside {
+                let mut pixels = [0i32; BLOCK];
+                for i in 0..BLOCK {
+                    let (column, row) = (ring.x + ring.r * x[i] + 0.5, ring.y + ring.r * y[i] + 0.5);
+                    pixels[i] = row as i32 * level.width as i32 + column as i32;
+                }
+                for i in 0..BLOCK {
+                    marks[i] = level.marks().get(pixels[i] as usize).copied().unwrap_or(0);
+                }
+                support.visible += BLOCK as u32;
+            } else {
+                for i in 0..BLOCK {
+                    if let Some((mark, _)) = level.mark(ring.x + ring.r * x[i], ring.y + ring.r * y[i]) {
+                        marks[i] = mark;
+                        support.visible += 1;
+                    }
+                }
+            }
+            let mut hits = 0u8;
+            for i in 0..BLOCK {
+                hits += u8::from(runs_along(marks[i], lowest[i]));
+            }
+            support.hits += u32::from(hits);
+            *looks += BLOCK as u64;
+            if (support.hits + 1) as f32 <= support.visible as f32 * least {
+                return None;
+            }
+        }
+        (support.visible >= LOOKS as u32 / 3 && support.hits as f32 >= support.visible as f32 * least)
+            .then_some(support)
+    }
+
+    /// Fits the ring to the edge points along it, and counts those that lie on it then; None if they do not determine one.
+    #[inline(always)]
+    pub(super) fn fit(
+        &self,
+        level: &Level,
+        ring: &Ring,
+        reach: f32,
+        looks: &mut u64,
+    ) -> Option<(Ring, Support)> {
+        let mut support = Support::default();
+        let (mut dx, mut dy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let (mut ux, mut uy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let (mut residual, mut weight) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        for index in 0..LOOKS {
+            let (x, y, lowest) = (self.x[index], self.y[index], self.lowest[index]);
+            let mut inside = false;
+            for step in [0.0, -1.5, 1.5] {
+                *looks += 1;
+                let at = ring.r + step;
+                let Some((mark, pixel)) = level.mark(ring.x + at * x, ring.y + at * y) else {
+                    continue;
+                };
+                inside = true;
+                if !runs_along(mark, lowest) {
+                    continue;
+                }
+                let point = level.point_at(pixel);
+                (dx[index], dy[index]) = (point.0 - ring.x, point.1 - ring.y);
+                let distance = (dx[index] * dx[index] + dy[index] * dy[index]).sqrt();
+                let off = distance - ring.r;
+                if off.abs() <= reach && distance > 0.5 {
+                    (ux[index], uy[index]) = (dx[index] / distance, dy[index] / distance);
+                    (residual[index], weight[index]) = (off, 1.0);
+                    break;
+                }
+            }
+            support.visible += u32::from(inside);
+        }
+        let mut moments = Moments::default();
+        for block in 0..LOOKS / LANES {
+            let of = |values: &[f32; LOOKS]| values.as_chunks::<LANES>().0[block];
+            moments.add(&of(&ux), &of(&uy), &of(&residual), &of(&weight));
+        }
+        let shift = moments.step()?;
+        if !(shift.x.abs() + shift.y.abs() + shift.r.abs() <= 3.0 * reach) {
+            return None;
+        }
+        let fitted = Ring {
+            x: ring.x + shift.x,
+            y: ring.y + shift.y,
+            r: ring.r + shift.r,
+        };
+        let slack = 0.7 + 0.02 * fitted.r;
+        for index in 0..LOOKS {
+            let (x, y) = (dx[index] - shift.x, dy[index] - shift.y);
+            let off = (x * x + y * y).sqrt() - fitted.r;
+            support.hits += u32::from(weight[index] > 0.0 && off.abs() <= slack);
+        }
+        Some((fitted, support))
+    }
+
+    /// Marks the points along the ring as explained.
+    pub(super) fn explain(&self, circle: &UnitCircle, level: &mut Level, ring: &Ring, looks: &mut u64) {
+        let count = ((6.3 * ring.r) as usize).clamp(16, 512);
+        *looks += 3 * count as u64;
+        for index in 0..count {
+            let (ux, uy) = circle.point(index, count);
+            let lowest = code(ux, uy).wrapping_sub(DIRECTION_SLACK) % CODES;
+            for step in [0.0, -1.5, 1.5] {
+                let at = ring.r + step;
+                if let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy)
+                    && runs_along(mark, lowest)
+                {
+                    level.explain(pixel);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a pixel with this mark has an edge whose code lies at most twice the slack above the lowest.
+#[inline]
+fn runs_along(mark: u8, lowest: u8) -> bool {
+    mark & EDGE != 0 && mark.wrapping_sub(lowest) % CODES <= 2 * DIRECTION_SLACK
+}
+
+/// Everything the search of a level needs.
+pub(super) struct Search<'a> {
+    pub(super) circle: &'a UnitCircle,
+    pub(super) outline: &'a Outline,
+    /// Radii sought at this level, pixels of the level.
+    pub(super) radii: (f32, f32),
+    /// Pixels of the frame per pixel of the level.
+    pub(super) scale: f32,
+    pub(super) seed: u64,
+    /// The sine of how far two normals may be from mirroring one another.
+    pub(super) mirror_slack: f32,
+}
+
+impl Search<'_> {
+    /// Draws pairs on the rows, then on the columns, until all points have had their turn or the budget is spent.
+    #[inline(always)]
+    pub(super) fn run(
+        &self,
+        level: &mut Level,
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) {
+        for transposed in [false, true] {
+            let lines = if transposed { level.width } else { level.height };
+            let stride = stride(lines);
+            let mut line = (self.seed % lines.max(1) as u64) as usize;
+            for _ in 0..lines {
+                line = (line + stride) % lines;
+                if budget.is_late() {
+                    return;
+                }
+                let points = level.line(transposed, line);
+                let line_end = points.end;
+                for at in points {
+                    if budget.is_spent() {
+                        return;
+                    }
+                    self.from_point(level, transposed, (at, line_end), found, prover, budget);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn from_point(
+        &self,
+        level: &mut Level,
+        transposed: bool,
+        (at, line_end): (usize, usize),
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) {
+        let lines = if transposed { &level.columns } else { &level.rows };
+        if lines.nx[at].abs() < LEAST_ALONG || !level.free[lines.id[at] as usize] {
+            return;
+        }
+        let mut rings = [Ring::default(); PARTNERS];
+        let count = lines.partners((at, line_end), self.radii, self.mirror_slack,
+            &level.free,
+            &mut rings,
+            &mut budget.looks,
+        );
+        for ring in &rings[..count] {
+            let ring = if transposed {
+                Ring {
+                    x: ring.y,
+                    y: ring.x,
+                    r: ring.r,
+                }
+            } else {
+                *ring
+            };
+            if self.consider(level, ring, found, prover, budget) {
+                return;
+            }
+        }
+    }
+
+    /// Looks at the circle and keeps it if it is worth it; true if it explains its points.
+    #[inline(always)]
+    fn consider(
+        &self,
+        level: &mut Level,
+        ring: Ring,
+        found: &mut Collected,
+        prover: &mut Prover<'_>,
+        budget: &mut Budget,
+    ) -> bool {
+        budget.draws += 1;
+        let Some(_) = self
+            .outline
+            .support(level, &ring, 0.5, &mut budget.looks)
+        else {
+            return false;
+        };
+        // The same circle is met again and again; a few fits from different pairs are enough.
+        if found.is_known(&Candidate::new(&ring, self.scale, Support::default()), budget) {
+            return false;
+        }
+        // Fit until it rests.
+        let (mut ring, mut support) = (ring, Support::default());
+        for round in 0..6 {
+            let reach = if round < 2 { 3.0 } else { 2.0 };
+            let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
+                break;
+            };
+            let outside = fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1;
+            if outside || now.hits + 2 < support.hits {
+                break;
+            }
+            let moved = (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
+            (ring, support) = (fitted, now);
+            if moved < 0.15 {
+                break;
+            }
+        }
+        if support.share() < 0.4 || support.visible < LOOKS as u32 / 3 {
+            return false;
+        }
+        let candidate = Candidate::new(&ring, self.scale, support);
+        let Some(place) = found.add(candidate, budget) else {
+            return false;
+        };
+        if support.share() < 0.7 {
+            return false;
+        }
+        // Likely enough to be proven at once; what is proven beyond doubt takes its points along.
+        found.candidates[place].tried = true;
+        budget.looks += PROOF;
+        let Some(proven) = prover.prove(&candidate) else {
+            return false;
+        };
+        self.outline
+            .explain(self.circle, level, &proven.shrunk(self.scale), &mut budget.looks);
+        true
+    }
+}
+
+impl Lines {
+    /// The circles of the point `at` and the nearest points further along its line whose normals mirror its own.
+    #[inline(always)]
+    fn partners(
+        &self,
+        (at, line_end): (usize, usize),
+        radii: (f32, f32),
+        mirror_slack: f32,
+        free: &[bool],
+        rings: &mut [Ring; PARTNERS],
+        looks: &mut u64,
+    ) -> usize {
+        // Inward: along the line at p, against it at q.
+        let sign = 1f32.copysign(self.nx[at]);
+        let (x, y, px, py) = (self.x[at], self.y[at], sign * self.nx[at], sign * self.ny[at]);
+        let end = x + 2.0 * radii.1;
+        let mut count = 0;
+        let mut first = at + 1;
+        // The lists end in a margin of points that mirror none.
+        while first < line_end && self.x[first] <= end {
+            *looks += 2;
+            let block = |values: &'_ [f32]| -> [f32; LANES] { values[first..first + LANES].as_chunks().0[0] };
+            let (qx, qy, nx, ny) = (block(&self.x), block(&self.y), block(&self.nx), block(&self.ny));
+            let mut fits = [0i32; LANES];
+            for lane in 0..LANES {
+                let crossed = (px * ny[lane] + py * nx[lane]).abs();
+                let dx = qx[lane] - x;
+                let along = px + nx[lane].abs();
+                fits[lane] = i32::from(crossed <= mirror_slack)
+                    & i32::from(nx[lane].abs() >= LEAST_ALONG)
+                    & i32::from((qy[lane] - y).abs() <= 1.0)
+                    & i32::from(dx >= radii.0 * along)
+                    & i32::from(dx <= radii.1 * along);
+            }
+            let mut bits = 0u32;
+            for (lane, fit) in fits.iter().enumerate() {
+                bits |= (*fit as u32) << lane;
+            }
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize % LANES;
+                bits &= bits - 1;
+                if !free[self.id[first + lane] as usize] {
+                    continue;
+                }
+                let sign = -(1f32.copysign(nx[lane]));
+                let (along, across) = (px - sign * nx[lane], py + sign * ny[lane]);
+                let length = (along * along + across * across).sqrt();
+                let r = 0.5 * (qx[lane] - x) * length / along;
+                rings[count] = Ring {
+                    x: 0.5 * (x + qx[lane]),
+                    y: 0.5 * (y + qy[lane]) + r * across / length,
+                    r,
+                };
+                count += 1;
+                if count == PARTNERS {
+                    return count;
+                }
+            }
+            first += LANES;
+        }
+        count
+    }
+}
+
+/// A step through `count` points that meets each of them once and leaps far.
+fn stride(count: usize) -> usize {
+    let mut step = (count as f64 * 0.618) as usize | 1;
+    while gcd(step, count) != 1 {
+        step += 2;
+    }
+    step
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}

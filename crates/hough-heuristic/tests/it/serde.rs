@@ -1,0 +1,71 @@
+use std::fmt::Debug;
+
+use hough_heuristic::{
+    Acceptance, CannyConfig, Circle, CurveSearchConfig, Detection, Ellipse, Features, FoundCurve,
+    HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling, StandardHoughConfig,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+fn comes_back<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
+    let stored = serde_json::to_string(value).unwrap();
+    assert_eq!(serde_json::from_str::<T>(&stored).unwrap(), *value, "{stored}");
+}
+
+#[test]
+fn what_is_stored_comes_back() {
+    let circle = Circle {
+        x: 12.25,
+        y: -3.5,
+        radius: 40.125,
+    };
+    comes_back(&circle);
+    comes_back(&Features::from_circle(&circle, 768));
+    comes_back(&Detection { circle, score: 0.875 });
+    comes_back(&FoundCurve {
+        curve: Line {
+            cos: 0.6,
+            sin: 0.8,
+            rho: -7.5,
+        },
+        beta: 0.75,
+    });
+    comes_back(&FoundCurve {
+        curve: Ellipse {
+            x: 60.0,
+            y: 45.5,
+            major: 25.0,
+            minor: 15.0,
+            angle: 0.25,
+        },
+        beta: 0.75,
+    });
+}
+
+#[test]
+fn settings_come_back() {
+    let accept = Acceptance {
+        region: Some(Region::in_frame((5, 6), (70, 80), (768, 576)).unwrap()),
+        theta: 0.5,
+        ..Acceptance::default()
+    };
+    comes_back(&accept);
+    comes_back(&CannyConfig::default());
+    comes_back(&CurveSearchConfig {
+        reach: Some(30.0),
+        ..CurveSearchConfig::default()
+    });
+    comes_back(&HeuristicConfig {
+        region: accept.region,
+        sampling: Sampling::Anywhere,
+        ..HeuristicConfig::default()
+    });
+    comes_back(&RandomizedHoughConfig {
+        accept,
+        ..RandomizedHoughConfig::default()
+    });
+    comes_back(&StandardHoughConfig {
+        accept,
+        ..StandardHoughConfig::default()
+    });
+}

@@ -1,0 +1,264 @@
+//! What the truth of a frame says is visible, and what hides what.
+
+use nalgebra::Point2;
+use pipeline_sim::{
+    Ball, Cell, Distortion, Ellipse, Look, Occluder, Renderer, Round, Scene, Shape, Thing, Workspace,
+};
+use puma_val2::{JointDelta, Joints};
+
+fn cell_at_goal() -> (Cell, Joints) {
+    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+    let goal = cell.goal_pose(45.0).expect("within reach");
+    (cell, goal)
+}
+
+#[test]
+fn truth_knows_what_hides_the_ball() {
+    let (cell, goal) = cell_at_goal();
+    let target = |scene: &Scene| {
+        let truth = Renderer::new(scene, 1).truth(&cell, &goal);
+        assert_eq!(truth[0].what, Round::Target);
+        truth[0]
+    };
+    let free = target(&Scene::plain());
+    assert!(free.visible > 0.99, "{}", free.visible);
+    assert_eq!(Some(free.ellipse.circle()), cell.circle(&goal));
+    // A strip of 20 units over the middle of a circle of radius 33.
+    let Ellipse { centre, .. } = free.ellipse;
+    let (x, y) = ((centre.x + 0.5) / 4.0, (centre.y + 0.5) / 4.0);
+    let strip = Occluder {
+        from: Point2::new(x, y - 100.0),
+        to: Point2::new(x, y + 100.0),
+        width: 20.0,
+        softness: 2.0,
+        albedo: 0.2,
+    };
+    let hidden = target(&Scene {
+        occluders: vec![strip],
+        ..Scene::plain()
+    });
+    let t = 10.0_f64 / 33.0;
+    let expected = 1.0 - 2.0 / std::f64::consts::PI * (t.asin() + t * (1.0 - t * t).sqrt());
+    assert!(
+        (hidden.visible - expected).abs() < 0.02,
+        "{} against {expected}",
+        hidden.visible
+    );
+    // Half out of the frame.
+    let mut cut = goal;
+    let mut share = 1.0;
+    while share > 0.6 {
+        cut = cut + JointDelta::from_degrees([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        share = Renderer::truth(&Renderer::new(&Scene::plain(), 1), &cell, &cut)
+            .first()
+            .map_or(0.0, |s| s.visible);
+    }
+    assert!((0.5..=0.6).contains(&share), "{share}");
+}
+
+#[test]
+fn nearer_things_hide_farther_ones() {
+    // A tall cylinder between the camera and a low ball on the table.
+    let (cell, _) = cell_at_goal();
+    let pose = Workspace::paper().search_poses()[3];
+    let look = Look {
+        albedo: 0.5,
+        texture: 0.0,
+        gloss: 0.0,
+    };
+    let thing = |shape, x, y| Thing {
+        shape,
+        x,
+        y,
+        turn: 0.0,
+        look,
+    };
+    let ball = thing(Shape::Ball { radius: 0.03 }, 0.80, 0.0);
+    let visible = |things: Vec<Thing>| {
+        let truth = Renderer::new(
+            &Scene {
+                things,
+                ..Scene::plain()
+            },
+            1,
+        )
+        .truth(&cell, &pose);
+        truth.iter().find(|s| s.what == Round::Ball).map(|s| s.visible)
+    };
+    assert!(visible(vec![ball]).expect("in the frame") > 0.95);
+    let camera = cell.camera_pose(&pose).translation.vector;
+    let (x, y) = (0.80 - 0.053, 0.053 * camera.y / (0.80 - camera.x));
+    let post = thing(
+        Shape::Cylinder {
+            radius: 0.02,
+            height: 0.10,
+        },
+        x,
+        y,
+    );
+    let beside = thing(
+        Shape::Cylinder {
+            radius: 0.02,
+            height: 0.10,
+        },
+        0.80 + 0.09,
+        y,
+    );
+    let (before, behind) = (visible(vec![post, ball]), visible(vec![beside, ball]));
+    assert!(before.is_none_or(|v| v < 0.7), "{before:?}");
+    assert!(behind.expect("in the frame") > 0.95, "{behind:?}");
+}
+
+/// A bare scene with one dull thing.
+fn with_thing(shape: Shape, x: f64, y: f64) -> Scene {
+    let look = Look {
+        albedo: 0.5,
+        texture: 0.0,
+        gloss: 0.0,
+    };
+    let thing = Thing {
+        shape,
+        x,
+        y,
+        turn: 0.3,
+        look,
+    };
+    Scene {
+        things: vec![thing],
+        ..Scene::plain()
+    }
+}
+
+#[test]
+fn a_ball_carried_over_a_box_hides_the_box_and_one_behind_it_is_hidden() {
+    let (mut cell, goal) = cell_at_goal();
+    cell.holder = None;
+    let shape = Shape::Box {
+        length: 0.10,
+        width: 0.08,
+        height: 0.05,
+    };
+    // The box under the ball reaches nearer to the camera than the ball does.
+    let (ball, eye) = (cell.ball.centre, cell.camera_pose(&goal).translation.vector);
+    let toward = (eye.xy() - ball.coords.xy()).normalize();
+    for nearer in [0.0, 0.02, 0.05, 0.07] {
+        let (x, y) = (ball.x + nearer * toward.x, ball.y + nearer * toward.y);
+        let truth = Renderer::new(&with_thing(shape, x, y), 1).truth(&cell, &goal);
+        assert_eq!(truth[0].what, Round::Target);
+        assert!(truth[0].visible > 0.98, "{nearer}: {}", truth[0].visible);
+    }
+    // A ball on the table close behind a tall box, as seen from a search pose, is hidden by it.
+    let pose = Workspace::paper().search_poses()[3];
+    let eye = cell.camera_pose(&pose).translation.vector;
+    let mut low = cell;
+    low.ball.centre = nalgebra::Point3::new(0.75, 0.15, cell.table + 0.02);
+    let toward = (eye.xy() - low.ball.centre.coords.xy()).normalize();
+    let tall = Shape::Box {
+        length: 0.05,
+        width: 0.05,
+        height: 0.09,
+    };
+    let before = with_thing(tall, 0.75 + 0.06 * toward.x, 0.15 + 0.06 * toward.y);
+    let hidden = Renderer::new(&before, 1).truth(&low, &pose);
+    let visible = hidden
+        .iter()
+        .find(|s| s.what == Round::Target)
+        .map_or(0.0, |s| s.visible);
+    assert!(visible < 0.7, "{visible}");
+}
+
+#[test]
+fn a_holder_without_its_ball_stands_where_it_stands() {
+    // The ball has been put down near the camera; between its holder and the camera stands a cylinder.
+    let pose = Workspace::paper().search_poses()[3];
+    let mut cell = Cell::paper(Ball::at(0.75, 0.15, -0.24));
+    let eye = cell.camera_pose(&pose).translation.vector;
+    let foot = cell.ball.centre.xy();
+    let toward = (eye.xy() - foot.coords).normalize();
+    let (x, y) = (foot.x + 0.05 * toward.x, foot.y + 0.05 * toward.y);
+    cell.ball.centre = nalgebra::Point3::new(
+        foot.x + 0.25 * toward.x,
+        foot.y + 0.25 * toward.y,
+        cell.table + 0.02,
+    );
+    let scene = with_thing(
+        Shape::Cylinder {
+            radius: 0.02,
+            height: 0.08,
+        },
+        x,
+        y,
+    );
+    let top = |cell: &Cell| {
+        let truth = Renderer::new(&scene, 1).truth(cell, &pose);
+        let top = truth
+            .into_iter()
+            .find(|s| s.what == Round::Top)
+            .expect("in the frame");
+        top.visible
+    };
+    assert!(top(&cell) > 0.99, "{}", top(&cell));
+    // In front of it, the holder does hide it.
+    let mut before = cell;
+    if let Some(holder) = &mut before.holder {
+        holder.foot += 0.10 * toward;
+        holder.top = -0.05;
+    }
+    assert!(top(&before) < 0.9, "{}", top(&before));
+}
+
+#[test]
+fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
+    let lens = Distortion {
+        k1: -0.30,
+        k2: 0.06,
+        ..Distortion::default()
+    };
+    let paper = pipeline_sim::Camera::paper();
+    let bent = paper.with_distortion(lens).expect("does not fold");
+    let small = paper.resized(192, 144).expect("a usable size");
+    let (cell, goal) = cell_at_goal();
+    for camera in [paper, small, bent] {
+        let mut cell = cell;
+        cell.camera = camera;
+        cell.holder = None;
+        let (width, height) = (f64::from(camera.size().0), f64::from(camera.size().1));
+        // What is large and bent is no ellipse any more.
+        let most = if camera.distortion().is_none() { 0.2 } else { 0.06 };
+        for radius in [0.012, 0.02, 0.06, most] {
+            // The centre on the right border, in a corner, and a little above the bottom.
+            for (x, y) in [
+                (width, 0.5 * height),
+                (0.0, 0.0),
+                (0.3 * width, height - 0.02 * width),
+            ] {
+                let circle = hough_heuristic::Circle {
+                    x: x - 0.5,
+                    y: y - 0.5,
+                    radius: radius * width,
+                };
+                let place = camera
+                    .sphere_of_circle(&circle, cell.ball.radius)
+                    .expect("some place shows it");
+                cell.ball.centre = cell.camera_pose(&goal) * place;
+                let truth = Renderer::new(&Scene::plain(), 1).truth(&cell, &goal);
+                let outline = truth[0].ellipse;
+                // Points spread evenly over the outlined area.
+                let n = 4000;
+                let inside = (0..n).filter(|k| {
+                    let share = (f64::from(*k) + 0.5) / f64::from(n);
+                    let rim = outline.point(f64::from(*k) * 2.399_963) - outline.centre;
+                    let p = outline.centre + rim * share.sqrt();
+                    (-0.5..=width - 0.5).contains(&p.x) && (-0.5..=height - 0.5).contains(&p.y)
+                });
+                let counted = inside.count() as f64 / f64::from(n);
+                assert!(
+                    (truth[0].visible - counted).abs() < 0.015,
+                    "{:?} {circle:?}: {} against {counted}",
+                    camera.size(),
+                    truth[0].visible
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Motions of the hand.
+
+use nalgebra::Isometry3;
+
+use super::wire::Failed;
+use super::{Val2Client, plain};
+use crate::{ArmError, Location, Transport, Xyzoat};
+
+impl<T: Transport> Val2Client<T> {
+    /// Moves the hand to a pose in the world frame by `DO MOVE TRANS(...)`, the joints interpolated, or along a straight line.
+    ///
+    /// Position within 0.1 mm and direction within 0.1 degrees are confirmed by `WHERE`. An armed proximity guard watches this motion as any other.
+    ///
+    /// # Errors
+    /// [`ArmError::Setting`] if a number of the pose is not finite; [`ArmError::Refused`] if the controller cannot reach it; otherwise as for
+    /// [`Manipulator::move_to`](crate::Manipulator::move_to).
+    pub fn move_hand(&mut self, hand: &Xyzoat, straight: bool) -> Result<Location, ArmError> {
+        if !hand.is_finite() {
+            return Err(ArmError::Setting {
+                what: "a hand pose",
+                value: hand.to_string(),
+                allowed: "six finite numbers",
+            });
+        }
+        let mut tries = 0;
+        loop {
+            // The pose is absolute: commanding it again leads to the same place.
+            let outcome = self.send_hand(hand, if straight { "MOVES" } else { "MOVE" });
+            let doubt = self.doubt(outcome)?;
+            let stands = self.stand_anywhere().map_err(|error| self.lost(error))?;
+            self.check_guard(stands, doubt.is_some())?;
+            let location = self.where_().map_err(|error| self.lost(error))?;
+            let (off, turned) = apart(&hand.pose(), &location.hand.pose());
+            if off < 1e-4 && turned < 0.1 {
+                return Ok(location);
+            }
+            match doubt {
+                Some(doubt) if tries < self.config.retries && !doubt.overdue => tries += 1,
+                Some(doubt) => return Err(doubt.error),
+                None => {
+                    let expected = format!("the hand at {hand}");
+                    let shown = location.hand.to_string();
+                    return Err(self.wire.garbled("a move of the hand", &expected, &shown));
+                }
+            }
+        }
+    }
+
+    /// Commands a motion of the hand: in one line where its echo is checked, as a point whose display is checked otherwise.
+    fn send_hand(&mut self, hand: &Xyzoat, word: &str) -> Result<(), Failed> {
+        let move_to_pose = format!("{word} TRANS({})", hand.val().map(plain).join(","));
+        if let Some(signal) = self.guard {
+            return self.run_guarded_once(signal, &[move_to_pose]);
+        }
+        let line = if self.echoes() && self.config.check_echo {
+            format!("DO {move_to_pose}")
+        } else {
+            let name = self.config.point_name.clone();
+            self.define_point(&name, hand.val(), &|shown| {
+                let shown = Xyzoat::from_val(shown.map(|(value, _)| value));
+                let (off, turned) = apart(&hand.pose(), &shown.pose());
+                off < 2e-5 && turned < 0.02
+            })?;
+            format!("DO {word} {name}")
+        };
+        self.command_once(&line, self.config.motion_timeout).map(drop)
+    }
+}
+
+/// How far two poses are apart, metres and degrees.
+fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    let off = (a.translation.vector - b.translation.vector).norm();
+    (off, a.rotation.angle_to(&b.rotation).to_degrees())
+}
