@@ -44,7 +44,7 @@ impl Tally {
         (
             mean,
             if n > 1.0 {
-                student(shares.len() - 1) * (variance / n).sqrt()
+                (student(shares.len() - 1) * (variance / n).sqrt()).min(100.0)
             } else {
                 f64::NAN
             },
