@@ -212,3 +212,30 @@ fn detect_circles_names_a_frame_that_is_too_large_and_goes_on() {
     );
     assert!(!errors.contains("small.pgm"), "{errors}");
 }
+
+#[test]
+fn the_emulator_names_what_it_cannot_serve_on() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a socket");
+    let address = taken.local_addr().expect("its address").to_string();
+    let mut cases = vec![
+        (["--tcp", address.as_str()], address.as_str()),
+        (["--tcp", "nonsense"], "nonsense"),
+        (["--profile", "nobody"], "val2_strict_miz"),
+    ];
+    let link = folder.path().join("none/arm").display().to_string();
+    if cfg!(unix) {
+        cases.push((["--link", link.as_str()], link.as_str()));
+    }
+    for (arguments, named) in cases {
+        let Some(mut command) = example("val2_emulator") else {
+            return;
+        };
+        let (output, errors) = output(command.args(arguments));
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
+        assert!(
+            errors.starts_with("error: ") && errors.contains(named),
+            "{arguments:?}: {errors}"
+        );
+    }
+}

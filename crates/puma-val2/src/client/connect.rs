@@ -110,7 +110,7 @@ impl<T: Transport> Val2Client<T> {
     /// Types a command that does no harm and listens whether it comes back before its line is ended.
     fn find_echo(&mut self) -> Result<(), ArmError> {
         self.wire.echo = Some(false);
-        for _ in 0..=self.config.retries {
+        for attempt in 0..=self.config.retries {
             self.wire.send(b"WHERE", "WHERE")?;
             let mut buffer = [0; 64];
             let mut heard = Vec::new();
@@ -131,15 +131,22 @@ impl<T: Transport> Val2Client<T> {
                     break;
                 }
             }
-            let echoed = !heard.is_empty();
             self.wire.send(b"\r", "WHERE")?;
             match self
                 .wire
                 .read_reply("WHERE", self.config.patience(), &self.config)
             {
                 Ok(reply) => {
-                    if Location::parse(&reply.text).is_some() || !reader::messages(&reply.text).is_empty() {
-                        self.wire.echo = Some(echoed);
+                    // An echo may come late, behind a message that nobody asked for, or damaged. What looks like neither echo nor silence is
+                    // listened to again.
+                    let said = String::from_utf8_lossy(&heard).to_ascii_uppercase();
+                    let echoed =
+                        said.contains("WHERE") || reply.text.to_ascii_uppercase().contains("WHERE\r");
+                    let plain = echoed || heard.is_empty() || attempt == self.config.retries;
+                    let answered =
+                        Location::parse(&reply.text).is_some() || !reader::messages(&reply.text).is_empty();
+                    if answered && plain {
+                        self.wire.echo = Some(echoed || !heard.is_empty());
                         return Ok(());
                     }
                 }
