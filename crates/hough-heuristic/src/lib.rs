@@ -24,8 +24,10 @@
 //!
 //! # Detectors
 //!
+//! * [`Trusted`]: for real photographs. An unknown number of circles, each proven against chance and measured with its standard
+//!   error, in a bounded number of draws; goes beyond the paper.
 //! * [`Heuristic`]: a random search that needs no memory but the edges themselves. The detector of the paper this project
-//!   follows (section 2.1), and the one to use.
+//!   follows (section 2.1).
 //! * [`RandomizedHough`] and [`StandardHough`]: the two transforms the paper compares it with. They accept circles by the
 //!   same rules ([`Acceptance`]), so that what differs is the search.
 //! * [`CurveSearch`]: the paper's algorithm as it stands there, for any [`Curve`] given by n pixels, such as [`Line`] and
@@ -51,6 +53,8 @@
 //! arc tangents, whose last bits differ between platforms.
 //!
 //! # Limitations
+//!
+//! [`Trusted`] finds what is round: lamps, wheels and letters too. The others go by β:
 //!
 //! β asks whether pixels of the circle are edges, not whether those edges run along it. Where edges cover more than a tenth
 //! of the picture, as in grass or gravel, chance alone lifts β above any useful θ, and what is found there means little. A sphere

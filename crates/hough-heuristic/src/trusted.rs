@@ -361,7 +361,7 @@ const DEEPEST: usize = 5;
 /// The most candidates of a frame.
 const CANDIDATES: usize = 192;
 /// One point of this many pixels may be an edge; of more the strongest are taken.
-const PIXELS_PER_POINT: usize = 8;
+const PIXELS_PER_POINT: usize = 12;
 /// What the operator makes of a step of one grey level.
 const STEP_GAIN: f32 = 2.3;
 /// The threshold in deviations of the noise.

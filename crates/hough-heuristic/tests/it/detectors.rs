@@ -291,26 +291,27 @@ fn a_known_radius_needs_pairs_only() {
     assert!(found >= 16, "found {found} of 20 balls");
 }
 
-#[test]
-fn turned_frames_give_turned_circles() {
-    let (frame, balls) = SCENE.render();
+/// A frame turned, and where its circles are then.
+pub(crate) type Turn = (GrayImage, Box<dyn Fn(&Circle) -> Circle>);
+
+/// The frame flipped both ways, turned by a quarter, and transposed.
+pub(crate) fn turns(frame: &GrayImage) -> [Turn; 4] {
     let (right, bottom) = (f64::from(frame.width()) - 1.0, f64::from(frame.height()) - 1.0);
-    type Turn = (GrayImage, Box<dyn Fn(&Circle) -> Circle>);
     let transposed = GrayImage::from_fn(frame.height(), frame.width(), |x, y| *frame.get_pixel(y, x));
-    let turns: [Turn; 4] = [
+    [
         (
-            imageops::flip_horizontal(&frame),
+            imageops::flip_horizontal(frame),
             Box::new(move |c| Circle { x: right - c.x, ..*c }),
         ),
         (
-            imageops::flip_vertical(&frame),
+            imageops::flip_vertical(frame),
             Box::new(move |c| Circle {
                 y: bottom - c.y,
                 ..*c
             }),
         ),
         (
-            imageops::rotate90(&frame),
+            imageops::rotate90(frame),
             Box::new(move |c| Circle {
                 x: bottom - c.y,
                 y: c.x,
@@ -318,7 +319,13 @@ fn turned_frames_give_turned_circles() {
             }),
         ),
         (transposed, Box::new(|c| Circle { x: c.y, y: c.x, ..*c })),
-    ];
+    ]
+}
+
+#[test]
+fn turned_frames_give_turned_circles() {
+    let (frame, balls) = SCENE.render();
+    let turns = turns(&frame);
     for (name, mut detector) in all(ACCEPT) {
         let upright = detector.detect(&frame);
         assert_eq!(upright.len(), balls.len());

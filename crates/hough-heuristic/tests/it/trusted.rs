@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
+use crate::detectors::turns;
 use crate::scenes::{Scene, same};
 
 const SCENE: Scene = Scene {
@@ -55,43 +56,10 @@ fn known_circles_are_recovered() {
 #[test]
 fn turned_frames_give_turned_circles() {
     let (frame, balls) = SCENE.render();
-    let (right, bottom) = (f64::from(frame.width()) - 1.0, f64::from(frame.height()) - 1.0);
-    let transposed = GrayImage::from_fn(frame.height(), frame.width(), |x, y| *frame.get_pixel(y, x));
-    type Turn = (GrayImage, Box<dyn Fn(&Circle) -> Circle>);
-    let turns: [Turn; 5] = [
-        (
-            imageops::flip_horizontal(&frame),
-            Box::new(move |c| Circle { x: right - c.x, ..*c }),
-        ),
-        (
-            imageops::flip_vertical(&frame),
-            Box::new(move |c| Circle {
-                y: bottom - c.y,
-                ..*c
-            }),
-        ),
-        (
-            imageops::rotate90(&frame),
-            Box::new(move |c| Circle {
-                x: bottom - c.y,
-                y: c.x,
-                ..*c
-            }),
-        ),
-        (
-            imageops::rotate180(&frame),
-            Box::new(move |c| Circle {
-                x: right - c.x,
-                y: bottom - c.y,
-                ..*c
-            }),
-        ),
-        (transposed, Box::new(|c| Circle { x: c.y, y: c.x, ..*c })),
-    ];
     let mut detector = plain();
     let upright = detector.detect(&frame);
     assert_eq!(upright.len(), balls.len());
-    for (turned, turn) in &turns {
+    for (turned, turn) in &turns(&frame) {
         let found = detector.detect(turned);
         assert_eq!(found.len(), upright.len());
         for one in &upright {
