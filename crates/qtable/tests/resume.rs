@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
-    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Learner,
-    ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, Problem, QLambda, QLearning, QTable, Sarsa,
-    SarsaLambda, Schedule, TimeLimit, TrainConfig, Training, TrainingInBlocks, Ucb, Until, Value, decode,
-    encode, toys, train_in_blocks,
+    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience, Greedy,
+    Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, Problem, QLambda, QLearning, QTable,
+    Sarsa, SarsaLambda, Schedule, State, Status, Step, TimeLimit, TrainConfig, Training, TrainingInBlocks,
+    Ucb, Until, Value, decode, encode, toys, train_in_blocks,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -161,6 +161,31 @@ fn damaged_settings_of_a_run_in_blocks_are_refused() {
         assert!(matches!(refused, Err(Problem::Contents(_))), "{refused:?}");
     }
     assert!(matches!(begun(0), Err(Error::Setting { name: "blocks", .. })));
+}
+
+/// The change of a value from one end of the numbers to the other is beyond both.
+#[test]
+fn a_sweep_with_an_enormous_change_ahead_can_be_saved() {
+    let mut learner = PrioritizedSweeping::new(1.0).unwrap().with_backups(1).unwrap();
+    let mut table = QTable::filled(2, 1, -1.7e308).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    for (state, reward, status) in [(1, 0.0, Status::Continuing), (0, 1.7e308, Status::Terminated)] {
+        let step = Step {
+            observation: State(0),
+            reward,
+            status,
+        };
+        let experience = Experience {
+            state: State(state),
+            action: Action(0),
+            step,
+            next_action: None,
+        };
+        learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
+    }
+    assert!(table.max(State(0)) > 1e308 && table.max(State(1)) < -1e308);
+    let back: PrioritizedSweeping = decode("l", &encode("l", &learner).unwrap()).unwrap();
+    assert_eq!(back, learner);
 }
 
 #[test]
