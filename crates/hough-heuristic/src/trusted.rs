@@ -214,7 +214,11 @@ impl Trusted {
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
         for depth in (finest..=smallest).rev() {
             let scale = (1 << depth) as f32;
-            let Grey { pixels, width, height } = pyramid.grey(depth);
+            let Grey {
+                pixels,
+                width,
+                height,
+            } = pyramid.grey(depth);
             let threshold = (STEP_GAIN * self.config.contrast as f32)
                 .max(NOISE_FACTOR * (noise / scale + ROUNDING) * self.maxima.noise_gain());
             let points = self
@@ -246,7 +250,12 @@ impl Trusted {
                 budget: &mut self.budget,
             });
         }
-        for candidate in self.collected.candidates.iter().filter(|candidate| !candidate.tried) {
+        for candidate in self
+            .collected
+            .candidates
+            .iter()
+            .filter(|candidate| !candidate.tried)
+        {
             if self.budget.is_late() {
                 break;
             }
@@ -268,7 +277,11 @@ impl Trusted {
                 break;
             }
             let rough = circle_of(&proof.in_frame());
-            if self.measurements.iter().any(|other| is_same(&rough, &other.circle)) {
+            if self
+                .measurements
+                .iter()
+                .any(|other| is_same(&rough, &other.circle))
+            {
                 continue;
             }
             self.budget.looks += 4 * search::PROOF;

@@ -58,11 +58,15 @@ impl Maxima {
         }
         if self.candidates.len() > most {
             self.squares.clear();
-            self.squares
-                .extend(self.candidates.iter().map(|candidate| candidate.gradient.square()));
+            self.squares.extend(
+                self.candidates
+                    .iter()
+                    .map(|candidate| candidate.gradient.square()),
+            );
             let rank = self.squares.len() - most;
             let (_, &mut least, _) = self.squares.select_nth_unstable(rank);
-            self.candidates.retain(|candidate| candidate.gradient.square() >= least);
+            self.candidates
+                .retain(|candidate| candidate.gradient.square() >= least);
         }
         &self.candidates
     }

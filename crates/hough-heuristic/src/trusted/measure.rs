@@ -69,7 +69,11 @@ pub(super) fn measure<'a>(
             measured.ring = measured.ring.grown(2.0);
         }
         first = false;
-        let rays = circle.rays(if last { (measured.ring.r * 3.0) as usize } else { 64 });
+        let rays = circle.rays(if last {
+            (measured.ring.r * 3.0) as usize
+        } else {
+            64
+        });
         let count = rays.x.len();
         let arc = measured.ring.r * std::f32::consts::TAU / count as f32;
         // Averaged along the outline over a length that grows with the noise.
@@ -78,7 +82,13 @@ pub(super) fn measure<'a>(
         let rounds = if last { ROUNDS } else { 1 };
         for round in 0..rounds {
             let reach = if round == 0 { REACH } else { 3 };
-            polar.sample(frame, rays, &measured.ring, reach.min(measured.ring.r as usize), half);
+            polar.sample(
+                frame,
+                rays,
+                &measured.ring,
+                reach.min(measured.ring.r as usize),
+                half,
+            );
             let focus = if round == 0 { 4.0 } else { 2.5 };
             let steepest = Steepest::on(polar, focus);
             let step = steepest.fit(rays.x, rays.y, focus)?;
@@ -95,7 +105,14 @@ pub(super) fn measure<'a>(
                     measured.ring.y += shift.y;
                     measured.ring.r += shift.r;
                 }
-                steepest.errors(rays.x, rays.y, &step, (2 * half + 1) as f32 * arc, arc, &mut measured);
+                steepest.errors(
+                    rays.x,
+                    rays.y,
+                    &step,
+                    (2 * half + 1) as f32 * arc,
+                    arc,
+                    &mut measured,
+                );
             }
         }
     }
@@ -170,7 +187,12 @@ fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     }
     let (before, behind) = (profile[at - 1], profile[at + 1]);
     let bend = 2.0 * top - before - behind;
-    let place = at as f32 + if bend > 0.0 { (0.5 * (behind - before) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    let place = at as f32
+        + if bend > 0.0 {
+            (0.5 * (behind - before) / bend).clamp(-0.5, 0.5)
+        } else {
+            0.0
+        };
     let value = |place: f32| {
         let place = place.clamp(0.0, (profile.len() - 1) as f32);
         let low = (place as usize).min(profile.len() - 2);
@@ -200,8 +222,8 @@ impl Steepest {
             let (mut best, mut at) = (0.0, 0);
             for step in 0..polar.steps {
                 let off = polar.distance(step as f32) / (focus + 1.5);
-                let strength = slope(step) * (1.0 - off * off).max(0.0)
-                    - 0.5 * polar.along[step * count + ray].abs();
+                let strength =
+                    slope(step) * (1.0 - off * off).max(0.0) - 0.5 * polar.along[step * count + ray].abs();
                 if strength > best {
                     (best, at) = (strength, step);
                 }

@@ -270,7 +270,10 @@ mod tests {
     #[test]
     fn logarithms_are_those_of_the_library() {
         for x in [1e-30f32, 0.001, 0.3, 0.999, 1.0, 1.5, 1.999, 2.0, 10.0, 1e7] {
-            assert!((log10(x) - x.log10()).abs() <= 1e-6 * x.log10().abs().max(1.0), "{x}");
+            assert!(
+                (log10(x) - x.log10()).abs() <= 1e-6 * x.log10().abs().max(1.0),
+                "{x}"
+            );
         }
     }
 

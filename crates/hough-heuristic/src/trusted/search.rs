@@ -52,7 +52,8 @@ impl Budget {
     /// Whether no more may be drawn; once it is spent it remains so.
     #[inline(always)]
     pub(super) fn is_spent(&mut self) -> bool {
-        self.spent |= self.draws >= self.most_draws || self.looks >= LOOKS_PER_DRAW * self.most_draws + 10_000;
+        self.spent |=
+            self.draws >= self.most_draws || self.looks >= LOOKS_PER_DRAW * self.most_draws + 10_000;
         self.spent
     }
 
@@ -281,7 +282,10 @@ impl Search<'_> {
             return;
         }
         let mut rings = [Ring::default(); PARTNERS];
-        let count = lines.partners((at, line_end), self.radii, self.mirror_slack,
+        let count = lines.partners(
+            (at, line_end),
+            self.radii,
+            self.mirror_slack,
             &level.free,
             &mut rings,
             &mut budget.looks,
@@ -313,10 +317,7 @@ impl Search<'_> {
         budget: &mut Budget,
     ) -> bool {
         budget.draws += 1;
-        let Some(_) = self
-            .outline
-            .support(level, &ring, 0.5, &mut budget.looks)
-        else {
+        let Some(_) = self.outline.support(level, &ring, 0.5, &mut budget.looks) else {
             return false;
         };
         // The same circle is met again and again; a few fits from different pairs are enough.

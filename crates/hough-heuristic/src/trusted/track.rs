@@ -36,14 +36,19 @@ impl Trusted {
             (last.radius - reach).max(self.config.min_radius),
             (last.radius + reach).min(self.config.max_radius),
         );
-        let usable = [last.x, last.y, last.radius, reach].iter().all(|value| value.is_finite());
+        let usable = [last.x, last.y, last.radius, reach]
+            .iter()
+            .all(|value| value.is_finite());
         if !usable || reach < 0.0 || radii.0 > radii.1 {
             return None;
         }
         // Room for the outline wherever it may be, and for the rays beyond it.
         let room = last.radius + 2.0 * reach + MARGIN;
         let clip = |value: f64, end: u32| value.clamp(0.0, f64::from(end)) as u32;
-        let (left, right) = (clip(last.x - room, frame.width()), clip(last.x + room + 1.0, frame.width()));
+        let (left, right) = (
+            clip(last.x - room, frame.width()),
+            clip(last.x + room + 1.0, frame.width()),
+        );
         let (top, bottom) = (
             clip(last.y - room, frame.height()),
             clip(last.y + room + 1.0, frame.height()),
@@ -54,7 +59,12 @@ impl Trusted {
         }
         let mut pixels = std::mem::take(&mut self.window).into_raw();
         pixels.clear();
-        for row in frame.as_raw().chunks_exact(frame.width() as usize).take(bottom as usize).skip(top as usize) {
+        for row in frame
+            .as_raw()
+            .chunks_exact(frame.width() as usize)
+            .take(bottom as usize)
+            .skip(top as usize)
+        {
             pixels.extend_from_slice(&row[left as usize..right as usize]);
         }
         let window = GrayImage::from_raw(width, height, pixels).unwrap_or_default();
@@ -76,7 +86,11 @@ impl Trusted {
         self.measurements.iter().map(moved).find(|measurement| {
             let circle = &measurement.circle;
             let off = ((circle.x - last.x).powi(2) + (circle.y - last.y).powi(2)).sqrt();
-            let placed = self.config.region.as_ref().is_none_or(|region| region.holds(circle));
+            let placed = self
+                .config
+                .region
+                .as_ref()
+                .is_none_or(|region| region.holds(circle));
             off <= reach && placed
         })
     }
