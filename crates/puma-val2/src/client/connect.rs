@@ -1,6 +1,6 @@
 //! Getting hold of the monitor, and calibrating the arm.
 
-use super::wire::{NUDGE, SPOIL, is_boot_question, is_doubt, last_line, shortened, way_out};
+use super::wire::{NUDGE, SPOIL, is_boot_question, is_doubt, last_question, shortened, way_out};
 use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
 use crate::{ArmError, Transport};
 
@@ -86,11 +86,12 @@ impl<T: Transport> Val2Client<T> {
                     return Err(self.wire.garbled("CR", "an idle monitor", heard));
                 }
                 Ending::Question if is_boot_question(&reply.text) => {
-                    let loads = last_line(&reply.text).to_ascii_uppercase().contains("LOAD");
-                    let yes = if loads {
-                        self.config.load_from_floppy
-                    } else {
+                    // Whatever may be the question that erases the memory is answered as that one.
+                    let initializes = last_question(&reply.text).contains("INIT");
+                    let yes = if initializes {
                         self.config.initialize
+                    } else {
+                        self.config.load_from_floppy
                     };
                     if yes { b"Y\r" } else { b"N\r" }
                 }

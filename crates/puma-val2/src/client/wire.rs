@@ -364,7 +364,7 @@ impl<T: Transport> Wire<T> {
 
 /// Whether the last question of a text is one of the start-up dialogue.
 pub(super) fn is_boot_question(text: &str) -> bool {
-    let question = last_line(text).to_ascii_uppercase();
+    let question = last_question(text);
     question.contains("(Y/N)") && (question.contains("LOAD") || question.contains("INIT"))
 }
 
@@ -391,7 +391,13 @@ pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     }
 }
 
-pub(super) fn last_line(text: &str) -> &str {
+/// The last question of a text, in upper case and without its mark. Where nothing is echoed one question can follow another on its line.
+pub(super) fn last_question(text: &str) -> String {
+    let line = last_line(text).trim_end_matches(['?', ' ']);
+    line.rsplit('?').next().unwrap_or_default().to_ascii_uppercase()
+}
+
+fn last_line(text: &str) -> &str {
     text.trim_end().rsplit(['\r', '\n']).next().unwrap_or_default()
 }
 

@@ -280,3 +280,14 @@ fn values_that_are_typed_may_have_a_sign() {
         console.line("1");
     }
 }
+
+#[test]
+fn lists_that_take_no_names_refuse_them() {
+    let mut console = Console::ready();
+    console.program("A", "TYPE 1");
+    for list in ["DIRECTORY", "FDIRECTORY", "IO", "STATUS", "SWITCH"] {
+        assert!(!console.line(list).contains('*'), "{list}");
+        let said = console.line(&format!("{list} A"));
+        assert!(said.contains("*Invalid argument*"), "{said}");
+    }
+}
