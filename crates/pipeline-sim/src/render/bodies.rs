@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::render::canvas::Canvas;
-use crate::render::shadow::toward;
 use crate::render::texture::Texture;
 use crate::render::view::View;
 use crate::{Look, Occluder, Scene, Shape, Thing};
@@ -13,6 +12,8 @@ pub(super) struct Studio<'a> {
     pub(super) view: &'a View,
     pub(super) scene: &'a Scene,
     pub(super) texture: &'a Texture,
+    /// Direction toward each lamp, and its light.
+    pub(super) lamps: Vec<(Vector3<f64>, f64)>,
     /// Height of the table.
     pub(super) table: f64,
     /// Light that the table throws back.
@@ -94,10 +95,9 @@ impl Studio<'_> {
     pub(super) fn irradiance(&self, normal: &Vector3<f64>) -> f64 {
         let up = 0.5 + 0.5 * normal.z;
         let lamps: f64 = self
-            .scene
-            .lights
+            .lamps
             .iter()
-            .map(|l| l.intensity.max(0.0) * toward(l).dot(normal).max(0.0))
+            .map(|(toward, intensity)| intensity * toward.dot(normal).max(0.0))
             .sum();
         self.scene.ambient.max(0.0) * up + self.bounce * (1.0 - up) + lamps
     }
@@ -123,13 +123,12 @@ impl Studio<'_> {
         let albedo = look.albedo as f32;
         let gloss = look.gloss as f32;
         let lamps: Vec<(Vector3<f32>, Vector3<f32>, f32)> = self
-            .scene
-            .lights
+            .lamps
             .iter()
-            .map(|l| {
-                let axis = self.view.turned(&toward(l));
+            .map(|(toward, intensity)| {
+                let axis = self.view.turned(toward);
                 let half = (axis - c.normalize()).try_normalize(1e-9).unwrap_or(axis);
-                (axis.cast(), half.cast(), l.intensity.max(0.0) as f32)
+                (axis.cast(), half.cast(), *intensity as f32)
             })
             .collect();
         let origin = columns.start;
@@ -227,7 +226,7 @@ impl Studio<'_> {
         self.view.polygon(&bottom, &mut b);
         let hull = convex_hull(a.iter().chain(&b).copied().collect());
         let axis = Point2::new(foot.x - eye.x, foot.y - eye.y);
-        let rotation = self.view.pose.rotation;
+        let rotation = self.view.pose.rotation.to_rotation_matrix();
         let shade = |x: f64, y: f64| {
             let d = rotation
                 * Vector3::new(
@@ -244,9 +243,10 @@ impl Studio<'_> {
             let n = n.unwrap_or_else(Vector3::x);
             let mut light = self.irradiance(&n);
             if look.gloss > 0.0 {
-                for lamp in &self.scene.lights {
-                    let half = (toward(lamp) - d.normalize()).try_normalize(1e-9).unwrap_or(n);
-                    light += lamp.intensity * look.gloss * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
+                let back = -d.normalize();
+                for (toward, intensity) in &self.lamps {
+                    let half = (toward + back).try_normalize(1e-9).unwrap_or(n);
+                    light += intensity * look.gloss * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
                 }
             }
             // Darker toward the table.

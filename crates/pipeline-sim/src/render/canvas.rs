@@ -10,8 +10,21 @@ pub(super) struct Canvas {
     pub(super) light: Vec<f32>,
     coverage: Vec<f32>,
     shade: Vec<f32>,
-    /// Edges of the polygon that cross the present row.
-    edges: Vec<(Point2<f64>, Point2<f64>)>,
+    /// Edges of the present polygon, but for level ones.
+    edges: Vec<Edge>,
+    /// Those of them that cross the present row.
+    crossing: Vec<Edge>,
+}
+
+/// An edge of a polygon, from its upper end down.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    top: f64,
+    bottom: f64,
+    /// At the upper end.
+    x: f64,
+    /// Change of x for each row.
+    slope: f64,
 }
 
 /// Scan lines per row of pixels; coverage is exact along x and sampled this finely along y.
@@ -26,6 +39,7 @@ impl Canvas {
             coverage: vec![0.0; width + 2],
             shade: vec![0.0; width + 2],
             edges: Vec::with_capacity(8),
+            crossing: Vec::with_capacity(8),
         }
     }
 
@@ -40,7 +54,7 @@ impl Canvas {
     pub(super) fn fill(&mut self, polygon: &[Point2<f64>], mut shade: impl FnMut(usize, usize, &mut [f32])) {
         let Some(rows) = self.rows_of(polygon) else { return };
         for y in rows {
-            let Some((start, end, solid)) = self.cover_row(polygon, y) else {
+            let Some((start, end, solid)) = self.cover_row(y) else {
                 continue;
             };
             let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
@@ -60,7 +74,7 @@ impl Canvas {
     pub(super) fn blend(&mut self, polygon: &[Point2<f64>], light: f32, share: f32) {
         let Some(rows) = self.rows_of(polygon) else { return };
         for y in rows {
-            let Some((start, end, solid)) = self.cover_row(polygon, y) else {
+            let Some((start, end, solid)) = self.cover_row(y) else {
                 continue;
             };
             let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
@@ -71,8 +85,8 @@ impl Canvas {
         }
     }
 
-    /// Rows that a polygon may touch.
-    fn rows_of(&self, polygon: &[Point2<f64>]) -> Option<std::ops::Range<usize>> {
+    /// Lists the edges of a polygon and tells the rows that it may touch.
+    fn rows_of(&mut self, polygon: &[Point2<f64>]) -> Option<std::ops::Range<usize>> {
         if polygon.len() < 3 {
             return None;
         }
@@ -85,19 +99,34 @@ impl Canvas {
         let bottom = polygon.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
         let first = (top + 0.5).floor().max(0.0);
         let last = (bottom + 0.5).floor().min(self.height as f64 - 1.0);
-        (first <= last).then(|| first as usize..last as usize + 1)
-    }
-
-    /// Coverage of one row: the touched pixels start..end, and whether all of them are covered wholly.
-    fn cover_row(&mut self, polygon: &[Point2<f64>], y: usize) -> Option<(usize, usize, bool)> {
-        let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
+        if first > last {
+            return None;
+        }
         self.edges.clear();
         let mut p = polygon[polygon.len() - 1];
         for &q in polygon {
-            if p.y.max(q.y) >= above && p.y.min(q.y) <= below {
-                self.edges.push((p, q));
+            let (upper, lower) = if p.y <= q.y { (p, q) } else { (q, p) };
+            if upper.y < lower.y {
+                self.edges.push(Edge {
+                    top: upper.y,
+                    bottom: lower.y,
+                    x: upper.x,
+                    slope: (lower.x - upper.x) / (lower.y - upper.y),
+                });
             }
             p = q;
+        }
+        Some(first as usize..last as usize + 1)
+    }
+
+    /// Coverage of one row: the touched pixels start..end, and whether all of them are covered wholly.
+    fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
+        let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
+        self.crossing.clear();
+        for edge in &self.edges {
+            if edge.bottom >= above && edge.top <= below {
+                self.crossing.push(*edge);
+            }
         }
         let mut spans = [(0.0_f64, -1.0_f64); SUBROWS];
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -105,11 +134,15 @@ impl Canvas {
         for (i, span) in spans.iter_mut().enumerate() {
             let line = y as f64 - 0.5 + (i as f64 + 0.5) / SUBROWS as f64;
             let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-            for (p, q) in &self.edges {
-                if (p.y <= line) != (q.y <= line) {
-                    let x = p.x + (line - p.y) / (q.y - p.y) * (q.x - p.x);
-                    left = left.min(x);
-                    right = right.max(x);
+            for edge in &self.crossing {
+                if edge.top <= line && line < edge.bottom {
+                    let x = edge.x + (line - edge.top) * edge.slope;
+                    if x < left {
+                        left = x;
+                    }
+                    if x > right {
+                        right = x;
+                    }
                 }
             }
             // Pixel x covers x - 0.5 .. x + 0.5; here its left border is at x.
@@ -127,14 +160,12 @@ impl Canvas {
         if least >= greatest {
             return None;
         }
-        let (start, end) = (least.floor() as usize, (greatest.ceil() as usize).min(self.width));
-        let (from, to) = (inner_left.ceil(), inner_right.floor());
+        // None is negative, so that a cast rounds down.
+        let up = |x: f64| x as usize + usize::from(x as usize as f64 != x);
+        let (start, end) = (least as usize, up(greatest).min(self.width));
+        let (from, to) = (up(inner_left), inner_right as usize);
         // Pixels from..to are covered by every scan line.
-        let (from, to) = if from < to {
-            (from as usize, to as usize)
-        } else {
-            (end, end)
-        };
+        let (from, to) = if from < to { (from, to) } else { (end, end) };
         if from == start && to == end {
             return Some((start, end, true));
         }

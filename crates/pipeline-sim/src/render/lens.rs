@@ -1,9 +1,14 @@
 //! What the lens does to the light: distortion and defocus.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 use crate::Camera;
 use crate::render::canvas::Canvas;
+
+/// Pixels from one place to the next at which a distortion is undone exactly.
+const CELL: usize = 4;
+/// How far from its exact place a pixel between them may be taken, pixels.
+const STRAIGHT: f64 = 0.005;
 
 /// The map from a distorted frame to the ideal one it is taken from.
 #[derive(Clone, Debug)]
@@ -39,20 +44,49 @@ impl Warp {
         let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
         let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
         let large = Camera::ideal(focal, Point2::from(principal - low), w, h);
-        // From pixel to pixel the answer changes little: the last one is where to look for the next.
-        let image = |x: u32, y: u32| (Point2::new(f64::from(x), f64::from(y)) - principal) / focal;
+        // From place to place the answer changes little: the last one is where to look for the next.
         let mut last = (Point2::origin(), Point2::origin());
-        let sources = (0..height)
-            .flat_map(|y| (0..width).map(move |x| (x, y)))
-            .map(|(x, y)| {
-                let shown = Point2::from(image(x, y));
-                let undone = camera.distortion().undistort_near(shown, last);
-                last = (shown, undone.unwrap_or(last.1));
-                let p = principal + last.1.coords * focal - low;
-                let (i, j) = (p.x.floor(), p.y.floor());
-                ((j as u32) * w + i as u32, (p.x - i) as f32, (p.y - j) as f32)
-            })
-            .collect();
+        let mut exact = |x: u32, y: u32| {
+            let shown = Point2::from((Point2::new(f64::from(x), f64::from(y)) - principal) / focal);
+            let undone = camera.distortion().undistort_near(shown, last);
+            last = (shown, undone.unwrap_or(last.1));
+            principal + last.1.coords * focal - low
+        };
+        let mut sources = vec![(0, 0.0, 0.0); width as usize * height as usize];
+        let mut put = |x: u32, y: u32, p: Vector2<f64>| {
+            let (i, j) = (p.x.floor(), p.y.floor());
+            sources[y as usize * width as usize + x as usize] =
+                ((j as u32) * w + i as u32, (p.x - i) as f32, (p.y - j) as f32);
+        };
+        let nodes = |length: u32| -> Vec<u32> {
+            let inner = (0..length.saturating_sub(1)).step_by(CELL);
+            inner.chain([length.saturating_sub(1)]).collect()
+        };
+        let (columns, rows) = (nodes(width), nodes(height));
+        let mut upper: Vec<Vector2<f64>> = columns.iter().map(|x| exact(*x, 0)).collect();
+        for (j, &top) in rows.iter().enumerate() {
+            let bottom = *rows.get(j + 1).unwrap_or(&top);
+            let lower: Vec<Vector2<f64>> = columns.iter().map(|x| exact(*x, bottom)).collect();
+            for (i, &left) in columns.iter().enumerate() {
+                let next = (i + 1).min(columns.len() - 1);
+                let right = columns[next];
+                let between = |x: u32, y: u32| {
+                    let fx = f64::from(x - left) / f64::from((right - left).max(1));
+                    let fy = f64::from(y - top) / f64::from((bottom - top).max(1));
+                    let (a, b) = (upper[i].lerp(&upper[next], fx), lower[i].lerp(&lower[next], fx));
+                    a.lerp(&b, fy)
+                };
+                // What is between bends most in the middle.
+                let (x, y) = ((left + right) / 2, (top + bottom) / 2);
+                let straight = (exact(x, y) - between(x, y)).norm() < STRAIGHT;
+                for y in top..bottom.max(top + 1) {
+                    for x in left..right.max(left + 1) {
+                        put(x, y, if straight { between(x, y) } else { exact(x, y) });
+                    }
+                }
+            }
+            upper = lower;
+        }
         Some(Self {
             camera: *camera,
             ideal: large,
@@ -149,6 +183,39 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
             for ((o, a), b) in out.iter_mut().zip(p).zip(q) {
                 *o += k * (a + b);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Distortion;
+
+    #[test]
+    fn every_pixel_is_taken_from_where_the_lens_has_it() {
+        for (k1, k2) in [(-0.35, 0.08), (-0.1, 0.0), (0.6, 0.0)] {
+            let lens = Distortion {
+                k1,
+                k2,
+                ..Distortion::default()
+            };
+            let camera = Camera::paper().with_distortion(lens).expect("does not fold");
+            let warp = Warp::new(&camera).expect("distorts");
+            let (width, height) = camera.size();
+            let mut worst = 0.0_f64;
+            for (x, y) in (0..height)
+                .step_by(3)
+                .flat_map(|y| (0..width).step_by(5).map(move |x| (x, y)))
+            {
+                let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
+                let exact = warp.ideal.principal_point() + ray.xy() * camera.focal_px();
+                let (at, fx, fy) = warp.sources[(y * width + x) as usize];
+                let (i, j) = (at % warp.ideal.size().0, at / warp.ideal.size().0);
+                let taken = Point2::new(f64::from(i) + f64::from(fx), f64::from(j) + f64::from(fy));
+                worst = worst.max((taken - exact).norm());
+            }
+            assert!(worst < 0.01, "{k1} {k2}: {worst}");
         }
     }
 }

@@ -23,7 +23,7 @@ use canvas::Canvas;
 use lens::{Warp, defocus};
 use light_grid::LightGrid;
 use sensor::Exposure;
-use shadow::{BallShadow, cast_things, table_light};
+use shadow::{BallShadow, cast_things, lamps, table_light};
 use texture::{CoarseMap, Texture};
 use view::View;
 
@@ -187,6 +187,7 @@ impl Renderer {
             view,
             scene: &self.scene,
             texture: &self.wood,
+            lamps: lamps(&self.scene),
             table: cell.table,
             bounce,
         };

@@ -25,6 +25,12 @@ pub(super) fn toward(light: &Light) -> Vector3<f64> {
     light.toward.try_normalize(1e-12).unwrap_or_else(Vector3::z)
 }
 
+/// Direction toward each lamp of a scene, and its light.
+pub(super) fn lamps(scene: &Scene) -> Vec<(Vector3<f64>, f64)> {
+    let lamp = |l: &Light| (toward(l), l.intensity.max(0.0));
+    scene.lights.iter().map(lamp).collect()
+}
+
 /// Darkens `map` where things keep the lamps' light off the table, and a little around their feet.
 pub(super) fn cast_things(map: &mut CoarseMap, scene: &Scene) {
     let (_, shares) = table_light(scene);

@@ -52,6 +52,10 @@ impl Renderer {
     /// The truth of such a frame is that of the middle of its exposure.
     pub fn take(&mut self, shot: &Shot, mut moment: impl FnMut(f64) -> (Cell, Joints)) -> &GrayImage {
         let count = shot.moments.clamp(1, 64);
+        if count == 1 && shot.interlace.is_none() {
+            let (cell, joints) = moment(0.5 * shot.exposure);
+            return self.render(&cell, &joints);
+        }
         let fields: &[f64] = match shot.interlace {
             Some(later) => &[0.0, later],
             None => &[0.0],

@@ -4,7 +4,7 @@ use rand::{Rng, RngExt};
 
 /// A square repeating texture with coarser copies of itself, values 0..=255 with mean 128.
 ///
-/// One byte a texel: what counts is how much memory a frame has to touch.
+/// One byte a value: how much memory a frame touches counts as much as what is worked out.
 #[derive(Clone, Debug)]
 pub(super) struct Texture {
     /// Texels per metre of the finest level.
@@ -14,10 +14,10 @@ pub(super) struct Texture {
 
 #[derive(Clone, Debug)]
 struct Level {
-    /// Logarithm of the side.
+    /// Logarithm of the side in half texels.
     bits: u32,
-    /// Row after row; each row, and the whole, goes on with a copy of its beginning, so that neighbours need no wrap.
-    texels: Vec<u8>,
+    /// Row after row, at every half texel: interpolated beforehand, so that to sample is to take the nearest.
+    values: Vec<u8>,
 }
 
 const FINEST_BITS: u32 = 10;
@@ -69,12 +69,10 @@ impl Texture {
         let mut levels = Vec::new();
         for bits in (3..=FINEST_BITS).rev() {
             let n = 1_usize << bits;
-            let at = |u: usize, v: usize| values[(v % n) * n + u % n].round() as u8;
-            let texels = (0..=n)
-                .flat_map(|v| (0..=n).map(move |u| (u, v)))
-                .map(|(u, v)| at(u, v))
-                .collect();
-            levels.push(Level { bits, texels });
+            levels.push(Level {
+                bits: bits + 1,
+                values: at_half_texels(&values, n),
+            });
             let half = n / 2;
             values = (0..half * half)
                 .map(|i| {
@@ -104,7 +102,8 @@ impl Texture {
     /// Samples from `from` on in steps of `step` (metres per entry), one for each entry of `row`, scaled so that the mean is 1 and one
     /// standard deviation about `strength` / 3.2.
     ///
-    /// Every second entry is the mean of its neighbours: with the level chosen for the pixels' size nothing visible is lost.
+    /// A sample is the nearest of the level's values, at most a quarter of a texel away along either axis. Every second entry is the mean of
+    /// its neighbours: with the level chosen for the pixels' size nothing visible is lost.
     pub(super) fn walk(
         &self,
         index: usize,
@@ -114,29 +113,22 @@ impl Texture {
         row: &mut [f32],
     ) {
         let level = &self.levels[index];
-        let scale = self.per_metre / (1_u64 << index) as f64 * 65536.0;
+        let scale = 2.0 * self.per_metre / (1_u64 << index) as f64 * 65536.0;
         // 16.16 fixed point; the texture repeats, so the wrap of the integers does no harm.
         let fixed = |metres: f64| (metres * scale) as i64 as u32;
-        let (mut u, mut v) = (fixed(from.0), fixed(from.1));
+        let half = 1 << 15;
+        let (mut u, mut v) = (fixed(from.0).wrapping_add(half), fixed(from.1).wrapping_add(half));
         let (du, dv) = (fixed(2.0 * step.0), fixed(2.0 * step.1));
-        let (mask, bits) = ((1_u32 << level.bits) - 1, level.bits);
-        let (gain, base) = (strength / (128.0 * 256.0), 1.0 - strength);
-        let (texels, line) = (level.texels.as_slice(), (1_usize << bits) + 1);
-        let pair = |at: usize| {
-            texels
-                .get(at..at + 2)
-                .map_or(0, |p| u32::from(p[0]) | u32::from(p[1]) << 8)
-        };
+        let bits = level.bits;
+        let (columns, rows) = ((1_u32 << bits) - 1, ((1_u32 << bits) - 1) << bits);
+        let (gain, base) = (strength / 128.0, 1.0 - strength);
+        let values = level.values.as_slice();
         let mut sample = || {
-            let at = ((v >> 16) & mask) as usize * line + ((u >> 16) & mask) as usize;
-            let word = pair(at) | pair(at + line) << 16;
-            let (fu, fv) = ((u >> 8) & 255, (v >> 8) & 255);
-            let across =
-                (((word & 0x00ff_00ff) * (256 - fu) + ((word >> 8) & 0x00ff_00ff) * fu) >> 8) & 0x00ff_00ff;
-            let value = (across & 255) * (256 - fv) + (across >> 16) * fv;
+            let at = (v >> (16 - bits) & rows) | (u >> 16 & columns);
+            let value = values.get(at as usize).copied().unwrap_or(128);
             u = u.wrapping_add(du);
             v = v.wrapping_add(dv);
-            base + gain * value as i32 as f32
+            base + gain * f32::from(value)
         };
         let mut here = sample();
         let mut pairs = row.chunks_exact_mut(2);
@@ -150,6 +142,24 @@ impl Texture {
             *last = here;
         }
     }
+}
+
+/// A repeating square of `n` by `n` values, interpolated at its texels and half way between them.
+fn at_half_texels(values: &[f32], n: usize) -> Vec<u8> {
+    let mut finer = Vec::with_capacity(4 * n * n);
+    for v in 0..n {
+        let (here, below) = (&values[v * n..][..n], &values[(v + 1) % n * n..][..n]);
+        let mut line = |at: &dyn Fn(usize) -> f32| {
+            finer.extend((0..n).flat_map(|u| {
+                let (left, right) = (at(u), at((u + 1) % n));
+                // The sums are positive: adding a half and cutting off rounds.
+                [(left + 0.5) as u8, (0.5 * (left + right) + 0.5) as u8]
+            }));
+        };
+        line(&|u| here[u]);
+        line(&|u| 0.5 * (here[u] + below[u]));
+    }
+    finer
 }
 
 /// Adds smooth periodic noise with the given number of cells along each side.
@@ -251,5 +261,43 @@ impl CoarseMap {
         );
         let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
         upper + (lower - upper) * fy
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand::rngs::Xoshiro256PlusPlus;
+
+    #[test]
+    fn a_walk_meets_each_texel_and_the_means_between_them() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let n = 1_usize << FINEST_BITS;
+        let texels: Vec<f32> = (0..n * n).map(|_| rng.random_range(0_u8..=255).into()).collect();
+        // A texel is a metre, and a half texel one step; the walk goes round the texture's border along both axes.
+        let texture = Texture::from_values(texels.clone(), 1.0);
+        let texel = |u: i64, v: i64| {
+            let wrap = |k: i64| k.rem_euclid(n as i64) as usize;
+            texels[wrap(v) * n + wrap(u)]
+        };
+        let mut row = vec![0.0_f32; 4001];
+        for (start, step) in [
+            ((-5.0, 7.0), (0.25, 0.0)),
+            ((3.0, -9.0), (0.0, 0.25)),
+            ((-5.0, -9.0), (0.25, 0.25)),
+        ] {
+            texture.walk(0, start, step, 1.0, &mut row);
+            for k in (0..4001_i64).step_by(2) {
+                let (u, v) = (start.0 + step.0 * k as f64, start.1 + step.1 * k as f64);
+                let (i, j) = (u.floor(), v.floor());
+                let (right, down) = (i64::from(u > i), i64::from(v > j));
+                let (i, j) = (i as i64, j as i64);
+                let mean = 0.25
+                    * (texel(i, j) + texel(i + right, j) + texel(i, j + down) + texel(i + right, j + down));
+                let error = 128.0 * row[k as usize] - mean;
+                assert!(error.abs() <= 0.51, "{u} {v}: {error}");
+            }
+        }
     }
 }

@@ -6,6 +6,7 @@ use puma_val2::Joints;
 use crate::camera::unit_outline;
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
+use crate::render::shadow::lamps;
 use crate::render::view::View;
 use crate::render::{Item, Renderer};
 use crate::{Cell, Ellipse, Scene, Shape};
@@ -120,6 +121,7 @@ impl Renderer {
             view: &close,
             scene: dark,
             texture: &self.wood,
+            lamps: lamps(dark),
             table: cell.table,
             bounce: 0.0,
         };

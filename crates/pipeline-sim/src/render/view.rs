@@ -93,8 +93,12 @@ impl View {
     pub(super) fn polygon(&self, corners: &[Point3<f64>], out: &mut Vec<Point2<f64>>) {
         out.clear();
         let n = corners.len();
+        let Some(first) = corners.first().map(|p| self.seen(p)) else {
+            return;
+        };
+        let mut p = first;
         for i in 0..n {
-            let (p, q) = (self.seen(&corners[i]), self.seen(&corners[(i + 1) % n]));
+            let q = corners.get(i + 1).map_or(first, |q| self.seen(q));
             if p.z >= NEAR {
                 out.push(self.pixel(&p));
             }
@@ -102,6 +106,7 @@ impl View {
                 let t = (NEAR - p.z) / (q.z - p.z);
                 out.push(self.pixel(&(p + (q - p) * t)));
             }
+            p = q;
         }
     }
 
