@@ -122,8 +122,15 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut log = EventLog::default();
-                    let Some(trial) = world.run(&mut agent, seed, &mut |event| log.note(event))? else {
-                        continue;
+                    let trial = match world.run(&mut agent, seed, &mut |event| log.note(event)) {
+                        Ok(Some(trial)) => trial,
+                        Ok(None) => continue,
+                        // A run that an arm or a camera ends is one that has failed, and no more.
+                        Err(error) => {
+                            eprintln!("{level}, {}, cell {draw}, ball {start}: {error}", rival.name);
+                            tally.add_broken_off();
+                            continue;
+                        }
                     };
                     let success = if options.grip { trial.held } else { trial.reached };
                     tally.add(success, &trial.outcome);

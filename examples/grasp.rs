@@ -316,13 +316,16 @@ fn teach(
     Ok(lesson)
 }
 
+/// Takes down an event, if it can.
+type Observe<'a> = dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>> + 'a;
+
 /// One run: places the ball and lets the agent go for it. What `observe` cannot write ends the run's pictures, not the run.
 fn reach_for(
     agent: &mut Agent<Timed<Learned>>,
     rig: &mut Rig,
     detector: &mut dyn CircleDetector,
     ball: &Ball,
-    observe: &mut dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>>,
+    observe: &mut Observe<'_>,
 ) -> Result<Outcome, Box<dyn Error>> {
     rig.place(ball);
     let stages = agent.controller().stages.clone();

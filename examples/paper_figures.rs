@@ -268,7 +268,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
             let lines = three.iter().filter_map(|(start, path)| {
                 let along = path.as_ref()?.iter().enumerate();
                 let line = along.map(|(i, (f, _))| (i as f64, feature(f))).collect();
-                Some((format!("{start}"), line))
+                Some((start.to_string(), line))
             });
             let title = format!("{name}, theta 3 ends in {low}..{high}");
             panels.push(Panel::new(&title, "step", lines.collect()).with_goal(low_end, high_end));

@@ -34,6 +34,8 @@ use stages::{Stages, Timed};
 mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
+#[path = "track/shortcut.rs"]
+mod shortcut;
 mod stages;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
@@ -65,6 +67,10 @@ struct Options {
     #[arg(long, value_name = "NAME", default_value_t)]
     detector: BallDetector,
 
+    /// No frames and no line: features straight from the geometry, in ten cells
+    #[arg(long)]
+    shortcut: bool,
+
     /// Noise of the camera in the dark, grey levels; that of the scene unless given
     #[arg(long, value_name = "LEVELS")]
     noise: Option<f64>,
@@ -77,6 +83,9 @@ struct Options {
     #[arg(long, value_name = "LEVEL", default_value_t = ErrorLevel::Moderate)]
     level: ErrorLevel,
 }
+
+/// From the gripper to the ball's centre: the jaws close on the ball up to this far, metres.
+const GRASP_TOLERANCE: f64 = 0.010;
 
 /// What happens to the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -92,7 +101,13 @@ enum Fate {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
+    let options = Options::parse();
+    let done = if options.shortcut {
+        shortcut::run(&options)
+    } else {
+        run(&options)
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -192,8 +207,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         // Whatever it ended with: what was learned until then is kept.
         let learned = agent.controller().inner.belief();
         learned.save(&options.out.join("camera.belief"))?;
-        let success =
-            matches!(&end, Ok(Outcome { gave_up: None, .. })) && miss.is_some_and(|miss| miss < 0.010);
+        let success = matches!(&end, Ok(Outcome { gave_up: None, .. }))
+            && miss.is_some_and(|miss| miss < GRASP_TOLERANCE);
         if teaching {
             end?;
             continue;
@@ -214,17 +229,20 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         write_whole(&options.out.join("track.png"), &animated(&film)?)?;
     }
     println!("{stages}");
-    let runs = options.runs.max(1);
+    say_result(grasped, options.runs, moves, near);
+    println!("results: {}", options.out.display());
+    Ok(())
+}
+
+/// How it went.
+fn say_result(grasped: usize, runs: usize, moves: usize, near: usize) {
+    let runs = runs.max(1);
     let (low, high) = interval(grasped, runs);
     println!(
-        "{grasped} of {} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {near} stops by the proximity sensors; \
-         results: {}",
-        options.runs,
+        "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {near} stops by the proximity sensors",
         100.0 * grasped as f64 / runs as f64,
-        moves as f64 / runs as f64,
-        options.out.display()
+        moves as f64 / runs as f64
     );
-    Ok(())
 }
 
 /// Wilson's interval of a share, percent.

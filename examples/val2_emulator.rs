@@ -14,6 +14,7 @@ use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
@@ -77,8 +78,17 @@ impl Server {
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments::parse();
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let mut profile = Profile::named(&arguments.profile).ok_or_else(|| {
         let names = Profile::all().map(|p| p.name).join(", ");
         format!("no profile `{}`: there are {names}", arguments.profile)
@@ -101,24 +111,34 @@ fn main() -> Result<(), Box<dyn Error>> {
             None => None,
         },
     };
-    let server = serve(&arguments, emulator, config)?;
+    let server = serve(arguments, emulator, config)?;
     println!("listening on {}", server.place());
     io::stdout().flush()?;
     attend(&server, floppy)
 }
 
 #[cfg(unix)]
-fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> io::Result<Server> {
+fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> Result<Server, Box<dyn Error>> {
     match &arguments.tcp {
-        Some(address) => TcpServer::spawn(address.as_str(), emulator, config).map(Server::Tcp),
-        None => PtyServer::spawn(emulator, config).map(Server::Pty),
+        Some(address) => on_socket(address, emulator, config),
+        None => Ok(Server::Pty(PtyServer::spawn(emulator, config)?)),
     }
 }
 
 #[cfg(not(unix))]
-fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> io::Result<Server> {
-    let address = arguments.tcp.as_deref().unwrap_or("127.0.0.1:5600");
-    TcpServer::spawn(address, emulator, config).map(Server::Tcp)
+fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> Result<Server, Box<dyn Error>> {
+    on_socket(
+        arguments.tcp.as_deref().unwrap_or("127.0.0.1:5600"),
+        emulator,
+        config,
+    )
+}
+
+fn on_socket(address: &str, emulator: Emulator, config: ServeConfig) -> Result<Server, Box<dyn Error>> {
+    match TcpServer::spawn(address, emulator, config) {
+        Ok(server) => Ok(Server::Tcp(server)),
+        Err(problem) => Err(format!("{address} cannot be listened at: {problem}").into()),
+    }
 }
 
 /// The floppy disk: a folder of text files, each named as in VAL with `.v2` behind it.

@@ -4,11 +4,10 @@
 
 #![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::io::{Read, Write};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::time::Duration;
+use std::process::{Command, Output};
 
 fn example(name: &str) -> Option<Command> {
     let tests = std::env::current_exe().ok()?;
@@ -214,125 +213,29 @@ fn detect_circles_names_a_frame_that_is_too_large_and_goes_on() {
     assert!(!errors.contains("small.pgm"), "{errors}");
 }
 
-/// A terminal at an emulator that the example serves on a socket.
-#[derive(Debug)]
-struct Terminal {
-    emulator: std::process::Child,
-    line: TcpStream,
-}
-
-impl Terminal {
-    /// Starts the emulator with this folder as its floppy disk.
-    fn with_floppy(folder: &Path) -> Option<Self> {
-        let mut emulator = example("val2_emulator")?
-            .args(["--tcp", "127.0.0.1:0", "--floppy"])
-            .arg(folder)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the emulator starts");
-        let mut first = String::new();
-        let out = emulator.stdout.take().expect("its output");
-        BufReader::new(out).read_line(&mut first).expect("its first line");
-        let address = first
-            .trim()
-            .strip_prefix("listening on ")
-            .expect("where it listens");
-        let line = TcpStream::connect(address).expect("a socket that listens");
-        line.set_read_timeout(Some(Duration::from_secs(20)))
-            .expect("a time-out");
-        let mut terminal = Self { emulator, line };
-        terminal.read_until("? ");
-        terminal.say("N", "? ");
-        terminal.say("N", "\r\n.");
-        Some(terminal)
-    }
-
-    fn say(&mut self, line: &str, until: &str) -> String {
-        self.line
-            .write_all(format!("{line}\r").as_bytes())
-            .expect("a line that takes it");
-        self.read_until(until)
-    }
-
-    fn read_until(&mut self, end: &str) -> String {
-        let mut said = Vec::new();
-        let mut byte = [0];
-        while !said.ends_with(end.as_bytes()) {
-            self.line.read_exact(&mut byte).expect("something to read");
-            said.push(byte[0]);
-        }
-        String::from_utf8_lossy(&said).into_owned()
-    }
-
-    /// Quits, and waits until it has.
-    fn quit(mut self) {
-        let mut panel = self.emulator.stdin.take().expect("its panel");
-        panel.write_all(b"quit\n").expect("a panel that listens");
-        assert!(self.emulator.wait().expect("its end").success());
-    }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = std::fs::read_dir(folder)
-        .expect("a folder")
-        .map(|entry| {
-            entry
-                .expect("an entry")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
-        .collect();
-    names.sort();
-    names
-}
-
 #[test]
-fn the_floppy_folder_holds_what_the_disk_does() {
+fn the_emulator_names_what_it_cannot_serve_on() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let disk = folder.path();
-    std::fs::write(disk.join("old.v2"), ".REALS\nN 3\n.END\n").expect("a file");
-    std::fs::write(disk.join("notes.txt"), "not a file of VAL's").expect("a file");
-    let Some(mut terminal) = Terminal::with_floppy(disk) else {
-        return;
-    };
-    // Names with a point in them are names of their own.
-    terminal.say("LOAD OLD", "\r\n.");
-    terminal.say("STORE CELL.A", "\r\n.");
-    terminal.say("DO M = 4", "\r\n.");
-    terminal.say("STORE CELL.B", "\r\n.");
-    terminal.say("STORE OLD", "\r\n.");
-    terminal.quit();
-    assert_eq!(names(disk), ["CELL.A.v2", "CELL.B.v2", "notes.txt", "old.v2"]);
-    let text = |name| std::fs::read_to_string(disk.join(name)).expect("a file");
-    assert_eq!(text("CELL.A.v2"), ".REALS\nN 3\n.END\n");
-    assert_eq!(text("CELL.B.v2"), ".REALS\nM 4\nN 3\n.END\n");
-    assert_eq!(text("old.v2"), text("CELL.B.v2"));
-
-    // Put in again it has them all, and what is deleted is gone from the folder too.
-    let mut terminal = Terminal::with_floppy(disk).expect("built a moment ago");
-    let listed = terminal.say("FDIRECTORY", "\r\n.");
-    assert!(listed.contains("CELL.A\r\nCELL.B\r\nOLD\r\n"), "{listed}");
-    terminal.say("FDELETE CELL.A", "? ");
-    terminal.say("Y", "\r\n.");
-    terminal.quit();
-    assert_eq!(names(disk), ["CELL.B.v2", "notes.txt", "old.v2"]);
-    let mut terminal = Terminal::with_floppy(disk).expect("built a moment ago");
-    terminal.say("FORMAT", "? ");
-    terminal.say("Y", "\r\n.");
-    terminal.quit();
-    assert_eq!(names(disk), ["notes.txt"]);
-
-    // Two files that VAL could not tell apart.
-    std::fs::write(disk.join("A.v2"), "").expect("a file");
-    std::fs::write(disk.join("a.v2"), "").expect("a file");
-    if names(disk).len() == 3 {
-        let mut command = example("val2_emulator").expect("built a moment ago");
-        let (output, errors) = output(command.args(["--tcp", "127.0.0.1:0", "--floppy"]).arg(disk));
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a socket");
+    let address = taken.local_addr().expect("its address").to_string();
+    let mut cases = vec![
+        (["--tcp", address.as_str()], address.as_str()),
+        (["--tcp", "nonsense"], "nonsense"),
+        (["--profile", "nobody"], "val2_strict_miz"),
+    ];
+    let link = folder.path().join("none/arm").display().to_string();
+    if cfg!(unix) {
+        cases.push((["--link", link.as_str()], link.as_str()));
+    }
+    for (arguments, named) in cases {
+        let Some(mut command) = example("val2_emulator") else {
+            return;
+        };
+        let (output, errors) = output(command.args(arguments));
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
         assert!(
-            !output.status.success() && errors.contains("are both the file A"),
-            "{errors}"
+            errors.starts_with("error: ") && errors.contains(named),
+            "{arguments:?}: {errors}"
         );
     }
 }

@@ -30,6 +30,13 @@ impl Tally {
         self.losses += outcome.losses;
     }
 
+    /// A run that was broken off.
+    pub(crate) fn add_broken_off(&mut self) {
+        if let Some((_, runs)) = self.draws.last_mut() {
+            *runs += 1;
+        }
+    }
+
     /// Mean share of successes over the cells and half the width of its 95 % interval, percent.
     fn success(&self) -> (f64, f64) {
         let shares: Vec<f64> = self
@@ -44,7 +51,7 @@ impl Tally {
         (
             mean,
             if n > 1.0 {
-                student(shares.len() - 1) * (variance / n).sqrt()
+                (student(shares.len() - 1) * (variance / n).sqrt()).min(100.0)
             } else {
                 f64::NAN
             },

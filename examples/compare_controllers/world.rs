@@ -16,7 +16,7 @@ const GRASP_TOLERANCE: f64 = 0.010;
 /// A cell with drawn errors.
 pub(crate) enum World {
     /// Features straight from the geometry, an arm that moves at once.
-    Shortcut(TrialCell),
+    Shortcut(Box<TrialCell>),
     /// Rendered frames, circle detection, VAL II on a line.
     Chain(Box<Chain>),
 }
@@ -37,11 +37,11 @@ pub(crate) struct Trial {
 impl World {
     pub(crate) fn shortcut(level: ErrorLevel, seed: u64, with_bodies: bool) -> Result<Self, Box<dyn Error>> {
         let cell = TrialCell::draw(level, seed)?;
-        Ok(Self::Shortcut(if with_bodies {
+        Ok(Self::Shortcut(Box::new(if with_bodies {
             cell
         } else {
             cell.without_bodies()
-        }))
+        })))
     }
 
     /// The emulated arm has no play: of the drawn errors, those of camera and ball are there.

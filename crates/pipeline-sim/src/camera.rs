@@ -130,9 +130,6 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// How many times as wide as the frame the image of a pinhole with the same view may be.
-    pub const MOST_STRETCH: f64 = 4.0;
-
     /// The paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3" CCD, whose image is
     /// 8.8 mm wide; principal point in the middle of the frame, no distortion.
     ///
@@ -368,7 +365,7 @@ impl Camera {
         self.principal + p.coords * self.focal_px
     }
 
-    /// Refuses a distortion that turns back before the farthest corner of the frame, or squeezes too much into it.
+    /// Refuses a distortion that turns back before the farthest corner of the frame.
     fn unfolded(self) -> Result<Self, CameraError> {
         if self.distortion.is_none() {
             return Ok(self);
@@ -393,13 +390,6 @@ impl Camera {
                     return Err(CameraError::Folds { radius_px: last });
                 }
                 last = out;
-                let stretch = u * self.focal_px / reach;
-                if stretch > Self::MOST_STRETCH {
-                    return Err(CameraError::TooWide {
-                        stretch,
-                        most: Self::MOST_STRETCH,
-                    });
-                }
             }
         }
         Ok(self)

@@ -30,17 +30,6 @@ pub enum CameraError {
         /// Distance from the principal point at which the image turns back, pixels.
         radius_px: f64,
     },
-    /// The lens squeezes the image so much that a pinhole's image of the same view would be more than [`crate::Camera::MOST_STRETCH`] times as
-    /// wide: a fisheye, which this camera cannot be.
-    #[error(
-        "the lens distortion is too strong: a pinhole would need an image {stretch:.1} times as wide, at most {most:.1} is possible"
-    )]
-    TooWide {
-        /// How many times as wide, at the corner of the frame.
-        stretch: f64,
-        /// The greatest possible.
-        most: f64,
-    },
     /// The lens shows nothing at this pixel: it lies outside the frame, beyond where the distortion folds the image over.
     #[error("no ray leads to the pixel ({x:.1}, {y:.1}): the lens shows nothing there")]
     NoRay {

@@ -5,7 +5,8 @@ use crate::{ArmError, JointDelta, Joints};
 /// An arm that moves by joint angles.
 ///
 /// Every call waits until the arm stands. A move either ends where it was asked to, as the arm itself reports, or is an
-/// error; after an error the arm stands, and [`Manipulator::joints`] says where.
+/// error; after an error [`Manipulator::joints`] says where the arm stands. Only [`ArmError::Unconfirmed`] and [`ArmError::Line`] leave open
+/// whether it does: the arm has been told to stop, if it could still hear.
 pub trait Manipulator {
     /// The joint angles that the arm reports.
     ///

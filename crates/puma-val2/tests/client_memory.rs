@@ -284,29 +284,34 @@ fn any_dialogue_is_left_at_connection() {
 /// A program of somebody else's that asks for numbers is not fed with zeros, which it might move by.
 #[test]
 fn a_program_that_asks_for_values_is_aborted_and_not_answered() {
-    let asking = |profile: Profile| {
-        let mut emulator = emulator(profile);
-        emulator
-            .load_text(".PROGRAM ASK\n PROMPT \"angles? \",A,B,C\n MOVE #PPOINT(A,B,C)\n.END")
-            .unwrap();
-        emulator
-    };
-    let mut waiting = asking(Profile::val2());
-    waiting.feed(b"N\rN\rCAL\rY\r", Duration::ZERO);
-    waiting.feed(b"EXECUTE ASK\r", Duration::from_secs(10));
-    let mut client = Val2Client::connect(MemoryLine::new(waiting), ClientConfig::default()).unwrap();
-    client.joints().unwrap();
-    assert_at(&client, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    for words in ["angles? ", "angles "] {
+        let asking = || {
+            let mut emulator = emulator(Profile::val2());
+            let text = format!(".PROGRAM ASK\n PROMPT \"{words}\",A,B,C\n MOVE #PPOINT(A,B,C)\n.END");
+            emulator.load_text(&text).unwrap();
+            emulator
+        };
+        let mut waiting = asking();
+        waiting.feed(b"N\rN\rCAL\rY\r", Duration::ZERO);
+        waiting.feed(b"EXECUTE ASK\r", Duration::from_secs(10));
+        let mut client = Val2Client::connect(MemoryLine::new(waiting), ClientConfig::default()).unwrap();
+        client.joints().unwrap();
+        assert_at(&client, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
 
-    let line = MemoryLine::new(asking(Profile::val2()));
-    let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
-    client.calibrate().unwrap();
-    assert!(matches!(client.execute("ASK"), Err(ArmError::Garbled { .. })));
-    assert!(client.last_known().is_none());
-    client
-        .move_by(JointDelta::from_degrees([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
-        .unwrap();
-    assert_at(&client, [1.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        let line = MemoryLine::new(asking());
+        let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
+        client.calibrate().unwrap();
+        let outcome = client.execute("ASK");
+        assert!(
+            matches!(outcome, Err(ArmError::Garbled { .. } | ArmError::Silence { .. })),
+            "{outcome:?}"
+        );
+        assert!(client.last_known().is_none());
+        client
+            .move_by(JointDelta::from_degrees([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+            .unwrap();
+        assert_at(&client, [1.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    }
 }
 
 #[test]
@@ -355,6 +360,77 @@ fn a_step_that_is_refused_leaves_the_editor() {
         );
         client.joints().unwrap();
         client.set_gripper(Gripper::Open).unwrap();
+    }
+}
+
+/// A line end inside a name or a step would make a command of what comes after it.
+#[test]
+fn names_and_steps_of_more_than_one_line_are_refused_before_anything_is_sent() {
+    let mut client = client(Profile::val2());
+    let before = client.line().traffic();
+    for bad in ["", " ", "A\rDO DRIVE 1,10,100", "A\nB", "A\u{3}", "\u{c9}"] {
+        let outcomes = [
+            client.execute(bad).map(drop),
+            client.store_program(bad, &["TYPE 1".to_owned()]),
+            client.store_program("GOOD", &["TYPE 1".to_owned(), bad.to_owned()]),
+        ];
+        for outcome in outcomes {
+            assert!(
+                matches!(outcome, Err(ArmError::Setting { .. })),
+                "{bad:?}: {outcome:?}"
+            );
+        }
+    }
+    assert_eq!(client.line().traffic(), before);
+}
+
+/// A line on which something is said, once, just after `WHERE` has been typed.
+struct Interrupted {
+    line: MemoryLine,
+    words: Option<&'static str>,
+}
+
+impl puma_val2::Transport for Interrupted {
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.line.send(bytes)?;
+        if bytes == b"WHERE"
+            && let Some(words) = self.words.take()
+        {
+            self.line.emulator_mut().interject(words);
+        }
+        Ok(())
+    }
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> std::io::Result<Option<usize>> {
+        self.line.receive(buffer, timeout)
+    }
+    fn clock(&self) -> Duration {
+        self.line.clock()
+    }
+    fn name(&self) -> &str {
+        "interrupted"
+    }
+}
+
+/// What somebody else says while the client finds out whether there is an echo is not taken for one.
+#[test]
+fn a_message_at_connection_is_no_echo() {
+    for echo in [true, false] {
+        for words in ["\r\nPAPER OUT\r\n", "*Disk error*\r\n", "?"] {
+            let profile = Profile {
+                echo,
+                ..Profile::val2()
+            };
+            let line = Interrupted {
+                line: MemoryLine::new(emulator(profile)),
+                words: Some(words),
+            };
+            let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
+            assert_eq!(client.echoes(), echo, "{words:?}");
+            client.calibrate().unwrap();
+            client
+                .move_to(Joints::from_degrees([10.0, -80.0, 90.0, 0.0, 0.0, 0.0]))
+                .unwrap();
+        }
     }
 }
 

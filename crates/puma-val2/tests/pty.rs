@@ -68,6 +68,12 @@ fn the_link_leads_to_the_terminal_and_goes_with_the_server() {
     assert!(std::fs::symlink_metadata(&link).is_err());
     std::fs::write(&link, "something of value").unwrap();
     assert!(PtyServer::spawn(emulator(), config()).is_err());
+    let astray = ServeConfig {
+        link: Some(folder.join("no such folder/arm")),
+        ..ServeConfig::default()
+    };
+    let problem = PtyServer::spawn(emulator(), astray).unwrap_err().to_string();
+    assert!(problem.contains("no such folder/arm cannot be made"), "{problem}");
     std::fs::remove_dir_all(&folder).unwrap();
 }
 

@@ -170,8 +170,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Table and learning curve of one learner with one seed. Exploration fades away, so that learners of the policy
-/// that acts come to the optimal one.
+/// Table and learning curve of one learner with one seed. Exploration fades away. What a learner of the policy that
+/// acts has learned of it while it explored, the safe way past the cliff for example, it may keep after that.
 fn learn(task: &Task, index: usize, seed: u64) -> Result<(QTable, Vec<Record>), qtable::Error> {
     let n = task.actions;
     let epsilon = Schedule::piecewise(&[(0, 1.0), (n / 4, 0.3), (n / 2, 0.1), (n * 3 / 4, 0.0)])?;
@@ -197,7 +197,7 @@ fn draw(path: &Path, curves: &[Vec<Vec<Record>>]) -> Result<(), Box<dyn Error>> 
         .map(|runs| Estimate::of_curves(runs, |record| record.mean_return))
         .collect();
     let at: Vec<f64> = curves[0][0].iter().map(|record| record.actions as f64).collect();
-    // From the median on, so that the first wild records do not press all else together.
+    // Without the lowest fifth, so that the first wild records do not press all else together.
     let mut means: Vec<f64> = estimates
         .iter()
         .flatten()
@@ -212,7 +212,7 @@ fn draw(path: &Path, curves: &[Vec<Vec<Record>>]) -> Result<(), Box<dyn Error>> 
     let root = SVGBackend::new(path, (1050, 800)).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.titled(
-        "mean return of an episode while learning, with the 95 % interval",
+        "mean return of an episode, with the 95 % interval, over the actions; in gray Q-learning; cut off below",
         ("sans-serif", 18),
     )?;
     for (index, area) in root.split_evenly((3, 3)).iter().enumerate() {
@@ -226,6 +226,7 @@ fn draw(path: &Path, curves: &[Vec<Vec<Record>>]) -> Result<(), Box<dyn Error>> 
         chart
             .configure_mesh()
             .x_labels(4)
+            .x_label_formatter(&|x| format!("{x:.0}"))
             .y_labels(6)
             .light_line_style(WHITE)
             .draw()?;

@@ -6,7 +6,8 @@
 //!
 //! * [`Training`] takes any learner and any policy, and can be stopped, saved and continued;
 //! * [`train`] is one-step [`QLearning`] with a [`Boltzmann`] policy, in one call;
-//! * [`train_in_blocks`] is the same several times faster, on a [`CachedBoltzmann`].
+//! * [`train_in_blocks`] is the same several times faster, on a [`CachedBoltzmann`]; [`TrainingInBlocks`] is that run
+//!   in pieces, saved and continued between blocks.
 //!
 //! [`over_seeds`] repeats an experiment, and [`Estimate`] is the mean with its 95 % interval. States come from
 //! measured quantities by way of [`Intervals`] and their [`Product`]. Where the dynamics are known, a [`Model`] gives
@@ -70,6 +71,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod blocks;
 mod cached;
 mod check_env;
 mod course;
@@ -99,6 +101,7 @@ mod validated;
 
 pub use rand;
 
+pub use blocks::{TrainingInBlocks, train_in_blocks};
 pub use cached::CachedBoltzmann;
 pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
 pub use curve::Record;
@@ -121,5 +124,5 @@ pub use seeds::{Estimate, over_seeds};
 pub use table::{QTable, Value};
 pub use text::CsvError;
 pub use time_limit::TimeLimit;
-pub use train::{Progress, TrainConfig, TrainReport, train, train_in_blocks};
+pub use train::{Progress, TrainConfig, TrainReport, train};
 pub use training::{Training, Until};

@@ -1,16 +1,13 @@
-//! Training with Q-learning and Boltzmann exploration, as the paper does it: plainly, and fast.
+//! Training with Q-learning and Boltzmann exploration, as the paper does it, in its plain form.
 
 use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::course::{Actor, Course, Pair, check_count, fit};
-use crate::{
-    Action, Boltzmann, CachedBoltzmann, Environment, Error, QLearning, QTable, Record, Schedule, State, Step,
-    Value,
-};
+use crate::course::{Course, Pair, check_count, fit};
+use crate::{Boltzmann, Environment, Error, QLearning, QTable, Record, Schedule, Value};
 
-/// Settings of [`train`].
+/// Settings of [`train`] and [`train_in_blocks`](crate::train_in_blocks).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct TrainConfig {
@@ -45,8 +42,8 @@ impl TrainConfig {
         }
     }
 
-    /// Refuses settings out of range.
-    fn check(&self) -> Result<Course, Error> {
+    /// A course with these settings, or the one that is out of range.
+    pub(crate) fn check(&self) -> Result<Course, Error> {
         check_count("actions", self.actions)?;
         QLearning::new(self.alpha.clone(), self.gamma)?;
         Boltzmann::check_temperature(&self.temperature)?;
@@ -98,9 +95,10 @@ pub fn train<V: Value>(
     let learner = &mut QLearning::new(config.alpha.clone(), config.gamma)?;
     let policy = &mut Boltzmann::new(config.temperature.clone())?;
     fit(environment, table)?;
-    let mut report = Reporter {
+    let mut curve = Vec::new();
+    let mut reporter = Reporter {
         of: config.actions,
-        curve: Vec::new(),
+        curve: &mut curve,
         on_progress,
     };
     while course.actions < config.actions {
@@ -113,112 +111,26 @@ pub fn train<V: Value>(
             },
             rng,
         )?;
-        report.after_action(&mut course, due);
+        reporter.after_action(&mut course, due);
     }
-    Ok(report.finish(&course))
+    Ok(TrainReport {
+        actions: course.actions,
+        episodes: course.episodes,
+        curve,
+    })
 }
 
-/// Learns a table as [`train`] does, several times faster: α and the temperature stand still within each of `blocks`
-/// equal parts of the run, at what their schedules say of its first action, and the actions are drawn from a
-/// [`CachedBoltzmann`].
-///
-/// With 256 to 1024 blocks nothing of the course of the schedules is lost. (An α by visits changes at every visit all
-/// the same.) Values are kept in `f32` while it runs and written back at the end, also after an error. It is
-/// generic over environment and generator, so that a compiler that optimises across crates (`lto = "fat"`) can put
-/// the whole loop together. The result is another one than that of [`train`] from the same seed, drawn from the same
-/// distribution but for the steps of the schedules.
-///
-/// # Errors
-/// As [`train`]; also for `blocks` of 0, and for values that do not fit into an `f32`.
-pub fn train_in_blocks<V: Value, E: Environment + ?Sized, R: Rng>(
-    environment: &mut E,
-    table: &mut QTable<V>,
-    config: &TrainConfig,
-    blocks: u64,
-    rng: &mut R,
-    on_progress: &mut dyn FnMut(&Progress),
-) -> Result<TrainReport, Error> {
-    let mut course = config.check()?;
-    check_count("blocks", blocks)?;
-    fit(environment, table)?;
-    let cached = CachedBoltzmann::new(table, config.temperature.at(0))?;
-    let by_visits = matches!(config.alpha, Schedule::InverseVisits { .. }).then_some(&config.alpha);
-    let mut actor = Blocked {
-        cached,
-        gamma: config.gamma,
-        alpha: 0.0,
-        by_visits,
-    };
-    let mut report = Reporter {
-        of: config.actions,
-        curve: Vec::new(),
-        on_progress,
-    };
-    // More blocks than actions would be empty ones.
-    let blocks = blocks.min(config.actions);
-    let mut run = || {
-        for block in 0..blocks {
-            let edge =
-                |block: u64| (u128::from(config.actions) * u128::from(block) / u128::from(blocks)) as u64;
-            let (from, to) = (edge(block), edge(block + 1));
-            actor.alpha = config.alpha.at(from);
-            actor.cached.set_temperature(config.temperature.at(from))?;
-            while course.actions < to {
-                let due = course.step(environment, &mut actor, rng)?;
-                report.after_action(&mut course, due);
-            }
-        }
-        Ok(())
-    };
-    let outcome = run();
-    actor.cached.write_to(table)?;
-    outcome.map(|()| report.finish(&course))
-}
-
-/// Q-learning on cached weights.
-struct Blocked<'a> {
-    cached: CachedBoltzmann,
-    gamma: f64,
-    /// α of the block.
-    alpha: f64,
-    /// The schedule of α, if it goes by visits.
-    by_visits: Option<&'a Schedule>,
-}
-
-impl Actor for Blocked<'_> {
-    /// Draws anew: nothing is ever chosen before.
-    #[inline]
-    fn choose(&mut self, state: State, _before: Option<Action>, rng: &mut dyn Rng) -> Result<Action, Error> {
-        self.cached.check_state(state)?;
-        Ok(self.cached.choose(state, rng))
-    }
-
-    #[inline]
-    fn learn(
-        &mut self,
-        state: State,
-        action: Action,
-        step: Step,
-        _rng: &mut dyn Rng,
-    ) -> Result<(f64, Option<Action>), Error> {
-        let alpha = match self.by_visits {
-            None => self.alpha,
-            Some(schedule) => schedule.at_visit(0, u64::from(self.cached.visits(state, action))),
-        };
-        Ok((self.cached.update(state, action, &step, alpha, self.gamma)?, None))
-    }
-}
-
-/// Collects the learning curve and tells of it.
-struct Reporter<'a> {
-    of: u64,
-    curve: Vec<Record>,
-    on_progress: &'a mut dyn FnMut(&Progress),
+/// Adds to the learning curve and tells of it.
+pub(crate) struct Reporter<'a> {
+    /// Actions to take in all.
+    pub(crate) of: u64,
+    pub(crate) curve: &'a mut Vec<Record>,
+    pub(crate) on_progress: &'a mut dyn FnMut(&Progress),
 }
 
 impl Reporter<'_> {
     #[inline]
-    fn after_action(&mut self, course: &mut Course, due: Option<Record>) {
+    pub(crate) fn after_action(&mut self, course: &mut Course, due: Option<Record>) {
         if due.is_some() || course.actions == self.of {
             let latest = due.unwrap_or_else(|| course.record());
             self.curve.push(latest);
@@ -227,14 +139,6 @@ impl Reporter<'_> {
                 of: self.of,
                 latest,
             });
-        }
-    }
-
-    fn finish(self, course: &Course) -> TrainReport {
-        TrainReport {
-            actions: course.actions,
-            episodes: course.episodes,
-            curve: self.curve,
         }
     }
 }

@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
-    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Learner,
-    ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, QLambda, QLearning, QTable, Sarsa, SarsaLambda,
-    Schedule, TimeLimit, Training, Ucb, Until, decode, encode, toys,
+    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience, Greedy,
+    Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, Problem, QLambda, QLearning, QTable,
+    Sarsa, SarsaLambda, Schedule, State, Status, Step, TimeLimit, TrainConfig, Training, TrainingInBlocks,
+    Ucb, Until, Value, decode, encode, toys, train_in_blocks,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -71,6 +72,120 @@ fn a_resumed_run_ends_as_an_uninterrupted_one() {
     stopping_changes_nothing(NStepQ::new(alpha(), gamma).unwrap(), epsilon());
     stopping_changes_nothing(DynaQ::new(alpha(), gamma).unwrap(), epsilon());
     stopping_changes_nothing(PrioritizedSweeping::new(gamma).unwrap(), epsilon());
+}
+
+#[test]
+fn a_run_in_blocks_goes_on_as_if_it_had_not_stopped() {
+    type Run<V> = (TrainingInBlocks<V>, World, Xoshiro256PlusPlus);
+    fn compare<V: Value + std::fmt::Display + Serialize + DeserializeOwned>(alpha: Schedule) {
+        let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
+        let mut lake = TimeLimit::new(lake, 30).unwrap();
+        let config = TrainConfig {
+            alpha,
+            temperature: Schedule::exponential(3.0, 0.001, 1_000).unwrap(),
+            record_every: 70,
+            ..TrainConfig::paper(1_000)
+        };
+        let table = QTable::<V>::filled(16, 4, V::from_f64(0.3)).unwrap();
+        let training = TrainingInBlocks::new(&lake, table.clone(), config.clone(), 37).unwrap();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(42);
+        let mut bytes = encode("run", &(training, &lake, &rng)).unwrap();
+
+        let mut whole = table;
+        let told = train_in_blocks(&mut lake, &mut whole, &config, 37, &mut rng, &mut |_| {}).unwrap();
+
+        let mut in_episode = 0;
+        // The ends of blocks 1, 1, 3, 13, 14 and 36, and of the run.
+        for (stop, reached) in [
+            (1, 27),
+            (27, 27),
+            (70, 81),
+            (333, 351),
+            (352, 378),
+            (963, 972),
+            (u64::MAX, 1_000),
+        ] {
+            let (mut part, mut lake, mut rng): Run<V> = decode("run", &bytes).unwrap();
+            part.run(&mut lake, stop, &mut rng, &mut |_| {}).unwrap();
+            assert_eq!(part.actions(), reached);
+            in_episode += u32::from(part.is_in_episode());
+            bytes = encode("run", &(part, lake, rng)).unwrap();
+        }
+        assert!(in_episode > 3);
+        let (part, part_lake, part_rng): Run<V> = decode("run", &bytes).unwrap();
+        assert_eq!(part.table(), &whole);
+        assert_eq!(part.table().to_csv(), whole.to_csv());
+        assert_eq!((&part_lake, &part_rng), (&lake, &rng));
+        assert_eq!((part.actions(), part.episodes()), (told.actions, told.episodes));
+        assert_eq!(part.curve(), told.curve);
+        assert_eq!(told.curve.len(), 15);
+    }
+    for alpha in [
+        Schedule::exponential(0.6, 0.02, 900),
+        Schedule::inverse_visits(1.0, 3.0),
+    ] {
+        compare::<f32>(alpha.clone().unwrap());
+        compare::<f64>(alpha.unwrap());
+    }
+}
+
+#[test]
+fn damaged_settings_of_a_run_in_blocks_are_refused() {
+    let forged = |gamma: f64, temperature: f64, blocks: u64| {
+        let table = QTable::<f64>::new(3, 2).unwrap();
+        let config = (
+            (gamma, (0u32, 0.5f64), (0u32, temperature)),
+            (100u64, 60u64, 1u64),
+        );
+        let (running, tally) = (None::<u64>, (0u64, 0.0f64, 0.0f64, 0u64, 0u64, 0u64, 0.0f64));
+        let course = ((60u64, 1u64, 0u64, 0u64), running, tally);
+        let bytes = encode("run", &(table, config, blocks, course, Vec::<u8>::new())).unwrap();
+        decode::<TrainingInBlocks>("run", &bytes)
+    };
+    let begun = |blocks| {
+        let config = TrainConfig {
+            alpha: Schedule::constant(0.5).unwrap(),
+            temperature: Schedule::constant(1.0).unwrap(),
+            ..TrainConfig::paper(100)
+        };
+        TrainingInBlocks::new(
+            &toys::chain(3).unwrap(),
+            QTable::new(3, 2).unwrap(),
+            config,
+            blocks,
+        )
+    };
+    assert_eq!(forged(0.9, 1.0, 5).unwrap(), begun(5).unwrap());
+    for (gamma, temperature, blocks) in [(1.1, 1.0, 5), (0.9, 1e-7, 5), (0.9, f64::NAN, 5), (0.9, 1.0, 0)] {
+        let refused = forged(gamma, temperature, blocks);
+        assert!(matches!(refused, Err(Problem::Contents(_))), "{refused:?}");
+    }
+    assert!(matches!(begun(0), Err(Error::Setting { name: "blocks", .. })));
+}
+
+/// The change of a value from one end of the numbers to the other is beyond both.
+#[test]
+fn a_sweep_with_an_enormous_change_ahead_can_be_saved() {
+    let mut learner = PrioritizedSweeping::new(1.0).unwrap().with_backups(1).unwrap();
+    let mut table = QTable::filled(2, 1, -1.7e308).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    for (state, reward, status) in [(1, 0.0, Status::Continuing), (0, 1.7e308, Status::Terminated)] {
+        let step = Step {
+            observation: State(0),
+            reward,
+            status,
+        };
+        let experience = Experience {
+            state: State(state),
+            action: Action(0),
+            step,
+            next_action: None,
+        };
+        learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
+    }
+    assert!(table.max(State(0)) > 1e308 && table.max(State(1)) < -1e308);
+    let back: PrioritizedSweeping = decode("l", &encode("l", &learner).unwrap()).unwrap();
+    assert_eq!(back, learner);
 }
 
 #[test]

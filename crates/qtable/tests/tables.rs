@@ -107,7 +107,7 @@ proptest! {
             let mask = ActionMask::new(4, 3, |state, action| (state.0 + action.0) % 2 == 0 || action.0 == 1);
             table.set_mask(Some(mask.unwrap())).unwrap();
         }
-        // A table with a mask refuses to write what it forbids, so such values come back as 0.
+        // What a mask forbids keeps its value.
         let back = QTable::from_csv(&table.to_csv()).unwrap();
         prop_assert_eq!(back.to_csv(), table.to_csv());
         prop_assert_eq!(back, table);

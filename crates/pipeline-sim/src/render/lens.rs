@@ -16,7 +16,8 @@ pub(super) struct Warp {
 }
 
 impl Warp {
-    /// `None` for a camera without distortion. For any other the ideal frame is large, but not endless: [`Camera::MOST_STRETCH`].
+    /// `None` for a camera without distortion. For any other the ideal frame is larger, but not endless: a radial distortion of three terms that does
+    /// not fold squeezes by less than three.
     pub(super) fn new(camera: &Camera) -> Option<Self> {
         if camera.distortion().is_none() {
             return None;

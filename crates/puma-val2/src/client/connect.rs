@@ -1,6 +1,6 @@
 //! Getting hold of the monitor, and calibrating the arm.
 
-use super::wire::{SPOIL, is_boot_question, is_doubt, last_line, shortened, way_out};
+use super::wire::{NUDGE, SPOIL, is_boot_question, is_doubt, last_question, shortened, way_out};
 use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
 use crate::{ArmError, Transport};
 
@@ -44,6 +44,13 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn reach_monitor(&mut self) -> Result<(), ArmError> {
+        self.wire.nudge = SPOIL;
+        let outcome = self.find_prompt();
+        self.wire.nudge = NUDGE;
+        outcome
+    }
+
+    fn find_prompt(&mut self) -> Result<(), ArmError> {
         let begun = self.wire.line.clock();
         let until = begun.saturating_add(self.config.connect_timeout);
         // Something that is no command and no answer: a half-typed line is spoilt by it, a question asked again.
@@ -79,11 +86,12 @@ impl<T: Transport> Val2Client<T> {
                     return Err(self.wire.garbled("CR", "an idle monitor", heard));
                 }
                 Ending::Question if is_boot_question(&reply.text) => {
-                    let loads = last_line(&reply.text).to_ascii_uppercase().contains("LOAD");
-                    let yes = if loads {
-                        self.config.load_from_floppy
-                    } else {
+                    // Whatever may be the question that erases the memory is answered as that one.
+                    let initializes = last_question(&reply.text).contains("INIT");
+                    let yes = if initializes {
                         self.config.initialize
+                    } else {
+                        self.config.load_from_floppy
                     };
                     if yes { b"Y\r" } else { b"N\r" }
                 }
@@ -103,7 +111,7 @@ impl<T: Transport> Val2Client<T> {
     /// Types a command that does no harm and listens whether it comes back before its line is ended.
     fn find_echo(&mut self) -> Result<(), ArmError> {
         self.wire.echo = Some(false);
-        for _ in 0..=self.config.retries {
+        for attempt in 0..=self.config.retries {
             self.wire.send(b"WHERE", "WHERE")?;
             let mut buffer = [0; 64];
             let mut heard = Vec::new();
@@ -124,15 +132,22 @@ impl<T: Transport> Val2Client<T> {
                     break;
                 }
             }
-            let echoed = !heard.is_empty();
             self.wire.send(b"\r", "WHERE")?;
             match self
                 .wire
                 .read_reply("WHERE", self.config.patience(), &self.config)
             {
                 Ok(reply) => {
-                    if Location::parse(&reply.text).is_some() || !reader::messages(&reply.text).is_empty() {
-                        self.wire.echo = Some(echoed);
+                    // An echo may come late, behind a message that nobody asked for, or damaged. What looks like neither echo nor silence is
+                    // listened to again.
+                    let said = String::from_utf8_lossy(&heard).to_ascii_uppercase();
+                    let echoed =
+                        said.contains("WHERE") || reply.text.to_ascii_uppercase().contains("WHERE\r");
+                    let plain = echoed || heard.is_empty() || attempt == self.config.retries;
+                    let answered =
+                        Location::parse(&reply.text).is_some() || !reader::messages(&reply.text).is_empty();
+                    if answered && plain {
+                        self.wire.echo = Some(echoed || !heard.is_empty());
                         return Ok(());
                     }
                 }

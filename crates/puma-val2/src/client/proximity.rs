@@ -1,6 +1,6 @@
 //! The proximity sensors: read, and set up to stop the arm.
 
-use super::wire::{Failed, Reply, is_doubt};
+use super::wire::{Failed, NUDGE, Reply, is_doubt};
 use super::{Ending, Val2Client, plain, shortened};
 use crate::{ArmError, Joints, ProximitySensor, Transport};
 
@@ -92,8 +92,14 @@ impl<T: Transport> Val2Client<T> {
     /// Types a program into the controller's editor, replacing one of the same name, and compares it with what the controller lists.
     ///
     /// # Errors
-    /// What the line or the controller said; [`ArmError::Garbled`] if the listing differs several times over.
+    /// [`ArmError::Setting`], before anything is sent, for a name or a step that is not one line of printable characters: what comes after a line end
+    /// would be a line of its own, and carried out; otherwise what the line or the controller said; [`ArmError::Garbled`] if the listing differs
+    /// several times over.
     pub fn store_program(&mut self, name: &str, steps: &[String]) -> Result<(), ArmError> {
+        check_line("the name of a program", name)?;
+        for step in steps {
+            check_line("a step of a program", step)?;
+        }
         let mut tries = 0;
         loop {
             match self.store_once(name, steps) {
@@ -141,15 +147,21 @@ impl<T: Transport> Val2Client<T> {
             .map_err(|failed| failed.error)
     }
 
-    /// Runs a stored program to its end and returns what it printed. A program that asks for values is aborted.
+    /// Runs a stored program to its end and returns what it printed. A program that asks for values gets none: it is aborted, at once if what it asks
+    /// ends with a question mark, else after `config.motion_timeout`.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch what other programs do; what the line or the controller said, its
-    /// messages in asterisks included; [`ArmError::Silence`] after `config.motion_timeout`, the program aborted.
+    /// [`ArmError::Setting`] for a name that is not one line of printable characters, and while a proximity guard is armed, which does not watch what
+    /// other programs do; what the line or the controller said, its messages in asterisks included; [`ArmError::Silence`] after
+    /// `config.motion_timeout`, the program aborted.
     pub fn execute(&mut self, program: &str) -> Result<String, ArmError> {
+        check_line("the name of a program", program)?;
         self.refuse_under_guard("a program")?;
         self.last_known = None;
-        match self.run(&format!("EXECUTE {program}")) {
+        self.wire.nudge = b"";
+        let outcome = self.run(&format!("EXECUTE {program}"));
+        self.wire.nudge = NUDGE;
+        match outcome {
             Ok(text) => Ok(text),
             Err(failed) if failed.maybe_done && is_doubt(&failed.error) => match self.end_program() {
                 Ok(()) => Err(failed.error),
@@ -204,6 +216,18 @@ impl<T: Transport> Val2Client<T> {
         }
         Ok(reply.text)
     }
+}
+
+/// Refuses what would not arrive as the one line that it is meant to be.
+fn check_line(what: &'static str, text: &str) -> Result<(), ArmError> {
+    if !text.trim().is_empty() && text.bytes().all(|b| matches!(b, 0x20..=0x7e)) {
+        return Ok(());
+    }
+    Err(ArmError::Setting {
+        what,
+        value: format!("{text:?}"),
+        allowed: "one line of printable ASCII characters",
+    })
 }
 
 /// The steps of a program that moves the arm under guard. A signal that is on already lets it stand.

@@ -46,7 +46,7 @@ pub(super) fn is_doubt(error: &ArmError) -> bool {
 pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
 
 /// Asks for the prompt.
-const NUDGE: &[u8] = b"\x11\r";
+pub(super) const NUDGE: &[u8] = b"\x11\r";
 
 /// Cancels a dialogue, where control characters are known.
 const CANCEL: &[u8] = b"\x03";
@@ -63,6 +63,8 @@ pub(super) struct Wire<T> {
     pub(super) notices: Vec<String>,
     /// Whether a line has been begun at the other end that was neither ended nor deleted.
     pub(super) half_typed: bool,
+    /// What a reply that does not come is asked for with. A program of somebody else's may take an empty line for an answer.
+    pub(super) nudge: &'static [u8],
     /// Whether the start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
 }
@@ -74,6 +76,7 @@ impl<T: Transport> Wire<T> {
             echo: None,
             notices: Vec::new(),
             half_typed: false,
+            nudge: NUDGE,
             restarted: false,
         }
     }
@@ -257,7 +260,9 @@ impl<T: Transport> Wire<T> {
                 let expected = format!("the prompt `{}`", config.idle_prompt);
                 return Err(self.silence(sent, &expected, &shortened(reader.text()), timeout));
             }
-            self.send(NUDGE, sent)?;
+            if !self.nudge.is_empty() {
+                self.send(self.nudge, sent)?;
+            }
         }
     }
 
@@ -359,7 +364,7 @@ impl<T: Transport> Wire<T> {
 
 /// Whether the last question of a text is one of the start-up dialogue.
 pub(super) fn is_boot_question(text: &str) -> bool {
-    let question = last_line(text).to_ascii_uppercase();
+    let question = last_question(text);
     question.contains("(Y/N)") && (question.contains("LOAD") || question.contains("INIT"))
 }
 
@@ -386,7 +391,13 @@ pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     }
 }
 
-pub(super) fn last_line(text: &str) -> &str {
+/// The last question of a text, in upper case and without its mark. Where nothing is echoed one question can follow another on its line.
+pub(super) fn last_question(text: &str) -> String {
+    let line = last_line(text).trim_end_matches(['?', ' ']);
+    line.rsplit('?').next().unwrap_or_default().to_ascii_uppercase()
+}
+
+fn last_line(text: &str) -> &str {
     text.trim_end().rsplit(['\r', '\n']).next().unwrap_or_default()
 }
 

@@ -348,12 +348,13 @@ fn numbers(line: &str) -> Result<Vec<Option<f64>>, Fault> {
     let mut found = Vec::new();
     loop {
         let negative = cursor.sign("-");
+        let signed = negative || cursor.sign("+");
         let value = match cursor.peek() {
             Some(Token::Number(number)) => {
                 cursor.next();
                 Some(if negative { -number } else { *number })
             }
-            _ if negative => return Err(Message::InvalidArgument.into()),
+            _ if signed => return Err(Message::InvalidArgument.into()),
             _ => None,
         };
         found.push(value);

@@ -49,7 +49,7 @@ impl Emulator {
     /// # Errors
     /// The first line that does not fit.
     pub fn load_text(&mut self, text: &str) -> Result<(), TextError> {
-        self.memory = parsed(text, self.memory.clone(), &self.profile)?;
+        self.memory = parsed(text, None, self.memory.clone(), &self.profile)?;
         Ok(())
     }
 
@@ -75,9 +75,17 @@ impl Emulator {
             }
         }
         cursor.expect_end()?;
-        let wanted = |k: Kind, name: &str| {
-            kind.is_none_or(|kind| kind == k) && (names.is_empty() || names.iter().any(|n| n == name))
+        let of_kind = |k: Kind| kind.is_none_or(|kind| kind == k);
+        let there = |name: &String| {
+            of_kind(Kind::Program) && self.memory.programs.contains_key(name)
+                || of_kind(Kind::Place) && self.memory.places.contains_key(name)
+                || of_kind(Kind::Real) && self.memory.reals.contains_key(name)
         };
+        if !names.iter().all(there) {
+            return Err(Message::UndefinedValue.into());
+        }
+        let wanted =
+            |k: Kind, name: &str| of_kind(k) && (names.is_empty() || names.iter().any(|n| n == name));
         let text = text_of(&self.memory, wanted);
         if self.floppy.len() >= self.profile.max_entries && !self.floppy.contains_key(&file) {
             return Err(Message::File.into());
@@ -91,12 +99,12 @@ impl Emulator {
         super::place::PlaceName::parse(cursor)?.key(&self.scope())
     }
 
-    /// `LOAD file`.
-    pub(super) fn load(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    /// `LOAD file`: everything in it, or only its programs, locations or variables.
+    pub(super) fn load(&mut self, kind: Option<Kind>, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let file = cursor.name()?;
         cursor.expect_end()?;
         let text = self.floppy.get(&file).ok_or(Message::File)?;
-        self.memory = parsed(text, self.memory.clone(), &self.profile).map_err(|error| error.fault)?;
+        self.memory = parsed(text, kind, self.memory.clone(), &self.profile).map_err(|error| error.fault)?;
         Ok(())
     }
 }
@@ -145,10 +153,16 @@ enum Section {
     Reals,
 }
 
-fn parsed(text: &str, mut memory: Memory, profile: &Profile) -> Result<Memory, TextError> {
+/// `memory` with what a text holds added: all of it, or what is of one kind. The rest of the text must be sound all the same.
+fn parsed(
+    text: &str,
+    kind: Option<Kind>,
+    mut memory: Memory,
+    profile: &Profile,
+) -> Result<Memory, TextError> {
     let mut section = Section::None;
     for (index, line) in text.lines().enumerate() {
-        take_line(line.trim(), &mut section, &mut memory, profile).map_err(|fault| TextError {
+        take_line(line.trim(), &mut section, kind, &mut memory, profile).map_err(|fault| TextError {
             line: index + 1,
             fault,
             text: line.chars().take(80).collect(),
@@ -167,7 +181,14 @@ fn parsed(text: &str, mut memory: Memory, profile: &Profile) -> Result<Memory, T
 /// Longest line that is no step of a program; six numbers with names need less.
 const DATA_LINE: usize = 512;
 
-fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &Profile) -> Result<(), Fault> {
+fn take_line(
+    line: &str,
+    section: &mut Section,
+    kind: Option<Kind>,
+    memory: &mut Memory,
+    profile: &Profile,
+) -> Result<(), Fault> {
+    let wanted = |k: Kind| kind.is_none_or(|kind| kind == k);
     let limit = match section {
         Section::Program(..) => profile.max_line,
         _ => DATA_LINE,
@@ -188,7 +209,9 @@ fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &P
             };
         }
         _ if upper == ".END" => {
-            if let Section::Program(name, program) = std::mem::replace(section, Section::None) {
+            if let Section::Program(name, program) = std::mem::replace(section, Section::None)
+                && wanted(Kind::Program)
+            {
                 memory.set_program(name, program, profile)?;
             }
         }
@@ -209,14 +232,18 @@ fn take_line(line: &str, section: &mut Section, memory: &mut Memory, profile: &P
                 None => (Place::Transformation(Xyzoat::from_val(values).pose()), name),
             };
             sound_name(plain, profile)?;
-            memory.set_place(name.to_owned(), place, profile)?;
+            if wanted(Kind::Place) {
+                memory.set_place(name.to_owned(), place, profile)?;
+            }
         }
         Section::Reals => {
             let [name, value] = words[..] else {
                 return Err(Message::InvalidArgument.into());
             };
-            let value = number(value)?;
-            memory.set_real(sound_name(name, profile)?, value, profile)?;
+            let (name, value) = (sound_name(name, profile)?, number(value)?);
+            if wanted(Kind::Real) {
+                memory.set_real(name, value, profile)?;
+            }
         }
     }
     Ok(())

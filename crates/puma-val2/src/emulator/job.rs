@@ -357,7 +357,8 @@ impl Emulator {
                 self.print_line(&line);
                 self.note(Event::ProgramEnded(how));
                 self.reactions.clear();
-                if how != Message::Completed {
+                // `HALT` is an end for good; what was stopped in any other way can go on.
+                if !matches!(how, Message::Completed | Message::Halted) {
                     self.paused = Some(job);
                 }
                 if !matches!(self.mode, Mode::Monitor | Mode::Busy | Mode::Answer(_)) {

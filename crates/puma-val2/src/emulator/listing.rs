@@ -17,6 +17,10 @@ impl Emulator {
     }
 
     pub(super) fn list(&mut self, command: Command, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let of_names = [Command::ListLocations, Command::ListReals, Command::ListPrograms];
+        if !of_names.contains(&command) {
+            cursor.expect_end()?;
+        }
         let mut names = Vec::new();
         while !cursor.at_end() {
             if !names.is_empty() {

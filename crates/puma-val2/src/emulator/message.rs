@@ -58,7 +58,7 @@ pub enum Message {
     Aborted,
     /// A program came to `PAUSE`.
     Paused,
-    /// A program came to `HALT`.
+    /// A program came to `HALT`, from where it cannot go on.
     Halted,
     /// A question that asks for confirmation, without its `(Y/N)?`.
     AreYouSure,

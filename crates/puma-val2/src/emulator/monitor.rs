@@ -31,7 +31,7 @@ pub(super) enum Command {
     ListLocations,
     ListPrograms,
     ListReals,
-    Load,
+    Load(Option<Kind>),
     Next,
     Panic,
     Point,
@@ -73,10 +73,10 @@ const COMMANDS: [(&str, (Command, bool)); 43] = [
     ("LISTL", (Command::ListLocations, true)),
     ("LISTP", (Command::ListPrograms, true)),
     ("LISTR", (Command::ListReals, true)),
-    ("LOAD", (Command::Load, true)),
-    ("LOADL", (Command::Load, true)),
-    ("LOADP", (Command::Load, true)),
-    ("LOADR", (Command::Load, true)),
+    ("LOAD", (Command::Load(None), true)),
+    ("LOADL", (Command::Load(Some(Kind::Place)), true)),
+    ("LOADP", (Command::Load(Some(Kind::Program)), true)),
+    ("LOADR", (Command::Load(Some(Kind::Real)), true)),
     ("NEXT", (Command::Next, false)),
     ("PANIC", (Command::Panic, true)),
     ("POINT", (Command::Point, false)),
@@ -235,7 +235,7 @@ impl Emulator {
             Command::Rename | Command::Copy => self.rename(cursor, command == Command::Copy)?,
             Command::Edit => return self.edit(cursor),
             Command::Store(kind) => self.store(kind, cursor)?,
-            Command::Load => self.load(cursor)?,
+            Command::Load(kind) => self.load(kind, cursor)?,
             Command::Directory
             | Command::FileDirectory
             | Command::Io

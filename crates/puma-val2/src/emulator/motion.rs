@@ -13,10 +13,22 @@ pub(super) struct Motion {
     /// Greatest speed and acceleration along the path, whose length is 1; per second, per second squared.
     speed: f64,
     acceleration: f64,
-    /// When it was broken off, and how long coming to a stand takes.
-    stop: Option<(Duration, Duration)>,
+    /// How it comes to a stand before its end.
+    stop: Option<Stop>,
     /// What is wrong with the place where the path ends.
     pub(super) failure: Option<Fault>,
+}
+
+/// A motion that is broken off travels its path ever more slowly.
+#[derive(Clone, Copy, Debug)]
+struct Stop {
+    at: Duration,
+    /// How long coming to a stand takes.
+    time: Duration,
+    /// Seconds of undisturbed travel used up until then.
+    travelled: f64,
+    /// How fast the path was travelled then, as a fraction of the undisturbed motion.
+    pace: f64,
 }
 
 /// How fast joints may turn.
@@ -95,7 +107,7 @@ impl Motion {
             .start
             .saturating_add(Duration::from_secs_f64(self.undisturbed().min(1e9)));
         match self.stop {
-            Some((at, time)) => end.min(at.saturating_add(time)),
+            Some(stop) => end.min(stop.at.saturating_add(stop.time)),
             None => end,
         }
     }
@@ -105,28 +117,36 @@ impl Motion {
         self.stop.is_some()
     }
 
-    /// Brings the arm to a stand within `time`, on the path.
+    /// Brings the arm to a stand within `time`, on the path. One that is slowing down already does so more sharply, if that is sooner.
     pub(super) fn break_off(&mut self, now: Duration, time: Duration) {
-        if self.stop.is_none() {
-            self.stop = Some((now, time));
+        let end = now.saturating_add(time);
+        if self
+            .stop
+            .is_some_and(|stop| stop.at.saturating_add(stop.time) <= end)
+        {
+            return;
         }
+        let pace = self
+            .stop
+            .map_or(1.0, |stop| 1.0 - stop.passed(now) / stop.time.as_secs_f64());
+        self.stop = Some(Stop {
+            at: now,
+            time,
+            travelled: self.travelled(now),
+            pace,
+        });
     }
 
-    /// Seconds of undisturbed travel that have been used up at `now`. While stopping, the path is travelled ever more slowly.
+    /// Seconds of undisturbed travel that have been used up at `now`.
     fn travelled(&self, now: Duration) -> f64 {
-        let since_start = |t: Duration| t.saturating_sub(self.start).as_secs_f64();
         match self.stop {
-            Some((at, time)) if now > at => {
-                let (passed, time) = ((now - at).as_secs_f64(), time.as_secs_f64());
-                let passed = passed.min(time);
-                let slowing = if time > 0.0 {
-                    passed - passed * passed / (2.0 * time)
-                } else {
-                    0.0
-                };
-                since_start(at) + slowing
+            Some(stop) if now > stop.at && !stop.time.is_zero() => {
+                let passed = stop.passed(now);
+                let slowing = passed - passed * passed / (2.0 * stop.time.as_secs_f64());
+                stop.travelled + stop.pace * slowing
             }
-            _ => since_start(now),
+            Some(stop) => stop.travelled,
+            None => now.saturating_sub(self.start).as_secs_f64(),
         }
     }
 
@@ -150,6 +170,13 @@ impl Motion {
         let (a, b) = (self.knots[span].0, self.knots[span + 1].0);
         let part = position - span as f64;
         Joints(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part))
+    }
+}
+
+impl Stop {
+    /// Seconds since the stop began, at most those it takes.
+    fn passed(&self, now: Duration) -> f64 {
+        now.saturating_sub(self.at).min(self.time).as_secs_f64()
     }
 }
 
@@ -201,5 +228,24 @@ mod tests {
         let stands = motion.at(motion.end());
         assert!(stands.0[0] > before.0[0] && stands.0[0] < motion.target().0[0]);
         assert_eq!(motion.at(at + Duration::from_secs(9)), stands);
+    }
+    #[test]
+    fn a_motion_that_is_stopping_can_be_stopped_more_sharply_but_not_less() {
+        let mut motion = motion();
+        let at = Duration::from_millis(5500);
+        motion.break_off(at, Duration::from_millis(600));
+        let later = at + Duration::from_millis(100);
+        let before = motion.at(later);
+        motion.break_off(later, Duration::from_secs(2));
+        assert_eq!(motion.end(), at + Duration::from_millis(600));
+        motion.break_off(later, Duration::from_millis(20));
+        assert_eq!(motion.end(), later + Duration::from_millis(20));
+        assert!((motion.at(later).0[0] - before.0[0]).abs() < 1e-12);
+        let stands = motion.at(motion.end());
+        let by = (stands.0[0] - before.0[0]).to_degrees();
+        assert!(by > 0.1 && by < 2.0, "{by}");
+        motion.break_off(later, Duration::ZERO);
+        assert_eq!(motion.end(), later);
+        assert!((motion.at(later + Duration::from_secs(1)).0[0] - before.0[0]).abs() < 1e-12);
     }
 }

@@ -193,8 +193,8 @@ impl Profile {
         }
     }
 
-    /// Only what a client for a real PUMA 260 controller has relied on: no `#PPOINT`, no control characters, no reactions from the monitor,
-    /// six-character names, and arm power that somebody has to switch on.
+    /// Only what a client for a real PUMA 260 controller has relied on: no `#PPOINT`, no control characters, no reactions from the monitor, no ear for
+    /// `PANIC` while `DO` blocks, six-character names, at most 100 % speed. Arm power is on, as that client asks a person to see to.
     pub fn val2_strict_miz() -> Self {
         Self {
             name: "val2_strict_miz",

@@ -120,10 +120,16 @@ fn replace_link(path: &Path, link: &Path) -> io::Result<()> {
     let mut beside = link.as_os_str().to_owned();
     beside.push(format!(".{}", std::process::id()));
     let beside = PathBuf::from(beside);
-    std::os::unix::fs::symlink(path, &beside)?;
-    fs::rename(&beside, link).inspect_err(|_| {
-        let _ = fs::remove_file(&beside);
-    })
+    std::os::unix::fs::symlink(path, &beside)
+        .and_then(|()| {
+            fs::rename(&beside, link).inspect_err(|_| {
+                let _ = fs::remove_file(&beside);
+            })
+        })
+        .map_err(|error| {
+            let what = format!("{} cannot be made a symbolic link: {error}", link.display());
+            io::Error::new(error.kind(), what)
+        })
 }
 
 /// Until the pipe says 1, or the pseudo-terminal fails.

@@ -11,6 +11,7 @@
 
 mod babble;
 mod characters;
+mod connecting;
 mod events;
 mod guard;
 mod hand;

@@ -139,6 +139,9 @@ fn cycles_and_ends() {
             .line("EXECUTE DEAD,2")
             .contains("Program halted at DEAD, step 3\r\n.")
     );
+    for again in ["PROCEED", "RETRY", "NEXT"] {
+        assert!(console.line(again).contains("*No program executing*"), "{again}");
+    }
     console.program("NAP", "TYPE 1\nPAUSE\nTYPE 2");
     assert!(console.line("EXECUTE NAP").contains("Program paused at NAP"));
     assert!(console.line("PROCEED").contains(" 2\r\nProgram completed"));

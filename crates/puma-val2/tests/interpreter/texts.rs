@@ -1,6 +1,6 @@
 //! Programs and data as text, and lines that are too much for the controller.
 
-use puma_val2::{Emulator, Message, Profile, PumaParams};
+use puma_val2::{Emulator, Event, Message, Profile, PumaParams};
 
 use crate::console::Console;
 
@@ -165,7 +165,7 @@ fn the_input_buffer_holds_what_it_says() {
     });
     console.emulator.take_events();
     let lost = |console: &mut Console| {
-        let is_loss = |event: &puma_val2::Event| *event == puma_val2::Event::CharacterLost;
+        let is_loss = |event: &Event| *event == Event::CharacterLost;
         console
             .emulator
             .take_events()
@@ -195,4 +195,99 @@ fn the_input_buffer_holds_what_it_says() {
     console.line_now("DO X = 3");
     console.emulator.feed(&[b'\r'; 1000], console.now);
     assert!(lost(&mut console) > 900);
+}
+
+/// The letter forms of the file commands touch their kind only, on the disk and in memory.
+#[test]
+fn files_by_kind() {
+    let mut console = Console::ready();
+    console.program("A", "TYPE 1");
+    console.lines("DO SET P = TRANS(1,2,3,4,5,6)\nDO HERE #Q\nDO N = 2.5");
+    console.lines("STORE ALL\nSTOREP PROGS\nSTOREL PLACES\nSTORER REALS\nSTOREL ONE=#Q");
+    let disk = console.emulator.floppy().clone();
+    let holds = |file: &str| [".PROGRAM A", "\nP 1", "\n#Q ", ".REALS"].map(|part| disk[file].contains(part));
+    assert_eq!(holds("ALL"), [true; 4]);
+    assert_eq!(holds("PROGS"), [true, false, false, false]);
+    assert_eq!(holds("PLACES"), [false, true, true, false]);
+    assert_eq!(holds("REALS"), [false, false, false, true]);
+    assert_eq!(holds("ONE"), [false, false, true, false]);
+
+    for refused in ["STORE BAD=NOBODY", "STOREP BAD=A,P", "STORER BAD=#Q"] {
+        assert!(console.line(refused).contains("*Undefined value*"), "{refused}");
+    }
+    assert!(!console.emulator.floppy().contains_key("BAD"));
+
+    let now = |console: &Console| {
+        let text = console.emulator.text();
+        [".PROGRAM A", "\nP 1", "\n#Q ", ".REALS"].map(|part| text.contains(part))
+    };
+    for (load, expected) in [
+        ("LOADP ALL", [true, false, false, false]),
+        ("LOADL ALL", [false, true, true, false]),
+        ("LOADR ALL", [false, false, false, true]),
+        ("LOAD ALL", [true; 4]),
+    ] {
+        console.lines("ZERO\nY");
+        assert_eq!(now(&console), [false; 4]);
+        console.line(load);
+        assert_eq!(now(&console), expected, "{load}");
+    }
+    console.lines("DELETEL P,#Q\nY\nDELETER N\nN");
+    assert_eq!(now(&console), [true, false, false, true]);
+    console.lines("DELETER N\nY\nDELETEP A\nY");
+    assert_eq!(now(&console), [false; 4]);
+}
+
+#[test]
+fn files_are_deleted_when_that_is_confirmed() {
+    let mut console = Console::ready();
+    console.lines("STORE A\nSTORE B\nSTORE C\nFDELETE B\nN");
+    assert_eq!(console.emulator.floppy().len(), 3);
+    console.emulator.take_events();
+    console.lines("FDELETE B\nY");
+    assert!(console.line("FDELETE B").contains("\n*"));
+    assert!(!console.line("FDIRECTORY").contains("B\r\n"));
+    console.lines("FORMAT\nN");
+    assert_eq!(console.emulator.floppy().len(), 2);
+    console.lines("FORMAT\nY");
+    assert!(console.emulator.floppy().is_empty());
+    let deleted: Vec<_> = console
+        .emulator
+        .take_events()
+        .into_iter()
+        .filter_map(|event| match event {
+            Event::FileDeleted(name) => Some(name),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(deleted, ["B", "A", "C"]);
+}
+
+#[test]
+fn values_that_are_typed_may_have_a_sign() {
+    let mut console = Console::ready();
+    console.lines("POINT #Q\n+10,-85,+95");
+    console.line("");
+    assert!(console.line("LISTL #Q").contains("10.000   -85.000    95.000"));
+    console.lines("DO PROMPT A,B\n+5,-6");
+    assert_eq!(
+        [console.emulator.real("A"), console.emulator.real("B")],
+        [Some(5.0), Some(-6.0)]
+    );
+    for bad in ["+-5", "-+5", "+", "5,+"] {
+        console.line("DO PROMPT A");
+        assert!(console.line(bad).contains("*Invalid argument*"), "{bad}");
+        console.line("1");
+    }
+}
+
+#[test]
+fn lists_that_take_no_names_refuse_them() {
+    let mut console = Console::ready();
+    console.program("A", "TYPE 1");
+    for list in ["DIRECTORY", "FDIRECTORY", "IO", "STATUS", "SWITCH"] {
+        assert!(!console.line(list).contains('*'), "{list}");
+        let said = console.line(&format!("{list} A"));
+        assert!(said.contains("*Invalid argument*"), "{said}");
+    }
 }

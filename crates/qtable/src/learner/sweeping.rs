@@ -120,7 +120,8 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
         let change = |table: &QTable<V>, state, action| {
             model
                 .backup(state, action, self.gamma, |next| table.max(next).to_f64())
-                .map(|value| (value - table.value(state, action).to_f64()).abs())
+                // A change that is not finite is the most urgent; its backup is refused if its value is not.
+                .map(|value| (value - table.value(state, action).to_f64()).abs().min(f64::MAX))
         };
         let mut outcome = Ok(error);
         self.queue.raise(

@@ -1,0 +1,166 @@
+//! Environments: masks, limits, lent and boxed ones, and the check of their contract.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
+
+mod odd;
+
+use odd::{odd, rng, step, trained};
+use qtable::{
+    Action, ActionMask, Environment, EnvironmentFault, Error, QTable, Schedule, State, Status, Step,
+    TimeLimit, TrainConfig, check_env, toys, train,
+};
+use rand::Rng;
+
+#[test]
+fn a_mask_keeps_its_actions_out_of_everything() {
+    // Action 1 of state 0 would be the best by far, and is forbidden.
+    struct Masked;
+    impl Environment for Masked {
+        fn states(&self) -> usize {
+            2
+        }
+        fn actions(&self) -> usize {
+            3
+        }
+        fn reset(&mut self, _rng: &mut dyn Rng) -> State {
+            State(0)
+        }
+        fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
+            assert_ne!(action, Action(1), "a forbidden action was taken");
+            step(1, action.0 as f64, Status::Terminated)
+        }
+        fn allows(&self, state: State, action: Action) -> bool {
+            state == State(1) || action != Action(1)
+        }
+    }
+    let mut environment = Masked;
+    let mut table = QTable::filled(2, 3, 50.0f64).unwrap();
+    let config = TrainConfig {
+        alpha: Schedule::constant(0.5).unwrap(),
+        ..TrainConfig::paper(500)
+    };
+    train(&mut environment, &mut table, &config, &mut rng(5), &mut |_| {}).unwrap();
+    assert_eq!(table.best(State(0)), Action(2));
+    assert_eq!(table.visits(State(0), Action(1)), 0);
+    assert!((table.value(State(0), Action(1)) - 50.0).abs() < 1e-12 && table.max(State(0)) < 50.0);
+    let forbidden = Error::ActionNotAllowed {
+        state: State(0),
+        action: Action(1),
+    };
+    assert_eq!(table.set(State(0), Action(1), 0.0), Err(forbidden));
+    assert!(check_env(&mut environment, 100, 0).is_ok());
+    let empty = ActionMask::new(2, 2, |state, _| state == State(1));
+    assert_eq!(empty, Err(Error::NoActionAllowed { state: State(0) }));
+}
+
+#[test]
+fn check_env_tells_what_is_wrong() {
+    let report = check_env(
+        &mut TimeLimit::new(toys::taxi().unwrap(), 200).unwrap(),
+        20_000,
+        3,
+    )
+    .unwrap();
+    assert!(
+        report.steps == 20_000 && report.truncated > 50 && report.states_met > 300,
+        "{report:?}"
+    );
+    let endless = check_env(&mut odd(|_| step(0, 0.0, Status::Continuing)), 500, 1).unwrap_err();
+    assert_eq!(endless, EnvironmentFault::Endless { steps: 500 });
+    // What it answers depends on all the steps it ever took.
+    let forgetful = odd(|n| {
+        step(
+            (n % 3) as usize,
+            0.0,
+            if n % 7 == 0 {
+                Status::Terminated
+            } else {
+                Status::Continuing
+            },
+        )
+    });
+    let fault = check_env(&mut { forgetful }, 500, 1).unwrap_err();
+    assert!(
+        matches!(fault, EnvironmentFault::NotReproducible { .. }),
+        "{fault}"
+    );
+}
+
+/// An environment whose shape or mask is another one after some steps.
+struct Shifting {
+    steps: u64,
+    grows: bool,
+}
+
+impl Environment for Shifting {
+    fn states(&self) -> usize {
+        if self.grows && self.steps > 40 { 4 } else { 3 }
+    }
+    fn actions(&self) -> usize {
+        2
+    }
+    fn reset(&mut self, _rng: &mut dyn Rng) -> State {
+        State(0)
+    }
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Step {
+        self.steps += 1;
+        step(1, 0.0, Status::Terminated)
+    }
+    fn allows(&self, _state: State, action: Action) -> bool {
+        self.grows || self.steps <= 40 || action == Action(0)
+    }
+}
+
+#[test]
+fn check_env_tells_what_has_changed() {
+    for (grows, what) in [(true, "the shape"), (false, "the mask")] {
+        let still = check_env(&mut Shifting { steps: 0, grows }, 20, 1);
+        assert!(still.is_ok(), "{still:?}");
+        let fault = check_env(&mut Shifting { steps: 0, grows }, 100, 1).unwrap_err();
+        let EnvironmentFault::Changed { what: found, .. } = fault else {
+            panic!("{fault}");
+        };
+        assert_eq!(found, what);
+    }
+}
+
+#[test]
+fn a_lent_or_boxed_environment_is_the_same_environment() {
+    let play = |environment: &mut dyn Environment| {
+        let config = TrainConfig {
+            episode_limit: 9,
+            ..TrainConfig::paper(2_000)
+        };
+        trained(environment, &config).unwrap().to_csv()
+    };
+    let mut chain = toys::chain(6).unwrap();
+    let wanted = play(&mut chain.clone());
+    assert_eq!(play(&mut Box::new(chain.clone())), wanted);
+    let mut boxed: Box<dyn Environment> = Box::new(chain.clone());
+    assert_eq!(play(&mut boxed), wanted);
+    assert_eq!(play(&mut TimeLimit::new(&mut chain, 9).unwrap()), wanted);
+    // A mask and a word on success come through.
+    let cliff: Box<dyn Environment> = Box::new(toys::cliff_walking().unwrap());
+    assert!(cliff.succeeded(&step(47, -1.0, Status::Terminated)));
+    assert!(
+        !Box::new(Shifting {
+            steps: 41,
+            grows: false
+        })
+        .allows(State(0), Action(1))
+    );
+}
+
+#[test]
+fn a_time_limit_truncates() {
+    let mut limited = TimeLimit::new(toys::chain(9).unwrap(), 3).unwrap();
+    let mut rng = rng(0);
+    for _ in 0..2 {
+        limited.reset(&mut rng);
+        let ends: Vec<Status> = (0..3).map(|_| limited.step(Action(0), &mut rng).status).collect();
+        assert_eq!(ends, [Status::Continuing, Status::Continuing, Status::Truncated]);
+    }
+    assert!(matches!(
+        TimeLimit::new(toys::chain(9).unwrap(), 0),
+        Err(Error::Setting { .. })
+    ));
+}
