@@ -161,7 +161,7 @@ impl Canvas {
             return None;
         }
         // None is negative, so that a cast rounds down.
-        let up = |x: f64| x as usize + usize::from(x as usize as f64 != x);
+        let up = |x: f64| x as usize + usize::from((x as usize as f64) < x);
         let (start, end) = (least as usize, up(greatest).min(self.width));
         let (from, to) = (up(inner_left), inner_right as usize);
         // Pixels from..to are covered by every scan line.
