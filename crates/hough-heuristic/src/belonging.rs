@@ -11,6 +11,8 @@ pub(crate) struct NearEdges {
     width: i32,
     height: i32,
     counts: Vec<u8>,
+    /// No fewer than the pixels of the frame that match.
+    most_matched: usize,
     /// The offsets at a distance of at most `tolerance`; at most 197 of them, so that a count fits in a byte.
     disc: Vec<(i32, i32)>,
 }
@@ -38,6 +40,7 @@ impl NearEdges {
     pub(crate) fn fill(&mut self, width: u32, height: u32, pixels: &[EdgePixel]) {
         self.width = width as i32;
         self.height = height as i32;
+        self.most_matched = pixels.len().saturating_mul(self.disc.len());
         self.counts.clear();
         self.counts.resize(width as usize * height as usize, 0);
         for pixel in pixels {
@@ -65,15 +68,19 @@ impl NearEdges {
         index(x, y, self.width, self.height).is_some_and(|index| self.counts[index] != 0)
     }
 
-    /// The belonging parameter β of a curve; 0 for a curve without pixels.
-    pub(crate) fn belonging<C: Curve>(&self, curve: &C) -> f64 {
+    /// The belonging parameter β of a curve, if it is above `theta`; a curve without pixels has none.
+    ///
+    /// Stops counting as soon as the outline is so long that all pixels that can match would not do, which changes no answer.
+    pub(crate) fn belonging<C: Curve>(&self, curve: &C, theta: f64) -> Option<f64> {
+        let longest = self.most_matched as f64 / theta;
         let (mut pixels, mut matched) = (0u32, 0u32);
-        curve.outline(self.width as u32, self.height as u32, |x, y| {
+        let complete = curve.outline(self.width as u32, self.height as u32, |x, y| {
             pixels += 1;
             matched += u32::from(self.matches(x, y));
-            true
+            f64::from(pixels) <= longest
         });
-        f64::from(matched) / f64::from(pixels.max(1))
+        let beta = f64::from(matched) / f64::from(pixels.max(1));
+        (complete && beta > theta).then_some(beta)
     }
 
     /// The β of a circle, if it is above `theta`.
@@ -189,8 +196,33 @@ mod tests {
         let expected = inside.len() as f64 / outline.len() as f64;
         assert!((beta - expected).abs() < 1e-12, "{beta} {expected}");
         assert!(expected < 0.6);
-        assert_eq!(near.belonging(&circle).to_bits(), beta.to_bits());
+        assert_eq!(near.belonging(&circle, 0.1), Some(beta));
+        assert_eq!(near.belonging(&circle, expected), None);
         assert_eq!(near.belonging_above(&circle, expected), None);
+    }
+
+    #[test]
+    fn an_endless_curve_is_turned_away() {
+        struct Endless;
+        impl Curve for Endless {
+            const PARAMETERS: usize = 1;
+            fn through(_: &[EdgePixel]) -> Option<Self> {
+                Some(Self)
+            }
+            fn outline(&self, _: u32, _: u32, mut visit: impl FnMut(i32, i32) -> bool) -> bool {
+                assert!((-100..1000).any(|x| !visit(x, 5)), "still counting");
+                false
+            }
+            fn distance(&self, _: f64, y: f64) -> f64 {
+                (y - 5.0).abs()
+            }
+        }
+        let row: Vec<EdgePixel> = (0..40).map(|x| EdgePixel { x, y: 5 }).collect();
+        let mut near = NearEdges::new(1.0);
+        near.fill(40, 12, &row);
+        assert_eq!(near.belonging(&Endless, 0.5), None);
+        near.fill(40, 12, &[]);
+        assert_eq!(near.belonging(&Endless, 0.5), None);
     }
 
     #[test]

@@ -35,14 +35,14 @@ pub trait Curve: Sized {
 }
 
 /// The least distance between two pixels of a draw, pixels: nearer ones say little about a curve but their own rounding.
-const MIN_SPACING: i64 = 3;
+const MIN_SPACING: u32 = 3;
 
 /// Whether any two of the pixels are nearer than [`MIN_SPACING`].
 fn crowded(pixels: &[EdgePixel]) -> bool {
     pixels.iter().enumerate().any(|(place, a)| {
         pixels[..place].iter().any(|b| {
-            let (dx, dy) = (i64::from(a.x) - i64::from(b.x), i64::from(a.y) - i64::from(b.y));
-            dx * dx + dy * dy < MIN_SPACING * MIN_SPACING
+            let (dx, dy) = (a.x.abs_diff(b.x), a.y.abs_diff(b.y));
+            dx < MIN_SPACING && dy < MIN_SPACING && dx * dx + dy * dy < MIN_SPACING * MIN_SPACING
         })
     })
 }

@@ -28,7 +28,8 @@ pub struct Acceptance {
     pub min_distance: f64,
     /// Where the centre may lie (default None: anywhere, even outside the frame).
     pub region: Option<Region>,
-    /// Whether to fit an accepted circle to its edge pixels by least squares (default true).
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). The Hough transforms, whose cells
+    /// are coarse, fit a candidate once before they verify it in any case.
     pub refine: bool,
 }
 

@@ -59,7 +59,8 @@ pub(crate) fn fit_circle(
             step_r = (d - ux * step_x - uy * step_y) / n;
             circle.radius += step_r;
         }
-        let moved = (circle.x - start.x).hypot(circle.y - start.y) + (circle.radius - start.radius).abs();
+        let (off_x, off_y) = (circle.x - start.x, circle.y - start.y);
+        let moved = (off_x * off_x + off_y * off_y).sqrt() + (circle.radius - start.radius).abs();
         let runaway = moved > 4.0 * band + 0.1 * start.radius;
         if !moved.is_finite() || runaway {
             return None;

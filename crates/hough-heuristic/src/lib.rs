@@ -49,8 +49,8 @@
 //! Coordinates are pixels with `(0, 0)` at the *centre* of the top-left pixel, x to the right and y down; [`Features`] are
 //! units that do not depend on the resolution. A detector owns its buffers, so use one detector for many frames: it allocates only for a frame that is
 //! larger, or has more edges, or takes more draws or votes than all before it. What it finds depends on its configuration (seed included) and the frame, never on the
-//! frames before, and is the same on every machine whose square roots are IEEE's; only [`StandardHough`] goes through sines and
-//! arc tangents, whose last bits differ between platforms.
+//! frames before, and is the same on every machine whose square roots are IEEE's; only [`StandardHough`] and [`Ellipse`] go through
+//! sines and arc tangents, whose last bits differ between platforms.
 //!
 //! # Limitations
 //!

@@ -9,21 +9,22 @@ impl Curve for Circle {
         let &[a, b, c] = pixels else {
             return None;
         };
+        // Whole numbers as floats: exact in frames of up to 2^16 pixels a side, and no overflow in larger ones.
         let from_a = |pixel: EdgePixel| {
             (
-                i64::from(pixel.x) - i64::from(a.x),
-                i64::from(pixel.y) - i64::from(a.y),
+                f64::from(pixel.x) - f64::from(a.x),
+                f64::from(pixel.y) - f64::from(a.y),
             )
         };
         let ((bx, by), (cx, cy)) = (from_a(b), from_a(c));
         let cross = bx * cy - by * cx;
-        if cross == 0 || crowded(pixels) {
+        if cross == 0.0 || crowded(pixels) {
             return None;
         }
         let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
-        let scale = 0.5 / cross as f64;
-        let x = (b2 * cy - c2 * by) as f64 * scale;
-        let y = (c2 * bx - b2 * cx) as f64 * scale;
+        let scale = 0.5 / cross;
+        let x = (b2 * cy - c2 * by) * scale;
+        let y = (c2 * bx - b2 * cx) * scale;
         Some(Circle {
             x: f64::from(a.x) + x,
             y: f64::from(a.y) + y,
@@ -131,6 +132,21 @@ mod tests {
         }
         assert_eq!(circles_of_radius([a, b], 10.0), None);
         assert_eq!(circles_of_radius([a, at(11, 20)], 10.0), None);
+    }
+
+    #[test]
+    fn pixels_however_far_apart_give_a_finite_circle_or_none() {
+        // The longest frames that there can be, and so flat that every circle through three of their pixels is huge.
+        let far = [at(0, 0), at(u32::MAX, 2), at(u32::MAX / 3, 1)];
+        let circle = Circle::through(&far).unwrap();
+        assert!(circle.x.is_finite() && circle.y.is_finite() && circle.radius.is_finite());
+        let corners = Circle::through(&[at(0, 0), at(u32::MAX, 0), at(0, u32::MAX)]).unwrap();
+        let half = f64::from(u32::MAX) / 2.0;
+        assert!((corners.x - half).abs() < 1.0 && (corners.y - half).abs() < 1.0);
+        assert_eq!(
+            Circle::through(&[at(0, 0), at(u32::MAX, u32::MAX), at(7, 7)]),
+            None
+        );
     }
 
     #[test]

@@ -129,7 +129,8 @@ impl CurveSearch {
 
     /// The curves of an edge image for which `admits` is true, in the order in which they were found.
     ///
-    /// Checking a curve takes as long as its outline is, so let `admits` turn away those much larger than the image.
+    /// Checking a curve takes as long as its outline is, up to the length at which no image with so many edge pixels could give it
+    /// a β above θ. So let `admits` turn away those much larger than the image.
     pub fn find<C: Curve>(&mut self, edges: &EdgeMap, admits: impl Fn(&C) -> bool) -> Vec<FoundCurve<C>> {
         let (width, height) = (edges.width(), edges.height());
         self.structure.fill(width, height, edges.pixels());
@@ -144,10 +145,9 @@ impl CurveSearch {
             let Some(curve) = C::through(&pixels).filter(&admits) else {
                 continue;
             };
-            let beta = self.near.belonging(&curve);
-            if beta <= self.config.theta {
+            let Some(beta) = self.near.belonging(&curve, self.config.theta) else {
                 continue;
-            }
+            };
             let band = self.config.tolerance + 1.5;
             let near = &mut self.near;
             self.structure.remove(|pixel| {
