@@ -206,10 +206,10 @@ mod tests {
         let needed = Probes::new(0.65).needed;
         // The share of draws that pass when each probe matches with this probability, independently of the others.
         let passing = |beta: f64| {
-            let mut by_matches = vec![1.0];
+            let mut by_matches = [0.0; PROBES + 1];
+            by_matches[0] = 1.0;
             for needed in needed {
                 for _ in 0..8 {
-                    by_matches.push(0.0);
                     for matched in (0..by_matches.len()).rev() {
                         let before = if matched > 0 { by_matches[matched - 1] } else { 0.0 };
                         by_matches[matched] = (1.0 - beta) * by_matches[matched] + beta * before;
