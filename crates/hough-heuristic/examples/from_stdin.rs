@@ -1,6 +1,9 @@
 //! Reads Y4M video from standard input and prints the circles of each frame as one line of JSON.
 //!
-//! ffmpeg -i balls.mp4 -f yuv4mpegpipe -pix_fmt yuv420p - | cargo run --release --features serde --example from_stdin
+//! ```text
+//! ffmpeg -i balls.mp4 -f yuv4mpegpipe -pix_fmt yuv420p - |
+//!     cargo run --release -p hough-heuristic --features serde --example from_stdin
+//! ```
 
 #![allow(clippy::print_stderr, reason = "a program for the terminal")]
 

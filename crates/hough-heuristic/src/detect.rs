@@ -63,7 +63,8 @@ pub trait CircleDetector {
         let _ = keep;
     }
 
-    /// What lies between the last frame and its circles; none for a detector that does not show it.
+    /// What lies between the last frame and its circles; none for a detector that does not show it. A frame that
+    /// [`check_frame`](CircleDetector::check_frame) refuses is not looked at, and leaves those of the frame before.
     fn stages(&self) -> Option<Stages<'_>> {
         None
     }

@@ -9,6 +9,7 @@ use crate::{Circle, ConfigError, Curve, Detection, EdgeMap, Region};
 /// Which circles a detector reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Acceptance {
     /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more hidden are found, and more
     /// circles that are none.

@@ -18,6 +18,7 @@ use crate::{
 /// The defaults suit the paper's frames of 768x576 pixels with one ball of radius 20 to 290 px amid moderate clutter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct HeuristicConfig {
     /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more hidden are found, and more
     /// circles that are none.

@@ -15,6 +15,7 @@ use crate::{
 /// The settings of [`RandomizedHough`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct RandomizedHoughConfig {
     /// Which circles are reported.
     pub accept: Acceptance,

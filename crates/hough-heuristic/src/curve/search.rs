@@ -10,6 +10,7 @@ use crate::{ConfigError, EdgeMap, EdgePixel};
 /// The settings of [`CurveSearch`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct CurveSearchConfig {
     /// The offset θ that β must exceed (default 0.6; 0..1, both excluded).
     pub theta: f64,

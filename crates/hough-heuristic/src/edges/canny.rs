@@ -21,6 +21,7 @@ const LOW_FLOOR: f32 = 0.6;
 /// default `sigma`, gives about `2.3 c`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct CannyConfig {
     /// A pixel this strong continues an edge (default 30; 0 < low <= high). Lower: longer edges, and more of them from
     /// texture.

@@ -69,3 +69,34 @@ fn settings_come_back() {
         ..StandardHoughConfig::default()
     });
 }
+
+/// A stored configuration of no fields is the default, and a field that there is not is named.
+fn may_be_partial<T: Default + DeserializeOwned + PartialEq + Debug>() {
+    assert_eq!(serde_json::from_str::<T>("{}").unwrap(), T::default());
+    let error = serde_json::from_str::<T>(r#"{"thetta":0.5}"#).unwrap_err();
+    assert!(error.to_string().contains("thetta"), "{error}");
+}
+
+#[test]
+fn what_is_not_stored_is_the_default() {
+    may_be_partial::<Acceptance>();
+    may_be_partial::<CannyConfig>();
+    may_be_partial::<CurveSearchConfig>();
+    may_be_partial::<HeuristicConfig>();
+    may_be_partial::<RandomizedHoughConfig>();
+    may_be_partial::<StandardHoughConfig>();
+    let stored = r#"{"accept":{"theta":0.5,"max_circles":3},"cell":3.0}"#;
+    let expected = StandardHoughConfig {
+        accept: Acceptance {
+            theta: 0.5,
+            max_circles: 3,
+            ..Acceptance::default()
+        },
+        cell: 3.0,
+        ..StandardHoughConfig::default()
+    };
+    assert_eq!(
+        serde_json::from_str::<StandardHoughConfig>(stored).unwrap(),
+        expected
+    );
+}
