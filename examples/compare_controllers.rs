@@ -79,7 +79,7 @@ struct Options {
     #[arg(long)]
     full_chain: bool,
 
-    /// How the circle is found in rendered frames: heuristic, rht, sht
+    /// How the circle is found in rendered frames: trusted, heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t)]
     detector: BallDetector,
 

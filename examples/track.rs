@@ -63,7 +63,7 @@ struct Options {
     #[arg(long, value_enum, default_value_t = Fate::Push)]
     ball: Fate,
 
-    /// How the circle is found: heuristic, rht, sht
+    /// How the circle is found: trusted, heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t)]
     detector: BallDetector,
 
