@@ -177,9 +177,11 @@ impl BehaviourSpec {
         self.space.len()
     }
 
-    /// How many actions it chooses from.
+    /// How many actions it chooses from; the largest number there is if they are more.
     pub fn actions(&self) -> usize {
-        self.moves.iter().map(|steps| steps.degrees.len()).product()
+        self.moves.iter().fold(1, |actions: usize, steps| {
+            actions.saturating_mul(steps.degrees.len())
+        })
     }
 
     /// The state that `percept` falls into.
@@ -294,6 +296,17 @@ mod tests {
         assert!(spec.space.is_goal(inside));
         assert_eq!(spec.state(&percept(0.0, 92.0, 33.0, 10.0)).unwrap(), inside);
         assert!(BehaviourSpec::approaching().with_y_goal(92.0, 74.0).is_err());
+    }
+
+    #[test]
+    fn more_actions_than_can_be_counted_are_no_panic() {
+        let mut spec = BehaviourSpec::centering();
+        let two = JointSteps {
+            joint: Joint::J1,
+            degrees: vec![-1.0, 1.0],
+        };
+        spec.moves = vec![two; 65];
+        assert_eq!(spec.actions(), usize::MAX);
     }
 
     #[test]
