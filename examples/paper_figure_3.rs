@@ -2,7 +2,7 @@
 //! the circle they estimate, and the circle that is found.
 //!
 //! ```text
-//! cargo run --release --example paper_figure_3 -- out/figure_3.png
+//! cargo run --release --example paper_figure_3
 //! ```
 
 #![allow(
@@ -33,7 +33,7 @@ mod overlay;
 #[derive(Parser, Debug)]
 struct Options {
     /// Where to write the picture, PNG
-    #[arg(value_name = "FILE", default_value = "figure_3.png")]
+    #[arg(value_name = "FILE", default_value = "out/figure_3.png")]
     picture: PathBuf,
 
     /// Seed of the scene and of the draws

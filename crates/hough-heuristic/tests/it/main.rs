@@ -8,9 +8,11 @@
 #[path = "../../scenes/scenes.rs"]
 mod scenes;
 
+mod any_frame;
 mod curves;
 mod detectors;
 mod heuristic;
+mod refusals;
 #[cfg(feature = "serde")]
 mod serde;
 #[cfg(feature = "files")]
