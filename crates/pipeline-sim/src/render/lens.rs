@@ -5,22 +5,24 @@ use nalgebra::{Point2, Vector2};
 use crate::Camera;
 use crate::render::canvas::{Area, Canvas};
 
-/// Pixels, at most, from one place to the next at which a distortion is undone exactly.
-const STEP: usize = 16;
-/// Pixels of a row that are taken from a straight line.
-const RUN: usize = 4;
+/// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts of the focal length.
+const STEP: (f64, f64) = (16.0, 1.0 / 60.0);
+/// The same for places between which pixels of a row are taken from a straight line.
+const RUN: (f64, f64) = (4.0, 1.0 / 250.0);
 
 /// The map from a distorted frame to the ideal one it is taken from.
 ///
-/// A distortion is undone exactly on a coarse grid. Between, cubic polynomials tell where every fourth pixel of every row comes from, and
-/// the three that follow lie on a straight line to the next: in all within .005 pixels of the exact place for lenses whose corners move by
-/// up to a tenth of the frame's width.
+/// A distortion is undone exactly on a coarse grid. Between, cubic polynomials tell where every fourth pixel of every row comes from (every
+/// one in small frames), and those that follow lie on a straight line to the next: in all within .005 pixels of the exact place for lenses
+/// whose corners move by up to a tenth of the frame's width.
 #[derive(Clone, Debug)]
 pub(super) struct Warp {
     camera: Camera,
     /// The ideal camera, large enough to hold all that the distorted frame shows.
     pub(super) ideal: Camera,
-    /// Row after row, where pixels 0, [`RUN`], ... and the last are taken from.
+    /// Pixels from one of the sources to the next.
+    run: usize,
+    /// Row after row, where pixels 0, `run`, ... and the last are taken from.
     sources: Vec<[f32; 2]>,
     /// Of them in a row.
     columns: usize,
@@ -35,7 +37,12 @@ impl Warp {
         }
         let (width, height) = camera.size();
         let (focal, principal) = (camera.focal_px(), camera.principal_point());
-        let (across, down) = (Nodes::new(width as usize), Nodes::new(height as usize));
+        let pixels = |(most, part): (f64, f64)| (part * focal).clamp(1.0, most);
+        let step = pixels(STEP);
+        let (across, down) = (
+            Nodes::new(width as usize, step),
+            Nodes::new(height as usize, step),
+        );
         // From place to place the answer changes little: the last one is where to look for the next.
         let mut last = (Point2::origin(), Point2::origin());
         let mut exact = |x: f64, y: f64| {
@@ -54,8 +61,9 @@ impl Warp {
         let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
         let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
         let ideal = Camera::ideal(focal, principal - low, w, h);
-        let runs = (width as usize).div_ceil(RUN);
-        let ends: Vec<usize> = (0..=runs).map(|k| (k * RUN).min(width as usize - 1)).collect();
+        let run = pixels(RUN) as usize;
+        let runs = (width as usize).div_ceil(run);
+        let ends: Vec<usize> = (0..=runs).map(|k| (k * run).min(width as usize - 1)).collect();
         let shares: Vec<(usize, [f64; 4])> = ends.iter().map(|x| across.shares(*x)).collect();
         let mut sources = Vec::with_capacity(ends.len() * height as usize);
         let mut row = vec![Vector2::zeros(); across.count];
@@ -74,6 +82,7 @@ impl Warp {
         Some(Self {
             camera: *camera,
             ideal,
+            run,
             sources,
             columns: ends.len(),
         })
@@ -89,9 +98,9 @@ impl Warp {
         let w = ideal.width;
         let rows = out.light.chunks_exact_mut(out.width.max(1));
         for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
-            for ((k, run), ends) in row.chunks_mut(RUN).enumerate().zip(sources.windows(2)) {
+            for ((k, run), ends) in row.chunks_mut(self.run).enumerate().zip(sources.windows(2)) {
                 // The last place of a row is that of its last pixel.
-                let length = RUN.min((out.width - 1 - k * RUN).max(1));
+                let length = self.run.min((out.width - 1 - k * self.run).max(1));
                 let share = 1.0 / length as f32;
                 // Whole pixels and their 65536ths.
                 let fixed = |v: f32| (v * 65536.0) as i64;
@@ -122,9 +131,10 @@ struct Nodes {
 }
 
 impl Nodes {
-    fn new(length: usize) -> Self {
+    /// At most `step` apart, but for a frame of one pixel.
+    fn new(length: usize, step: f64) -> Self {
         let last = length.saturating_sub(1);
-        let count = last.div_ceil(STEP).max(3) + 1;
+        let count = ((last as f64 / step).ceil() as usize).max(3) + 1;
         Self {
             count,
             spacing: last as f64 / (count - 1) as f64,
@@ -266,6 +276,31 @@ mod tests {
     use super::*;
     use crate::Distortion;
 
+    /// How far pixels are taken from where the lens has them, at most.
+    fn worst(camera: &Camera) -> f64 {
+        let warp = Warp::new(camera).expect("distorts");
+        let (width, height) = camera.size();
+        let mut worst = 0.0_f64;
+        for (x, y) in (0..height)
+            .step_by(3)
+            .flat_map(|y| (0..width).step_by(5).map(move |x| (x, y)))
+        {
+            let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
+            let exact = warp.ideal.principal_point() + ray.xy() * camera.focal_px();
+            let run = &warp.sources[y as usize * warp.columns + x as usize / warp.run..];
+            let (from, to) = (run[0].map(f64::from), run[1].map(f64::from));
+            let start = x as usize / warp.run * warp.run;
+            let length = warp.run.min((width as usize - 1 - start).max(1));
+            let part = (x as usize - start) as f64 / length as f64;
+            let taken = Point2::new(
+                from[0] + part * (to[0] - from[0]),
+                from[1] + part * (to[1] - from[1]),
+            );
+            worst = worst.max((taken - exact).norm());
+        }
+        worst
+    }
+
     #[test]
     fn every_pixel_is_taken_from_where_the_lens_has_it() {
         for (k1, k2) in [(-0.35, 0.08), (-0.1, 0.0), (0.6, 0.0)] {
@@ -275,25 +310,60 @@ mod tests {
                 ..Distortion::default()
             };
             let camera = Camera::paper().with_distortion(lens).expect("does not fold");
-            let warp = Warp::new(&camera).expect("distorts");
-            let (width, height) = camera.size();
-            let mut worst = 0.0_f64;
-            for (x, y) in (0..height)
-                .step_by(3)
-                .flat_map(|y| (0..width).step_by(5).map(move |x| (x, y)))
-            {
-                let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
-                let exact = warp.ideal.principal_point() + ray.xy() * camera.focal_px();
-                let run = &warp.sources[y as usize * warp.columns + x as usize / RUN..];
-                let (from, to) = (run[0].map(f64::from), run[1].map(f64::from));
-                let part = f64::from(x % RUN as u32) / f64::from((width - 1 - x / 4 * 4).clamp(1, 4));
-                let taken = Point2::new(
-                    from[0] + part * (to[0] - from[0]),
-                    from[1] + part * (to[1] - from[1]),
+            let off = worst(&camera);
+            assert!(off < 0.005, "{k1} {k2}: {off}");
+            for (width, height) in [(769, 577), (192, 144), (62, 46), (8, 6), (5, 2), (1, 1)] {
+                let small = camera.resized(width, height).expect("does not fold");
+                let off = worst(&small);
+                assert!(off < 0.005, "{k1} {k2} {width}x{height}: {off}");
+                let warp = Warp::new(&small).expect("distorts");
+                let (w, h) = warp.ideal.size();
+                let mut ideal = Canvas::new(w as usize, h as usize);
+                ideal.light.fill(0.5);
+                let mut out = Canvas::new(width as usize, height as usize);
+                warp.apply(&ideal, &mut out);
+                assert!(
+                    out.light.iter().all(|v| (v - 0.5).abs() < 1e-6),
+                    "{width}x{height}"
                 );
-                worst = worst.max((taken - exact).norm());
             }
-            assert!(worst < 0.005, "{k1} {k2}: {worst}");
+        }
+    }
+
+    #[test]
+    fn defocus_is_a_gaussian_cut_off_at_two_and_a_half_deviations() {
+        // Neither side is a multiple of a block; the border is continued.
+        let (w, h) = (53_usize, 41_usize);
+        let mut state = 1_u32;
+        let light: Vec<f32> = (0..w * h)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 8) as f32 / 16_777_216.0
+            })
+            .collect();
+        for sigma in [0.6, 1.0, 2.3, 3.5] {
+            let mut canvas = Canvas::new(w, h);
+            canvas.light.copy_from_slice(&light);
+            defocus(&mut canvas, sigma, &mut Vec::new());
+            let reach = (2.5 * sigma).ceil() as i64;
+            let weight = |d: i64| (-0.5 * (d as f64 / sigma).powi(2)).exp();
+            let sum: f64 = (-reach..=reach).map(weight).sum();
+            for (x, y) in [(0_i64, 0_i64), (26, 20), (52, 40), (50, 3), (15, 40)] {
+                let at = |x: i64, y: i64| {
+                    let (x, y) = (x.clamp(0, w as i64 - 1), y.clamp(0, h as i64 - 1));
+                    f64::from(light[y as usize * w + x as usize])
+                };
+                let exact: f64 = (-reach..=reach)
+                    .flat_map(|j| (-reach..=reach).map(move |i| (i, j)))
+                    .map(|(i, j)| weight(i) * weight(j) * at(x + i, y + j))
+                    .sum::<f64>()
+                    / (sum * sum);
+                let blurred = f64::from(canvas.light[y as usize * w + x as usize]);
+                assert!(
+                    (blurred - exact).abs() < 1e-5,
+                    "{sigma} {x} {y}: {blurred} {exact}"
+                );
+            }
         }
     }
 }

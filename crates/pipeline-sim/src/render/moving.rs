@@ -395,4 +395,40 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn what_does_not_move_evenly_is_drawn_moment_by_moment() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let scene = Scene::generate(SceneKind::Motion, &mut rng);
+        let snapshot = Snapshot::draw(SceneKind::Motion, &mut rng);
+        let frames = |change: &dyn Fn(f64, &mut crate::Cell)| {
+            let moment = |t: f64| {
+                let (mut cell, joints) = snapshot.moment(t);
+                change(t / snapshot.shot.exposure, &mut cell);
+                (cell, joints)
+            };
+            let quick = Renderer::new(&scene, 7).take(&snapshot.shot, moment).to_vec();
+            let exact = Renderer::new(&scene, 7)
+                .take_exactly(&snapshot.shot, moment)
+                .to_vec();
+            quick == exact
+        };
+        // The ball jumps, swings, grows, is not there; the table sinks; the lens zooms.
+        let side = |cell: &mut crate::Cell, by: f64| cell.ball.centre.y += by;
+        assert!(frames(&|t, cell| side(cell, if t > 0.6 { 0.05 } else { 0.0 })));
+        assert!(frames(&|t, cell| side(cell, 0.02 * (6.0 * t).sin())));
+        assert!(frames(&|t, cell| cell.ball.radius *= 1.0 + 0.1 * t));
+        assert!(frames(&|t, cell| if t > 0.7 {
+            cell.ball.centre.x = f64::NAN;
+        }));
+        assert!(frames(&|t, cell| cell.table -= 0.01 * t));
+        assert!(frames(&|t, cell| {
+            cell.camera = cell
+                .camera
+                .with_focal_factor(1.0 + 0.1 * t)
+                .unwrap_or(cell.camera);
+        }));
+        // A ball that rolls on is not among them.
+        assert!(!frames(&|t, cell| side(cell, 0.002 * t)));
+    }
 }
