@@ -143,10 +143,22 @@ fn what_has_no_outline_is_named() {
             Err(ProjectionError::Radius { .. })
         ));
     }
-    for (f, w) in [(0.0, 0.0088), (-0.01, 0.0088), (0.0115, 0.0), (f64::NAN, 0.0088)] {
-        assert!(Camera::pinhole(f, w, 768, 576).is_err());
+    for (f, w, width, height, named) in [
+        (0.0, 0.0088, 768, 576, "focal length (m)"),
+        (-0.01, 0.0088, 768, 576, "focal length (m)"),
+        (f64::NAN, 0.0088, 768, 576, "focal length (m)"),
+        (0.0115, 0.0, 768, 576, "sensor width (m)"),
+        (0.0115, -0.0088, 768, 576, "sensor width (m)"),
+        (0.0115, 0.0088, 0, 576, "frame width (px)"),
+        (0.0115, 0.0088, 768, 0, "frame height (px)"),
+    ] {
+        let refused = Camera::pinhole(f, w, width, height).expect_err("no camera");
+        assert!(
+            matches!(refused, CameraError::NotPositive { quantity, .. } if quantity == named),
+            "{refused}"
+        );
+        assert!(refused.to_string().contains(named), "{refused}");
     }
-    assert!(Camera::pinhole(0.0115, 0.0088, 0, 576).is_err());
     assert!(camera.with_focal_factor(0.0).is_err());
     assert!(
         camera

@@ -242,7 +242,7 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
                 &canvas.light[below * w..][..w],
             )
         });
-        weigh(pairs, &mut mixed[y * w..][..w]);
+        weigh(&pairs, &mut mixed[y * w..][..w]);
     }
     for (row, out) in mixed.chunks_exact(w).zip(canvas.light.chunks_exact_mut(w)) {
         padded[..reach].fill(row[0]);
@@ -250,12 +250,12 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
         padded[reach + w..].fill(row[w - 1]);
         let pairs = kernel.iter().enumerate();
         let pairs = pairs.map(|(i, k)| (*k, &padded[reach - i..][..w], &padded[reach + i..][..w]));
-        weigh(pairs, out);
+        weigh(&pairs, out);
     }
 }
 
 /// The sum of pairs of rows, each with its weight.
-fn weigh<'a>(pairs: impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone, out: &mut [f32]) {
+fn weigh<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
     let mut at = 0;
     let mut blocks = out.chunks_exact_mut(BLOCK);
     for block in &mut blocks {

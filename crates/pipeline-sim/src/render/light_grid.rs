@@ -84,8 +84,8 @@ impl LightGrid {
             let to = upper + (lower - upper) * fy;
             let slope = (to - from) / STEP as f32;
             if let Some(part) = part.first_chunk_mut::<STEP>() {
-                for k in 0..STEP {
-                    part[k] *= from + slope * k as f32;
+                for (k, value) in part.iter_mut().enumerate() {
+                    *value *= from + slope * k as f32;
                 }
             } else {
                 for (k, value) in part.iter_mut().enumerate() {
