@@ -70,6 +70,8 @@ mod error;
 mod event;
 #[cfg(feature = "serde")]
 mod export;
+#[cfg(feature = "serde")]
+mod export_policy;
 mod eye;
 mod hybrid;
 mod learned;
