@@ -267,32 +267,42 @@ impl<'a> Run<'a> {
         self.arm.set_gripper(Gripper::Closed)?;
         self.tell(EventKind::Gripped, None);
         match self.config.lift {
-            Some(lift) => self.verify(from, lift),
+            Some(lift) => self.verify(&sighting, from, lift),
             None => Ok(Phase::End(None)),
         }
     }
 
-    /// Back to where the ball was seen from, and up: a ball that shows from either place is not in the jaws.
-    fn verify(&mut self, from: Joints, lift: JointDelta) -> Result<Phase, AgentError> {
-        let lifted = self.config.limits.nearest(&(from + lift));
-        for (pose, done) in [(from, EventKind::Withdrawn), (lifted, EventKind::Lifted)] {
+    /// Back to where the ball was seen from, where it must not be any more, and up, from where none must be seen that was left behind.
+    fn verify(&mut self, seen: &Sighting, from: Joints, lift: JointDelta) -> Result<Phase, AgentError> {
+        let (lifted, least) = (
+            self.config.limits.nearest(&(from + lift)),
+            self.config.left_behind,
+        );
+        let still_there: &dyn Fn(&Sighting) -> bool = &|now| is_same_place(seen, now);
+        let left_behind: &dyn Fn(&Sighting) -> bool = &|now| now.features.r >= least;
+        for (pose, done, is_ball) in [
+            (from, EventKind::Withdrawn, still_there),
+            (lifted, EventKind::Lifted, left_behind),
+        ] {
             if self.go_to(pose, done)? == Went::Back {
                 // Whether the ball is in the jaws is not known.
                 return Ok(Phase::End(Some(GaveUp::Obstructed)));
             }
-            if self.still_shows()? {
+            if self.shows(is_ball)? {
                 self.arm.set_gripper(Gripper::Open)?;
                 self.tell(EventKind::Missed, None);
                 self.cycles += 1;
                 return Ok(Phase::Recover(from));
             }
         }
+        // What was seen since was not the ball.
+        self.last_seen = Some(*seen);
         Ok(Phase::End(None))
     }
 
-    /// Whether a ball is in view, in two looks at one place.
-    fn still_shows(&mut self) -> Result<bool, AgentError> {
-        let Some(first) = self.look()? else {
+    /// Whether such a ball is in view, in two looks at one place.
+    fn shows(&mut self, is_ball: &dyn Fn(&Sighting) -> bool) -> Result<bool, AgentError> {
+        let Some(first) = self.look()?.filter(is_ball) else {
             return Ok(false);
         };
         let again = self.look()?;
