@@ -16,8 +16,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
-    JacobianAt, Learned, LookAhead, Percept, PositionBased, ServoSettings,
+    Agent, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased, JacobianAt,
+    Learned, LookAhead, Percept, PositionBased, ServoSettings,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
@@ -118,7 +118,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
                 let made = (rival.make)(&mut world, seed_of(options.seed, &[2, draw]), options.moves)?;
                 tally.begin_draw();
-                let mut agent = Agent::with_controller(AgentConfig::paper(world.search_poses()), made)?;
+                let mut agent = Agent::with_controller(world.agent_config(), made)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut log = EventLog::default();
@@ -258,7 +258,7 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
 
 /// The hybrid after at most `moves` moves in `cell`, learning nothing more.
 fn taught_hybrid(world: &mut World, seed: u64, moves: usize) -> Made {
-    let config = AgentConfig::paper(world.search_poses());
+    let config = world.agent_config();
     let longest = config.max_cycles;
     let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
     let mut made = 0;

@@ -118,7 +118,8 @@ impl Tape<'_> {
 fn is_answer(kind: &EventKind) -> bool {
     !matches!(
         kind,
-        EventKind::Lost
+        EventKind::Searching
+            | EventKind::Lost
             | EventKind::TooFast
             | EventKind::AtGoal
             | EventKind::Gripped

@@ -196,7 +196,8 @@ fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option
                 residual[lane] = distance[lane] - shift_r - shift_x * ux[lane] - shift_y * uy[lane];
                 let off = residual[lane] / focus;
                 let within = (1.0 - off * off).max(0.0);
-                weight[lane] = slope[lane].min(30.0) * within;
+                let slope = slope[lane].min(30.0);
+                weight[lane] = slope * slope * within;
                 count[lane] += f32::from(u8::from(weight[lane] > 0.0));
             }
             moments.add(ux, uy, &residual, &weight);

@@ -171,7 +171,7 @@ impl Outline {
                 let off = distance - ring.r;
                 if off.abs() <= reach && distance > 0.5 {
                     (ux[index], uy[index]) = (dx[index] / distance, dy[index] / distance);
-                    (residual[index], weight[index]) = (off, 1.0);
+                    (residual[index], weight[index]) = (off, level.strength_at(pixel));
                     break;
                 }
             }

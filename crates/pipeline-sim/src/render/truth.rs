@@ -8,7 +8,8 @@ use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
 use crate::render::shadow::lamps;
 use crate::render::view::View;
-use crate::render::{Item, Renderer};
+use crate::render::Renderer;
+use crate::render::picture::Item;
 use crate::{Cell, Ellipse, Scene, Shape};
 
 /// What a round outline belongs to.
