@@ -1,5 +1,6 @@
 //! The detector whose score can be trusted.
 
+mod budget;
 mod candidate;
 mod config;
 mod directions;
@@ -13,14 +14,13 @@ mod prover;
 mod search;
 mod track;
 
-use std::time::{Duration, Instant};
-
 use image::GrayImage;
 
 pub use config::TrustedConfig;
 
 use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
+use budget::{Budget, MEASURING, Stage};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
@@ -28,7 +28,7 @@ use measure::Measured;
 use polar::{Grey, Polar, Ring};
 use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
-use search::{Budget, Outline, Search};
+use search::{Outline, Search};
 
 /// Finds an unknown number of circles, and says of each how sure it is and how exact.
 ///
@@ -168,12 +168,7 @@ impl Trusted {
         if frame.width() < LEAST_SIDE || frame.height() < LEAST_SIDE {
             return;
         }
-        let megapixels = frame.len() as f64 * 1e-6;
-        self.budget.most_draws = (f64::from(self.config.draws_per_megapixel) * megapixels).ceil() as u64;
-        self.budget.deadline = self
-            .config
-            .milliseconds_per_megapixel
-            .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3));
+        self.budget = Budget::new(&self.config, frame.len());
         let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
         self.shrink(frame, radii.1);
         self.prove(frame, radii, noise);
@@ -256,17 +251,13 @@ impl Trusted {
                 budget: &mut self.budget,
             });
         }
-        for candidate in self
-            .collected
-            .candidates
-            .iter()
-            .filter(|candidate| !candidate.tried)
-        {
-            if self.budget.is_late() {
+        let candidates = &mut self.collected.candidates;
+        candidates.sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight));
+        for candidate in candidates.iter().filter(|candidate| !candidate.tried) {
+            if self.budget.is_late() || self.budget.is_over(Stage::Proofs) {
                 break;
             }
-            self.budget.looks += search::PROOF;
-            prover.prove(candidate);
+            prover.prove(candidate, &mut self.budget.looks);
         }
     }
 
@@ -291,7 +282,10 @@ impl Trusted {
             {
                 continue;
             }
-            self.budget.looks += 4 * search::PROOF;
+            if self.budget.is_over(Stage::Measurements) {
+                break;
+            }
+            self.budget.looks += MEASURING;
             let measured = widest(Measuring {
                 pyramid,
                 proof,

@@ -20,8 +20,9 @@ pub struct TrustedConfig {
     pub min_score: f64,
     /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower finds fainter circles and takes longer; noise raises it.
     pub contrast: f64,
-    /// How many pairs may be drawn, for each million pixels of the frame (default 200000; at least 1). Bounds the work; less leaves out circles amid
-    /// dense texture.
+    /// How many pairs may be drawn, for each million pixels of the frame (default 40000; at least 1), a frame below a quarter of a million counting as
+    /// one. Sixteen looks go with each draw and bound all of the work that depends on what the frame shows. Less leaves out circles amid dense texture, more
+    /// finds little.
     pub draws_per_megapixel: u32,
     /// How long the search may take, milliseconds for each million pixels (default None: no clock is looked at; above 0). With a clock what is found
     /// depends on the machine too.
@@ -40,7 +41,7 @@ impl Default for TrustedConfig {
             max_circles: 32,
             min_score: 0.5,
             contrast: 8.0,
-            draws_per_megapixel: 200_000,
+            draws_per_megapixel: 40_000,
             milliseconds_per_megapixel: None,
             region: None,
             seed: 1,

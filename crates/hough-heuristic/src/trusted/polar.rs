@@ -121,8 +121,12 @@ impl Polar {
         for step in 0..self.steps {
             let (near, far) = self.grey[step * stride..][..2 * stride].split_at(stride);
             let out = &mut self.outward[step * count..][..count];
-            out.fill(0.0);
-            for shift in MARGIN - half..=MARGIN + half {
+            let first = MARGIN - half;
+            let (near_by, far_by) = (&near[first..][..count], &far[first..][..count]);
+            for index in 0..count {
+                out[index] = (far_by[index] - near_by[index]) * share;
+            }
+            for shift in first + 1..=MARGIN + half {
                 let (near, far) = (&near[shift..][..count], &far[shift..][..count]);
                 for index in 0..count {
                     out[index] += (far[index] - near[index]) * share;
