@@ -1,6 +1,6 @@
 //! Keeps what happens in the runs: a row an event, a picture a frame.
 
-use grasp_agent::{Event, EventKind, Outcome};
+use grasp_agent::{Event, EventKind, EventLog, Outcome};
 use hough_heuristic::Features;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
@@ -13,9 +13,13 @@ pub(crate) struct RunRecord {
     /// The ball's centre, millimetres in the arm's world frame.
     pub(crate) ball_mm: [f64; 3],
     pub(crate) rows: Vec<Row>,
+    /// The same, complete: it can be replayed.
+    pub(crate) log: EventLog,
     /// Frames looked at.
     frames: usize,
     pub(crate) outcome: Option<Outcome>,
+    /// Why the run was broken off, if it was.
+    pub(crate) fault: Option<String>,
     pub(crate) grasped: bool,
     /// From the gripper to the ball's centre when the jaws closed, millimetres.
     pub(crate) miss_mm: Option<f64>,
@@ -46,8 +50,10 @@ impl RunRecord {
         Self {
             ball_mm,
             rows: Vec::new(),
+            log: EventLog::default(),
             frames: 0,
             outcome: None,
+            fault: None,
             grasped: false,
             miss_mm: None,
         }
@@ -55,6 +61,7 @@ impl RunRecord {
 
     /// Takes down an event; returns the picture of its frame, if it has one.
     pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
+        self.log.note(event);
         let (features, action) = match event.kind {
             EventKind::Seen(sighting) => (Some(sighting.features), None),
             EventKind::Moved(delta) => (None, Some(delta)),
