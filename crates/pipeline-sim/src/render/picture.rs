@@ -72,7 +72,10 @@ impl Renderer {
         let (near, far, half) = TABLE;
         let corners = [(near, -half), (far, -half), (far, half), (near, half)];
         let mut polygon = Vec::with_capacity(8);
-        view.polygon(&corners.map(|(x, y)| Point3::new(x, y, studio.table)), &mut polygon);
+        view.polygon(
+            &corners.map(|(x, y)| Point3::new(x, y, studio.table)),
+            &mut polygon,
+        );
         let strength = self.scene.table.texture as f32;
         canvas.fill(&polygon, |y, x0, row| {
             plane_row(&plane, &self.wood, strength, (y, x0), row, |x| {
