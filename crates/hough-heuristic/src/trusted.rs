@@ -159,7 +159,7 @@ impl Trusted {
         }
     }
 
-    /// Finds the circles of a frame with radii in this range into `measurements`.
+    /// Finds the circles of a frame with radii in this range, or about the one radius, into `measurements`.
     fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
         self.proofs.clear();
         self.measurements.clear();
@@ -169,6 +169,12 @@ impl Trusted {
             return;
         }
         self.budget = Budget::new(&self.config, frame.len());
+        let radii = if radii.0 < radii.1 {
+            radii
+        } else {
+            let slack = 1.0 + 0.05 * radii.0;
+            (radii.0 - slack, radii.1 + slack)
+        };
         let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
         self.shrink(frame, radii.1);
         self.prove(frame, radii, noise);
@@ -295,8 +301,11 @@ impl Trusted {
             });
             let scale = (1 << proof.depth) as f32;
             let measured = measured.unwrap_or_else(|| Measured::roughly(proof.in_frame(), scale));
-            let circle = circle_of(&measured.ring);
+            let mut circle = circle_of(&measured.ring);
             let fits = (radii.0..=radii.1).contains(&circle.radius);
+            if self.config.min_radius >= self.config.max_radius {
+                circle.radius = self.config.max_radius;
+            }
             let placed = self
                 .config
                 .region

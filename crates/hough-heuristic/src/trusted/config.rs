@@ -8,11 +8,13 @@ use crate::{ConfigError, Region};
 /// The defaults are meant for every frame: there is no threshold to tune to a scene.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct TrustedConfig {
     /// The smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is searched too, which takes several times as
     /// long.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 280; min_radius..=100000).
+    /// The largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius` the radius is known: circles that measure within a
+    /// pixel and 5 % of it are reported, with that radius.
     pub max_radius: f64,
     /// The most circles reported (default 32; at least 1): the best.
     pub max_circles: usize,
