@@ -120,6 +120,37 @@ fn frames_of_any_size_pass() {
     }
 }
 
+#[cfg(feature = "parallel")]
+#[test]
+fn any_number_of_threads_finds_the_same() {
+    let pool = |threads| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap()
+    };
+    for (width, height, noise) in [(1500, 1101, 2.0), (1101, 1500, 20.0)] {
+        let scene = Scene {
+            width,
+            height,
+            noise,
+            balls: 6,
+            radius: (20.0, 120.0),
+            ..SCENE
+        };
+        let (frame, balls) = scene.render();
+        let mut one = plain();
+        pool(1).install(|| one.detect(&frame));
+        assert!(2 * one.measurements().len() > balls.len());
+        for threads in [2, 3, 8] {
+            let mut several = plain();
+            pool(threads).install(|| several.detect(&frame));
+            assert_eq!(several.measurements(), one.measurements());
+            assert_eq!(several.effort(), one.effort());
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
