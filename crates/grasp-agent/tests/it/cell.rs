@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::nalgebra::Point3;
 use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
@@ -16,6 +17,8 @@ pub(crate) enum Fault {
     None,
     NoFrame(usize),
     FrozenFrame(usize),
+    /// Frames, and after so many looks always the same one, with what was in it.
+    FrozenPicture(usize),
     Garbage,
     /// Every seventh look finds a circle that is not the ball.
     FalseCircle,
@@ -23,6 +26,10 @@ pub(crate) enum Fault {
     Phantoms,
     ArmStuck(usize),
     LineDead(usize),
+    /// After so many orders to the gripper.
+    GripperDead(usize),
+    /// After so many moves.
+    SensorDead(usize),
     Near(usize),
 }
 
@@ -33,9 +40,20 @@ pub(crate) struct Cell {
     pub(crate) joints: Joints,
     pub(crate) closed: bool,
     pub(crate) stops: usize,
-    looks: usize,
+    pub(crate) looks: usize,
     moves: usize,
+    grips: usize,
     old: Option<Features>,
+}
+
+impl Cell {
+    fn dead_line(&self, doing: &str) -> ArmError {
+        ArmError::Line {
+            port: "ttyUSB0".into(),
+            doing: doing.into(),
+            source: std::io::Error::from(std::io::ErrorKind::BrokenPipe),
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -52,6 +70,7 @@ impl Shared {
             stops: 0,
             looks: 0,
             moves: 0,
+            grips: 0,
             old: None,
         })))
     }
@@ -115,7 +134,19 @@ impl Eye for Shared {
             }
             _ => seen,
         };
-        cell.old = seen.or(cell.old);
+        let (seen, frame) = match cell.fault {
+            Fault::FrozenPicture(after) => {
+                let number = cell.looks.min(after);
+                let seen = if cell.looks > after { cell.old } else { seen };
+                cell.old = seen;
+                let pixel = |x, y| Luma([(number * 7 + (x * y) as usize) as u8]);
+                (seen, Some(GrayImage::from_fn(16, 12, pixel)))
+            }
+            _ => {
+                cell.old = seen.or(cell.old);
+                (seen, None)
+            }
+        };
         let ball = seen.map(|features| Sighting {
             features,
             detection: Detection {
@@ -123,7 +154,7 @@ impl Eye for Shared {
                 score: 1.0,
             },
         });
-        Ok(Look { frame: None, ball })
+        Ok(Look { frame, ball })
     }
 }
 
@@ -142,21 +173,19 @@ impl Manipulator for Shared {
         cell.moves += 1;
         match cell.fault {
             Fault::ArmStuck(after) if cell.moves > after => {}
-            Fault::LineDead(after) if cell.moves > after => {
-                let source = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
-                return Err(ArmError::Line {
-                    port: "ttyUSB0".into(),
-                    doing: "DRIVE".into(),
-                    source,
-                });
-            }
+            Fault::LineDead(after) if cell.moves > after => return Err(cell.dead_line("DRIVE")),
             _ => cell.joints = target,
         }
         Ok(cell.joints)
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        self.0.borrow_mut().closed = gripper == Gripper::Closed;
+        let mut cell = self.0.borrow_mut();
+        cell.grips += 1;
+        match cell.fault {
+            Fault::GripperDead(after) if cell.grips > after => return Err(cell.dead_line("CLOSEI")),
+            _ => cell.closed = gripper == Gripper::Closed,
+        }
         Ok(())
     }
 
@@ -169,6 +198,10 @@ impl Manipulator for Shared {
 impl ProximitySensor for Shared {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let cell = self.0.borrow();
-        Ok(matches!(cell.fault, Fault::Near(at) if cell.moves == at))
+        match cell.fault {
+            Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
+            Fault::Near(at) => Ok(cell.moves == at),
+            _ => Ok(false),
+        }
     }
 }
