@@ -16,8 +16,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
-    JacobianAt, Learned, LookAhead, Percept, PositionBased, ServoSettings,
+    Agent, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased, JacobianAt,
+    Learned, LookAhead, Percept, PositionBased, ServoSettings,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
@@ -140,7 +140,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     }
                 };
                 tally.begin_draw();
-                let mut agent = Agent::with_controller(AgentConfig::paper(world.search_poses()), made)?;
+                let mut agent = Agent::with_controller(world.agent_config(), made)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut log = EventLog::default();
@@ -317,7 +317,7 @@ fn taught_hybrid(
     seed: u64,
     moves: usize,
 ) -> Result<(Hybrid, Option<Fault>), Box<dyn Error>> {
-    let config = AgentConfig::paper(world.search_poses());
+    let config = world.agent_config();
     let longest = config.max_cycles;
     let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
     let (mut made, mut fault) = (0, None);

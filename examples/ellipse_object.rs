@@ -74,8 +74,6 @@ fn length(text: &str) -> Result<f64, String> {
     }
 }
 
-/// From the gripper to the egg's centre: the jaws close on it up to this far, metres.
-const GRASP_TOLERANCE: f64 = 0.010;
 /// How far the jaws may be from closing straight across the egg, degrees.
 const ACROSS_TOLERANCE: f64 = 20.0;
 
@@ -138,7 +136,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         drop(camera);
         let (miss, off) = (rig.grip_miss(), off_across(&rig, &egg));
         let round = options.length < 44.0;
-        let held = outcome.gave_up.is_none() && miss <= GRASP_TOLERANCE && (round || off <= ACROSS_TOLERANCE);
+        let held = outcome.gave_up.is_none() && rig.holds_ball() && (round || off <= ACROSS_TOLERANCE);
         gripped += usize::from(held);
         moves += if held { outcome.cycles } else { 0 };
         let seen = outcome.last_seen.map_or("-".into(), |sighting| {

@@ -19,8 +19,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, JointLimits, Learned,
-    OnlineLearning, Outcome, Percept,
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind, JointLimits,
+    Learned, OnlineLearning, Outcome, Percept,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -61,8 +61,6 @@ const ACTIONS: (u64, u64) = (60_000, 500_000);
 const ACTIONS_FINE: u64 = 4_000_000;
 /// Trials in simulation by which the best table is chosen.
 const TRIALS: usize = 500;
-/// From the gripper to the ball's centre: the jaws close on the ball up to this far, metres.
-const GRASP_TOLERANCE: f64 = 0.010;
 
 fn main() -> ExitCode {
     match run(&Options::parse()) {
@@ -146,25 +144,22 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             .sample_seen_ball(&rig.cell().get(), &mut rng)
             .ok_or("no place of the workspace is in view from a search pose")?;
         let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
-        let done = reach_for(
-            &mut agent,
-            &mut rig,
-            &mut *detector,
-            &ball,
-            &mut |event| match record.note(run, event) {
+        let cell = rig.cell().clone();
+        let done = reach_for(&mut agent, &mut rig, &mut *detector, &ball, &mut |event| {
+            if let EventKind::Gripping(_) = event.kind {
+                record.gripped_at(cell.with(|cell| cell.grip_miss(&event.joints)));
+            }
+            match record.note(run, event) {
                 Some(picture) => {
                     sheet.add(&picture);
                     frames.write(&picture)
                 }
                 None => Ok(()),
-            },
-        );
+            }
+        });
         match done {
             Ok(outcome) => {
-                if outcome.gave_up.is_none() {
-                    record.gripped_at(rig.grip_miss(), GRASP_TOLERANCE);
-                }
-                record.outcome = Some(outcome);
+                record.ended(outcome, rig.holds_ball(), rig.contacts().collisions);
                 bar.suspend(|| say(options, &one_line(run, &record)));
                 bar.inc(1);
             }

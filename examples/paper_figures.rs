@@ -208,7 +208,7 @@ fn scored(lesson: &Result<Lesson, LearnError>, starts: &[puma_grasp::PlaneStart]
 /// Features per step while reaching, by distance and elbow, and while the ball is pushed away again and again.
 fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Error>> {
     let cell = TrialCell::draw(ErrorLevel::None, 0)?;
-    let mut config = AgentConfig::paper(cell.search_poses());
+    let mut config = cell.agent_config();
     config.max_cycles = 120;
     let mut csv = String::from("figure,run,step,x,y,r,theta3\n");
     let (mut reach, mut track) = (Vec::new(), Vec::new());

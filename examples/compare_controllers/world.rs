@@ -2,16 +2,12 @@
 
 use std::error::Error;
 
-use grasp_agent::{Agent, Controller, Event, EventKind, Outcome};
+use grasp_agent::{Agent, AgentConfig, Controller, Event, EventKind, Outcome};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Workspace};
 use puma_grasp::{BallDetector, Rig, RigParts, TrialCell, bright_ball_scene};
-use puma_val2::Joints;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
-
-/// From the gripper to the ball's centre: the jaws close on the ball up to this far, metres.
-const GRASP_TOLERANCE: f64 = 0.010;
 
 /// A cell with drawn errors.
 pub(crate) enum World {
@@ -32,6 +28,8 @@ pub(crate) struct Trial {
     pub(crate) outcome: Outcome,
     pub(crate) reached: bool,
     pub(crate) held: bool,
+    /// Counted through the full chain only.
+    pub(crate) collisions: usize,
 }
 
 impl World {
@@ -61,10 +59,10 @@ impl World {
         })))
     }
 
-    pub(crate) fn search_poses(&self) -> [Joints; 6] {
+    pub(crate) fn agent_config(&self) -> AgentConfig {
         match self {
-            Self::Shortcut(cell) => cell.search_poses(),
-            Self::Chain(chain) => chain.workspace.search_poses(),
+            Self::Shortcut(cell) => cell.agent_config(),
+            Self::Chain(chain) => AgentConfig::paper(chain.workspace.search_poses()),
         }
     }
 
@@ -82,6 +80,7 @@ impl World {
                     outcome: result.outcome,
                     reached: result.reached,
                     held: result.held,
+                    collisions: 0,
                 }))
             }
             Self::Chain(chain) => chain.run(agent, seed, observe),
@@ -109,11 +108,11 @@ impl Chain {
             reached |= event.kind == EventKind::AtGoal;
             observe(event);
         })?;
-        let held = outcome.gave_up.is_none() && self.rig.grip_miss() <= GRASP_TOLERANCE;
         Ok(Some(Trial {
             outcome,
             reached,
-            held,
+            held: self.rig.holds_ball(),
+            collisions: self.rig.contacts().collisions,
         }))
     }
 }

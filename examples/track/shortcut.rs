@@ -17,7 +17,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     for number in 0..CELLS {
         let seed = options.seed.wrapping_add(number as u64);
         let cell = TrialCell::draw(options.level, seed)?;
-        let mut config = AgentConfig::paper(cell.search_poses());
+        let mut config = cell.agent_config();
         config.max_cycles = 120;
         let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
         let balls = (options.runs + CELLS - 1 - number) / CELLS;

@@ -19,7 +19,8 @@ pub struct Agent<C = Learned> {
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
-    /// `None` when the gripper has closed at the goal; otherwise why it has not.
+    /// `None` when the gripper has closed at the goal and, unless [`AgentConfig::lift`] is `None`, what was seen there has been lifted;
+    /// otherwise why not.
     pub gave_up: Option<GaveUp>,
     /// Moves after the first sighting, recovery moves included, the grip not.
     pub cycles: usize,

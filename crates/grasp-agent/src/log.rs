@@ -189,7 +189,8 @@ impl Tape<'_> {
 fn is_answer(kind: &EventKind) -> bool {
     !matches!(
         kind,
-        EventKind::SameFrame
+        EventKind::Searching
+            | EventKind::SameFrame
             | EventKind::Lost
             | EventKind::TooFast
             | EventKind::AtGoal

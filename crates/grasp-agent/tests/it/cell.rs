@@ -31,6 +31,24 @@ pub(crate) enum Fault {
     /// After so many moves.
     SensorDead(usize),
     Near(usize),
+    /// The arm's own guard halts it halfway in this move.
+    Halted(usize),
+    /// As before, and on the way back.
+    HaltedTwice(usize),
+    /// It halts every move of the open hand, but of JT5, that shows the ball with a radius above this.
+    HaltedNear(f64),
+    /// It halts so many ways of the gripper to the ball.
+    HaltedGrips(usize),
+    /// It halts every way of the closed hand.
+    HaltedClosed,
+    /// The jaws hold nothing.
+    Slippery,
+    /// The only circle ever seen is one in the middle of the goal: in the first look.
+    PhantomOnce,
+    /// From the pose of the first look.
+    PhantomFromThere,
+    /// From everywhere.
+    PhantomEverywhere,
 }
 
 pub(crate) struct Cell {
@@ -39,10 +57,13 @@ pub(crate) struct Cell {
     pub(crate) fault: Fault,
     pub(crate) joints: Joints,
     pub(crate) closed: bool,
+    pub(crate) held: bool,
     pub(crate) stops: usize,
     pub(crate) looks: usize,
+    looked_first: Option<Joints>,
     moves: usize,
     grips: usize,
+    halts: usize,
     old: Option<Features>,
 }
 
@@ -67,10 +88,13 @@ impl Shared {
             fault,
             joints: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
             closed: false,
+            held: false,
             stops: 0,
             looks: 0,
+            looked_first: None,
             moves: 0,
             grips: 0,
+            halts: 0,
             old: None,
         })))
     }
@@ -119,6 +143,21 @@ impl Eye for Shared {
                 y: 1e300,
                 r: -3.0,
             }),
+            Fault::PhantomOnce | Fault::PhantomFromThere | Fault::PhantomEverywhere => {
+                let here = cell.joints;
+                let first = *cell.looked_first.get_or_insert(here);
+                let shows = match cell.fault {
+                    Fault::PhantomOnce => cell.looks == 1,
+                    Fault::PhantomFromThere => here == first,
+                    _ => true,
+                };
+                // Not the same to the last digit: the camera is not frozen.
+                shows.then(|| Features {
+                    x: 103.5,
+                    y: 78.0 + 0.01 * cell.looks as f64,
+                    r: 33.0,
+                })
+            }
             Fault::FalseCircle if cell.looks.is_multiple_of(7) => Some(Features {
                 x: 20.0,
                 y: 30.0,
@@ -171,10 +210,37 @@ impl Manipulator for Shared {
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
         let mut cell = self.0.borrow_mut();
         cell.moves += 1;
-        match cell.fault {
-            Fault::ArmStuck(after) if cell.moves > after => {}
-            Fault::LineDead(after) if cell.moves > after => return Err(cell.dead_line("DRIVE")),
-            _ => cell.joints = target,
+        let (moves, from) = (cell.moves, cell.joints);
+        let gripping = !cell.closed && (target.0[4] - from.0[4]).to_degrees() < -10.0 && from.0[4] > 0.7;
+        let halted = match cell.fault {
+            Fault::ArmStuck(after) if moves > after => return Ok(from),
+            Fault::LineDead(after) if moves > after => {
+                return Err(cell.dead_line("DRIVE"));
+            }
+            Fault::Halted(at) => moves == at,
+            Fault::HaltedTwice(at) => moves == at || moves == at + 1,
+            Fault::HaltedNear(r) => {
+                !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
+            }
+            Fault::HaltedGrips(times) => gripping && cell.halts < times,
+            Fault::HaltedClosed => cell.closed && cell.halts == 0,
+            _ => false,
+        };
+        cell.joints = if halted {
+            from + JointDelta(std::array::from_fn(|i| 0.5 * (target.0[i] - from.0[i])))
+        } else {
+            target
+        };
+        if cell.held {
+            cell.ball = cell.truth.tool_point(&cell.joints);
+        }
+        if halted {
+            cell.halts += 1;
+            return Err(ArmError::ProximityStop {
+                port: "ttyUSB0".into(),
+                signal: 1001,
+                joints: cell.joints,
+            });
         }
         Ok(cell.joints)
     }
@@ -182,10 +248,12 @@ impl Manipulator for Shared {
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         let mut cell = self.0.borrow_mut();
         cell.grips += 1;
-        match cell.fault {
-            Fault::GripperDead(after) if cell.grips > after => return Err(cell.dead_line("CLOSEI")),
-            _ => cell.closed = gripper == Gripper::Closed,
+        if matches!(cell.fault, Fault::GripperDead(after) if cell.grips > after) {
+            return Err(cell.dead_line("CLOSEI"));
         }
+        cell.closed = gripper == Gripper::Closed;
+        let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
+        cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
         Ok(())
     }
 

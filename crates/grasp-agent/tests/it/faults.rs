@@ -19,8 +19,26 @@ fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, 
 fn without_a_fault_the_ball_is_gripped() {
     let (end, log, cell) = end_of(Fault::None);
     assert_eq!(end.unwrap().gave_up, None);
-    assert_eq!(log.events.last().unwrap().kind, EventKind::Gripped);
-    assert!(cell.0.borrow().closed && cell.miss() < 0.003, "{}", cell.miss());
+    let words: Vec<&str> = log.events.iter().map(|event| event.kind.word()).collect();
+    // What was seen at the goal is seen again, gripped, and seen no more.
+    let end = [
+        "at-goal",
+        "seen",
+        "gripping",
+        "gripped",
+        "withdrawn",
+        "not-seen",
+        "not-seen",
+        "lifted",
+        "not-seen",
+        "not-seen",
+    ];
+    assert!(words.ends_with(&end), "{words:?}");
+    assert!(
+        cell.0.borrow().closed && cell.0.borrow().held && cell.miss() < 0.003,
+        "{}",
+        cell.miss()
+    );
 }
 
 #[test]
@@ -69,7 +87,9 @@ fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
 
 #[test]
 fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
-    let mut agent = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut without_lift = config();
+    without_lift.lift = None;
+    let mut agent = Agent::with_controller(without_lift, PositionBased::new(ServoSettings::paper())).unwrap();
     let cell = Shared::new(
         CameraModel::paper(),
         [0.6, 0.1, -0.1],
@@ -174,18 +194,109 @@ fn something_near_stops_the_arm_and_takes_it_back() {
     assert!(cell.0.borrow().stops > 0);
 }
 
+/// The words of the events from the first of this kind on.
+fn words_from(log: &EventLog, first: &str) -> Vec<&'static str> {
+    let words = log.events.iter().map(|event| event.kind.word());
+    words.skip_while(|word| *word != first).collect()
+}
+
 #[test]
-fn a_ball_that_is_not_gripped_is_reached_for_again() {
-    let mut with_lift = config();
-    with_lift.lift = Some(puma_val2::JointDelta::from_degrees([
-        0.0, -15.0, 0.0, 0.0, 18.01, 0.0,
-    ]));
-    with_lift.max_cycles = 12;
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
-    let mut agent = Agent::with_controller(with_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+fn an_arm_that_its_own_guard_halts_is_taken_back_and_goes_on() {
+    for fault in [Fault::Halted(3), Fault::HaltedTwice(3)] {
+        let (end, log, cell) = end_of(fault);
+        assert_eq!(end.unwrap().gave_up, None, "{fault:?}");
+        assert!(cell.0.borrow().held, "{fault:?}");
+        let near = words_from(&log, "too-near");
+        let twice = fault != Fault::Halted(3);
+        assert_eq!(near[1], "taken-back", "{fault:?}");
+        assert_eq!(near[2] == "too-near", twice, "{fault:?}: {near:?}");
+        // The arm has stopped by itself; it need not be told.
+        assert_eq!(cell.0.borrow().stops, 0, "{fault:?}");
+        let at = log
+            .events
+            .iter()
+            .position(|e| e.kind == EventKind::TooNear)
+            .unwrap();
+        let (before, halted, back) = (&log.events[at - 2], &log.events[at], &log.events[at + 1]);
+        assert_ne!(halted.joints, before.joints, "{fault:?}");
+        assert_eq!(back.joints == before.joints, !twice, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
+    let (end, log, cell) = end_of(Fault::HaltedGrips(1));
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let expected = [
+        "gripping",
+        "too-near",
+        "taken-back",
+        "seen",
+        "at-goal",
+        "seen",
+        "gripping",
+        "gripped",
+    ];
+    assert!(words_from(&log, "gripping").starts_with(&expected));
+    let (end, _, cell) = end_of(Fault::HaltedGrips(100));
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
+    assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn a_hand_that_is_halted_before_it_has_lifted_has_not_succeeded() {
+    let (end, log, _) = end_of(Fault::HaltedClosed);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
+    let expected = ["gripped", "withdrawn", "too-near", "taken-back", "gave-up"];
+    assert_eq!(words_from(&log, "gripped"), expected);
+}
+
+#[test]
+fn where_every_move_is_halted_a_controller_that_can_aim_from_there_grips() {
+    // The hybrid is halted again and again on its way, and knows by then where the ball is.
+    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    for run in 0..10 {
+        let y = 0.05 * f64::from(run) - 0.25;
+        let cell = Shared::new(CameraModel::paper(), [0.6, y, -0.1], Fault::None);
+        assert_eq!(
+            cell.run(&mut agent, &mut EventLog::default()).unwrap().gave_up,
+            None
+        );
+    }
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.0, -0.1], Fault::HaltedNear(30.0));
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
-    // In this cell nothing ever holds the ball, so every grip is a miss.
+    assert_eq!(outcome.gave_up, None);
+    assert!(cell.0.borrow().held);
+    assert!(words_from(&log, "at-goal").is_empty());
+    let halts = log.events.iter().filter(|event| event.kind == EventKind::TooNear);
+    assert!(halts.count() >= 3);
+}
+
+#[test]
+fn a_circle_in_the_goal_that_is_no_ball_is_not_taken_for_a_success() {
+    for (fault, gripped) in [
+        (Fault::PhantomOnce, false),
+        (Fault::PhantomFromThere, true),
+        (Fault::PhantomEverywhere, true),
+    ] {
+        let (end, log, cell) = end_of(fault);
+        assert!(end.unwrap().gave_up.is_some(), "{fault:?}");
+        assert_eq!(!words_from(&log, "gripped").is_empty(), gripped, "{fault:?}");
+        assert_eq!(!words_from(&log, "missed").is_empty(), gripped, "{fault:?}");
+        assert!(!cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_ball_that_is_not_gripped_is_reached_for_again() {
+    let mut short = config();
+    short.max_cycles = 12;
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
+    let mut agent = Agent::with_controller(short, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut log = EventLog::default();
+    let outcome = cell.run(&mut agent, &mut log).unwrap();
     let missed = log
         .events
         .iter()
@@ -196,6 +307,17 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
         "{missed} {outcome:?}"
     );
     assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn every_search_begins_with_an_event() {
+    let (_, log, _) = end_of(Fault::None);
+    assert_eq!(log.events[1].kind, EventKind::Searching);
+    // A ball that is lost for good is recovered nowhere and searched anew.
+    let (end, log, _) = end_of(Fault::PhantomOnce);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
+    let last = words_from(&log, "recover");
+    assert!(last.contains(&"searching"), "{last:?}");
 }
 
 #[test]
@@ -230,10 +352,7 @@ fn what_was_learned_before_the_line_died_is_kept() {
 
 #[test]
 fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a_pose_out_of_limits() {
-    let mut checked = config();
-    checked.lift = Some(puma_val2::JointDelta::from_degrees([
-        0.0, -15.0, 0.0, 0.0, 18.01, 0.0,
-    ]));
+    let checked = config();
     for gain in [1.0, 0.5] {
         let servo = ServoSettings::paper().with_gain(gain);
         let mut agent = Agent::with_controller(checked.clone(), PositionBased::new(servo)).unwrap();

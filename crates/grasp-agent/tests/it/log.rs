@@ -8,6 +8,18 @@ use grasp_agent::{
 
 use crate::cell::{Fault, Shared, config};
 
+const FAULTS: [Fault; 9] = [
+    Fault::None,
+    Fault::Near(4),
+    Fault::FalseCircle,
+    Fault::Halted(3),
+    Fault::HaltedTwice(3),
+    Fault::HaltedNear(20.0),
+    Fault::HaltedGrips(1),
+    Fault::HaltedClosed,
+    Fault::PhantomFromThere,
+];
+
 fn replays<C: Controller + Clone>(controller: C, fault: Fault) {
     let agent = Agent::with_controller(config(), controller).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
@@ -36,7 +48,7 @@ fn replays<C: Controller + Clone>(controller: C, fault: Fault) {
 #[test]
 fn logs_replay_to_the_same_run() {
     let servo = ServoSettings::paper();
-    for fault in [Fault::None, Fault::Near(4), Fault::FalseCircle] {
+    for fault in FAULTS {
         replays(PositionBased::new(servo), fault);
         replays(ImageBased::new(servo, JacobianAt::Goal), fault);
         replays(Hybrid::new(HybridSettings::paper()), fault);
@@ -51,7 +63,7 @@ fn logs_of_learned_behaviours_replay_frozen_and_learning() {
     };
     let pair = BehaviourPair::paper_mended();
     let learned = Learned::new(blank(pair.centering), blank(pair.approaching));
-    for fault in [Fault::None, Fault::Near(4), Fault::FalseCircle] {
+    for fault in FAULTS {
         replays(learned.clone(), fault);
         replays(learned.clone().learning(OnlineLearning::careful(7)), fault);
     }
