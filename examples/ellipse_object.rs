@@ -36,6 +36,7 @@ use rand::{RngExt, SeedableRng};
 use egg::{Egg, EggCamera};
 use files::{writable_folder, write_png};
 use overlay::Overlay;
+use program::ended;
 
 #[path = "ellipse_object/egg.rs"]
 mod egg;
@@ -43,6 +44,7 @@ mod egg;
 mod files;
 #[allow(dead_code, reason = "shared with the examples that draw circles")]
 mod overlay;
+mod program;
 
 /// Find, reach and grip eggs through rendered frames, ellipse detection and VAL II.
 ///
@@ -78,13 +80,7 @@ fn length(text: &str) -> Result<f64, String> {
 const ACROSS_TOLERANCE: f64 = 20.0;
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {

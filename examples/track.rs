@@ -29,11 +29,13 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use files::{writable_folder, write_whole};
+use program::ended;
 use stages::{Stages, Timed};
 
 mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
+mod program;
 #[path = "track/shortcut.rs"]
 mod shortcut;
 mod stages;
@@ -107,13 +109,7 @@ fn main() -> ExitCode {
     } else {
         run(&options)
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(done)
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
