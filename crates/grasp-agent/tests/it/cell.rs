@@ -36,6 +36,8 @@ pub(crate) enum Fault {
     HaltedClosed,
     /// The jaws hold nothing.
     Slippery,
+    /// The ball, once it is in the jaws, shows at the border of the image.
+    ShowsInTheJaws,
     /// The only circle ever seen is one in the middle of the goal: in the first look.
     PhantomOnce,
     /// From the pose of the first look.
@@ -112,6 +114,11 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
+            Fault::ShowsInTheJaws if cell.held => Some(Features {
+                x: 87.0 + 0.01 * cell.looks as f64,
+                y: 141.0,
+                r: 27.0,
+            }),
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
                     origin: "camera".into(),

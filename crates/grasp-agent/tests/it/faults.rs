@@ -209,6 +209,15 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
 }
 
 #[test]
+fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
+    let (end, log, cell) = end_of(Fault::ShowsInTheJaws);
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let expected = ["lifted", "seen", "seen", "lifted", "seen"];
+    assert_eq!(words_from(&log, "lifted"), expected);
+}
+
+#[test]
 fn every_search_begins_with_an_event() {
     let (_, log, _) = end_of(Fault::None);
     assert_eq!(log.events[1].kind, EventKind::Searching);
