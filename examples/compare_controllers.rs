@@ -111,7 +111,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         for draw in 0..options.draws {
             let errors = seed_of(options.seed, &[1, draw]);
             let mut world = if options.full_chain {
-                World::chain(*level, errors, options.detector)?
+                World::chain(*level, errors, options.detector, options.grip)?
             } else {
                 World::shortcut(*level, errors, options.grip)?
             };
@@ -134,6 +134,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     };
                     let success = if options.grip { trial.held } else { trial.reached };
                     tally.add(success, &trial.outcome);
+                    tally.collisions += trial.collisions;
                     if options.logs && !success {
                         let folder = options.out.join("failures");
                         writable_folder(&folder)?;

@@ -296,9 +296,9 @@ impl<'a> Run<'a> {
         from: Joints,
         lift: JointDelta,
     ) -> Result<Option<bool>, AgentError> {
-        // Back to where it was seen from: it must not be there any more.
+        // Back to where it was seen from: it must not be there any more, nor in the way, which was free before.
         if self.go_to(from, EventKind::Withdrawn)? == Went::Back {
-            return Ok(None);
+            return Ok(Some(false));
         }
         let there = self.look_twice()?;
         if there.is_some_and(|now| is_same_place(seen, &now)) {

@@ -32,8 +32,8 @@ pub(crate) enum Fault {
     HaltedNear(f64),
     /// It halts so many ways of the gripper to the ball.
     HaltedGrips(usize),
-    /// It halts every way of the closed hand.
-    HaltedClosed,
+    /// It halts the closed hand in its first or second way.
+    HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
     /// The ball, once it is in the jaws, shows at the border of the image.
@@ -58,6 +58,7 @@ pub(crate) struct Cell {
     looked_first: Option<Joints>,
     moves: usize,
     halts: usize,
+    closed_moves: usize,
     old: Option<Features>,
 }
 
@@ -78,6 +79,7 @@ impl Shared {
             looked_first: None,
             moves: 0,
             halts: 0,
+            closed_moves: 0,
             old: None,
         })))
     }
@@ -204,7 +206,10 @@ impl Manipulator for Shared {
                 !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
-            Fault::HaltedClosed => cell.closed && cell.halts == 0,
+            Fault::HaltedClosed(way) => {
+                cell.closed_moves += usize::from(cell.closed);
+                cell.closed && cell.halts == 0 && cell.closed_moves == way
+            }
             _ => false,
         };
         cell.joints = if halted {
