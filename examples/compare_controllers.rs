@@ -114,7 +114,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             let errors = seed_of(options.seed, &[1, draw]);
             let new_world = || {
                 if options.full_chain {
-                    World::chain(*level, errors, options.detector)
+                    World::chain(*level, errors, options.detector, options.grip)
                 } else {
                     World::shortcut(*level, errors, options.grip)
                 }
@@ -153,6 +153,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     };
                     let success = if options.grip { trial.held } else { trial.reached };
                     tally.add(success, &trial.outcome);
+                    tally.collisions += trial.collisions;
                     if !success {
                         failures.keep(&run_of(format!("ball {start}")), &log)?;
                     }

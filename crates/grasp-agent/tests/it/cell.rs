@@ -39,10 +39,12 @@ pub(crate) enum Fault {
     HaltedNear(f64),
     /// It halts so many ways of the gripper to the ball.
     HaltedGrips(usize),
-    /// It halts every way of the closed hand.
-    HaltedClosed,
+    /// It halts the closed hand in its first or second way.
+    HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
+    /// The ball, once it is in the jaws, shows at the border of the image.
+    ShowsInTheJaws,
     /// The only circle ever seen is one in the middle of the goal: in the first look.
     PhantomOnce,
     /// From the pose of the first look.
@@ -64,6 +66,7 @@ pub(crate) struct Cell {
     moves: usize,
     grips: usize,
     halts: usize,
+    closed_moves: usize,
     old: Option<Features>,
 }
 
@@ -95,6 +98,7 @@ impl Shared {
             moves: 0,
             grips: 0,
             halts: 0,
+            closed_moves: 0,
             old: None,
         })))
     }
@@ -131,6 +135,11 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
+            Fault::ShowsInTheJaws if cell.held => Some(Features {
+                x: 87.0 + 0.01 * cell.looks as f64,
+                y: 141.0,
+                r: 27.0,
+            }),
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
                     origin: "camera".into(),
@@ -223,7 +232,10 @@ impl Manipulator for Shared {
                 !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
-            Fault::HaltedClosed => cell.closed && cell.halts == 0,
+            Fault::HaltedClosed(way) => {
+                cell.closed_moves += usize::from(cell.closed);
+                cell.closed && cell.halts == 0 && cell.closed_moves == way
+            }
             _ => false,
         };
         cell.joints = if halted {

@@ -245,11 +245,26 @@ fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
 }
 
 #[test]
-fn a_hand_that_is_halted_before_it_has_lifted_has_not_succeeded() {
-    let (end, log, _) = end_of(Fault::HaltedClosed);
+fn a_closed_hand_that_is_halted_has_not_succeeded() {
+    // On its way back, which was free: the ball is in that way and not in the jaws. It is gripped again.
+    let (end, log, cell) = end_of(Fault::HaltedClosed(1));
+    let expected = [
+        "gripped",
+        "withdrawn",
+        "too-near",
+        "taken-back",
+        "missed",
+        "recover",
+        "seen",
+    ];
+    assert!(words_from(&log, "gripped").starts_with(&expected), "{log:?}");
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    // As it lifts: what is in the jaws is not known.
+    let (end, log, _) = end_of(Fault::HaltedClosed(2));
+    let expected = ["lifted", "too-near", "taken-back", "gave-up"];
+    assert_eq!(words_from(&log, "lifted"), expected);
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
-    let expected = ["gripped", "withdrawn", "too-near", "taken-back", "gave-up"];
-    assert_eq!(words_from(&log, "gripped"), expected);
 }
 
 #[test]
@@ -307,6 +322,15 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
         "{missed} {outcome:?}"
     );
     assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
+    let (end, log, cell) = end_of(Fault::ShowsInTheJaws);
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let expected = ["lifted", "seen", "seen", "lifted", "seen"];
+    assert_eq!(words_from(&log, "lifted"), expected);
 }
 
 #[test]

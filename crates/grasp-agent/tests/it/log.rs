@@ -8,7 +8,7 @@ use grasp_agent::{
 
 use crate::cell::{Fault, Shared, config};
 
-const FAULTS: [Fault; 9] = [
+const FAULTS: [Fault; 10] = [
     Fault::None,
     Fault::Near(4),
     Fault::FalseCircle,
@@ -16,7 +16,8 @@ const FAULTS: [Fault; 9] = [
     Fault::HaltedTwice(3),
     Fault::HaltedNear(20.0),
     Fault::HaltedGrips(1),
-    Fault::HaltedClosed,
+    Fault::HaltedClosed(1),
+    Fault::HaltedClosed(2),
     Fault::PhantomFromThere,
 ];
 
