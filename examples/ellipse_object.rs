@@ -33,11 +33,14 @@ use puma_val2::{JointDelta, Joints};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
+use detour::Detour;
 use egg::{Egg, EggCamera};
 use files::{writable_folder, write_png};
 use overlay::Overlay;
 use program::ended;
 
+#[path = "ellipse_object/detour.rs"]
+mod detour;
 #[path = "ellipse_object/egg.rs"]
 mod egg;
 #[allow(dead_code, reason = "shared with the examples that write other files")]
@@ -121,21 +124,23 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let (mut last, mut closed) = (None, None);
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
-        let outcome = agent.run(&mut eye, arm, &mut *sensor, &mut |event| match (
-            &event.kind,
-            event.frame,
-            outline.get(),
-        ) {
-            (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
-                last = Some((frame.clone(), ellipse));
-            }
-            (EventKind::Gripping(_), ..) => {
-                let miss = cell.with(|cell| cell.grip_miss(&event.joints));
-                closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
-            }
-            (EventKind::Missed, ..) => closed = None,
-            _ => {}
-        })?;
+        let params = cell.get().params;
+        let outcome = agent.run(
+            &mut eye,
+            &mut Detour { arm, params },
+            &mut *sensor,
+            &mut |event| match (&event.kind, event.frame, outline.get()) {
+                (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
+                    last = Some((frame.clone(), ellipse));
+                }
+                (EventKind::Gripping(_), ..) => {
+                    let miss = cell.with(|cell| cell.grip_miss(&event.joints));
+                    closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
+                }
+                (EventKind::Missed, ..) => closed = None,
+                _ => {}
+            },
+        )?;
         // The camera holds the rig until here.
         drop(eye);
         drop(camera);
