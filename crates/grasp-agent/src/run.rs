@@ -275,41 +275,63 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Back to where the ball was seen from, where it must not be any more, and up, from where none must be seen that was left behind.
+    /// Looks whether the jaws hold what was seen, and opens them again if not.
     fn verify(&mut self, seen: &Sighting, from: Joints, lift: JointDelta) -> Result<Phase, AgentError> {
-        let (lifted, least) = (
-            self.config.limits.nearest(&(from + lift)),
-            self.config.left_behind,
-        );
-        let still_there: &dyn Fn(&Sighting) -> bool = &|now| is_same_place(seen, now);
-        let left_behind: &dyn Fn(&Sighting) -> bool = &|now| now.features.r >= least;
-        for (pose, done, is_ball) in [
-            (from, EventKind::Withdrawn, still_there),
-            (lifted, EventKind::Lifted, left_behind),
-        ] {
-            if self.go_to(pose, done)? == Went::Back {
-                // Whether the ball is in the jaws is not known.
-                return Ok(Phase::End(Some(GaveUp::Obstructed)));
-            }
-            if self.shows(is_ball)? {
+        let held = self.is_held(seen, from, lift)?;
+        // What was seen meanwhile was not the ball on its place.
+        self.last_seen = Some(*seen);
+        Ok(match held {
+            None => Phase::End(Some(GaveUp::Obstructed)),
+            Some(true) => Phase::End(None),
+            Some(false) => {
                 self.arm.set_gripper(Gripper::Open)?;
                 self.tell(EventKind::Missed, None);
                 self.cycles += 1;
-                return Ok(Phase::Recover(from));
+                Phase::Recover(from)
             }
-        }
-        // What was seen since was not the ball.
-        self.last_seen = Some(*seen);
-        Ok(Phase::End(None))
+        })
     }
 
-    /// Whether such a ball is in view, in two looks at one place.
-    fn shows(&mut self, is_ball: &dyn Fn(&Sighting) -> bool) -> Result<bool, AgentError> {
-        let Some(first) = self.look()?.filter(is_ball) else {
-            return Ok(false);
+    /// Whether the jaws hold the ball that was seen from `from`; `None` if the hand was stopped before that was known.
+    fn is_held(
+        &mut self,
+        seen: &Sighting,
+        from: Joints,
+        lift: JointDelta,
+    ) -> Result<Option<bool>, AgentError> {
+        // Back to where it was seen from: it must not be there any more, nor in the way, which was free before.
+        if self.go_to(from, EventKind::Withdrawn)? == Went::Back {
+            return Ok(Some(false));
+        }
+        let there = self.look_twice()?;
+        if there.is_some_and(|now| is_same_place(seen, &now)) {
+            return Ok(Some(false));
+        }
+        // Up: none must be seen that was left behind.
+        let limits = &self.config.limits;
+        let up = |share: f64| limits.nearest(&(from + JointDelta(lift.0.map(|turn| share * turn))));
+        if self.go_to(up(1.0), EventKind::Lifted)? == Went::Back {
+            return Ok(None);
+        }
+        let below = self.look_twice()?;
+        let Some(below) = below.filter(|now| now.features.r >= self.config.left_behind) else {
+            return Ok(Some(true));
+        };
+        // Unless it is the one in the jaws, which goes where the hand goes.
+        if self.go_to(up(4.0 / 3.0), EventKind::Lifted)? == Went::Back {
+            return Ok(None);
+        }
+        let along = self.look()?;
+        Ok(Some(along.is_some_and(|now| is_same_place(&below, &now))))
+    }
+
+    /// What is in view in two looks at the same place.
+    fn look_twice(&mut self) -> Result<Option<Sighting>, AgentError> {
+        let Some(first) = self.look()? else {
+            return Ok(None);
         };
         let again = self.look()?;
-        Ok(again.is_some_and(|again| is_same_place(&first, &again)))
+        Ok(again.filter(|again| is_same_place(&first, again)))
     }
 
     fn situation(&self, sighting: &Sighting) -> Situation {
@@ -415,7 +437,9 @@ impl<'a> Run<'a> {
             let ball = ball.filter(is_finite);
             let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
             self.tell(kind, frame.as_ref());
-            self.watch.looked(&self.joints, frame, ball.as_ref());
+            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
+                self.tell(EventKind::SameFrame, None);
+            }
             if self.watch.same() >= self.config.same_frames {
                 return Err(self.frozen());
             }
