@@ -17,6 +17,8 @@ pub(super) const DIRECTION_SLACK: u8 = 7;
 const LEAST_ALONG: f32 = 0.58;
 /// What a proof costs, in looks.
 pub(super) const PROOF: u64 = 400;
+/// The share of the outline that must lie on edges at the first look: of a ball hidden by two fifths little more is to be seen.
+const FIRST_SHARE: f32 = 0.44;
 /// How many mirrored partners of a point are tried.
 const PARTNERS: usize = 6;
 
@@ -318,7 +320,7 @@ impl Search<'_> {
         budget: &mut Budget,
     ) -> bool {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, 0.5, &mut budget.looks) else {
+        let Some(_) = self.outline.support(level, &ring, FIRST_SHARE, &mut budget.looks) else {
             return false;
         };
         // The same circle is met again and again; a few fits from different pairs are enough.
