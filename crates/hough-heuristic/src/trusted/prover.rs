@@ -2,6 +2,7 @@
 
 use image::GrayImage;
 
+use super::budget::PROOF;
 use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Grey, Polar, Ring};
@@ -67,7 +68,7 @@ pub(super) struct Prover<'a> {
 
 impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
-    pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
+    pub(super) fn prove(&mut self, candidate: &Candidate, looks: &mut u64) -> Option<Ring> {
         let coarsest = self.depth_for(candidate.r);
         // Noise hides the outline at the larger sizes, and leaves few samples at the smaller ones: whichever says more.
         let finest = if self.noise > NOISY {
@@ -77,6 +78,7 @@ impl Prover<'_> {
         };
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
+            *looks += PROOF;
             let proof = self.prove_at(depth, candidate);
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
