@@ -28,7 +28,7 @@ pub(crate) enum Fault {
     Halted(usize),
     /// As before, and on the way back.
     HaltedTwice(usize),
-    /// It halts every move of the open hand, but of JT5, that shows the ball with a radius above this.
+    /// It halts the first three moves that show the ball with a radius above this.
     HaltedNear(f64),
     /// It halts so many ways of the gripper to the ball.
     HaltedGrips(usize),
@@ -36,8 +36,8 @@ pub(crate) enum Fault {
     HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
-    /// The ball, once it is in the jaws, shows at the border of the image.
-    ShowsInTheJaws,
+    /// The ball, once it is in the jaws, shows at the border of the image, from so many looks on.
+    ShowsInTheJaws(usize),
     /// The only circle ever seen is one in the middle of the goal: in the first look.
     PhantomOnce,
     /// From the pose of the first look.
@@ -59,6 +59,7 @@ pub(crate) struct Cell {
     moves: usize,
     halts: usize,
     closed_moves: usize,
+    looks_held: usize,
     old: Option<Features>,
 }
 
@@ -80,6 +81,7 @@ impl Shared {
             moves: 0,
             halts: 0,
             closed_moves: 0,
+            looks_held: 0,
             old: None,
         })))
     }
@@ -116,11 +118,14 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
-            Fault::ShowsInTheJaws if cell.held => Some(Features {
-                x: 87.0 + 0.01 * cell.looks as f64,
-                y: 141.0,
-                r: 27.0,
-            }),
+            Fault::ShowsInTheJaws(from) if cell.held => {
+                cell.looks_held += 1;
+                (cell.looks_held > from).then(|| Features {
+                    x: 87.0 + 0.01 * cell.looks as f64,
+                    y: 141.0,
+                    r: 27.0,
+                })
+            }
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
                     origin: "camera".into(),
@@ -203,7 +208,7 @@ impl Manipulator for Shared {
             Fault::Halted(at) => moves == at,
             Fault::HaltedTwice(at) => moves == at || moves == at + 1,
             Fault::HaltedNear(r) => {
-                !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
+                cell.halts < 3 && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
             Fault::HaltedClosed(way) => {
