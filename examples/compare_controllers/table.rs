@@ -83,7 +83,7 @@ pub(crate) struct Row {
 
 impl Row {
     pub(crate) const HEADER: &str =
-        "level     controller                       success %     cycles  losses/run  collisions  runs";
+        "level     controller                         success %     cycles  losses/run  collisions  runs";
 
     pub(crate) fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
         let count = |part: fn(&(usize, usize)) -> usize| tally.draws.iter().map(part).sum::<usize>();
@@ -111,11 +111,23 @@ impl fmt::Display for Row {
             collisions,
             runs,
         } = self;
+        // One cell has no interval, and no success no moves.
+        let interval = number(*half, |half| format!("+-{half:5.1}"));
+        let cycles = number(*cycles, |cycles| format!("{cycles:.1}"));
         write!(
             f,
-            "{:9} {name:30} {mean:6.1} +-{half:5.1} {cycles:9.1} {losses:11.2} {collisions:11} {runs:5}",
+            "{:9} {name:32} {mean:6.1} {interval:7} {cycles:>9} {losses:11.2} {collisions:11} {runs:5}",
             level.to_string()
         )
+    }
+}
+
+/// A number in words, none for what is none.
+fn number(value: f64, words: impl FnOnce(f64) -> String) -> String {
+    if value.is_finite() {
+        words(value)
+    } else {
+        String::new()
     }
 }
 
@@ -133,8 +145,8 @@ pub(crate) fn csv(rows: &[Row]) -> String {
         runs,
     } in rows
     {
-        csv +=
-            &format!("{level},\"{name}\",{mean:.3},{half:.3},{cycles:.3},{losses:.4},{collisions},{runs}\n");
+        let [half, cycles] = [*half, *cycles].map(|value| number(value, |value| format!("{value:.3}")));
+        csv += &format!("{level},\"{name}\",{mean:.3},{half},{cycles},{losses:.4},{collisions},{runs}\n");
     }
     csv
 }

@@ -3,6 +3,7 @@
 use puma_val2::{Joints, Manipulator, ProximitySensor};
 
 use crate::run::Run;
+use crate::watch::Watch;
 use crate::{AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, Learned, Sighting};
 
 /// The modules of section 2.2 of the paper around a [`Controller`], which moves the arm while the ball is in view: the paper's two
@@ -11,6 +12,7 @@ use crate::{AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, 
 pub struct Agent<C = Learned> {
     config: AgentConfig,
     controller: C,
+    watch: Watch,
 }
 
 /// How a run ended.
@@ -50,7 +52,11 @@ impl<C: Controller> Agent<C> {
     /// [`AgentError::Config`] for settings that cannot work.
     pub fn with_controller(config: AgentConfig, controller: C) -> Result<Self, AgentError> {
         config.check()?;
-        Ok(Self { config, controller })
+        Ok(Self {
+            config,
+            controller,
+            watch: Watch::default(),
+        })
     }
 
     /// The settings.
@@ -83,7 +89,16 @@ impl<C: Controller> Agent<C> {
         observe: &mut dyn FnMut(&Event<'_>),
     ) -> Result<Outcome, AgentError> {
         self.controller.begin();
-        let result = Run::new(&self.config, &mut self.controller, eye, arm, proximity, observe).until_done();
+        let run = Run::new(
+            &self.config,
+            &mut self.controller,
+            &mut self.watch,
+            eye,
+            arm,
+            proximity,
+            observe,
+        );
+        let result = run.until_done();
         self.controller.end();
         result
     }

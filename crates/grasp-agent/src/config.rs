@@ -39,8 +39,8 @@ pub struct AgentConfig {
     pub left_behind: f64,
     /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
     pub reach_tolerance: f64,
-    /// Frames in a row, each from another pose, that may show the ball at exactly the same place before the camera counts as
-    /// frozen \[2\].
+    /// Frames in a row, each from another pose, that may be the same as the one before, or show the ball at exactly the same place, before the
+    /// camera counts as frozen \[2\]. Nothing is gripped after a single one of them.
     pub same_frames: usize,
 }
 

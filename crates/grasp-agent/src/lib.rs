@@ -71,6 +71,8 @@ mod error;
 mod event;
 #[cfg(feature = "serde")]
 mod export;
+#[cfg(feature = "serde")]
+mod export_policy;
 mod eye;
 mod hybrid;
 mod learned;
@@ -83,6 +85,7 @@ mod run;
 mod servo;
 mod spec;
 mod task;
+mod watch;
 
 pub use hough_heuristic;
 pub use nalgebra;

@@ -3,6 +3,7 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 
+use crate::watch::Watch;
 use crate::{
     AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, Look, Outcome, Percept,
     Sighting, Situation,
@@ -50,9 +51,7 @@ pub(crate) struct Run<'a> {
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
-    /// The pose that the last look was taken from, and how many looks from different poses brought the same.
-    looked_from: Joints,
-    same: usize,
+    watch: &'a mut Watch,
     /// Moves in a row that were taken back.
     taken_back: usize,
     /// All of them since the search.
@@ -66,6 +65,7 @@ impl<'a> Run<'a> {
     pub(crate) fn new(
         config: &'a AgentConfig,
         controller: &'a mut dyn Controller,
+        watch: &'a mut Watch,
         eye: &'a mut dyn Eye,
         arm: &'a mut dyn Manipulator,
         proximity: &'a mut dyn ProximitySensor,
@@ -74,6 +74,7 @@ impl<'a> Run<'a> {
         Self {
             config,
             controller,
+            watch,
             eye,
             arm,
             proximity,
@@ -82,8 +83,6 @@ impl<'a> Run<'a> {
             cycles: 0,
             losses: 0,
             last_seen: None,
-            looked_from: Joints::default(),
-            same: 0,
             taken_back: 0,
             barred: 0,
             grips: Grips::default(),
@@ -155,6 +154,10 @@ impl<'a> Run<'a> {
         let now = self.situation(&sighting);
         let percept = Percept::new(sighting.features, &self.joints);
         if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
+            // What is shown from two poses alike is not what is there: no reason to grip.
+            if self.watch.same() > 0 {
+                return Err(self.frozen());
+            }
             self.tell(EventKind::AtGoal, None);
             return Ok(Phase::Grip {
                 seen: sighting,
@@ -339,37 +342,27 @@ impl<'a> Run<'a> {
         for _ in 0..self.config.looks {
             let Look { frame, ball } = self.eye.look()?;
             let ball = ball.filter(is_finite);
+            let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
+            self.tell(kind, frame.as_ref());
+            self.watch.looked(&self.joints, frame, ball.as_ref());
+            if self.watch.same() >= self.config.same_frames {
+                return Err(self.frozen());
+            }
             if let Some(sighting) = ball {
-                self.tell(EventKind::Seen(sighting), frame.as_ref());
-                self.check_alive(&sighting)?;
                 self.wandered |= self
                     .last_seen
                     .is_some_and(|last| !is_same_place(&last, &sighting));
                 self.last_seen = Some(sighting);
                 return Ok(Some(sighting));
             }
-            self.tell(EventKind::NotSeen, frame.as_ref());
-            self.same = 0;
         }
         Ok(None)
     }
 
-    /// A ball that stays at exactly the same place while the camera moves is an old frame.
-    fn check_alive(&mut self, sighting: &Sighting) -> Result<(), AgentError> {
-        const A_MOVE: f64 = 0.002;
-        let moved = (0..3).any(|i| (self.joints.0[i] - self.looked_from.0[i]).abs() > A_MOVE);
-        if !moved {
-            return Ok(());
+    fn frozen(&self) -> AgentError {
+        AgentError::FrozenCamera {
+            looks: self.watch.same() + 1,
         }
-        self.looked_from = self.joints;
-        let same = self
-            .last_seen
-            .is_some_and(|last| last.features == sighting.features);
-        self.same = if same { self.same + 1 } else { 0 };
-        if self.same >= self.config.same_frames {
-            return Err(AgentError::FrozenCamera { looks: self.same + 1 });
-        }
-        Ok(())
     }
 
     fn tell(&mut self, kind: EventKind, frame: Option<&GrayImage>) {

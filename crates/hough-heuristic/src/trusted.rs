@@ -36,7 +36,8 @@ use search::{Budget, Outline, Search};
 /// are *pairs* on one row or column whose gradients mirror one another, at a half, a quarter and further halves of the frame, the
 /// smallest first. A circle whose outline runs along edges is fitted and becomes a candidate.
 ///
-/// **Proof.** A candidate is looked at where its radius is 12 to 24 px (8 to 12 px: the frame itself). On 64 rays across its outline
+/// **Proof.** A candidate is looked at where its radius is 12 to 24 px (8 to 12 px: the frame itself; in noise at up to three sizes,
+/// from 4.5 px on). On 64 rays across its outline
 /// the strongest edge that runs along it is sought within 6 px on either side. If there were no circle, that edge would lie
 /// anywhere: within the tolerance by a known chance, be the picture as textured as it may. The number of false alarms
 /// is the number of circles that differ noticeably in the frame, times the probability that chance alone puts so many of
@@ -212,7 +213,7 @@ impl Trusted {
             circle: &self.circle,
             polar: &mut self.polar,
             noise,
-            tests: log10(frame.len() as f32 * CIRCLES_PER_PIXEL),
+            tests: log10((frame.len() * RADII * (self.depth + 1)) as f32),
             proofs: &mut self.proofs,
         };
         let smallest = pyramid.depth();
@@ -368,8 +369,10 @@ const STEP_GAIN: f32 = 2.3;
 const NOISE_FACTOR: f32 = 3.5;
 /// What rounding adds to the noise of each size, grey levels.
 const ROUNDING: f32 = 0.3;
-/// Circles that differ noticeably, for each pixel of the frame: a dozen radii for each place, over all sizes.
-const CIRCLES_PER_PIXEL: f32 = 16.0;
+/// Circles about one place that differ noticeably, at each size.
+const RADII: usize = 12;
+/// Noise above which the larger circles are measured at half the size of the frame, grey levels.
+const NOISY: f32 = 15.0;
 
 /// Whether two circles are two accounts of one thing.
 fn is_same(a: &Circle, b: &Circle) -> bool {
@@ -420,7 +423,11 @@ impl Vectorized for Measuring<'_> {
     #[inline(always)]
     fn run(self) -> Self::Output {
         let pyramid = self.pyramid;
-        let frames = (0..=self.proof.depth).rev().map(|depth| pyramid.grey(depth));
-        measure::measure(frames, self.circle, self.polar, self.proof.ring, self.noise)
+        // The slope over one pixel is lost in noise: over two it is found.
+        let finest = usize::from(self.noise > NOISY).min(self.proof.depth);
+        let frames = (finest..=self.proof.depth).rev().map(|depth| pyramid.grey(depth));
+        let scale = (1 << finest) as f32;
+        let (start, noise) = (self.proof.ring, self.noise / scale);
+        measure::measure(frames, self.circle, self.polar, start, noise).map(|measured| measured.grown(scale))
     }
 }

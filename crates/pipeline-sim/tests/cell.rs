@@ -1,7 +1,7 @@
 //! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
 
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, ProjectionError, SightError, Workspace};
+use pipeline_sim::{Ball, Cell, Contact, Grasp, ProjectionError, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;

@@ -16,6 +16,9 @@ pub struct HybridSettings {
     pub nominal: CameraModel,
     /// How wrong that may be.
     pub prior: Prior,
+    /// How much of that may have come about since a belief was learned that the controller begins with, as a share \[0.2\]; see
+    /// [`Hybrid::with_belief`]. At 0 a camera that has been knocked in the meantime is not learned again for a long time.
+    pub drift: f64,
     /// Features of the ball where it should be \[(103.5, 78, 33)\].
     pub goal: Features,
     /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
@@ -37,6 +40,7 @@ impl HybridSettings {
         Self {
             nominal: CameraModel::paper(),
             prior: Prior::by_eye(),
+            drift: 0.2,
             goal: Features {
                 x: 103.5,
                 y: 78.0,
@@ -60,6 +64,8 @@ impl HybridSettings {
 #[derive(Clone, Debug)]
 pub struct Hybrid {
     settings: HybridSettings,
+    /// What was believed before anything of what is remembered was seen.
+    before: Belief,
     belief: Belief,
     remembered: Vec<Evidence>,
     current: Evidence,
@@ -104,13 +110,19 @@ const LEAST_BOLDNESS: f64 = 1.0 / 64.0;
 impl Hybrid {
     /// A controller that knows nothing but `settings`, and learns.
     pub fn new(settings: HybridSettings) -> Self {
-        Self::with_belief(settings, Belief::new(&settings.prior))
+        Self::beginning(settings, Belief::new(&settings.prior))
     }
 
-    /// A controller that has learned before.
+    /// A controller that has learned before, and goes on from there: what it sees from now on is weighed against `belief`, held as firmly as
+    /// [`HybridSettings::drift`] leaves it.
     pub fn with_belief(settings: HybridSettings, belief: Belief) -> Self {
+        Self::beginning(settings, belief.loosened(&settings.prior, settings.drift))
+    }
+
+    fn beginning(settings: HybridSettings, belief: Belief) -> Self {
         Self {
             settings,
+            before: belief.clone(),
             belief,
             remembered: Vec::new(),
             current: Evidence::default(),
@@ -325,8 +337,8 @@ impl Controller for Hybrid {
             return;
         }
         let all: Vec<&Evidence> = self.remembered.iter().collect();
-        let prior = Belief::new(&self.settings.prior).with_noise(self.belief.noise());
-        if let Some(fit) = Fit::of(&prior, &self.belief.numbers(), &self.settings.nominal, &all) {
+        let before = self.before.clone().with_noise(self.belief.noise());
+        if let Some(fit) = Fit::of(&before, &self.belief.numbers(), &self.settings.nominal, &all) {
             self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
         }
     }

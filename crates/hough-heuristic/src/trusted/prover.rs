@@ -60,7 +60,7 @@ pub(super) struct Prover<'a> {
     pub(super) polar: &'a mut Polar,
     /// Deviation of the frame's noise, grey levels.
     pub(super) noise: f32,
-    /// Decimal logarithm of the number of circles that might have been tested.
+    /// Decimal logarithm of the number of circles that might have been tested at the full size.
     pub(super) tests: f32,
     pub(super) proofs: &'a mut Vec<Proof>,
 }
@@ -68,7 +68,27 @@ pub(super) struct Prover<'a> {
 impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
     pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
-        let depth = self.depth_for(candidate.r);
+        let coarsest = self.depth_for(candidate.r);
+        // Noise hides the outline at the larger sizes, and leaves few samples at the smaller ones: whichever says more.
+        let finest = if self.noise > NOISY {
+            coarsest.saturating_sub(2)
+        } else {
+            coarsest
+        };
+        let mut best: Option<Proof> = None;
+        for depth in (finest..=coarsest).rev() {
+            let proof = self.prove_at(depth, candidate);
+            if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
+                best = proof;
+            }
+        }
+        let best = best?;
+        self.proofs.push(best);
+        best.is_beyond_doubt().then(|| best.in_frame())
+    }
+
+    /// The proof in the frame that was halved so many times.
+    fn prove_at(&mut self, depth: usize, candidate: &Candidate) -> Option<Proof> {
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),
@@ -77,12 +97,11 @@ impl Prover<'_> {
             start: candidate.ring().shrunk(scale),
             setting: Setting {
                 noise: self.noise / scale + 0.3,
-                tests: self.tests,
+                // Each size has a quarter of the places that the next larger one has.
+                tests: self.tests - 0.602 * depth as f32,
             },
-        });
-        let proof = Proof { depth, ..proof? };
-        self.proofs.push(proof);
-        proof.is_beyond_doubt().then(|| proof.in_frame())
+        })?;
+        Some(Proof { depth, ..proof })
     }
 
     /// How many times the frame is to be halved for a circle of this radius.

@@ -6,7 +6,7 @@ use super::candidate::{Candidate, Collected};
 use super::directions::{CODES, UnitCircle, code};
 use super::fit::Moments;
 use super::level::{EDGE, Level, Lines};
-use super::polar::{LANES, Ring};
+use super::polar::{LANES, Ring, whole};
 use super::prover::Prover;
 
 /// Points of a circle's outline that are looked at.
@@ -15,6 +15,8 @@ pub(super) const LOOKS: usize = 32;
 pub(super) const DIRECTION_SLACK: u8 = 7;
 /// The least part of a normal along the line that the pair lies on.
 const LEAST_ALONG: f32 = 0.58;
+/// Of the outline so much is to lie on edges for a circle to be worth a proof: of those that prove to be circles 99 in 100 have it.
+const LEAST_SHARE: f32 = 0.5;
 /// What a proof costs, in looks.
 pub(super) const PROOF: u64 = 400;
 /// How many mirrored partners of a point are tried.
@@ -108,8 +110,8 @@ impl Outline {
             if inside {
                 let mut pixels = [0i32; BLOCK];
                 for i in 0..BLOCK {
-                    let (column, row) = (ring.x + ring.r * x[i] + 0.5, ring.y + ring.r * y[i] + 0.5);
-                    pixels[i] = row as i32 * level.width as i32 + column as i32;
+                    let (column, row) = (whole(ring.x + ring.r * x[i]).0, whole(ring.y + ring.r * y[i]).0);
+                    pixels[i] = row * level.width as i32 + column;
                 }
                 for i in 0..BLOCK {
                     marks[i] = level.marks().get(pixels[i] as usize).copied().unwrap_or(0);
@@ -169,7 +171,7 @@ impl Outline {
                 let off = distance - ring.r;
                 if off.abs() <= reach && distance > 0.5 {
                     (ux[index], uy[index]) = (dx[index] / distance, dy[index] / distance);
-                    (residual[index], weight[index]) = (off, 1.0);
+                    (residual[index], weight[index]) = (off, level.strength_at(pixel));
                     break;
                 }
             }
@@ -342,7 +344,7 @@ impl Search<'_> {
                 break;
             }
         }
-        if support.share() < 0.4 || support.visible < LOOKS as u32 / 3 {
+        if support.share() < LEAST_SHARE || support.visible < LOOKS as u32 / 3 {
             return false;
         }
         let candidate = Candidate::new(&ring, self.scale, support);

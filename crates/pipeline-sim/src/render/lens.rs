@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 
 use crate::Camera;
-use crate::render::canvas::Canvas;
+use crate::render::canvas::{Area, Canvas};
 
 /// Pixels from one place to the next at which a distortion is undone exactly.
 const CELL: usize = 4;
@@ -112,28 +112,40 @@ impl Warp {
     }
 }
 
-/// Blurs the whole canvas as the sensor's own pass does ([`crate::Sensor::blur`]): three taps along each axis. For fields, which
+/// Blurs an area of a canvas as the sensor's own pass does ([`crate::Sensor::blur`]): three taps along each axis. For fields, which
 /// must be blurred before they are woven.
-pub(super) fn soften(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
+pub(super) fn soften(canvas: &mut Canvas, area: Area, sigma: f64, spare: &mut Vec<f32>) {
     let (side, middle) = three_taps(sigma);
-    let (w, h) = (canvas.width, canvas.height);
-    if w == 0 || h == 0 {
+    if area.is_empty() || side <= 0.0 {
         return;
     }
+    let width = canvas.width;
+    let (w, h) = (area.right - area.left, area.bottom - area.top);
+    // The area as it was, and a row with a pixel more at either end.
     spare.clear();
-    spare.extend_from_slice(&canvas.light);
-    for y in 0..h {
-        let line = |k: usize| &spare[k * w..(k + 1) * w];
-        let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(h - 1)));
-        let out = &mut canvas.light[y * w..(y + 1) * w];
-        for (((o, a), c), b) in out.iter_mut().zip(above).zip(here).zip(below) {
-            *o = middle * c + side * (a + b);
+    spare.resize(w * h + w + 2, 0.0);
+    let (before, mixed) = spare.split_at_mut(w * h);
+    for values in [&mut canvas.light, &mut canvas.cover] {
+        if values.is_empty() {
+            continue;
         }
-        let mut left = out[0];
-        for x in 0..w {
-            let (here, right) = (out[x], out[(x + 1).min(w - 1)]);
-            out[x] = middle * here + side * (left + right);
-            left = here;
+        let place = |y: usize| (area.top + y) * width + area.left;
+        for (y, copy) in before.chunks_exact_mut(w).enumerate() {
+            copy.copy_from_slice(&values[place(y)..][..w]);
+        }
+        for y in 0..h {
+            let line = |k: usize| &before[k * w..][..w];
+            let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(h - 1)));
+            for (((m, a), c), b) in mixed[1..=w].iter_mut().zip(above).zip(here).zip(below) {
+                *m = middle * c + side * (a + b);
+            }
+            mixed[0] = mixed[1];
+            mixed[w + 1] = mixed[w];
+            let sides = mixed.iter().zip(&mixed[2..]);
+            let out = &mut values[place(y)..][..w];
+            for ((o, c), (l, r)) in out.iter_mut().zip(&mixed[1..]).zip(sides) {
+                *o = middle * c + side * (l + r);
+            }
         }
     }
 }
