@@ -3,7 +3,7 @@
 use puma_val2::{Gripper, Joint, JointDelta, Joints};
 
 use super::{OFTEN, Phase, Run, Went};
-use crate::{AgentError, EventKind, GaveUp, Sighting};
+use crate::{AgentError, Consequence, EventKind, GaveUp, Sighting};
 
 /// Ways of the gripper to the ball that were taken back.
 #[derive(Clone, Copy, Debug, Default)]
@@ -12,6 +12,9 @@ pub(super) struct Grips {
     /// Whether the last one was aimed by the controller.
     own: bool,
 }
+
+/// Seen from where the ball was at the goal, what has less than this share of its radius is something smaller.
+const BALL_SIZED: f64 = 0.6;
 
 impl Run<'_> {
     /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind. Away from the goal only a
@@ -59,6 +62,7 @@ impl Run<'_> {
             Some(false) => {
                 self.arm.set_gripper(Gripper::Open)?;
                 self.tell(EventKind::Missed, None);
+                self.controller.judge(&Consequence::Missed);
                 self.cycles += 1;
                 Phase::Recover(from)
             }
@@ -73,6 +77,7 @@ impl Run<'_> {
     }
 
     fn after_a_barred_grip(&mut self) -> Result<Phase, AgentError> {
+        self.controller.judge(&Consequence::Missed);
         self.grips.taken_back += 1;
         self.cycles += 1;
         if self.grips.taken_back >= OFTEN {
@@ -105,28 +110,29 @@ impl Run<'_> {
         if self.go_to(up(1.0), EventKind::Lifted)? == Went::Back {
             return Ok(None);
         }
-        let below = self.look_twice()?;
+        let (below, least) = (self.look_twice()?, self.config.left_behind);
+        // What is as large as the ball is the ball: where it was, pushed aside, or in the jaws.
+        let there = there.filter(|now| now.features.r > BALL_SIZED * seen.features.r);
+        let below = below.filter(|now| now.features.r >= least);
+        let Some(ball) = there.or(below) else {
+            return Ok(Some(true));
+        };
+        // What goes where the hand goes is in the jaws, unless it has been in the camera from the beginning.
         if let (Some(there), Some(below)) = (&there, &below)
             && is_same_place(there, below)
         {
-            // It goes where the hand goes: it is in the jaws, or has been in the camera from the beginning.
             return Ok(Some(wandered));
         }
-        if there.is_some_and(|there| is_same_place(seen, &there)) {
-            return Ok(Some(false));
-        }
-        let least = self.config.left_behind;
-        let Some(below) = below.filter(|now| now.features.r >= least) else {
-            return Ok(Some(true));
-        };
-        // A ball left behind, or the one in the jaws after all: the hand goes on up.
         if self.go_to(up(4.0 / 3.0), EventKind::Lifted)? == Went::Back {
             return Ok(None);
         }
         let now = self.look()?;
-        Ok(Some(now.is_some_and(|now| {
-            is_same_place(&below, &now) || now.features.r < least
-        })))
+        Ok(Some(
+            wandered
+                && now.is_some_and(|now| {
+                    is_same_place(&ball, &now) || there.is_none() && now.features.r < least
+                }),
+        ))
     }
 
     /// What is in view in two looks at the same place.

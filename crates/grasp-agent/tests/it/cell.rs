@@ -36,6 +36,8 @@ pub(crate) enum Fault {
     HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
+    /// The jaws squeeze the ball out the first time; where it lies then it cannot be seen from the lifted hand.
+    SqueezedOut,
     /// The ball, once it is in the jaws, shows at the border of the image, from so many looks on.
     ShowsInTheJaws(usize),
     /// The only circle ever seen is one in the middle of the goal: in the first look.
@@ -60,6 +62,7 @@ pub(crate) struct Cell {
     halts: usize,
     closed_moves: usize,
     looks_held: usize,
+    closed_at: Option<Joints>,
     old: Option<Features>,
 }
 
@@ -82,6 +85,7 @@ impl Shared {
             halts: 0,
             closed_moves: 0,
             looks_held: 0,
+            closed_at: None,
             old: None,
         })))
     }
@@ -118,6 +122,11 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
+            Fault::SqueezedOut
+                if cell.closed && cell.closed_at.is_some_and(|at| at.0[1] - cell.joints.0[1] > 0.1) =>
+            {
+                None
+            }
             Fault::ShowsInTheJaws(from) if cell.held => {
                 cell.looks_held += 1;
                 (cell.looks_held > from).then(|| Features {
@@ -241,6 +250,11 @@ impl Manipulator for Shared {
         cell.closed = gripper == Gripper::Closed;
         let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
         cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
+        if cell.fault == Fault::SqueezedOut && cell.held && cell.halts == 0 {
+            (cell.held, cell.halts) = (false, 1);
+            cell.ball.y += 0.02;
+            cell.closed_at = Some(cell.joints);
+        }
         Ok(())
     }
 

@@ -236,6 +236,16 @@ fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
 }
 
 #[test]
+fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
+    let (end, log, cell) = end_of(Fault::SqueezedOut);
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let missed = words_from(&log, "gripped");
+    let missed = missed.iter().filter(|word| **word == "missed");
+    assert_eq!(missed.count(), 1);
+}
+
+#[test]
 fn every_search_begins_with_an_event() {
     let (_, log, _) = end_of(Fault::None);
     assert_eq!(log.events[1].kind, EventKind::Searching);
