@@ -25,11 +25,13 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use files::{writable_folder, write_whole};
+use program::ended;
 use table::{Row, Tally};
 use world::World;
 
 #[allow(dead_code, reason = "shared with the examples that write pictures")]
 mod files;
+mod program;
 #[path = "compare_controllers/table.rs"]
 mod table;
 #[path = "compare_controllers/world.rs"]
@@ -89,13 +91,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {

@@ -29,6 +29,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use cpu::cpu_time;
 use files::{writable_folder, write_png, write_whole};
 use plot::{Panel, drawn};
+use program::ended;
 
 mod cpu;
 mod files;
@@ -37,6 +38,7 @@ mod on_the_arm;
 mod overlay;
 #[path = "paper_figures/plot.rs"]
 mod plot;
+mod program;
 #[path = "paper_figures/snapshots.rs"]
 mod snapshots;
 
@@ -62,13 +64,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {

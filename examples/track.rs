@@ -29,12 +29,14 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use files::{writable_folder, write_whole};
+use program::ended;
 use stages::{Stages, Timed};
 use tally::{Counted, Tally};
 
 mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
+mod program;
 #[path = "track/shortcut.rs"]
 mod shortcut;
 mod stages;
@@ -127,13 +129,7 @@ fn main() -> ExitCode {
     } else {
         run(&options)
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(done)
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -190,16 +186,12 @@ impl Chain<'_> {
             None => Hybrid::new(settings),
         };
         let stages = self.stages.clone();
-        let timed = |inner| Timed {
-            inner,
-            stages: stages.clone(),
-        };
-        let mut agent = Agent::with_controller(config, timed(hybrid))?;
+        let mut agent = Agent::with_controller(config, stages.around(hybrid))?;
         for number in 0..options.teach + runs {
             let teaching = number < options.teach;
             if number == options.teach {
                 let learned = agent.controller().inner.clone().frozen();
-                agent = Agent::with_controller(agent.config().clone(), timed(learned))?;
+                agent = Agent::with_controller(agent.config().clone(), stages.around(learned))?;
             }
             let (ball, _) = workspace
                 .sample_seen_ball(&rig.cell().get(), &mut rng)
@@ -257,19 +249,11 @@ impl Chain<'_> {
             arm,
             mut sensor,
         } = rig.parts();
+        let stages = &self.stages;
         let (mut camera, mut detector, mut arm) = (
-            Timed {
-                inner: camera,
-                stages: self.stages.clone(),
-            },
-            Timed {
-                inner: &mut *self.detector as &mut dyn CircleDetector,
-                stages: self.stages.clone(),
-            },
-            Timed {
-                inner: arm,
-                stages: self.stages.clone(),
-            },
+            stages.around(camera),
+            stages.around(&mut *self.detector as &mut dyn CircleDetector),
+            stages.around(arm),
         );
         let mut eye = CameraEye::new(&mut camera, &mut detector);
         let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {

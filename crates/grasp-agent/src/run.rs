@@ -344,7 +344,9 @@ impl<'a> Run<'a> {
             let ball = ball.filter(is_finite);
             let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
             self.tell(kind, frame.as_ref());
-            self.watch.looked(&self.joints, frame, ball.as_ref());
+            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
+                self.tell(EventKind::SameFrame, None);
+            }
             if self.watch.same() >= self.config.same_frames {
                 return Err(self.frozen());
             }

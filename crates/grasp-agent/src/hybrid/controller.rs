@@ -68,6 +68,8 @@ pub struct Hybrid {
     before: Belief,
     belief: Belief,
     remembered: Vec<Evidence>,
+    /// Whether something is remembered that is not yet part of the belief.
+    news: bool,
     current: Evidence,
     estimate: Option<Estimate>,
     learning: bool,
@@ -125,6 +127,7 @@ impl Hybrid {
             before: belief.clone(),
             belief,
             remembered: Vec::new(),
+            news: false,
             current: Evidence::default(),
             estimate: None,
             learning: true,
@@ -153,6 +156,7 @@ impl Hybrid {
         // One sighting says where the ball is, and nothing of the camera.
         if self.learning && self.current.len() >= 2 {
             self.remembered.push(self.current.clone());
+            self.news = true;
             let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
             self.remembered.drain(..forgotten);
         }
@@ -341,7 +345,7 @@ impl Controller for Hybrid {
 
     fn end(&mut self) {
         self.remember();
-        if !self.learning || self.remembered.is_empty() {
+        if !self.learning || !std::mem::take(&mut self.news) {
             return;
         }
         let all: Vec<&Evidence> = self.remembered.iter().collect();

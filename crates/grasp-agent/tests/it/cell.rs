@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::nalgebra::Point3;
 use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
@@ -16,6 +17,8 @@ pub(crate) enum Fault {
     None,
     NoFrame(usize),
     FrozenFrame(usize),
+    /// Frames, and after so many looks always the same one, with what was in it.
+    FrozenPicture(usize),
     Garbage,
     /// Every seventh look finds a circle that is not the ball.
     FalseCircle,
@@ -23,6 +26,10 @@ pub(crate) enum Fault {
     Phantoms,
     ArmStuck(usize),
     LineDead(usize),
+    /// After so many orders to the gripper.
+    GripperDead(usize),
+    /// After so many moves.
+    SensorDead(usize),
     Near(usize),
     /// The arm's own guard halts it halfway in this move.
     Halted(usize),
@@ -56,14 +63,25 @@ pub(crate) struct Cell {
     pub(crate) closed: bool,
     pub(crate) held: bool,
     pub(crate) stops: usize,
-    looks: usize,
+    pub(crate) looks: usize,
     looked_first: Option<Joints>,
     moves: usize,
+    grips: usize,
     halts: usize,
     closed_moves: usize,
     looks_held: usize,
     closed_at: Option<Joints>,
     old: Option<Features>,
+}
+
+impl Cell {
+    fn dead_line(&self, doing: &str) -> ArmError {
+        ArmError::Line {
+            port: "ttyUSB0".into(),
+            doing: doing.into(),
+            source: std::io::Error::from(std::io::ErrorKind::BrokenPipe),
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -82,6 +100,7 @@ impl Shared {
             looks: 0,
             looked_first: None,
             moves: 0,
+            grips: 0,
             halts: 0,
             closed_moves: 0,
             looks_held: 0,
@@ -177,7 +196,19 @@ impl Eye for Shared {
             }
             _ => seen,
         };
-        cell.old = seen.or(cell.old);
+        let (seen, frame) = match cell.fault {
+            Fault::FrozenPicture(after) => {
+                let number = cell.looks.min(after);
+                let seen = if cell.looks > after { cell.old } else { seen };
+                cell.old = seen;
+                let pixel = |x, y| Luma([(number * 7 + (x * y) as usize) as u8]);
+                (seen, Some(GrayImage::from_fn(16, 12, pixel)))
+            }
+            _ => {
+                cell.old = seen.or(cell.old);
+                (seen, None)
+            }
+        };
         let ball = seen.map(|features| Sighting {
             features,
             detection: Detection {
@@ -185,7 +216,7 @@ impl Eye for Shared {
                 score: 1.0,
             },
         });
-        Ok(Look { frame: None, ball })
+        Ok(Look { frame, ball })
     }
 }
 
@@ -207,12 +238,7 @@ impl Manipulator for Shared {
         let halted = match cell.fault {
             Fault::ArmStuck(after) if moves > after => return Ok(from),
             Fault::LineDead(after) if moves > after => {
-                let source = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
-                return Err(ArmError::Line {
-                    port: "ttyUSB0".into(),
-                    doing: "DRIVE".into(),
-                    source,
-                });
+                return Err(cell.dead_line("DRIVE"));
             }
             Fault::Halted(at) => moves == at,
             Fault::HaltedTwice(at) => moves == at || moves == at + 1,
@@ -247,6 +273,10 @@ impl Manipulator for Shared {
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         let mut cell = self.0.borrow_mut();
+        cell.grips += 1;
+        if matches!(cell.fault, Fault::GripperDead(after) if cell.grips > after) {
+            return Err(cell.dead_line("CLOSEI"));
+        }
         cell.closed = gripper == Gripper::Closed;
         let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
         cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
@@ -267,6 +297,10 @@ impl Manipulator for Shared {
 impl ProximitySensor for Shared {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let cell = self.0.borrow();
-        Ok(matches!(cell.fault, Fault::Near(at) if cell.moves == at))
+        match cell.fault {
+            Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
+            Fault::Near(at) => Ok(cell.moves == at),
+            _ => Ok(false),
+        }
     }
 }
