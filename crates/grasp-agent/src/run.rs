@@ -3,10 +3,18 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 
+use crate::watch::Watch;
 use crate::{
     AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, Look, Outcome, Percept,
     Sighting, Situation,
 };
+
+mod gripping;
+
+use gripping::{Grips, is_same_place};
+
+/// So many moves that were taken back are too many.
+const OFTEN: usize = 3;
 
 /// Where the state machine stands.
 #[derive(Clone, Copy, Debug)]
@@ -17,8 +25,8 @@ enum Phase {
     Reach(Sighting),
     /// The ball was in view from this pose and is not any more.
     Recover(Joints),
-    /// The ball is where it should be.
-    Grip(Sighting),
+    /// The ball is where it should be, or as near to that as can be.
+    Grip { seen: Sighting, at_goal: bool },
     /// Over, without a grip where there is a reason.
     End(Option<GaveUp>),
 }
@@ -43,17 +51,21 @@ pub(crate) struct Run<'a> {
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
-    /// The pose that the last look was taken from, and how many looks from different poses brought the same.
-    looked_from: Joints,
-    same: usize,
+    watch: &'a mut Watch,
     /// Moves in a row that were taken back.
     taken_back: usize,
+    /// All of them since the search.
+    barred: usize,
+    grips: Grips,
+    /// Whether what is seen has shown in more than one place of the image since the search began.
+    wandered: bool,
 }
 
 impl<'a> Run<'a> {
     pub(crate) fn new(
         config: &'a AgentConfig,
         controller: &'a mut dyn Controller,
+        watch: &'a mut Watch,
         eye: &'a mut dyn Eye,
         arm: &'a mut dyn Manipulator,
         proximity: &'a mut dyn ProximitySensor,
@@ -62,6 +74,7 @@ impl<'a> Run<'a> {
         Self {
             config,
             controller,
+            watch,
             eye,
             arm,
             proximity,
@@ -70,9 +83,10 @@ impl<'a> Run<'a> {
             cycles: 0,
             losses: 0,
             last_seen: None,
-            looked_from: Joints::default(),
-            same: 0,
             taken_back: 0,
+            barred: 0,
+            grips: Grips::default(),
+            wandered: false,
         }
     }
 
@@ -97,7 +111,7 @@ impl<'a> Run<'a> {
                 Phase::Search => self.search()?,
                 Phase::Reach(sighting) => self.reach(sighting)?,
                 Phase::Recover(last) => self.recover(last)?,
-                Phase::Grip(sighting) => self.grip(sighting)?,
+                Phase::Grip { seen, at_goal } => self.grip(seen, at_goal)?,
                 Phase::End(gave_up) => {
                     if let Some(reason) = gave_up {
                         self.tell(EventKind::GaveUp(reason), None);
@@ -117,6 +131,8 @@ impl<'a> Run<'a> {
     /// Looks around from the search poses, the nearest pan angle first; then from beside them.
     fn search(&mut self) -> Result<Phase, AgentError> {
         let config = self.config;
+        self.tell(EventKind::Searching, None);
+        (self.wandered, self.barred) = (false, 0);
         let rounds = std::iter::once(JointDelta::default()).chain(config.search_again.iter().copied());
         for (round, beside) in rounds.enumerate() {
             for pose in nearest_first(&config.search_poses, &self.joints) {
@@ -138,8 +154,15 @@ impl<'a> Run<'a> {
         let now = self.situation(&sighting);
         let percept = Percept::new(sighting.features, &self.joints);
         if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
+            // What is shown from two poses alike is not what is there: no reason to grip.
+            if self.watch.same() > 0 {
+                return Err(self.frozen());
+            }
             self.tell(EventKind::AtGoal, None);
-            return Ok(Phase::Grip(sighting));
+            return Ok(Phase::Grip {
+                seen: sighting,
+                at_goal: true,
+            });
         }
         if self.cycles >= self.config.max_cycles {
             return Ok(Phase::End(Some(GaveUp::OutOfCycles)));
@@ -175,19 +198,20 @@ impl<'a> Run<'a> {
         Ok(Phase::Reach(after))
     }
 
-    /// Looks again from where the last move began; where moves come to nothing again and again, whatever is seen is not to be had, and the
-    /// search begins anew.
+    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself, and a
+    /// controller that can aim at it from here does; where they do so in a row and it cannot, whatever is seen is not to be had, and the search
+    /// begins anew.
     fn after_taking_back(&mut self, from: Joints) -> Result<Phase, AgentError> {
-        const OFTEN: usize = 3;
         self.controller.judge(&Consequence::TakenBack);
         self.taken_back += 1;
-        if self.taken_back >= OFTEN {
-            self.taken_back = 0;
-            return Ok(Phase::Search);
-        }
-        Ok(match self.look()? {
-            Some(sighting) => Phase::Reach(sighting),
-            None => self.lose(from),
+        self.barred += 1;
+        let Some(seen) = self.look()? else {
+            return Ok(self.lose(from));
+        };
+        Ok(if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
+            Phase::Grip { seen, at_goal: false }
+        } else {
+            Phase::Reach(seen)
         })
     }
 
@@ -217,32 +241,6 @@ impl<'a> Run<'a> {
         Ok(Phase::Search)
     }
 
-    /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind.
-    fn grip(&mut self, sighting: Sighting) -> Result<Phase, AgentError> {
-        let (config, from) = (self.config, self.joints);
-        let now = self.situation(&sighting);
-        let own = self.controller.grip(&now, &config.limits);
-        let delta = own
-            .filter(|delta| config.limits.admit(&(from + *delta)))
-            .unwrap_or(config.grip);
-        if self.go_by(delta, EventKind::Gripping(delta))? == Went::Back {
-            return Ok(Phase::End(Some(GaveUp::Obstructed)));
-        }
-        self.arm.set_gripper(Gripper::Closed)?;
-        self.tell(EventKind::Gripped, None);
-        let Some(lift) = config.lift else {
-            return Ok(Phase::End(None));
-        };
-        let lifted = config.limits.nearest(&(self.joints + lift));
-        if self.go_to(lifted, EventKind::Lifted)? == Went::Back || self.look()?.is_none() {
-            return Ok(Phase::End(None));
-        }
-        self.arm.set_gripper(Gripper::Open)?;
-        self.tell(EventKind::Missed, None);
-        self.cycles += 1;
-        Ok(Phase::Recover(from))
-    }
-
     fn situation(&self, sighting: &Sighting) -> Situation {
         Situation {
             features: sighting.features,
@@ -270,34 +268,49 @@ impl<'a> Run<'a> {
         done: EventKind,
     ) -> Result<Went, AgentError> {
         let from = self.joints;
-        let stopped_short = matches!(ordered, Err(ArmError::NotReached { .. }));
-        let reached = match ordered {
-            Ok(joints) => joints,
-            // An arm that its sensors have stopped stands somewhere on the way.
-            Err(ArmError::NotReached { .. }) => self.arm.joints()?,
+        let (reached, halted, fault) = match ordered {
+            Ok(joints) => (joints, false, None),
+            Err(ArmError::ProximityStop { joints, .. }) => (joints, true, None),
+            // An arm that something else has stopped stands somewhere on the way; its sensors may say what.
+            Err(error @ ArmError::NotReached { .. }) => (self.arm.joints()?, false, Some(error)),
             Err(error) => return Err(error.into()),
         };
         self.stand_at(reached);
         self.tell(done, None);
-        let near = self.proximity.object_near()?;
-        if !near {
-            if let (true, Err(error)) = (stopped_short, ordered) {
-                return Err(error.into());
-            }
-            self.check_reached(&target)?;
-            return Ok(Went::There);
+        if self.too_near(halted)? {
+            self.take_back(from)?;
+            return Ok(Went::Back);
         }
-        self.arm.stop()?;
-        self.tell(EventKind::TooNear, None);
-        self.take_back(from)?;
-        Ok(Went::Back)
+        match fault {
+            Some(error) => Err(error.into()),
+            None => self.check_reached(&target).map(|()| Went::There),
+        }
     }
 
-    /// Goes back the way the arm came.
+    /// Whether something is too near to the hand: the arm has been halted by its own guard, or is stopped now.
+    fn too_near(&mut self, halted: bool) -> Result<bool, AgentError> {
+        if !halted {
+            if !self.proximity.object_near()? {
+                return Ok(false);
+            }
+            self.arm.stop()?;
+        }
+        self.tell(EventKind::TooNear, None);
+        Ok(true)
+    }
+
+    /// Goes back the way the arm came. Where that is barred too, the arm stands where it is.
     fn take_back(&mut self, from: Joints) -> Result<(), AgentError> {
-        let reached = self.arm.move_to(from)?;
+        let (reached, halted) = match self.arm.move_to(from) {
+            Ok(joints) => (joints, false),
+            Err(ArmError::ProximityStop { joints, .. }) => (joints, true),
+            Err(error) => return Err(error.into()),
+        };
         self.stand_at(reached);
         self.tell(EventKind::TakenBack, None);
+        if self.too_near(halted)? {
+            return Ok(());
+        }
         self.check_reached(&from)
     }
 
@@ -329,33 +342,29 @@ impl<'a> Run<'a> {
         for _ in 0..self.config.looks {
             let Look { frame, ball } = self.eye.look()?;
             let ball = ball.filter(is_finite);
+            let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
+            self.tell(kind, frame.as_ref());
+            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
+                self.tell(EventKind::SameFrame, None);
+            }
+            if self.watch.same() >= self.config.same_frames {
+                return Err(self.frozen());
+            }
             if let Some(sighting) = ball {
-                self.tell(EventKind::Seen(sighting), frame.as_ref());
-                self.check_alive(&sighting)?;
+                self.wandered |= self
+                    .last_seen
+                    .is_some_and(|last| !is_same_place(&last, &sighting));
                 self.last_seen = Some(sighting);
                 return Ok(Some(sighting));
             }
-            self.tell(EventKind::NotSeen, frame.as_ref());
         }
         Ok(None)
     }
 
-    /// A ball that stays at exactly the same place while the camera moves is an old frame.
-    fn check_alive(&mut self, sighting: &Sighting) -> Result<(), AgentError> {
-        const A_MOVE: f64 = 0.002;
-        let moved = (0..3).any(|i| (self.joints.0[i] - self.looked_from.0[i]).abs() > A_MOVE);
-        if !moved {
-            return Ok(());
+    fn frozen(&self) -> AgentError {
+        AgentError::FrozenCamera {
+            looks: self.watch.same() + 1,
         }
-        self.looked_from = self.joints;
-        let same = self
-            .last_seen
-            .is_some_and(|last| last.features == sighting.features);
-        self.same = if same { self.same + 1 } else { 0 };
-        if self.same >= self.config.same_frames {
-            return Err(AgentError::FrozenCamera { looks: self.same + 1 });
-        }
-        Ok(())
     }
 
     fn tell(&mut self, kind: EventKind, frame: Option<&GrayImage>) {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::directions::code;
-use super::polar::LANES;
+use super::polar::{LANES, whole};
 use crate::edges::Candidate;
 
 /// Set in the mark of a pixel with an edge.
@@ -33,6 +33,8 @@ pub(super) struct Level {
     pub(super) columns: Lines,
     /// Which points no circle explains so far.
     pub(super) free: Vec<bool>,
+    /// How steep the edge is at each point.
+    strength: Vec<f32>,
     /// For each pixel: 0 where no edge is within a pixel, else [`EDGE`] and the code of the edge's normal.
     near: Vec<u8>,
     /// Where `near` is not 0: which point it is.
@@ -50,6 +52,8 @@ impl Level {
         self.free.clear();
         self.free.resize(candidates.len(), true);
 
+        self.strength.clear();
+
         let rows = &mut self.rows;
         rows.resize(candidates.len());
         rows.starts.clear();
@@ -60,7 +64,9 @@ impl Level {
                 rows.starts.push(id);
             }
             let (gx, gy, dx, dy) = candidate.gradient.level_geometry();
-            let unit = 1.0 / (gx * gx + gy * gy).sqrt().max(1e-20);
+            let strength = (gx * gx + gy * gy).sqrt();
+            self.strength.push(strength);
+            let unit = 1.0 / strength.max(1e-20);
             rows.x[index] = px as f32 + dx;
             rows.y[index] = py as f32 + dy;
             rows.nx[index] = gx * unit;
@@ -87,9 +93,9 @@ impl Level {
     /// The mark of the pixel, or None outside.
     #[inline]
     pub(super) fn mark(&self, x: f32, y: f32) -> Option<(u8, usize)> {
-        // Casts of what lies outside saturate at either end.
-        let (column, row) = ((x + 0.5) as i32 as usize, (y + 0.5) as i32 as usize);
-        if x < -0.5 || y < -0.5 || column >= self.width || row >= self.height {
+        // Numbers below 0 become very large ones.
+        let (column, row) = (whole(x).0 as usize, whole(y).0 as usize);
+        if column >= self.width || row >= self.height {
             return None;
         }
         let pixel = row * self.width + column;
@@ -107,6 +113,12 @@ impl Level {
     pub(super) fn point_at(&self, pixel: usize) -> (f32, f32) {
         let id = self.nearest[pixel] as usize;
         (self.rows.x[id], self.rows.y[id])
+    }
+
+    /// How steep the edge is at the point that a mark stands for.
+    #[inline(always)]
+    pub(super) fn strength_at(&self, pixel: usize) -> f32 {
+        self.strength[self.nearest[pixel] as usize]
     }
 
     /// Takes the point that a mark stands for out of the search.

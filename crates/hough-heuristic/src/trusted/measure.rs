@@ -44,6 +44,17 @@ impl Measured {
         );
     }
 
+    /// The same in a frame whose pixels are `factor` times as small.
+    pub(super) fn grown(&self, factor: f32) -> Self {
+        Self {
+            ring: self.ring.grown(factor),
+            centre_error: self.centre_error * factor,
+            radius_error: self.radius_error * factor,
+            cos2: self.cos2 * factor,
+            sin2: self.sin2 * factor,
+        }
+    }
+
     /// Shortest by longest diameter.
     pub(super) fn axis_ratio(&self) -> f32 {
         let flattening = (self.cos2 * self.cos2 + self.sin2 * self.sin2).sqrt() / self.ring.r;
@@ -102,7 +113,7 @@ pub(super) fn measure<'a>(
         let count = rays.x.len();
         let arc = measured.ring.r * std::f32::consts::TAU / count as f32;
         // Averaged along the outline over a length that grows with the noise.
-        let length = (0.35 * noise).clamp(1.0, (0.3 * measured.ring.r).max(1.0));
+        let length = noise.clamp(1.0, (0.3 * measured.ring.r).max(1.0));
         let half = ((0.5 * length / arc) as usize).min(8);
         let rounds = if last { ROUNDS } else { 1 };
         for round in 0..rounds {
@@ -115,7 +126,14 @@ pub(super) fn measure<'a>(
                 half,
             );
             let focus = if round == 0 { 4.0 } else { 2.5 };
-            let steepest = Steepest::on(polar, focus);
+            let final_round = last && round + 1 == rounds;
+            // What noise makes of the slope; while the outline is being sought, the steep parts of it lead.
+            let doubtful = if final_round {
+                2.0 * noise / ((2 * half + 1) as f32).sqrt()
+            } else {
+                f32::INFINITY
+            };
+            let steepest = Steepest::on(polar, focus, doubtful);
             let step = steepest.fit(rays.x, rays.y, focus)?;
             measured.ring.x += step.x;
             measured.ring.y += step.y;
@@ -123,7 +141,7 @@ pub(super) fn measure<'a>(
             if !(step.x.abs() + step.y.abs() + step.r.abs() < 6.0 && measured.ring.r > 2.0) {
                 return None;
             }
-            if last && round + 1 == rounds {
+            if final_round {
                 steepest.errors(
                     rays.x,
                     rays.y,
@@ -227,9 +245,19 @@ fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     Some(width * excess.clamp(0.0, 0.5))
 }
 
+/// The weight of a slope: its square where that is below what is doubtful, itself where it is far above.
+#[inline(always)]
+fn weight_of(slope: f32, doubtful: f32) -> f32 {
+    if doubtful.is_finite() {
+        slope * slope / (slope + doubtful)
+    } else {
+        slope * slope
+    }
+}
+
 impl Steepest {
     #[inline(always)]
-    fn on(polar: &Polar, focus: f32) -> Self {
+    fn on(polar: &Polar, focus: f32, doubtful: f32) -> Self {
         let count = polar.rays;
         let mut steepest = Self {
             distance: [0.0; MOST],
@@ -259,7 +287,11 @@ impl Steepest {
                 }
             }
             steepest.distance[ray] = polar.distance(place);
-            steepest.weight[ray] = if best > 0.0 { here.min(30.0) } else { 0.0 };
+            steepest.weight[ray] = if best > 0.0 {
+                weight_of(here.min(60.0), doubtful)
+            } else {
+                0.0
+            };
         }
         steepest
     }
