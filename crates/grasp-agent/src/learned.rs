@@ -136,6 +136,10 @@ impl Controller for Learned {
     }
 
     fn judge(&mut self, consequence: &Consequence) {
+        if *consequence == Consequence::Missed {
+            // No action of theirs has come to this.
+            return;
+        }
         for half in [&mut self.centering, &mut self.approaching] {
             if let Some((settings, _)) = &self.learning {
                 half.learn(settings, consequence);
@@ -222,6 +226,7 @@ impl Half {
         let value = match consequence {
             Consequence::Seen(now) => self.worth(settings.gamma, &before, &now.percept()),
             Consequence::Lost | Consequence::TakenBack => Some(self.behaviour.spec().reward.lost),
+            Consequence::Missed => None,
         };
         let Some(value) = value else { return };
         let old = self.behaviour.table().value(state, action);
