@@ -205,7 +205,12 @@ impl Chain<'_> {
             let learned = agent.controller().inner.belief();
             learned.save(&options.out.join("camera.belief"))?;
             let Some(number) = counted else {
-                end?;
+                if let Err(error) = end {
+                    let file = options.out.join("teaching.json");
+                    write_whole(&file, &serde_json::to_vec_pretty(&log)?)?;
+                    let file = file.display();
+                    return Err(format!("teaching was broken off: {error}; events: {file}").into());
+                }
                 continue;
             };
             let (contacts, holds) = (rig.contacts(), rig.holds_ball());
