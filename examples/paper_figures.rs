@@ -87,7 +87,8 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     let starts = search_starts(400, 1);
     let optimum = starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
     println!(
-        "approaching from 400 search starts, breadth-first optimum {optimum:.2} steps; kappa {}",
+        "Figure 6: approaching, learned with each simulator and reward, then tried in the exact plane from 400 starts of the search \
+         (breadth-first optimum {optimum:.2} steps, loop breaker {}); without search and recovery, so that a ball once lost stays lost",
         Learned::APPROACHING_KAPPA
     );
     println!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
@@ -211,8 +212,9 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
     for (figure, pushes, runs) in [(7, 0, 60), (8, 3, 3)] {
         for run in 0..runs {
             let mut agent = Agent::with_controller(config.clone(), taught.clone())?;
-            let (mut done, mut path, mut gripped) = (0, Vec::new(), false);
-            let mut looked = None;
+            // What was seen before each move; of several looks the last one.
+            let (mut done, mut path, mut looked_at) = (0, Vec::new(), None);
+            let mut gripped = false;
             let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
                 let there = cell.features(joints).is_some_and(|f| {
                     (99.0..=108.0).contains(&f.x)
@@ -228,22 +230,19 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                 if let EventKind::Seen(sighting) = event.kind
                     && !gripped
                 {
-                    // A second look from the same place is no step.
-                    if looked.replace(event.joints) == Some(event.joints) {
-                        return;
+                    if looked_at.replace(event.cycle) == Some(event.cycle) {
+                        path.pop();
                     }
-                    let (f, theta3) = (sighting.features, grasp_agent::theta3(&event.joints));
-                    let _ = writeln!(
-                        csv,
-                        "{figure},{run},{},{:.2},{:.2},{:.2},{theta3:.2}",
-                        path.len(),
-                        f.x,
-                        f.y,
-                        f.r
-                    );
-                    path.push((f, theta3));
+                    path.push((sighting.features, grasp_agent::theta3(&event.joints)));
                 }
             })?;
+            for (step, (f, theta3)) in path.iter().enumerate() {
+                let _ = writeln!(
+                    csv,
+                    "{figure},{run},{step},{:.2},{:.2},{:.2},{theta3:.2}",
+                    f.x, f.y, f.r
+                );
+            }
             if figure == 7 {
                 reach.push(path);
             } else {

@@ -62,11 +62,11 @@ impl Learned {
     }
 
     /// The same with another loop breaker: what choosing an action again in the same state costs, see
-    /// [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a number above zero counts as 0.
+    /// [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a finite number above zero counts as 0.
     #[must_use]
     pub fn with_kappa(mut self, centering: f64, approaching: f64) -> Self {
-        self.centering.kappa = centering.max(0.0);
-        self.approaching.kappa = approaching.max(0.0);
+        let sound = |kappa: f64| if kappa.is_finite() { kappa.max(0.0) } else { 0.0 };
+        (self.centering.kappa, self.approaching.kappa) = (sound(centering), sound(approaching));
         self
     }
 
