@@ -213,8 +213,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         for run in 0..runs {
             let mut agent = Agent::with_controller(config.clone(), taught.clone())?;
             // What was seen before each move; of several looks the last one.
-            let (mut done, mut path, mut looked_at) = (0, Vec::new(), None);
-            let mut gripped = false;
+            let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
             let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
                 let there = cell.features(joints).is_some_and(|f| {
                     (99.0..=108.0).contains(&f.x)
