@@ -132,9 +132,11 @@ fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
         assert!(rig.holds_ball() && agent.controller().taken_back > 0);
         // It was stopped on the way, and not at its end.
         let halted = &log.events[near];
-        let EventKind::Moved(ordered) = log.events[near - 1].kind else {
-            panic!("{words:?}")
+        let ordered = match log.events[near - 1].kind {
+            EventKind::Moved(delta) => Some(delta),
+            _ => None,
         };
+        let ordered = ordered.expect("a move");
         let from = log.events[near + 1].joints;
         let went = (halted.joints.0[4] - from.0[4]) / ordered.0[4];
         assert!((0.0..0.95).contains(&went), "{went}");
