@@ -25,11 +25,13 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use files::{writable_folder, write_whole};
+use program::ended;
 use table::{Row, Tally};
 use world::World;
 
 #[allow(dead_code, reason = "shared with the examples that write pictures")]
 mod files;
+mod program;
 #[path = "compare_controllers/table.rs"]
 mod table;
 #[path = "compare_controllers/world.rs"]
@@ -89,13 +91,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -118,7 +114,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             let errors = seed_of(options.seed, &[1, draw]);
             let new_world = || {
                 if options.full_chain {
-                    World::chain(*level, errors, options.detector)
+                    World::chain(*level, errors, options.detector, options.grip)
                 } else {
                     World::shortcut(*level, errors, options.grip)
                 }
@@ -157,6 +153,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     };
                     let success = if options.grip { trial.held } else { trial.reached };
                     tally.add(success, &trial.outcome);
+                    tally.collisions += trial.collisions;
                     if !success {
                         failures.keep(&run_of(format!("ball {start}")), &log)?;
                     }

@@ -34,6 +34,7 @@ use rand::{Rng, SeedableRng};
 
 use files::{writable_folder, write_png, write_whole};
 use options::{FormName, Options, RewardName};
+use program::ended;
 use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
 use stages::{Stages, Timed};
@@ -45,6 +46,7 @@ mod options;
 mod overlay;
 #[path = "grasp/plots.rs"]
 mod plots;
+mod program;
 #[path = "grasp/record.rs"]
 mod record;
 #[path = "grasp/results.rs"]
@@ -63,13 +65,7 @@ const ACTIONS_FINE: u64 = 4_000_000;
 const TRIALS: usize = 500;
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -125,14 +121,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         ..AgentConfig::paper(workspace.search_poses())
     };
     let stages = Stages::default();
-    let learned = Timed {
-        inner: if options.keep_learning {
-            taught.learned.learning(OnlineLearning::careful(options.seed))
-        } else {
-            taught.learned
-        },
-        stages: stages.clone(),
-    };
+    let learned = stages.around(if options.keep_learning {
+        taught.learned.learning(OnlineLearning::careful(options.seed))
+    } else {
+        taught.learned
+    });
     let mut agent = Agent::with_controller(config, learned)?;
     let mut records = Vec::new();
     let mut sheet = ContactSheet::default();
@@ -378,20 +371,8 @@ fn reach_for(
         arm,
         mut sensor,
     } = rig.parts();
-    let (mut camera, mut arm, mut detector) = (
-        Timed {
-            inner: camera,
-            stages: stages.clone(),
-        },
-        Timed {
-            inner: arm,
-            stages: stages.clone(),
-        },
-        Timed {
-            inner: detector,
-            stages: stages.clone(),
-        },
-    );
+    let (mut camera, mut arm, mut detector) =
+        (stages.around(camera), stages.around(arm), stages.around(detector));
     let mut written = Ok(());
     let mut eye = CameraEye::new(&mut camera, &mut detector);
     let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {

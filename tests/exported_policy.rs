@@ -18,7 +18,7 @@ fn learned() -> Learned {
     let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
     let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
     let quiet = &mut |_: &qtable::Progress| ();
-    let anywhere: Vec<_> = (0..200).map(|_| simulator.start(&mut rng)).collect();
+    let anywhere: Vec<_> = (0..500).map(|_| simulator.start(&mut rng)).collect();
     let centering = learn_best(
         BehaviourSpec::centering(),
         &simulator,
@@ -27,12 +27,12 @@ fn learned() -> Learned {
         &mut rng,
         quiet,
     );
-    let trials = search_percepts(200, 1);
+    let trials = search_percepts(500, 1);
     let approaching = learn_best(
         BehaviourSpec::approaching(),
         &simulator,
         &trials,
-        300_000,
+        500_000,
         &mut rng,
         quiet,
     );
@@ -76,12 +76,12 @@ fn another_program_reaches_the_balls_with_an_exported_policy() {
     let Some((reached, moves)) = by_the_script(&policy) else {
         return;
     };
-    assert!(reached >= 197, "{reached} of 200");
-
     let cell = TrialCell::draw(ErrorLevel::None, 0)
         .expect("a camera")
         .without_bodies();
-    let config = AgentConfig::paper(Workspace::paper().search_poses());
+    let mut config = AgentConfig::paper(Workspace::paper().search_poses());
+    // What the hand touches nothing with it cannot lift.
+    config.lift = None;
     let mut agent = Agent::with_controller(config, learned).expect("valid settings");
     let (mut here, mut cycles) = (0, 0);
     for seed in 0..200 {
@@ -93,12 +93,12 @@ fn another_program_reaches_the_balls_with_an_exported_policy() {
         }
     }
     let here_moves = f64::from(cycles as u32) / f64::from(here);
+    println!("reached {reached} of 200 in {moves} moves there, {here} in {here_moves:.2} here");
     // The balls are others: 200 of them scatter the mean by about half a move.
     assert!(
-        here >= 197 && (moves - here_moves).abs() < 2.0,
+        reached >= 190 && here >= 190 && (moves - here_moves).abs() < 1.5,
         "{reached} in {moves} there, {here} in {here_moves} here"
     );
-    println!("reached {reached} of 200 in {moves} moves there, {here} in {here_moves:.2} here");
 
     // Its parts matter: without loop breakers, or with the actions counted the other way round, the same table does worse.
     let endless = policy

@@ -1,5 +1,6 @@
 //! The controller around the controller: search, reach, recover, grip, supervision, as one explicit state machine.
 
+use hough_heuristic::image::GrayImage;
 use puma_val2::{Joints, Manipulator, ProximitySensor};
 
 use crate::run::Run;
@@ -72,6 +73,12 @@ impl<C: Controller> Agent<C> {
     /// The controller, with what it has learned so far.
     pub fn into_controller(self) -> C {
         self.controller
+    }
+
+    /// The same, as if the frame seen last had been `frame`: for a replay, which has no frames.
+    pub(crate) fn having_seen(mut self, frame: GrayImage) -> Self {
+        self.watch.pretend(frame);
+        self
     }
 
     /// Searches the ball, reaches it and closes the gripper on it; what the controller learns on the way is kept.

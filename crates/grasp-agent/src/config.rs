@@ -29,9 +29,10 @@ pub struct AgentConfig {
     pub looks: usize,
     /// How fast the hand may come nearer to the ball.
     pub approach: ApproachLimit,
-    /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still where it was; then it is
-    /// lifted by this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. A ball that is seen is not in the jaws, and is reached
-    /// for again; a hand that is stopped has not succeeded. `None`: closing the jaws at the goal is success, whatever is between them.
+    /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still there; then it is lifted by
+    /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that keeps its place in the image as the hand goes up is
+    /// in the jaws. A ball that is not is reached for again; a hand that is stopped has not succeeded. `None`: closing the jaws at the goal is
+    /// success, whatever is between them.
     pub lift: Option<JointDelta>,
     /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
     /// end of what the ball stood on for example.

@@ -24,23 +24,35 @@ enum Shown {
 }
 
 impl Watch {
-    /// Takes down a look from the pose `joints`. Two frames are the same when all their pixels are, which the noise of a camera prevents; of an
+    /// Takes down a look from the pose `joints`, and tells whether it showed the same as the one before from another pose. Two frames are the same when all their pixels are, which the noise of a camera prevents; of an
     /// eye without frames, two sightings are when the ball is at exactly the same place.
-    pub(crate) fn looked(&mut self, joints: &Joints, frame: Option<GrayImage>, ball: Option<&Sighting>) {
+    pub(crate) fn looked(
+        &mut self,
+        joints: &Joints,
+        frame: Option<GrayImage>,
+        ball: Option<&Sighting>,
+    ) -> bool {
         /// Least turn of one of the first three joints that changes what is seen, radians.
         const A_MOVE: f64 = 0.002;
         let shown = match (frame, ball) {
-            (Some(frame), _) => Shown::Frame(frame),
-            (None, Some(sighting)) => Shown::Ball(sighting.features),
-            // Nothing seen without a frame says nothing.
-            (None, None) => return,
+            (Some(frame), _) => Some(Shown::Frame(frame)),
+            (None, Some(sighting)) => Some(Shown::Ball(sighting.features)),
+            // What is not seen can be anything.
+            (None, None) => None,
         };
-        if (0..3).any(|i| (joints.0[i] - self.from.0[i]).abs() > A_MOVE) {
-            let same = self.shown.as_ref() == Some(&shown);
+        let moved = (0..3).any(|i| (joints.0[i] - self.from.0[i]).abs() > A_MOVE);
+        let same = moved && shown.is_some() && shown == self.shown;
+        if moved {
             self.same = if same { self.same + 1 } else { 0 };
         }
         self.from = *joints;
-        self.shown = Some(shown);
+        self.shown = shown;
+        same
+    }
+
+    /// As if what was shown last had been `frame`, if anything was.
+    pub(crate) fn pretend(&mut self, frame: GrayImage) {
+        self.shown = self.shown.take().map(|_| Shown::Frame(frame));
     }
 
     /// How many looks in a row, each from another pose than the one before, have shown the same as that.
@@ -93,11 +105,14 @@ mod tests {
         let mut watch = Watch::default();
         watch.looked(&at(10.0), None, Some(&ball(50.0)));
         watch.looked(&at(20.0), None, Some(&ball(50.0)));
-        // Looks that show nothing say nothing.
-        watch.looked(&at(30.0), None, None);
-        watch.looked(&at(40.0), None, Some(&ball(50.0)));
+        watch.looked(&at(30.0), None, Some(&ball(50.0)));
         assert_eq!(watch.same(), 2);
-        watch.looked(&at(50.0), None, Some(&ball(51.0)));
+        watch.looked(&at(40.0), None, Some(&ball(51.0)));
+        assert_eq!(watch.same(), 0);
+        // In between it was gone, so it is not an old picture.
+        watch.looked(&at(50.0), None, None);
+        watch.looked(&at(60.0), None, None);
+        watch.looked(&at(70.0), None, Some(&ball(51.0)));
         assert_eq!(watch.same(), 0);
     }
 }

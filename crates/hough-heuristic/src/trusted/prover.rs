@@ -16,6 +16,9 @@ const SMALL: f32 = 9.0;
 /// What noise that is, grey levels.
 const NOISY: f32 = 8.0;
 
+/// What a second look takes from the certainty.
+const SECOND_LOOK: f32 = 1.0;
+
 /// The frame and its halves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pyramid<'a> {
@@ -79,9 +82,24 @@ impl Prover<'_> {
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
             *looks += PROOF;
-            let proof = self.prove_at(depth, candidate);
+            let proof = self.prove_at(depth, &candidate.ring());
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
+            }
+        }
+        // A short arc is told from chance where it is sharp: at twice the size, from where the first look led.
+        if let Some(first) = best
+            && finest == coarsest
+            && coarsest > 0
+            && first.certainty >= 0.0
+            && !first.is_beyond_doubt()
+        {
+            *looks += PROOF;
+            if let Some(mut second) = self.prove_at(coarsest - 1, &first.in_frame()) {
+                second.certainty -= SECOND_LOOK;
+                if second.certainty > first.certainty {
+                    best = Some(second);
+                }
             }
         }
         let best = best?;
@@ -89,14 +107,14 @@ impl Prover<'_> {
         best.is_beyond_doubt().then(|| best.in_frame())
     }
 
-    /// The proof in the frame that was halved so many times.
-    fn prove_at(&mut self, depth: usize, candidate: &Candidate) -> Option<Proof> {
+    /// The proof of a circle in pixels of the frame, in the frame that was halved so many times.
+    fn prove_at(&mut self, depth: usize, ring: &Ring) -> Option<Proof> {
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),
             circle: self.circle,
             polar: self.polar,
-            start: candidate.ring().shrunk(scale),
+            start: ring.shrunk(scale),
             setting: Setting {
                 noise: self.noise / scale + 0.3,
                 // Each size has a quarter of the places that the next larger one has.

@@ -15,7 +15,9 @@ pub(super) const DIRECTION_SLACK: u8 = 7;
 /// The least part of a normal along the line that the pair lies on.
 const LEAST_ALONG: f32 = 0.58;
 /// Of the outline so much is to lie on edges for a circle to be worth a proof: of those that prove to be circles 99 in 100 have it.
-const LEAST_SHARE: f32 = 0.5;
+const LEAST_SHARE: f32 = 0.44;
+/// The share of the outline that must lie on edges at the first look: of a ball hidden by two fifths little more is to be seen.
+const FIRST_SHARE: f32 = 0.44;
 /// How many mirrored partners of a point are tried.
 const PARTNERS: usize = 6;
 
@@ -290,7 +292,7 @@ impl Search<'_> {
         budget: &mut Budget,
     ) -> bool {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, 0.5, &mut budget.looks) else {
+        let Some(_) = self.outline.support(level, &ring, FIRST_SHARE, &mut budget.looks) else {
             return false;
         };
         // The same circle is met again and again; a few fits from different pairs are enough.
