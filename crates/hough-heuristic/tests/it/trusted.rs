@@ -9,7 +9,7 @@ use hough_heuristic::{
 };
 use proptest::prelude::*;
 use rand::rngs::Xoshiro256PlusPlus;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{Rng, SeedableRng};
 
 use crate::patterns::patterns;
 use crate::scenes::{Scene, same};
@@ -396,9 +396,10 @@ fn detections_are_the_golden_ones() {
     ];
     let mut frames: Vec<_> = scenes
         .iter()
-        .map(|(name, scene)| (*name, scene.render().0))
+        .map(|(name, scene)| ((*name).to_owned(), scene.render().0))
         .collect();
-    frames.extend(adversarial(200, 160));
+    let discs = |(name, _): &(String, GrayImage)| name == "grid-of-discs-24";
+    frames.extend(patterns(200, 160).into_iter().filter(discs));
     for (name, frame) in &frames {
         for found in plain().detect(frame) {
             let Circle { x, y, radius } = found.circle;
