@@ -9,6 +9,8 @@
 
 #![allow(clippy::print_stderr, reason = "what an example is for")]
 
+#[path = "../scenes/patterns.rs"]
+mod patterns;
 #[path = "../scenes/scenes.rs"]
 mod scenes;
 #[path = "../scenes/simple.rs"]
@@ -22,7 +24,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use hough_heuristic::Circle;
-use hough_heuristic::image::ImageFormat;
+use hough_heuristic::image::{GrayImage, ImageFormat};
 
 use simple::{KINDS, Kind};
 
@@ -44,6 +46,9 @@ struct Options {
     /// Kinds of scenes, separated by commas; all unless told otherwise.
     #[arg(long, value_delimiter = ',', value_parser = kind)]
     kinds: Vec<Kind>,
+    /// Instead patterns that wear out detectors, one frame each: noise, texture, stripes, rings, which hold no circle that counts.
+    #[arg(long)]
+    patterns: bool,
 }
 
 fn main() -> ExitCode {
@@ -65,22 +70,34 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     } else {
         &options.kinds
     };
-    for kind in kinds {
+    for kind in kinds.iter().filter(|_| !options.patterns) {
         for number in 0..options.frames {
             let (frame, balls) = kind.render(options.size, options.seed, number);
             let file = format!("{}_{number:03}.png", kind.name);
-            let mut png = Cursor::new(Vec::new());
-            frame.write_to(&mut png, ImageFormat::Png)?;
-            save(&options.out.join(&file), png.get_ref())?;
+            save_png(&options.out.join(&file), &frame)?;
             writeln!(frames, "{file},{}", kind.name)?;
             for Circle { x, y, radius } in balls {
                 writeln!(truth, "{file},{x:.4},{y:.4},{radius:.4}")?;
             }
         }
     }
+    if options.patterns {
+        let (width, height) = options.size;
+        for (name, frame) in patterns::patterns(width, height) {
+            let file = format!("{name}.png");
+            save_png(&options.out.join(&file), &frame)?;
+            writeln!(frames, "{file},patterns")?;
+        }
+    }
     save(&options.out.join("truth.csv"), truth.as_bytes())?;
     save(&options.out.join("frames.csv"), frames.as_bytes())?;
     Ok(())
+}
+
+fn save_png(path: &Path, frame: &GrayImage) -> Result<(), Box<dyn Error>> {
+    let mut png = Cursor::new(Vec::new());
+    frame.write_to(&mut png, ImageFormat::Png)?;
+    Ok(save(path, png.get_ref())?)
 }
 
 /// Width and height, as in `768x576`.

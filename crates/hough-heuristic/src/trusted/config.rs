@@ -22,7 +22,7 @@ pub struct TrustedConfig {
     pub min_score: f64,
     /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower finds fainter circles and takes longer; noise raises it.
     pub contrast: f64,
-    /// How many pairs may be drawn, for each million pixels of the frame (default 40000; at least 1), a frame below a quarter of a million counting as
+    /// How many pairs may be drawn, for each million pixels of the frame (default 50000; at least 1), a frame below a quarter of a million counting as
     /// one. Sixteen looks go with each draw and bound all of the work that depends on what the frame shows. Less leaves out circles amid dense texture, more
     /// finds little.
     pub draws_per_megapixel: u32,
@@ -43,7 +43,7 @@ impl Default for TrustedConfig {
             max_circles: 32,
             min_score: 0.5,
             contrast: 8.0,
-            draws_per_megapixel: 40_000,
+            draws_per_megapixel: 50_000,
             milliseconds_per_megapixel: None,
             region: None,
             seed: 1,

@@ -5,6 +5,8 @@
     reason = "a test may fail that way, also in a function that several tests share"
 )]
 
+#[path = "../../scenes/patterns.rs"]
+mod patterns;
 #[path = "../../scenes/scenes.rs"]
 mod scenes;
 
