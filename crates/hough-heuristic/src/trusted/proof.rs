@@ -142,7 +142,7 @@ pub(super) fn prove(
     } else {
         0
     };
-    let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
+    let least = (2.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
     let mut ring = start;
     for round in 0..4 {
         let edges = Edges::around(&ring, grey, rays, polar, half, least);

@@ -15,6 +15,8 @@ const SMALL: f32 = 9.0;
 /// What noise that is, grey levels.
 const NOISY: f32 = 8.0;
 
+/// The least radius at which a circle is looked at a second time at half the size, pixels there.
+const LEAST_SECOND: f32 = 8.0;
 /// What a second look takes from the certainty.
 const SECOND_LOOK: f32 = 1.0;
 
@@ -85,17 +87,18 @@ impl Prover<'_> {
                 best = proof;
             }
         }
-        // A short arc is told from chance where it is sharp: at twice the size, from where the first look led.
-        if let Some(first) = best
-            && finest == coarsest
-            && coarsest > 0
-            && first.certainty >= 0.0
-            && !first.is_beyond_doubt()
-            && let Some(mut second) = self.prove_at(coarsest - 1, &first.in_frame())
-        {
-            second.certainty -= SECOND_LOOK;
-            if second.certainty > first.certainty {
-                best = Some(second);
+        // In doubt, the size on either side is asked too: the smaller forgives a smeared outline, and at the larger one a
+        // short arc is sharp enough to be told from chance.
+        if finest == coarsest && best.is_none_or(|first| !first.is_beyond_doubt()) {
+            if coarsest < self.pyramid.depth() && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32 {
+                best = better(best, self.prove_at(coarsest + 1, &candidate.ring()));
+            }
+            if coarsest > 0
+                && let Some(first) = best
+                && first.depth == coarsest
+                && first.certainty >= 0.0
+            {
+                best = better(best, self.prove_at(coarsest - 1, &first.in_frame()));
             }
         }
         let best = best?;
@@ -130,6 +133,18 @@ impl Prover<'_> {
             r *= 0.5;
         }
         depth
+    }
+}
+
+/// The better of two proofs, of which the second one has its price.
+fn better(first: Option<Proof>, second: Option<Proof>) -> Option<Proof> {
+    let second = second.map(|proof| Proof {
+        certainty: proof.certainty - SECOND_LOOK,
+        ..proof
+    });
+    match (first, second) {
+        (Some(first), Some(second)) if first.certainty >= second.certainty => Some(first),
+        (first, second) => second.or(first),
     }
 }
 
