@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{Agent, AgentConfig, BehaviourPair, EventKind, Learned, Percept, YGoal};
+use grasp_agent::{Agent, BehaviourPair, EventKind, Learned, Percept, YGoal};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{
     ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn_best, score, search_percepts, search_starts,
@@ -29,6 +29,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use cpu::cpu_time;
 use files::{writable_folder, write_png, write_whole};
 use plot::{Panel, drawn};
+use program::ended;
 
 mod cpu;
 mod files;
@@ -37,6 +38,7 @@ mod on_the_arm;
 mod overlay;
 #[path = "paper_figures/plot.rs"]
 mod plot;
+mod program;
 #[path = "paper_figures/snapshots.rs"]
 mod snapshots;
 
@@ -62,13 +64,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -208,7 +204,7 @@ fn scored(lesson: &Result<Lesson, LearnError>, starts: &[puma_grasp::PlaneStart]
 /// Features per step while reaching, by distance and elbow, and while the ball is pushed away again and again.
 fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Error>> {
     let cell = TrialCell::draw(ErrorLevel::None, 0)?;
-    let mut config = AgentConfig::paper(cell.search_poses());
+    let mut config = cell.agent_config();
     config.max_cycles = 120;
     let mut csv = String::from("figure,run,step,x,y,r,theta3\n");
     let (mut reach, mut track) = (Vec::new(), Vec::new());

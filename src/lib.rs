@@ -33,9 +33,11 @@
 //! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example `grasp`:
 //! `cargo run --release --example grasp`.
 
+mod guarded_arm;
 mod plane;
 mod rig;
 mod setup;
+mod surroundings;
 mod training;
 mod trial;
 
@@ -48,6 +50,7 @@ pub use qtable;
 pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts};
 pub use rig::{Rig, RigError, RigParts};
 pub use setup::{BallDetector, UnknownDetector, bright_ball_scene};
+pub use surroundings::Contacts;
 pub use training::{LearnError, Lesson, Simulator, learn, learn_best, schedule};
 pub use trial::{FeatureEye, TrialCell, TrialResult};
 

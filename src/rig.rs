@@ -9,21 +9,28 @@ use hough_heuristic::{CircleDetector, FrameSource};
 use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
+use puma_val2::nalgebra::Point3;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, MoveWay, Profile,
-    ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, Profile, ProximitySensor,
+    PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
+use crate::Contacts;
+use crate::guarded_arm::GuardedArm;
+use crate::surroundings::Surroundings;
+
 /// An arm behind a VAL II controller, calibrated, with a simulated cell around it: a ball to place, a camera on the hand whose
-/// frames are rendered from where the arm stands, and proximity sensors.
+/// frames are rendered from where the arm stands, proximity sensors, and a gripper that holds the ball or misses it.
 ///
-/// With [`Rig::emulated`] the controller is emulated here and the camera follows the emulated arm itself. With [`Rig::on_port`] and
-/// [`Rig::on_socket`] it is somebody else's, and the camera follows what that controller reports.
+/// With [`Rig::emulated`] the controller is emulated here; camera, sensors and ball follow the emulated arm itself, on its way too, and the
+/// sensors are wired to the controller, which stops the arm. With [`Rig::on_port`] and [`Rig::on_socket`] it is somebody else's, and the cell
+/// follows what that controller reports at the end of each move; its moves are guarded by its own sensors' input.
 pub struct Rig {
     name: String,
     arm: Box<dyn Manipulator>,
     pose: Pose,
     cell: SharedCell,
+    surroundings: Surroundings,
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
 }
 
@@ -45,7 +52,15 @@ impl Rig {
     /// # Errors
     /// The system has no line to spare, or the emulator cannot be reached through it.
     pub fn emulated(realtime: bool, scene: &Scene, seed: u64) -> Result<Self, RigError> {
-        let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+        let (cell, client_config) = (paper_cell(), ClientConfig::for_emulator());
+        let surroundings = Surroundings::new(cell.clone());
+        let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+        let around = surroundings.clone();
+        emulator
+            .attach_sensor(client_config.proximity_signal, move |joints| {
+                around.hand_at(joints)
+            })
+            .map_err(|fault| RigError::Serve(io::Error::other(fault.to_string())))?;
         let config = ServeConfig {
             realtime,
             ..ServeConfig::default()
@@ -64,13 +79,20 @@ impl Rig {
             (server, line)
         };
         let name = line.name().to_owned();
-        let arm = connect(line, ClientConfig::for_emulator())?;
+        let pose: Pose = Arc::new(move || server.joints());
+        let arm = ArmInCell {
+            arm: connect(line, client_config)?,
+            surroundings: surroundings.clone(),
+            pose: Arc::clone(&pose),
+            reported: None,
+        };
         Ok(Self::assemble(
             name,
             Box::new(arm),
-            Arc::new(move || server.joints()),
-            scene,
-            seed,
+            pose,
+            surroundings,
+            cell,
+            (scene, seed),
         ))
     }
 
@@ -93,12 +115,39 @@ impl Rig {
 
     fn elsewhere<T: Transport + 'static>(line: T, scene: &Scene, seed: u64) -> Result<Self, RigError> {
         let name = line.name().to_owned();
-        let (arm, pose) = Mirrored::new(connect(line, ClientConfig::default())?)?;
-        Ok(Self::assemble(name, Box::new(arm), pose, scene, seed))
+        let mut arm = connect(line, ClientConfig::default())?;
+        let reported = Arc::new(Mutex::new(arm.joints()?));
+        let pose: Pose = {
+            let reported = Arc::clone(&reported);
+            Arc::new(move || *reported.lock().unwrap_or_else(PoisonError::into_inner))
+        };
+        let cell = paper_cell();
+        let surroundings = Surroundings::new(cell.clone());
+        surroundings.hand_at(&pose());
+        let arm = ArmInCell {
+            arm,
+            surroundings: surroundings.clone(),
+            pose: Arc::clone(&pose),
+            reported: Some(reported),
+        };
+        Ok(Self::assemble(
+            name,
+            Box::new(arm),
+            pose,
+            surroundings,
+            cell,
+            (scene, seed),
+        ))
     }
 
-    fn assemble(name: String, arm: Box<dyn Manipulator>, pose: Pose, scene: &Scene, seed: u64) -> Self {
-        let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)));
+    fn assemble(
+        name: String,
+        arm: Box<dyn Manipulator>,
+        pose: Pose,
+        surroundings: Surroundings,
+        cell: SharedCell,
+        (scene, seed): (&Scene, u64),
+    ) -> Self {
         let look_from: Box<dyn FnMut() -> Joints + Send> = {
             let pose = Arc::clone(&pose);
             Box::new(move || pose())
@@ -109,6 +158,7 @@ impl Rig {
             arm,
             pose,
             cell,
+            surroundings,
             camera,
         }
     }
@@ -123,9 +173,37 @@ impl Rig {
         &self.cell
     }
 
-    /// Puts the ball, on a holder, at another place.
+    /// Puts the ball, on a holder, at another place, out of the jaws if they held it; contacts are counted from here on.
     pub fn place(&mut self, ball: &Ball) {
         self.cell.with(|cell| cell.place_ball(ball.centre));
+        self.surroundings.begin();
+    }
+
+    /// Takes the ball and its holder out of the cell, opens the jaws, and takes the arm to `pose`; then the next ball can be placed.
+    ///
+    /// # Errors
+    /// What kept the arm from getting there.
+    pub fn clear_for(&mut self, pose: Joints) -> Result<(), ArmError> {
+        self.cell.with(|cell| {
+            cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
+            cell.holder = None;
+        });
+        self.arm.set_gripper(Gripper::Open)?;
+        match self.arm.move_to(pose) {
+            // An arm that stood close to what has just been taken away.
+            Err(ArmError::ProximityStop { .. }) => self.arm.move_to(pose).map(drop),
+            outcome => outcome.map(drop),
+        }
+    }
+
+    /// What the hand has done in the cell since the ball was placed.
+    pub fn contacts(&self) -> Contacts {
+        self.surroundings.contacts()
+    }
+
+    /// Whether the ball is in the jaws.
+    pub fn holds_ball(&self) -> bool {
+        self.cell.get().held.is_some()
     }
 
     /// Lets `agent` go for the ball.
@@ -208,17 +286,21 @@ impl std::fmt::Debug for Rig {
     }
 }
 
-/// Gets hold of the monitor and calibrates. Joints are moved one by one with `DRIVE`, as the paper's increments are.
-fn connect<T: Transport>(line: T, config: ClientConfig) -> Result<Val2Client<T>, ArmError> {
+/// The cell that a rig begins with.
+fn paper_cell() -> SharedCell {
+    SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)))
+}
+
+/// Gets hold of the monitor, calibrates, and arms the proximity guard.
+fn connect<T: Transport>(line: T, config: ClientConfig) -> Result<GuardedArm<T>, ArmError> {
     let config = ClientConfig {
-        way: MoveWay::Drive,
         speed_percent: Some(100.0),
         power_retries: 15,
         ..config
     };
     let mut client = Val2Client::connect(line, config)?;
     client.calibrate()?;
-    Ok(client)
+    GuardedArm::new(client)
 }
 
 /// The proximity sensors of a simulated cell.
@@ -234,46 +316,49 @@ impl ProximitySensor for CellSensor {
     }
 }
 
-/// An arm whose last reported joint angles others can read.
-struct Mirrored<M> {
+/// An arm that the cell follows.
+struct ArmInCell<M> {
     arm: M,
-    reported: Arc<Mutex<Joints>>,
+    surroundings: Surroundings,
+    pose: Pose,
+    /// For the cell to know where the arm is, what it reports; `None` where the cell sees it move.
+    reported: Option<Arc<Mutex<Joints>>>,
 }
 
-impl<M: Manipulator> Mirrored<M> {
-    fn new(mut arm: M) -> Result<(Self, Pose), ArmError> {
-        let reported = Arc::new(Mutex::new(arm.joints()?));
-        let pose = {
-            let reported = Arc::clone(&reported);
-            Arc::new(move || *reported.lock().unwrap_or_else(PoisonError::into_inner))
+impl<M: Manipulator> ArmInCell<M> {
+    fn note(&self, outcome: Result<Joints, ArmError>) -> Result<Joints, ArmError> {
+        let stands = match &outcome {
+            Ok(joints) | Err(ArmError::ProximityStop { joints, .. }) => Some(joints),
+            Err(_) => None,
         };
-        Ok((Self { arm, reported }, pose))
-    }
-
-    fn note(&self, joints: Joints) -> Joints {
-        *self.reported.lock().unwrap_or_else(PoisonError::into_inner) = joints;
-        joints
+        if let (Some(reported), Some(joints)) = (&self.reported, stands) {
+            *reported.lock().unwrap_or_else(PoisonError::into_inner) = *joints;
+            self.surroundings.hand_at(joints);
+        }
+        outcome
     }
 }
 
-impl<M: Manipulator> Manipulator for Mirrored<M> {
+impl<M: Manipulator> Manipulator for ArmInCell<M> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        let joints = self.arm.joints()?;
-        Ok(self.note(joints))
+        let joints = self.arm.joints();
+        self.note(joints)
     }
 
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
-        let joints = self.arm.move_by(delta)?;
-        Ok(self.note(joints))
+        let joints = self.arm.move_by(delta);
+        self.note(joints)
     }
 
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let joints = self.arm.move_to(target)?;
-        Ok(self.note(joints))
+        let joints = self.arm.move_to(target);
+        self.note(joints)
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        self.arm.set_gripper(gripper)
+        self.arm.set_gripper(gripper)?;
+        self.surroundings.jaws(gripper, &(self.pose)());
+        Ok(())
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {

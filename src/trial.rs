@@ -1,10 +1,9 @@
 //! Trials on the feature shortcut: one ball in a cell that may be wrong, and an agent that goes for it, without rendering.
 
-use grasp_agent::{Agent, AgentError, Controller, Event, Eye, Look, Outcome, Sighting};
+use grasp_agent::{Agent, AgentConfig, AgentError, Controller, Event, Eye, Look, Outcome, Sighting};
 use hough_heuristic::{Detection, Features, FrameError};
 use pipeline_sim::{
-    Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Grasp, Hand, SharedCell, SimulatedArm,
-    Workspace,
+    Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Hand, SharedCell, SimulatedArm, Workspace,
 };
 use puma_val2::{ArmError, Joints, Manipulator, ProximitySensor};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -46,7 +45,7 @@ pub struct TrialResult {
     pub outcome: Outcome,
     /// Whether the ball stood at the goal.
     pub reached: bool,
-    /// Whether the jaws hold the ball.
+    /// Whether the jaws hold the ball at the end.
     pub held: bool,
     /// From the point between the finger pads to the ball's centre when the jaws closed, metres; `None` if they did not.
     pub miss: Option<f64>,
@@ -113,6 +112,15 @@ impl TrialCell {
         }))
     }
 
+    /// The paper's settings for this cell. A hand without bodies cannot hold the ball, and is not asked to lift it.
+    pub fn agent_config(&self) -> AgentConfig {
+        let paper = AgentConfig::paper(self.search_poses());
+        AgentConfig {
+            lift: paper.lift.filter(|_| self.bodies),
+            ..paper
+        }
+    }
+
     /// The poses from which balls are looked for.
     pub fn search_poses(&self) -> [Joints; 6] {
         self.workspace.search_poses()
@@ -163,7 +171,7 @@ impl TrialCell {
                 observe(event);
             },
         )?;
-        let held = arm.grasp() == Some(Grasp::Held);
+        let held = shared.get().held.is_some();
         Ok(Some(TrialResult {
             outcome,
             reached,

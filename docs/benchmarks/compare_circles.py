@@ -5,11 +5,14 @@
     cargo build --release --example detect_circles --example render_dataset
     venv/bin/python docs/benchmarks/compare_circles.py FOLDER... --csv circles.csv
     venv/bin/python docs/benchmarks/compare_circles.py --scenes benchmark --sizes 192x144,768x576 --frames 20
+    cargo build --release -p hough-heuristic --example scenes
+    venv/bin/python docs/benchmarks/compare_circles.py --scenes simple --frames 20
 
 A FOLDER is a set. It holds images and may hold the tables that `render_dataset` writes: truth.csv (file,cx,cy,r and any further columns;
 (0, 0) is the centre of the top-left pixel) with a row a circle, and frames.csv (file,scene) or files.txt (a name a line) with
 the frames that count. A frame without a row in truth.csv holds no circle; a folder without truth.csv holds none at all. With frames.csv every scene
-is a set of its own. `--scenes` renders sets of these kinds first, as `render_dataset` names them.
+is a set of its own. `--scenes` renders sets of these kinds first, as `render_dataset` names them, or with `simple` those of the detector crate's
+example `scenes`.
 
 Prints a Markdown table and writes CSV, a row for each set and detector, and a row `mean of sets` for each detector. Columns:
 
@@ -111,8 +114,8 @@ def read_sets(folder, scratch, pad):
 
 def render(options, size, out):
     """Renders the scenes at a size, "WxH"."""
-    command = [options.renderer, "--out", out, "--frames", str(options.frames), "--seed", str(options.seed),
-               "--kinds", options.scenes, "--size", size]
+    program = [options.simple_renderer] if options.scenes == "simple" else [options.renderer, "--kinds", options.scenes]
+    command = [*program, "--out", out, "--frames", str(options.frames), "--seed", str(options.seed), "--size", size]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
@@ -346,12 +349,13 @@ def main():
     parser.add_argument("--slow", default="sht,sht-gradient", help="detectors that see few frames, each once [%(default)s]")
     parser.add_argument("--slow-frames", type=int, default=5, help="that many, spread over the set [%(default)s]")
     parser.add_argument("--pad", type=int, default=0, metavar="PX", help="widen the frames of folders by repeating their border")
-    parser.add_argument("--scenes", metavar="KIND,...", help="kinds of scenes to render; `benchmark` for those made for this")
+    parser.add_argument("--scenes", metavar="KIND,...", help="kinds of scenes to render; `benchmark` or `simple` for those made for this")
     parser.add_argument("--sizes", default="768x576", help="at these sizes; the radius range is scaled along [%(default)s]")
     parser.add_argument("--frames", type=int, default=20, help="so many frames of each [%(default)s]")
     parser.add_argument("--seed", type=int, default=1, help="from this seed [%(default)s]")
     parser.add_argument("--program", default="target/release/examples/detect_circles", help="[%(default)s]")
     parser.add_argument("--renderer", default="target/release/examples/render_dataset", help="[%(default)s]")
+    parser.add_argument("--simple-renderer", default="target/release/examples/scenes", help="[%(default)s]")
     parser.add_argument("--csv", metavar="FILE", help="where to write all measures")
     options = parser.parse_args()
     if not options.folders and not options.scenes:

@@ -1,6 +1,6 @@
 //! Keeps what happens in the runs: a row an event, a picture a frame.
 
-use grasp_agent::{Event, EventKind, Outcome};
+use grasp_agent::{Event, EventKind, EventLog, Outcome};
 use hough_heuristic::Features;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
@@ -13,10 +13,19 @@ pub(crate) struct RunRecord {
     /// The ball's centre, millimetres in the arm's world frame.
     pub(crate) ball_mm: [f64; 3],
     pub(crate) rows: Vec<Row>,
+    /// The same, complete: it can be replayed.
+    pub(crate) log: EventLog,
     /// Frames looked at.
     frames: usize,
+    /// Whether the jaws are closed: what is seen then is not the ball, or is about to be told to have been missed.
+    gripped: bool,
     pub(crate) outcome: Option<Outcome>,
+    /// Why the run was broken off, if it was.
+    pub(crate) fault: Option<String>,
+    /// Whether the jaws hold the ball and the agent says so.
     pub(crate) grasped: bool,
+    /// How often the hand ran into something.
+    pub(crate) collisions: usize,
     /// From the gripper to the ball's centre when the jaws closed, millimetres.
     pub(crate) miss_mm: Option<f64>,
 }
@@ -46,20 +55,31 @@ impl RunRecord {
         Self {
             ball_mm,
             rows: Vec::new(),
+            log: EventLog::default(),
             frames: 0,
+            gripped: false,
             outcome: None,
+            fault: None,
             grasped: false,
+            collisions: 0,
             miss_mm: None,
         }
     }
 
     /// Takes down an event; returns the picture of its frame, if it has one.
     pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
-        let (features, action) = match event.kind {
-            EventKind::Seen(sighting) => (Some(sighting.features), None),
+        self.log.note(event);
+        match event.kind {
+            EventKind::Gripped => self.gripped = true,
+            EventKind::Missed => self.gripped = false,
+            _ => {}
+        }
+        let (sighting, action) = match event.kind {
+            EventKind::Seen(sighting) if !self.gripped => (Some(sighting), None),
             EventKind::Moved(delta) => (None, Some(delta)),
             _ => (None, None),
         };
+        let features = sighting.map(|sighting| sighting.features);
         self.rows.push(Row {
             step: event.cycle,
             event: event.kind.word(),
@@ -70,7 +90,7 @@ impl RunRecord {
 
         let mut overlay = Overlay::new(event.frame?);
         self.frames += 1;
-        if let EventKind::Seen(sighting) = event.kind {
+        if let Some(sighting) = sighting {
             overlay.circle(&sighting.detection.circle);
         }
         let full = overlay.into_image();
@@ -91,10 +111,16 @@ impl RunRecord {
         })
     }
 
-    /// The jaws have closed `miss` metres from the ball's centre.
-    pub(crate) fn gripped_at(&mut self, miss: f64, tolerance: f64) {
+    /// The jaws are about to close, `miss` metres from the ball's centre.
+    pub(crate) fn gripped_at(&mut self, miss: f64) {
         self.miss_mm = Some(miss * 1000.0);
-        self.grasped = miss <= tolerance;
+    }
+
+    /// The run is over.
+    pub(crate) fn ended(&mut self, outcome: Outcome, holds_ball: bool, collisions: usize) {
+        self.grasped = outcome.gave_up.is_none() && holds_ball;
+        self.collisions = collisions;
+        self.outcome = Some(outcome);
     }
 
     /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.

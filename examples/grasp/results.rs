@@ -35,6 +35,8 @@ pub(crate) struct RunSummary {
     pub(crate) grasped: bool,
     pub(crate) cycles: usize,
     pub(crate) losses: usize,
+    /// How often the hand ran into ball, holder or table.
+    pub(crate) collisions: usize,
     #[serde(rename = "final")]
     pub(crate) last_seen: Option<FinalFeatures>,
     pub(crate) miss_mm: Option<f64>,
@@ -85,7 +87,7 @@ impl Summary {
             let result = match (&run.reason, run.grasped) {
                 (_, true) => "grasped".into(),
                 (Some(reason), false) => format!("not grasped: {reason}"),
-                (None, false) => "not grasped: the jaws closed beside the ball".into(),
+                (None, false) => "not grasped: the jaws hold no ball, though none is seen either".into(),
             };
             let _ = writeln!(
                 table,
@@ -102,6 +104,10 @@ impl Summary {
             self.runs.len(),
             100.0 * self.success_rate
         );
+        let collisions: usize = self.runs.iter().map(|run| run.collisions).sum();
+        if collisions > 0 {
+            let _ = write!(table, ", {collisions} collisions of the hand");
+        }
         if let Some(mean) = self.mean_cycles {
             let _ = write!(
                 table,
@@ -121,6 +127,7 @@ impl RunSummary {
             grasped: record.grasped,
             cycles: outcome.map_or(0, |o| o.cycles),
             losses: outcome.map_or(0, |o| o.losses),
+            collisions: record.collisions,
             last_seen: outcome.and_then(|o| o.last_seen).map(|sighting| {
                 let f = sighting.features;
                 FinalFeatures {
@@ -130,7 +137,10 @@ impl RunSummary {
                 }
             }),
             miss_mm: record.miss_mm.map(rounded),
-            reason: outcome.and_then(|o| o.gave_up).map(|reason| reason.to_string()),
+            reason: outcome
+                .and_then(|o| o.gave_up)
+                .map(|reason| reason.to_string())
+                .or_else(|| record.fault.clone()),
         }
     }
 }

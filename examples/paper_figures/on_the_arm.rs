@@ -90,7 +90,7 @@ fn one_arm(form: ReachForm, level: ErrorLevel, seed: u64) -> Result<Vec<(f64, f6
 
     let cell = TrialCell::draw(level, 50 + seed)?.without_bodies();
     let mut scores = vec![score(&cell, &learned, Some(only_x))?];
-    let config = AgentConfig::paper(cell.search_poses());
+    let config = cell.agent_config();
     let learning = learned.learning(OnlineLearning::careful(seed));
     let mut agent = Agent::with_controller(config, learning)?;
     let (mut made, mut ball) = (0, 0);
@@ -110,7 +110,7 @@ fn score(
     controller: &Learned,
     goal: Option<Vec<GoalInterval>>,
 ) -> Result<(f64, f64), Box<dyn Error>> {
-    let config = AgentConfig::paper(cell.search_poses());
+    let config = cell.agent_config();
     let config = AgentConfig {
         goal: goal.unwrap_or(config.goal),
         ..config

@@ -43,9 +43,10 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
         .ok_or("no place of the workspace is in view from a search pose")?;
     rig.place(&ball);
     let table = rig.cell().get().table;
-    let mut moments = Vec::new();
+    let (mut moments, mut gripped) = (Vec::new(), false);
     rig.run(&agent, &mut *detector, &mut |event| {
-        if let (EventKind::Seen(sighting), Some(frame)) = (&event.kind, event.frame) {
+        gripped |= event.kind == EventKind::Gripped;
+        if let (EventKind::Seen(sighting), Some(frame), false) = (&event.kind, event.frame, gripped) {
             moments.push(Moment {
                 frame: frame.clone(),
                 sighting: *sighting,

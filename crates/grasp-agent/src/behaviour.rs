@@ -155,7 +155,7 @@ pub struct Episode {
 }
 
 /// How much choosing an action that lost the ball weighs, in ordinary choices: enough that it is not chosen again.
-const LOST_WEIGHT: u32 = 50;
+pub(crate) const LOST_WEIGHT: u32 = 50;
 
 impl Episode {
     /// The beginning of an episode of `behaviour`.

@@ -29,13 +29,18 @@ pub struct AgentConfig {
     pub looks: usize,
     /// How fast the hand may come nearer to the ball.
     pub approach: ApproachLimit,
-    /// After the jaws have closed: the move with which the arm lifts the ball, to look whether it is still where it was \[none\]. A ball
-    /// that is seen then is not in the jaws, and is reached for again.
+    /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still there; then it is lifted by
+    /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that is seen there is in the jaws if it stays in
+    /// its place in the image when the hand goes up by a third of that more. A ball that is not in the jaws is reached for again; a hand that is
+    /// stopped has not succeeded. `None`: closing the jaws at the goal is success, whatever is between them.
     pub lift: Option<JointDelta>,
+    /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
+    /// end of what the ball stood on for example.
+    pub left_behind: f64,
     /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
     pub reach_tolerance: f64,
-    /// Frames in a row, each from another pose, that may show the ball at exactly the same place before the camera counts as
-    /// frozen \[2\].
+    /// Frames in a row, each from another pose, that may be the same as the one before, or show the ball at exactly the same place, before the
+    /// camera counts as frozen \[2\]. Nothing is gripped after a single one of them.
     pub same_frames: usize,
 }
 
@@ -86,7 +91,8 @@ impl AgentConfig {
                 radius: 62.0,
                 growth: 1.5,
             },
-            lift: None,
+            lift: Some(turn(Joint::J2, -15.0)),
+            left_behind: 9.0,
             reach_tolerance: 1_f64.to_radians(),
             same_frames: 2,
         }

@@ -20,7 +20,7 @@ pub struct Event<'a> {
 
 /// What can happen in a run.
 ///
-/// Every answer of arm, sensor and camera makes exactly one event, in the order of the answers, so that the events determine the
+/// Every answer of arm, sensor and camera makes an event, in the order of the answers, so that the events determine the
 /// run: see [`EventLog::replay`](crate::EventLog::replay).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,6 +28,8 @@ pub struct Event<'a> {
 pub enum EventKind {
     /// The run begins with the arm here and the gripper open.
     Started,
+    /// A search of the workspace begins.
+    Searching,
     /// The arm stands at the search pose with this index, and is about to look. Indices go on counting when the poses are tried again
     /// with a displacement.
     AtSearchPose(usize),
@@ -35,17 +37,19 @@ pub enum EventKind {
     Seen(Sighting),
     /// No ball is in the frame.
     NotSeen,
-    /// The controller chose this move and the arm has made it.
+    /// What was just looked at is the same, to the last pixel, as from the pose before: the camera may have stopped.
+    SameFrame,
+    /// The controller chose this move and the arm has made it, or a part of it if [`EventKind::TooNear`] follows.
     Moved(JointDelta),
     /// The ball has left the frame during the last move.
     Lost,
     /// The arm has gone back to the pose from which the ball was last seen (0), or made the recovery move with this number.
     Recovering(usize),
-    /// Something is too near to the hand; the arm has been stopped.
+    /// Something is too near to the hand; the arm has been stopped, on its way to the pose of the event before or there.
     TooNear,
     /// The ball came nearer too fast.
     TooFast,
-    /// The arm has gone back by one move.
+    /// The arm has gone back by one move, or, if [`EventKind::TooNear`] follows, a part of the way.
     TakenBack,
     /// Centre and radius are at the goal.
     AtGoal,
@@ -53,6 +57,8 @@ pub enum EventKind {
     Gripping(JointDelta),
     /// The gripper has closed.
     Gripped,
+    /// The hand, closed, has gone back to where the ball was last seen from.
+    Withdrawn,
     /// The arm has lifted what it gripped.
     Lifted,
     /// The ball was not in the jaws, which have opened again.
@@ -68,9 +74,11 @@ impl EventKind {
     pub fn word(&self) -> &'static str {
         match self {
             Self::Started => "started",
+            Self::Searching => "searching",
             Self::AtSearchPose(_) => "search",
             Self::Seen(_) => "seen",
             Self::NotSeen => "not-seen",
+            Self::SameFrame => "same-frame",
             Self::Moved(_) => "moved",
             Self::Lost => "lost",
             Self::Recovering(_) => "recover",
@@ -80,6 +88,7 @@ impl EventKind {
             Self::AtGoal => "at-goal",
             Self::Gripping(_) => "gripping",
             Self::Gripped => "gripped",
+            Self::Withdrawn => "withdrawn",
             Self::Lifted => "lifted",
             Self::Missed => "missed",
             Self::GaveUp(_) => "gave-up",
@@ -98,7 +107,7 @@ pub enum GaveUp {
     OutOfCycles,
     /// Every move that the controller could make leads out of the working limits.
     NoMoveLeft,
-    /// Something was too near to the hand on the way to the ball.
+    /// Something was too near to the hand on its last way to the ball, again and again, or when what it had gripped was lifted.
     Obstructed,
 }
 
@@ -108,7 +117,7 @@ impl std::fmt::Display for GaveUp {
             Self::NotFound => "the ball is in view from no search pose",
             Self::OutOfCycles => "the goal was not reached within the allowed number of moves",
             Self::NoMoveLeft => "every move leads out of the working limits",
-            Self::Obstructed => "something stood between the gripper and the ball",
+            Self::Obstructed => "something was too near to the hand as it went for the ball or lifted it",
         })
     }
 }

@@ -2,54 +2,52 @@
 
 use std::fmt::Write as _;
 
+use hough_heuristic::Features;
 use qtable::{Action, QTable, State};
 
-use crate::{Behaviour, BehaviourError, BehaviourSpec};
+use crate::percept::THETA3_ZERO;
+use crate::{Behaviour, BehaviourError, BehaviourSpec, GoalInterval};
 
 /// Most states times actions that are read from text.
 const MOST_ENTRIES: usize = 1 << 24;
 
 impl Behaviour {
-    /// The behaviour as JSON: its name; the inputs with their edges and goal intervals; the joints with their steps in degrees; the goal;
-    /// the reward; and `q`, a row of values for every state.
+    /// The behaviour as JSON: its name; the units and conventions, with the frame's size and the zero of theta 3; the inputs with their edges
+    /// and goal intervals; the joints with their steps in degrees; the goal; the reward; and `q`, a row of values for every state.
     ///
     /// A state is a mixed-radix number of the intervals that the inputs lie in, the last input varying fastest, and an action one of the
     /// joints' steps, the last joint varying fastest. An interval is closed below and open above, but for goal intervals, which are closed at
-    /// both ends. How often each pair was visited is not part of it.
+    /// both ends. How often each pair was visited is not part of it. What else a controller needs is in
+    /// [`Learned::to_json`](crate::Learned::to_json).
     pub fn to_json(&self) -> String {
-        let rows = (0..self.table().states()).map(|state| self.table().row(State(state)).to_vec());
-        let document = document::Document {
-            format: document::FORMAT.into(),
-            spec: self.spec().clone(),
-            q: rows.collect(),
-        };
-        // Plain data with text keys and finite numbers: there is nothing that could not be written.
-        serde_json::to_string_pretty(&document).unwrap_or_default()
+        text_of(&Document::of(self))
     }
 
     /// Reads what [`Behaviour::to_json`] wrote, or another program in the same form.
     ///
     /// # Errors
     /// [`BehaviourError::Text`], with the place where there is one: no JSON, a missing part, edges that do not increase, a number that is not
-    /// finite, a wrong number of rows or values.
+    /// finite, a wrong number of rows or values, a joint that is moved twice, no goal, another frame or zero of theta 3 than here.
     pub fn from_json(text: &str) -> Result<Self, BehaviourError> {
-        let document: document::Document = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
-        if document.format != document::FORMAT {
-            return Err(bad(format!(
-                "its format is {:?}; {:?} is read here",
-                document.format,
-                document::FORMAT
-            )));
-        }
-        let q: Vec<&[f64]> = document.q.iter().map(Vec::as_slice).collect();
-        of_rows(document.spec, &q)
+        let document: Document = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
+        document.into_behaviour()
     }
 
     /// The values as a CSV table: a column for the lower and upper end of each input's interval (empty where it has none), a column for each
-    /// action, headed by its joint steps in degrees, and `best`, the number of the best action (from 0); a row for every state.
+    /// action, headed by its joint steps in degrees, and `best`, the number of the best action (from 0); a row for every state. Before them
+    /// stand lines that begin with `#`: units, conventions and the goal.
     pub fn to_csv(&self) -> String {
         let spec = self.spec();
-        let mut csv = String::new();
+        let mut csv = format!("# behaviour {}\n", spec.name.replace('\n', " "));
+        for line in Conventions::default().lines() {
+            let _ = writeln!(csv, "# {line}");
+        }
+        for GoalInterval { input, low, high } in &spec.goal {
+            let _ = writeln!(
+                csv,
+                "# at the goal {input:?} is from {low} to {high}, both ends included"
+            );
+        }
         for input in &spec.inputs {
             let _ = write!(csv, "{input:?} from,{input:?} to,");
         }
@@ -91,21 +89,19 @@ impl Behaviour {
     /// number of lines or columns.
     pub fn from_csv(spec: BehaviourSpec, text: &str) -> Result<Self, BehaviourError> {
         let blank = Self::new(spec, blank_table(shape_of(text)?)?)?;
-        let (expected, ends, actions) = (
-            blank.to_csv(),
-            2 * blank.spec().inputs.len(),
-            blank.spec().actions(),
-        );
-        let mut lines = text.lines().zip(expected.lines()).enumerate();
-        if let Some((_, (found, wanted))) = lines.next()
-            && found.trim_end() != wanted
+        let expected = blank.to_csv();
+        let (ends, actions) = (2 * blank.spec().inputs.len(), blank.spec().actions());
+        let mut lines = table_lines(text).zip(table_lines(&expected));
+        if let Some(((line, found), (_, wanted))) = lines.next()
+            && found != wanted
         {
-            return Err(bad("line 1: inputs or actions are not those of the behaviour"));
+            return Err(bad(format!(
+                "line {line}: inputs or actions are not those of the behaviour"
+            )));
         }
         let mut rows = Vec::new();
-        for (number, (found, wanted)) in lines {
-            let line = number + 1;
-            let fields: Vec<&str> = found.trim_end().split(',').collect();
+        for ((line, found), (_, wanted)) in lines {
+            let fields: Vec<&str> = found.split(',').collect();
             if fields.len() != ends + actions + 1 {
                 return Err(bad(format!(
                     "line {line}: {} columns where {} are needed",
@@ -129,20 +125,35 @@ impl Behaviour {
     }
 }
 
+/// The lines of a CSV table that are no remarks, with their numbers in the text, from 1.
+fn table_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text
+        .lines()
+        .zip(1..)
+        .map(|(line, number)| (number, line.trim_end()));
+    lines.filter(|(_, line)| !line.starts_with('#'))
+}
+
 /// Seven digits: the angles of the steps went to radians and back.
-fn rounded(degrees: f64) -> f64 {
+pub(crate) fn rounded(degrees: f64) -> f64 {
     (degrees * 1e7).round() / 1e7
 }
 
-fn bad(what: impl Into<String>) -> BehaviourError {
+/// Plain data with text keys and finite numbers: there is nothing that could not be written.
+pub(crate) fn text_of(document: &impl serde::Serialize) -> String {
+    serde_json::to_string_pretty(document).unwrap_or_default()
+}
+
+pub(crate) fn bad(what: impl Into<String>) -> BehaviourError {
     BehaviourError::Text { what: what.into() }
 }
 
 /// States and actions that a CSV table has lines and columns for; whether they are the right ones is checked later.
 fn shape_of(text: &str) -> Result<(usize, usize), BehaviourError> {
-    let header = text.lines().next().ok_or_else(|| bad("there is nothing"))?;
+    let mut lines = table_lines(text);
+    let (_, header) = lines.next().ok_or_else(|| bad("there is nothing"))?;
     let actions = header.split(',').filter(|name| name.starts_with("JT")).count();
-    Ok((text.lines().count().saturating_sub(1), actions))
+    Ok((lines.count(), actions))
 }
 
 fn blank_table((states, actions): (usize, usize)) -> Result<QTable, BehaviourError> {
@@ -169,31 +180,109 @@ fn of_rows(spec: BehaviourSpec, rows: &[&[f64]]) -> Result<Behaviour, BehaviourE
                 .map_err(|e| bad(e.to_string()))?;
         }
     }
-    if spec.moves.iter().any(|steps| steps.degrees.is_empty()) {
-        return Err(bad("a joint has no steps"));
-    }
-    if spec.inputs.len() != spec.space.quantities().len() {
-        return Err(bad(format!(
-            "there are {} inputs and intervals for {}",
-            spec.inputs.len(),
-            spec.space.quantities().len()
-        )));
-    }
+    spec.check().map_err(bad)?;
     Behaviour::new(spec, table)
 }
 
-mod document {
-    use super::BehaviourSpec;
+/// What the numbers of a behaviour mean: two that a program needs, and words for who writes it.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Conventions {
+    /// Width and height of a frame in the units of x, y and r.
+    frame: [f64; 2],
+    /// `JT3` where theta 3 is zero.
+    theta3_zero_degrees: f64,
+    #[serde(default)]
+    words: Vec<String>,
+}
 
-    pub(super) const FORMAT: &str = "grasp-agent behaviour 1";
+impl Default for Conventions {
+    fn default() -> Self {
+        let words = [
+            "X, Y: centre of the ball's outline from the upper left corner of the frame, right and down; R: its radius; in units of which a frame is \
+             as wide and as high as `frame` says",
+            "Theta3: JT3 in degrees, as VAL II prints it, less theta3_zero_degrees",
+            "an interval is closed below and open above; a goal interval is closed at both ends; the outer ones have no end",
+            "states: a number for each combination of intervals, the last input varying fastest, from 0",
+            "actions: a number for each combination of steps, degrees added to the joints, the last joint varying fastest, from 0",
+            "at the goal nothing is to be done; elsewhere the action with the highest value is made, the first of several equal ones, among those \
+             that keep every joint within its limits",
+        ];
+        Self {
+            frame: [Features::WIDTH, Features::HEIGHT],
+            theta3_zero_degrees: THETA3_ZERO,
+            words: words.map(Into::into).into(),
+        }
+    }
+}
 
-    /// What the JSON holds.
-    #[derive(serde::Serialize, serde::Deserialize)]
-    pub(super) struct Document {
-        pub(super) format: String,
-        #[serde(flatten)]
-        pub(super) spec: BehaviourSpec,
-        pub(super) q: Vec<Vec<f64>>,
+impl Conventions {
+    fn lines(&self) -> impl Iterator<Item = String> {
+        let [width, height] = self.frame;
+        let numbers = format!(
+            "frame {width} x {height}; theta3_zero_degrees {}",
+            self.theta3_zero_degrees
+        );
+        std::iter::once(numbers).chain(self.words.clone())
+    }
+
+    /// Numbers with other conventions than these mean something else.
+    fn check(&self) -> Result<(), BehaviourError> {
+        let ours = Self::default();
+        let differs = |a: f64, b: f64| a.is_nan() || (a - b).abs() > 1e-9;
+        if differs(self.frame[0], ours.frame[0]) || differs(self.frame[1], ours.frame[1]) {
+            return Err(bad(format!(
+                "its frame is {:?} where {:?} is used here; scale x, y and r",
+                self.frame, ours.frame
+            )));
+        }
+        if differs(self.theta3_zero_degrees, ours.theta3_zero_degrees) {
+            return Err(bad(format!(
+                "its theta 3 is zero at JT3 = {} degrees, which is {} here; shift its edges",
+                self.theta3_zero_degrees, ours.theta3_zero_degrees
+            )));
+        }
+        Ok(())
+    }
+}
+
+const FORMAT: &str = "grasp-agent behaviour 1";
+
+/// What the JSON holds.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Document {
+    format: String,
+    conventions: Conventions,
+    #[serde(flatten)]
+    spec: BehaviourSpec,
+    q: Vec<Vec<f64>>,
+}
+
+impl Document {
+    pub(crate) fn of(behaviour: &Behaviour) -> Self {
+        let table = behaviour.table();
+        Self {
+            format: FORMAT.into(),
+            conventions: Conventions::default(),
+            spec: behaviour.spec().clone(),
+            q: (0..table.states())
+                .map(|state| table.row(State(state)).to_vec())
+                .collect(),
+        }
+    }
+
+    pub(crate) fn into_behaviour(self) -> Result<Behaviour, BehaviourError> {
+        check_format(&self.format, FORMAT)?;
+        self.conventions.check()?;
+        let q: Vec<&[f64]> = self.q.iter().map(Vec::as_slice).collect();
+        of_rows(self.spec, &q)
+    }
+}
+
+pub(crate) fn check_format(found: &str, wanted: &str) -> Result<(), BehaviourError> {
+    if found == wanted {
+        Ok(())
+    } else {
+        Err(bad(format!("its format is {found:?}; {wanted:?} is read here")))
     }
 }
 
@@ -218,7 +307,9 @@ mod tests {
         let behaviour = behaviour();
         assert!(Behaviour::from_json(&behaviour.to_json()).unwrap() == behaviour);
         let csv = behaviour.to_csv();
-        assert_eq!(csv.lines().count(), 91);
+        assert_eq!(csv.lines().filter(|line| !line.starts_with('#')).count(), 91);
+        assert!(csv.contains("# frame 192 x 144; theta3_zero_degrees 170\n"));
+        assert!(csv.contains("# at the goal R is from 32 to 34, both ends included\n"));
         assert!(Behaviour::from_csv(BehaviourSpec::approaching(), &csv).unwrap() == behaviour);
     }
 
@@ -242,17 +333,63 @@ mod tests {
                 .to_string()
         };
         assert!(of("").contains("nothing"));
-        assert!(of(&csv.replace("JT2-20 ", "JT2-21 ")).contains("line 1"));
+        let header = csv.lines().take_while(|line| line.starts_with('#')).count() + 1;
+        let refused = of(&csv.replace("JT2-20 ", "JT2-21 "));
+        assert!(refused.contains(&format!("line {header}:")), "{refused}");
         let broken = csv.lines().enumerate().map(|(i, line)| {
-            if i == 7 {
+            if i == header + 6 {
                 line.replace('.', "?")
             } else {
                 line.into()
             }
         });
-        assert!(of(&broken.collect::<Vec<String>>().join("\n")).contains("line 8"));
-        assert!(of(&csv.lines().take(50).collect::<Vec<_>>().join("\n")).contains("49x81"));
+        let refused = of(&broken.collect::<Vec<String>>().join("\n"));
+        assert!(refused.contains(&format!("line {}:", header + 7)), "{refused}");
+        let cut = csv.lines().take(header + 49).collect::<Vec<_>>().join("\n");
+        assert!(of(&cut).contains("49x81"));
         let other = Behaviour::from_csv(BehaviourSpec::centering(), &csv);
         assert!(matches!(other, Err(BehaviourError::Shape { .. })));
+    }
+    #[test]
+    fn what_no_program_could_run_is_refused_with_the_reason() {
+        let json = behaviour().to_json();
+        // A change of the document, and what is said of it.
+        type Change = fn(&mut serde_json::Value);
+        let cases: [(Change, &str); 11] = [
+            (|d| d["moves"][1]["joint"] = "J2".into(), "JT2 is moved twice"),
+            (
+                |d| d["moves"][0]["degrees"] = serde_json::json!([]),
+                "JT2 has no steps",
+            ),
+            (|d| d["moves"] = serde_json::json!([]), "moves no joint"),
+            (|d| d["goal"] = serde_json::json!([]), "no goal"),
+            (|d| d["goal"][0]["low"] = 90.0.into(), "goal of Y"),
+            (|d| d["reward"]["goal"] = serde_json::Value::Null, "null"),
+            (|d| d["reward"]["floor"] = (-1.0).into(), "floor"),
+            (|d| d["reward"]["terms"] = serde_json::json!([]), "no terms"),
+            (|d| d["inputs"] = serde_json::json!(["Y", "R"]), "2 inputs"),
+            (
+                |d| d["conventions"]["theta3_zero_degrees"] = 180.0.into(),
+                "JT3 = 180",
+            ),
+            (|d| d["conventions"]["frame"][0] = 768.0.into(), "768"),
+        ];
+        for (change, said) in cases {
+            let mut document: serde_json::Value = serde_json::from_str(&json).unwrap();
+            change(&mut document);
+            let refused = Behaviour::from_json(&document.to_string())
+                .unwrap_err()
+                .to_string();
+            assert!(refused.contains(said), "{refused} does not say {said}");
+        }
+        // Numbers that JSON has no words for come through other formats.
+        let mut spec = BehaviourSpec::approaching();
+        spec.reward.terms[0].weight = f64::NAN;
+        assert!(
+            Behaviour::from_csv(spec, &behaviour().to_csv())
+                .unwrap_err()
+                .to_string()
+                .contains("reward")
+        );
     }
 }

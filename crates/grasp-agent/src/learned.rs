@@ -70,6 +70,11 @@ impl Learned {
         self
     }
 
+    /// The loop breakers of centering and approaching, units of Q.
+    pub fn kappa(&self) -> (f64, f64) {
+        (self.centering.kappa, self.approaching.kappa)
+    }
+
     /// The same, learning from what happens.
     #[must_use]
     pub fn learning(mut self, settings: OnlineLearning) -> Self {

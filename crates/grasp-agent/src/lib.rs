@@ -3,7 +3,8 @@
 //! A ball of known size lies somewhere in reach of a PUMA 560 with a camera on its hand. Two behaviours, learned
 //! separately by Q-learning, bring the hand to it: **centering** turns the first joint by what it sees of the ball's x and
 //! radius, **approaching** turns the second and third by y, radius and the elbow angle. Around them stand a search from fixed
-//! poses, a recovery for when the ball leaves the image, the activation of the gripper, and a stop when something comes too near.
+//! poses, a recovery for when the ball leaves the image, the activation of the gripper, a look at whether it holds the ball, and a stop when
+//! something comes too near.
 //!
 //! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. A [`BehaviourPair`] is both together:
 //!   [`paper_literal`](BehaviourPair::paper_literal), [`paper_mended`](BehaviourPair::paper_mended), [`fine`](BehaviourPair::fine).
@@ -70,6 +71,8 @@ mod error;
 mod event;
 #[cfg(feature = "serde")]
 mod export;
+#[cfg(feature = "serde")]
+mod export_policy;
 mod eye;
 mod hybrid;
 mod learned;
@@ -82,6 +85,7 @@ mod run;
 mod servo;
 mod spec;
 mod task;
+mod watch;
 
 pub use hough_heuristic;
 pub use nalgebra;

@@ -91,6 +91,25 @@ impl Reward {
         }
     }
 
+    /// Whether it is a reward; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let of_terms = self.terms.iter().flat_map(|term| [term.weight, term.target]);
+        if let Some(number) = of_terms
+            .chain([self.goal, self.lost, self.floor])
+            .find(|number| !number.is_finite())
+        {
+            return Err(format!("its reward has {number} in it"));
+        }
+        if self.floor < 0.0 {
+            return Err(format!("the floor of its reward is {}, below 0", self.floor));
+        }
+        if self.terms.is_empty() {
+            return Err("its reward has no terms: nothing pays for coming closer".into());
+        }
+        Ok(())
+    }
+
     /// What arriving at the goal is worth under the discount factor `gamma`.
     pub fn arrival(&self, gamma: f64) -> f64 {
         if self.absorbing {

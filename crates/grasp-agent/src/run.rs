@@ -3,6 +3,7 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 
+use crate::watch::Watch;
 use crate::{
     AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, Look, Outcome, Percept,
     Sighting, Situation,
@@ -17,8 +18,8 @@ enum Phase {
     Reach(Sighting),
     /// The ball was in view from this pose and is not any more.
     Recover(Joints),
-    /// The ball is where it should be.
-    Grip(Sighting),
+    /// The ball is where it should be, or as near to that as can be.
+    Grip { seen: Sighting, at_goal: bool },
     /// Over, without a grip where there is a reason.
     End(Option<GaveUp>),
 }
@@ -43,17 +44,18 @@ pub(crate) struct Run<'a> {
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
-    /// The pose that the last look was taken from, and how many looks from different poses brought the same.
-    looked_from: Joints,
-    same: usize,
+    watch: &'a mut Watch,
     /// Moves in a row that were taken back.
     taken_back: usize,
+    /// Times that the way of the gripper to the ball was taken back.
+    grips_taken_back: usize,
 }
 
 impl<'a> Run<'a> {
     pub(crate) fn new(
         config: &'a AgentConfig,
         controller: &'a mut dyn Controller,
+        watch: &'a mut Watch,
         eye: &'a mut dyn Eye,
         arm: &'a mut dyn Manipulator,
         proximity: &'a mut dyn ProximitySensor,
@@ -62,6 +64,7 @@ impl<'a> Run<'a> {
         Self {
             config,
             controller,
+            watch,
             eye,
             arm,
             proximity,
@@ -70,9 +73,8 @@ impl<'a> Run<'a> {
             cycles: 0,
             losses: 0,
             last_seen: None,
-            looked_from: Joints::default(),
-            same: 0,
             taken_back: 0,
+            grips_taken_back: 0,
         }
     }
 
@@ -97,7 +99,7 @@ impl<'a> Run<'a> {
                 Phase::Search => self.search()?,
                 Phase::Reach(sighting) => self.reach(sighting)?,
                 Phase::Recover(last) => self.recover(last)?,
-                Phase::Grip(sighting) => self.grip(sighting)?,
+                Phase::Grip { seen, at_goal } => self.grip(seen, at_goal)?,
                 Phase::End(gave_up) => {
                     if let Some(reason) = gave_up {
                         self.tell(EventKind::GaveUp(reason), None);
@@ -117,6 +119,7 @@ impl<'a> Run<'a> {
     /// Looks around from the search poses, the nearest pan angle first; then from beside them.
     fn search(&mut self) -> Result<Phase, AgentError> {
         let config = self.config;
+        self.tell(EventKind::Searching, None);
         let rounds = std::iter::once(JointDelta::default()).chain(config.search_again.iter().copied());
         for (round, beside) in rounds.enumerate() {
             for pose in nearest_first(&config.search_poses, &self.joints) {
@@ -138,8 +141,15 @@ impl<'a> Run<'a> {
         let now = self.situation(&sighting);
         let percept = Percept::new(sighting.features, &self.joints);
         if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
+            // What is shown from two poses alike is not what is there: no reason to grip.
+            if self.watch.same() > 0 {
+                return Err(self.frozen());
+            }
             self.tell(EventKind::AtGoal, None);
-            return Ok(Phase::Grip(sighting));
+            return Ok(Phase::Grip {
+                seen: sighting,
+                at_goal: true,
+            });
         }
         if self.cycles >= self.config.max_cycles {
             return Ok(Phase::End(Some(GaveUp::OutOfCycles)));
@@ -175,19 +185,23 @@ impl<'a> Run<'a> {
         Ok(Phase::Reach(after))
     }
 
-    /// Looks again from where the last move began; where moves come to nothing again and again, whatever is seen is not to be had, and the
-    /// search begins anew.
+    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself: a
+    /// controller that can aim at it from here does; otherwise whatever is seen is not to be had, and the search begins anew.
     fn after_taking_back(&mut self, from: Joints) -> Result<Phase, AgentError> {
         const OFTEN: usize = 3;
         self.controller.judge(&Consequence::TakenBack);
         self.taken_back += 1;
-        if self.taken_back >= OFTEN {
-            self.taken_back = 0;
-            return Ok(Phase::Search);
+        let often = self.taken_back >= OFTEN;
+        let Some(sighting) = self.look()? else {
+            return Ok(self.lose(from));
+        };
+        if !often {
+            return Ok(Phase::Reach(sighting));
         }
-        Ok(match self.look()? {
-            Some(sighting) => Phase::Reach(sighting),
-            None => self.lose(from),
+        self.taken_back = 0;
+        Ok(Phase::Grip {
+            seen: sighting,
+            at_goal: false,
         })
     }
 
@@ -217,30 +231,107 @@ impl<'a> Run<'a> {
         Ok(Phase::Search)
     }
 
-    /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind.
-    fn grip(&mut self, sighting: Sighting) -> Result<Phase, AgentError> {
-        let (config, from) = (self.config, self.joints);
-        let now = self.situation(&sighting);
-        let own = self.controller.grip(&now, &config.limits);
-        let delta = own
-            .filter(|delta| config.limits.admit(&(from + *delta)))
-            .unwrap_or(config.grip);
+    /// The move that brings the gripper to the ball, where the controller has one of its own.
+    fn aimed(&mut self, sighting: &Sighting) -> Option<JointDelta> {
+        let (now, limits) = (self.situation(sighting), &self.config.limits);
+        let delta = self.controller.grip(&now, limits)?;
+        limits.admit(&(self.joints + delta)).then_some(delta)
+    }
+
+    /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind. Away from the goal only a
+    /// controller that can aim from there goes for the ball.
+    fn grip(&mut self, seen: Sighting, at_goal: bool) -> Result<Phase, AgentError> {
+        const TRIES: usize = 3;
+        let from = self.joints;
+        // What shows for a moment only is no ball, and the jaws do not close on it.
+        let Some(sighting) = self.look()? else {
+            return Ok(self.lose(from));
+        };
+        if !is_same_place(&seen, &sighting) {
+            return Ok(Phase::Reach(sighting));
+        }
+        // After a stop on the way the aim is another.
+        let fixed = at_goal.then_some(self.config.grip);
+        let own = self.aimed(&sighting).filter(|_| self.grips_taken_back != 1);
+        let Some(delta) = own.or(fixed) else {
+            return Ok(Phase::Search);
+        };
         if self.go_by(delta, EventKind::Gripping(delta))? == Went::Back {
-            return Ok(Phase::End(Some(GaveUp::Obstructed)));
+            self.grips_taken_back += 1;
+            self.cycles += 1;
+            if self.grips_taken_back >= TRIES {
+                return Ok(Phase::End(Some(GaveUp::Obstructed)));
+            }
+            return Ok(match self.look()? {
+                Some(sighting) => Phase::Reach(sighting),
+                None => self.lose(from),
+            });
         }
         self.arm.set_gripper(Gripper::Closed)?;
         self.tell(EventKind::Gripped, None);
-        let Some(lift) = config.lift else {
-            return Ok(Phase::End(None));
-        };
-        let lifted = config.limits.nearest(&(self.joints + lift));
-        if self.go_to(lifted, EventKind::Lifted)? == Went::Back || self.look()?.is_none() {
-            return Ok(Phase::End(None));
+        match self.config.lift {
+            Some(lift) => self.verify(&sighting, from, lift),
+            None => Ok(Phase::End(None)),
         }
-        self.arm.set_gripper(Gripper::Open)?;
-        self.tell(EventKind::Missed, None);
-        self.cycles += 1;
-        Ok(Phase::Recover(from))
+    }
+
+    /// Looks whether the jaws hold what was seen, and opens them again if not.
+    fn verify(&mut self, seen: &Sighting, from: Joints, lift: JointDelta) -> Result<Phase, AgentError> {
+        let held = self.is_held(seen, from, lift)?;
+        // What was seen meanwhile was not the ball on its place.
+        self.last_seen = Some(*seen);
+        Ok(match held {
+            None => Phase::End(Some(GaveUp::Obstructed)),
+            Some(true) => Phase::End(None),
+            Some(false) => {
+                self.arm.set_gripper(Gripper::Open)?;
+                self.tell(EventKind::Missed, None);
+                self.cycles += 1;
+                Phase::Recover(from)
+            }
+        })
+    }
+
+    /// Whether the jaws hold the ball that was seen from `from`; `None` if the hand was stopped before that was known.
+    fn is_held(
+        &mut self,
+        seen: &Sighting,
+        from: Joints,
+        lift: JointDelta,
+    ) -> Result<Option<bool>, AgentError> {
+        // Back to where it was seen from: it must not be there any more, nor in the way, which was free before.
+        if self.go_to(from, EventKind::Withdrawn)? == Went::Back {
+            return Ok(Some(false));
+        }
+        let there = self.look_twice()?;
+        if there.is_some_and(|now| is_same_place(seen, &now)) {
+            return Ok(Some(false));
+        }
+        // Up: none must be seen that was left behind.
+        let limits = &self.config.limits;
+        let up = |share: f64| limits.nearest(&(from + JointDelta(lift.0.map(|turn| share * turn))));
+        if self.go_to(up(1.0), EventKind::Lifted)? == Went::Back {
+            return Ok(None);
+        }
+        let below = self.look_twice()?;
+        let Some(below) = below.filter(|now| now.features.r >= self.config.left_behind) else {
+            return Ok(Some(true));
+        };
+        // Unless it is the one in the jaws, which goes where the hand goes.
+        if self.go_to(up(4.0 / 3.0), EventKind::Lifted)? == Went::Back {
+            return Ok(None);
+        }
+        let along = self.look()?;
+        Ok(Some(along.is_some_and(|now| is_same_place(&below, &now))))
+    }
+
+    /// What is in view in two looks at the same place.
+    fn look_twice(&mut self) -> Result<Option<Sighting>, AgentError> {
+        let Some(first) = self.look()? else {
+            return Ok(None);
+        };
+        let again = self.look()?;
+        Ok(again.filter(|again| is_same_place(&first, again)))
     }
 
     fn situation(&self, sighting: &Sighting) -> Situation {
@@ -270,34 +361,49 @@ impl<'a> Run<'a> {
         done: EventKind,
     ) -> Result<Went, AgentError> {
         let from = self.joints;
-        let stopped_short = matches!(ordered, Err(ArmError::NotReached { .. }));
-        let reached = match ordered {
-            Ok(joints) => joints,
-            // An arm that its sensors have stopped stands somewhere on the way.
-            Err(ArmError::NotReached { .. }) => self.arm.joints()?,
+        let (reached, halted, fault) = match ordered {
+            Ok(joints) => (joints, false, None),
+            Err(ArmError::ProximityStop { joints, .. }) => (joints, true, None),
+            // An arm that something else has stopped stands somewhere on the way; its sensors may say what.
+            Err(error @ ArmError::NotReached { .. }) => (self.arm.joints()?, false, Some(error)),
             Err(error) => return Err(error.into()),
         };
         self.stand_at(reached);
         self.tell(done, None);
-        let near = self.proximity.object_near()?;
-        if !near {
-            if let (true, Err(error)) = (stopped_short, ordered) {
-                return Err(error.into());
-            }
-            self.check_reached(&target)?;
-            return Ok(Went::There);
+        if self.too_near(halted)? {
+            self.take_back(from)?;
+            return Ok(Went::Back);
         }
-        self.arm.stop()?;
-        self.tell(EventKind::TooNear, None);
-        self.take_back(from)?;
-        Ok(Went::Back)
+        match fault {
+            Some(error) => Err(error.into()),
+            None => self.check_reached(&target).map(|()| Went::There),
+        }
     }
 
-    /// Goes back the way the arm came.
+    /// Whether something is too near to the hand: the arm has been halted by its own guard, or is stopped now.
+    fn too_near(&mut self, halted: bool) -> Result<bool, AgentError> {
+        if !halted {
+            if !self.proximity.object_near()? {
+                return Ok(false);
+            }
+            self.arm.stop()?;
+        }
+        self.tell(EventKind::TooNear, None);
+        Ok(true)
+    }
+
+    /// Goes back the way the arm came. Where that is barred too, the arm stands where it is.
     fn take_back(&mut self, from: Joints) -> Result<(), AgentError> {
-        let reached = self.arm.move_to(from)?;
+        let (reached, halted) = match self.arm.move_to(from) {
+            Ok(joints) => (joints, false),
+            Err(ArmError::ProximityStop { joints, .. }) => (joints, true),
+            Err(error) => return Err(error.into()),
+        };
         self.stand_at(reached);
         self.tell(EventKind::TakenBack, None);
+        if self.too_near(halted)? {
+            return Ok(());
+        }
         self.check_reached(&from)
     }
 
@@ -329,33 +435,26 @@ impl<'a> Run<'a> {
         for _ in 0..self.config.looks {
             let Look { frame, ball } = self.eye.look()?;
             let ball = ball.filter(is_finite);
+            let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
+            self.tell(kind, frame.as_ref());
+            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
+                self.tell(EventKind::SameFrame, None);
+            }
+            if self.watch.same() >= self.config.same_frames {
+                return Err(self.frozen());
+            }
             if let Some(sighting) = ball {
-                self.tell(EventKind::Seen(sighting), frame.as_ref());
-                self.check_alive(&sighting)?;
                 self.last_seen = Some(sighting);
                 return Ok(Some(sighting));
             }
-            self.tell(EventKind::NotSeen, frame.as_ref());
         }
         Ok(None)
     }
 
-    /// A ball that stays at exactly the same place while the camera moves is an old frame.
-    fn check_alive(&mut self, sighting: &Sighting) -> Result<(), AgentError> {
-        const A_MOVE: f64 = 0.002;
-        let moved = (0..3).any(|i| (self.joints.0[i] - self.looked_from.0[i]).abs() > A_MOVE);
-        if !moved {
-            return Ok(());
+    fn frozen(&self) -> AgentError {
+        AgentError::FrozenCamera {
+            looks: self.watch.same() + 1,
         }
-        self.looked_from = self.joints;
-        let same = self
-            .last_seen
-            .is_some_and(|last| last.features == sighting.features);
-        self.same = if same { self.same + 1 } else { 0 };
-        if self.same >= self.config.same_frames {
-            return Err(AgentError::FrozenCamera { looks: self.same + 1 });
-        }
-        Ok(())
     }
 
     fn tell(&mut self, kind: EventKind, frame: Option<&GrayImage>) {
@@ -372,6 +471,12 @@ impl<'a> Run<'a> {
 fn is_finite(sighting: &Sighting) -> bool {
     let f = sighting.features;
     f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0
+}
+
+/// Whether two sightings from one pose can be of one ball: the noise of any camera that can be worked with is less than this.
+fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
+    let (a, b) = (a.features, b.features);
+    (a.x - b.x).abs() < 10.0 && (a.y - b.y).abs() < 10.0 && (a.r - b.r).abs() < 6.0
 }
 
 /// Indices of `poses`, the one whose first joint is nearest to that of `joints` first.

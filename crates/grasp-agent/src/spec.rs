@@ -219,6 +219,43 @@ impl BehaviourSpec {
         JointDelta::from_degrees(degrees)
     }
 
+    /// Whether a program could run it; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let axes = self.space.quantities().len();
+        if self.inputs.len() != axes {
+            return Err(format!(
+                "there are {} inputs and intervals for {axes}",
+                self.inputs.len()
+            ));
+        }
+        if self.moves.is_empty() {
+            return Err("it moves no joint".into());
+        }
+        for (i, JointSteps { joint, degrees }) in self.moves.iter().enumerate() {
+            if self.moves[..i].iter().any(|before| before.joint == *joint) {
+                return Err(format!("{joint} is moved twice"));
+            }
+            if degrees.is_empty() {
+                return Err(format!("{joint} has no steps"));
+            }
+            if let Some(step) = degrees.iter().find(|step| !step.is_finite()) {
+                return Err(format!("{joint} has a step of {step} degrees"));
+            }
+        }
+        if self.goal.is_empty() {
+            return Err("it has no goal".into());
+        }
+        let none = |interval: &&GoalInterval| {
+            let GoalInterval { low, high, .. } = interval;
+            !(low.is_finite() && high.is_finite() && low <= high)
+        };
+        if let Some(GoalInterval { input, low, high }) = self.goal.iter().find(none) {
+            return Err(format!("the goal of {input:?} is from {low} to {high}"));
+        }
+        self.reward.check()
+    }
+
     /// The first part in which two specifications differ.
     #[cfg(feature = "serde")]
     pub(crate) fn difference(&self, other: &Self) -> &'static str {

@@ -74,10 +74,12 @@ impl Scene {
     }
 }
 
-struct Canvas {
-    width: u32,
-    height: u32,
-    grey: Vec<f64>,
+/// A picture in work.
+pub struct Canvas {
+    pub width: u32,
+    pub height: u32,
+    /// Grey levels, row by row.
+    pub grey: Vec<f64>,
 }
 
 impl Canvas {
@@ -94,7 +96,7 @@ impl Canvas {
     }
 
     /// Paints where `inside` (signed distance to the border, pixels, positive inside) says, softly over one pixel.
-    fn paint(
+    pub fn paint(
         &mut self,
         (left, top, right, bottom): (f64, f64, f64, f64),
         inside: impl Fn(f64, f64) -> f64,
@@ -155,16 +157,6 @@ impl Canvas {
                 )
             })
             .collect();
-        let inside = |px: f64, py: f64| {
-            polygon
-                .iter()
-                .zip(polygon.iter().cycle().skip(1))
-                .map(|(a, b)| {
-                    let (ex, ey) = (b.0 - a.0, b.1 - a.1);
-                    (ex * (py - a.1) - ey * (px - a.0)) / ex.hypot(ey)
-                })
-                .fold(f64::INFINITY, f64::min)
-        };
         let reach = long.max(wide);
         if balls
             .iter()
@@ -174,12 +166,13 @@ impl Canvas {
         }
         self.paint(
             (cx - reach, cy - reach, cx + reach, cy + reach),
-            inside,
+            convex(&polygon),
             |_, _| grey,
         );
     }
 
-    fn develop(self, noise: f64, rng: &mut Xoshiro256PlusPlus) -> GrayImage {
+    /// The picture in whole grey levels, with noise of this deviation.
+    pub fn develop(self, noise: f64, rng: &mut Xoshiro256PlusPlus) -> GrayImage {
         let mut bytes = Vec::with_capacity(self.grey.len());
         for grey in self.grey {
             let (u, v): (f64, f64) = (rng.random(), rng.random());
@@ -187,6 +180,20 @@ impl Canvas {
             bytes.push((grey + noise * normal).round().clamp(0.0, 255.0) as u8);
         }
         GrayImage::from_raw(self.width, self.height, bytes).expect("one byte per pixel")
+    }
+}
+
+/// How far inside of a convex polygon a point lies, pixels; its corners turn from x to y.
+pub fn convex(corners: &[(f64, f64)]) -> impl Fn(f64, f64) -> f64 {
+    move |px, py| {
+        corners
+            .iter()
+            .zip(corners.iter().cycle().skip(1))
+            .map(|(a, b)| {
+                let (ex, ey) = (b.0 - a.0, b.1 - a.1);
+                (ex * (py - a.1) - ey * (px - a.0)) / ex.hypot(ey)
+            })
+            .fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The detector whose score can be trusted.
 
+mod budget;
 mod candidate;
 mod config;
 mod directions;
@@ -13,14 +14,13 @@ mod prover;
 mod search;
 mod track;
 
-use std::time::{Duration, Instant};
-
 use image::GrayImage;
 
 pub use config::TrustedConfig;
 
 use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
+use budget::{Budget, MEASURING, Stage};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
@@ -28,7 +28,7 @@ use measure::Measured;
 use polar::{Grey, Polar, Ring};
 use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
-use search::{Budget, Outline, Search};
+use search::{Outline, Search};
 
 /// Finds an unknown number of circles, and says of each how sure it is and how exact.
 ///
@@ -159,7 +159,7 @@ impl Trusted {
         }
     }
 
-    /// Finds the circles of a frame with radii in this range into `measurements`.
+    /// Finds the circles of a frame with radii in this range, or about the one radius, into `measurements`.
     fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
         self.proofs.clear();
         self.measurements.clear();
@@ -168,12 +168,13 @@ impl Trusted {
         if frame.width() < LEAST_SIDE || frame.height() < LEAST_SIDE {
             return;
         }
-        let megapixels = frame.len() as f64 * 1e-6;
-        self.budget.most_draws = (f64::from(self.config.draws_per_megapixel) * megapixels).ceil() as u64;
-        self.budget.deadline = self
-            .config
-            .milliseconds_per_megapixel
-            .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3));
+        self.budget = Budget::new(&self.config, frame.len());
+        let radii = if radii.0 < radii.1 {
+            radii
+        } else {
+            let slack = 1.0 + 0.05 * radii.0;
+            (radii.0 - slack, radii.1 + slack)
+        };
         let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
         self.shrink(frame, radii.1);
         self.prove(frame, radii, noise);
@@ -256,17 +257,13 @@ impl Trusted {
                 budget: &mut self.budget,
             });
         }
-        for candidate in self
-            .collected
-            .candidates
-            .iter()
-            .filter(|candidate| !candidate.tried)
-        {
-            if self.budget.is_late() {
+        let candidates = &mut self.collected.candidates;
+        candidates.sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight));
+        for candidate in candidates.iter().filter(|candidate| !candidate.tried) {
+            if self.budget.is_late() || self.budget.is_over(Stage::Proofs) {
                 break;
             }
-            self.budget.looks += search::PROOF;
-            prover.prove(candidate);
+            prover.prove(candidate, &mut self.budget.looks);
         }
     }
 
@@ -291,7 +288,10 @@ impl Trusted {
             {
                 continue;
             }
-            self.budget.looks += 4 * search::PROOF;
+            if self.budget.is_over(Stage::Measurements) {
+                break;
+            }
+            self.budget.looks += MEASURING;
             let measured = widest(Measuring {
                 pyramid,
                 proof,
@@ -301,8 +301,11 @@ impl Trusted {
             });
             let scale = (1 << proof.depth) as f32;
             let measured = measured.unwrap_or_else(|| Measured::roughly(proof.in_frame(), scale));
-            let circle = circle_of(&measured.ring);
+            let mut circle = circle_of(&measured.ring);
             let fits = (radii.0..=radii.1).contains(&circle.radius);
+            if self.config.min_radius >= self.config.max_radius {
+                circle.radius = self.config.max_radius;
+            }
             let placed = self
                 .config
                 .region

@@ -318,19 +318,31 @@ impl Cell {
     /// The ball may be between the open fingers, that is what they are for: it counts when a finger, the palm or the camera comes
     /// nearer to its surface than the sensors' range, which does not happen in a correct reach and grip. A held ball does not count.
     pub fn proximity(&self, joints: &Joints) -> bool {
-        self.hand_bodies(joints).iter().any(|body| self.is_near(body))
+        let range = self.hand.sensor_range;
+        self.hand_bodies(joints)
+            .iter()
+            .any(|body| self.is_within(range, body))
+    }
+
+    /// Whether fingers, palm or camera overlap table, holder or ball (a held ball does not count): what no hand of metal can do, and what a
+    /// simulated one that got there has run into.
+    pub fn collides(&self, joints: &Joints) -> bool {
+        /// Bodies that [`Cell::follow`] has pushed apart touch, to rounding.
+        const TOUCH: f64 = -1e-6;
+        self.hand_bodies(joints)
+            .iter()
+            .any(|body| self.is_within(TOUCH, body))
     }
 
     /// What each of the pair of sensors says, the one on the left finger (the hand's +y) first: whether its finger is about to touch
     /// table, holder or ball, as [`Cell::proximity`] has it for the whole hand.
     pub fn proximity_pair(&self, joints: &Joints) -> [bool; 2] {
         let [left, right, ..] = self.hand_bodies(joints);
-        [left, right].map(|finger| self.is_near(&finger))
+        [left, right].map(|finger| self.is_within(self.hand.sensor_range, &finger))
     }
 
-    /// Whether a part of the hand is within the sensors' range of something.
-    fn is_near(&self, body: &Capsule) -> bool {
-        let range = self.hand.sensor_range;
+    /// Whether a part of the hand is nearer to something than `range`.
+    fn is_within(&self, range: f64, body: &Capsule) -> bool {
         let holder = self.holder.map(|h| Capsule {
             from: Point3::new(h.foot.x, h.foot.y, self.table),
             to: Point3::new(h.foot.x, h.foot.y, h.top - h.radius),

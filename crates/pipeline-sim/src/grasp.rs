@@ -102,7 +102,7 @@ impl Cell {
     /// Lets the ball follow the hand, now at `joints`: a held ball comes along; one that finger, palm or camera overlap is pushed aside,
     /// holder and all, until they only touch.
     ///
-    /// Call it after every move (and along the way for long moves); [`crate::SimulatedArm`] does.
+    /// Call it after every move (and along the way for long moves, which [`Cell::sweep`] does); [`crate::SimulatedArm`] does.
     pub fn follow(&mut self, joints: &Joints) -> Contact {
         if let Some(place) = self.held {
             self.ball.centre = self.params.wrist(joints) * place;
@@ -136,6 +136,40 @@ impl Cell {
         let by = (self.ball.centre - start).norm();
         if by > 0.0 {
             Contact::Pushed { by }
+        } else {
+            Contact::Free
+        }
+    }
+
+    /// As [`Cell::follow`], for a hand that goes from one pose to another with all joints in step: the ball follows along the way, at most
+    /// 0.02 rad of a joint at a time.
+    pub fn sweep(&mut self, from: &Joints, to: &Joints) -> Contact {
+        /// Greatest joint step between two looks for contact on the way, radians.
+        const STEP: f64 = 0.02;
+        if self.held.is_some() {
+            return self.follow(to);
+        }
+        // Too far away to meet: the hand reaches 0.25 m from the wrist, and no point of the wrist's way is farther from its ends than the
+        // way is long.
+        let wrist_at = |joints: &Joints| self.params.wrist(joints).translation.vector;
+        let (start, end) = (wrist_at(from), wrist_at(to));
+        let turned = (0..6).map(|i| (to.0[i] - from.0[i]).abs()).fold(0.0, f64::max);
+        let way: f64 = (0..3).map(|i| (to.0[i] - from.0[i]).abs()).sum();
+        let ball = self.ball.centre.coords;
+        if (ball - start).norm().min((ball - end).norm()) > 0.25 + 0.5 * way {
+            return Contact::Free;
+        }
+        let steps = (turned / STEP).ceil().clamp(1.0, 1000.0) as usize;
+        let (before, mut pushed) = (self.ball.centre, false);
+        for i in 1..=steps {
+            let t = i as f64 / steps as f64;
+            let pose = Joints(std::array::from_fn(|j| from.0[j] + t * (to.0[j] - from.0[j])));
+            pushed |= matches!(self.follow(&pose), Contact::Pushed { .. });
+        }
+        if pushed {
+            Contact::Pushed {
+                by: (self.ball.centre - before).norm(),
+            }
         } else {
             Contact::Free
         }

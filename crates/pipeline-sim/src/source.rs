@@ -143,9 +143,6 @@ pub struct SimulatedArm {
     stops: usize,
 }
 
-/// Greatest joint step between two looks for contact on the way, radians.
-const SWEEP: f64 = 0.02;
-
 impl SimulatedArm {
     /// A perfect arm in `cell`, standing at `joints`.
     ///
@@ -221,7 +218,7 @@ impl Manipulator for SimulatedArm {
             cell.params.check(&target)?;
             let from = drive.links();
             drive.send(target);
-            Ok(sweep(cell, &from, &drive.links()))
+            Ok(cell.sweep(&from, &drive.links()))
         })?;
         self.contact = contact;
         Ok(drive.reported())
@@ -239,39 +236,6 @@ impl Manipulator for SimulatedArm {
     fn stop(&mut self) -> Result<(), ArmError> {
         self.stops += 1;
         Ok(())
-    }
-}
-
-/// Takes the hand from one pose to another in joint space, and the ball with it where they meet.
-fn sweep(cell: &mut Cell, from: &Joints, to: &Joints) -> Contact {
-    if cell.held.is_some() {
-        return cell.follow(to);
-    }
-    // Too far away to meet: the hand reaches 0.25 m from the wrist, and no point of the wrist's way is farther from its ends than the way
-    // is long.
-    let (start, end) = (
-        cell.params.wrist(from).translation.vector,
-        cell.params.wrist(to).translation.vector,
-    );
-    let turned = (0..6).map(|i| (to.0[i] - from.0[i]).abs()).fold(0.0, f64::max);
-    let way: f64 = (0..3).map(|i| (to.0[i] - from.0[i]).abs()).sum();
-    let ball = cell.ball.centre.coords;
-    if (ball - start).norm().min((ball - end).norm()) > 0.25 + 0.5 * way {
-        return Contact::Free;
-    }
-    let steps = (turned / SWEEP).ceil().clamp(1.0, 1000.0) as usize;
-    let (before, mut pushed) = (cell.ball.centre, false);
-    for i in 1..=steps {
-        let t = i as f64 / steps as f64;
-        let pose = Joints(std::array::from_fn(|j| from.0[j] + t * (to.0[j] - from.0[j])));
-        pushed |= matches!(cell.follow(&pose), Contact::Pushed { .. });
-    }
-    if pushed {
-        Contact::Pushed {
-            by: (cell.ball.centre - before).norm(),
-        }
-    } else {
-        Contact::Free
     }
 }
 

@@ -1,7 +1,7 @@
 //! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
 
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, ProjectionError, SightError, Workspace};
+use pipeline_sim::{Ball, Cell, Contact, Grasp, ProjectionError, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -111,6 +111,33 @@ fn the_proximity_sensors_warn_of_table_ball_and_holder() {
         assert!(onto.into_iter().any(|pose| cell.proximity(&pose)));
         let aside = goal + JointDelta::from_degrees([2.5, 0.0, 0.0, 0.0, -18.01, 0.0]);
         assert!(cell.proximity(&aside), "a finger on the ball");
+        assert!(!cell.collides(&goal));
+        // A little farther and the finger is in the ball; pushed aside, it touches it and no more.
+        let into = goal + JointDelta::from_degrees([3.5, 0.0, 0.0, 0.0, -18.01, 0.0]);
+        let mut pushed = cell;
+        assert!(cell.collides(&into) && matches!(pushed.follow(&into), Contact::Pushed { .. }));
+        assert!(!pushed.collides(&into) && pushed.proximity(&into));
+    }
+}
+
+#[test]
+fn the_ball_follows_along_the_way_and_not_only_at_its_end() {
+    for (cell, goal) in goals(20) {
+        // From one side of the ball to the other: at neither end is it touched.
+        let beside = |degrees: f64| goal + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, -18.01, 0.0]);
+        let (from, to) = (beside(12.0), beside(-12.0));
+        let (mut swept, mut looked) = (cell, cell);
+        assert_eq!(
+            (looked.follow(&from), looked.follow(&to)),
+            (Contact::Free, Contact::Free)
+        );
+        assert!(matches!(swept.sweep(&from, &to), Contact::Pushed { by } if by > 0.02));
+        // A held ball comes along.
+        let grip = beside(0.0);
+        let mut held = cell;
+        assert_eq!(held.close_gripper(&grip), Grasp::Held);
+        assert_eq!(held.sweep(&grip, &goal), Contact::Carried);
+        assert!(held.grip_miss(&goal) < 0.001 && !held.collides(&goal));
     }
 }
 

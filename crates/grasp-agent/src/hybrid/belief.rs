@@ -123,6 +123,22 @@ impl Belief {
         self.noise
     }
 
+    /// The same after a time in which camera, ball and gears may have changed by `share` of what `prior` allows for: as much is believed,
+    /// and less firmly.
+    pub(crate) fn loosened(&self, prior: &Prior, share: f64) -> Self {
+        let change = (prior.deviations() * share).map(|s| s * s);
+        let information = self.information_matrix().try_inverse();
+        let information = information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());
+        let Some(information) = information.filter(|i| i.iter().all(|v| v.is_finite())) else {
+            return self.clone();
+        };
+        Self::of(
+            self.numbers(),
+            0.5 * (information + information.transpose()),
+            self.noise,
+        )
+    }
+
     pub(crate) fn with_noise(self, noise: f64) -> Self {
         Self { noise, ..self }
     }

@@ -16,6 +16,9 @@ pub struct HybridSettings {
     pub nominal: CameraModel,
     /// How wrong that may be.
     pub prior: Prior,
+    /// How much of that may have come about since a belief was learned that the controller begins with, as a share \[0.2\]; see
+    /// [`Hybrid::with_belief`]. At 0 a camera that has been knocked in the meantime is not learned again for a long time.
+    pub drift: f64,
     /// Features of the ball where it should be \[(103.5, 78, 33)\].
     pub goal: Features,
     /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
@@ -37,6 +40,7 @@ impl HybridSettings {
         Self {
             nominal: CameraModel::paper(),
             prior: Prior::by_eye(),
+            drift: 0.2,
             goal: Features {
                 x: 103.5,
                 y: 78.0,
@@ -60,8 +64,12 @@ impl HybridSettings {
 #[derive(Clone, Debug)]
 pub struct Hybrid {
     settings: HybridSettings,
+    /// What was believed before anything of what is remembered was seen.
+    before: Belief,
     belief: Belief,
     remembered: Vec<Evidence>,
+    /// Whether something is remembered that is not yet part of the belief.
+    news: bool,
     current: Evidence,
     estimate: Option<Estimate>,
     learning: bool,
@@ -72,6 +80,8 @@ pub struct Hybrid {
     doubt: bool,
     /// Sightings for which a ball that has just moved is taken to be still moving.
     moving: usize,
+    /// Grips in this run so far: none of them has held the ball.
+    grips: i32,
 }
 
 /// The ball and the camera as they are taken to be at the moment.
@@ -102,15 +112,22 @@ const LEAST_BOLDNESS: f64 = 1.0 / 64.0;
 impl Hybrid {
     /// A controller that knows nothing but `settings`, and learns.
     pub fn new(settings: HybridSettings) -> Self {
-        Self::with_belief(settings, Belief::new(&settings.prior))
+        Self::beginning(settings, Belief::new(&settings.prior))
     }
 
-    /// A controller that has learned before.
+    /// A controller that has learned before, and goes on from there: what it sees from now on is weighed against `belief`, held as firmly as
+    /// [`HybridSettings::drift`] leaves it.
     pub fn with_belief(settings: HybridSettings, belief: Belief) -> Self {
+        Self::beginning(settings, belief.loosened(&settings.prior, settings.drift))
+    }
+
+    fn beginning(settings: HybridSettings, belief: Belief) -> Self {
         Self {
             settings,
+            before: belief.clone(),
             belief,
             remembered: Vec::new(),
+            news: false,
             current: Evidence::default(),
             estimate: None,
             learning: true,
@@ -118,6 +135,7 @@ impl Hybrid {
             losses: 0,
             doubt: false,
             moving: 0,
+            grips: 0,
         }
     }
 
@@ -138,6 +156,7 @@ impl Hybrid {
         // One sighting says where the ball is, and nothing of the camera.
         if self.learning && self.current.len() >= 2 {
             self.remembered.push(self.current.clone());
+            self.news = true;
             let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
             self.remembered.drain(..forgotten);
         }
@@ -245,6 +264,7 @@ impl Controller for Hybrid {
         self.losses = 0;
         self.doubt = false;
         self.moving = 0;
+        self.grips = 0;
     }
 
     fn arm_at(&mut self, joints: &Joints) {
@@ -301,7 +321,10 @@ impl Controller for Hybrid {
         let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
             .map(|i| estimate.covariance[(i, i)])
             .sum();
-        if uncertainty.sqrt() > self.settings.grip_certainty {
+        // What the agent's settings have missed once they miss again.
+        let enough = self.settings.grip_certainty * 4_f64.powi(self.grips);
+        self.grips = (self.grips + 1).min(10);
+        if uncertainty.sqrt() > enough {
             return None;
         }
         let links = self.current.links(&estimate.numbers);
@@ -314,12 +337,12 @@ impl Controller for Hybrid {
 
     fn end(&mut self) {
         self.remember();
-        if !self.learning || self.remembered.is_empty() {
+        if !self.learning || !std::mem::take(&mut self.news) {
             return;
         }
         let all: Vec<&Evidence> = self.remembered.iter().collect();
-        let prior = Belief::new(&self.settings.prior).with_noise(self.belief.noise());
-        if let Some(fit) = Fit::of(&prior, &self.belief.numbers(), &self.settings.nominal, &all) {
+        let before = self.before.clone().with_noise(self.belief.noise());
+        if let Some(fit) = Fit::of(&before, &self.belief.numbers(), &self.settings.nominal, &all) {
             self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
         }
     }

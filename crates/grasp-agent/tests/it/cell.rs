@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::nalgebra::Point3;
 use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
@@ -16,6 +17,8 @@ pub(crate) enum Fault {
     None,
     NoFrame(usize),
     FrozenFrame(usize),
+    /// Frames, and after so many looks always the same one, with what was in it.
+    FrozenPicture(usize),
     Garbage,
     /// Every seventh look finds a circle that is not the ball.
     FalseCircle,
@@ -23,7 +26,31 @@ pub(crate) enum Fault {
     Phantoms,
     ArmStuck(usize),
     LineDead(usize),
+    /// After so many orders to the gripper.
+    GripperDead(usize),
+    /// After so many moves.
+    SensorDead(usize),
     Near(usize),
+    /// The arm's own guard halts it halfway in this move.
+    Halted(usize),
+    /// As before, and on the way back.
+    HaltedTwice(usize),
+    /// It halts every move of the open hand, but of JT5, that shows the ball with a radius above this.
+    HaltedNear(f64),
+    /// It halts so many ways of the gripper to the ball.
+    HaltedGrips(usize),
+    /// It halts the closed hand in its first or second way.
+    HaltedClosed(usize),
+    /// The jaws hold nothing.
+    Slippery,
+    /// The ball, once it is in the jaws, shows at the border of the image.
+    ShowsInTheJaws,
+    /// The only circle ever seen is one in the middle of the goal: in the first look.
+    PhantomOnce,
+    /// From the pose of the first look.
+    PhantomFromThere,
+    /// From everywhere.
+    PhantomEverywhere,
 }
 
 pub(crate) struct Cell {
@@ -32,10 +59,25 @@ pub(crate) struct Cell {
     pub(crate) fault: Fault,
     pub(crate) joints: Joints,
     pub(crate) closed: bool,
+    pub(crate) held: bool,
     pub(crate) stops: usize,
-    looks: usize,
+    pub(crate) looks: usize,
+    looked_first: Option<Joints>,
     moves: usize,
+    grips: usize,
+    halts: usize,
+    closed_moves: usize,
     old: Option<Features>,
+}
+
+impl Cell {
+    fn dead_line(&self, doing: &str) -> ArmError {
+        ArmError::Line {
+            port: "ttyUSB0".into(),
+            doing: doing.into(),
+            source: std::io::Error::from(std::io::ErrorKind::BrokenPipe),
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -49,9 +91,14 @@ impl Shared {
             fault,
             joints: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
             closed: false,
+            held: false,
             stops: 0,
             looks: 0,
+            looked_first: None,
             moves: 0,
+            grips: 0,
+            halts: 0,
+            closed_moves: 0,
             old: None,
         })))
     }
@@ -88,6 +135,11 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
+            Fault::ShowsInTheJaws if cell.held => Some(Features {
+                x: 87.0 + 0.01 * cell.looks as f64,
+                y: 141.0,
+                r: 27.0,
+            }),
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
                     origin: "camera".into(),
@@ -100,6 +152,21 @@ impl Eye for Shared {
                 y: 1e300,
                 r: -3.0,
             }),
+            Fault::PhantomOnce | Fault::PhantomFromThere | Fault::PhantomEverywhere => {
+                let here = cell.joints;
+                let first = *cell.looked_first.get_or_insert(here);
+                let shows = match cell.fault {
+                    Fault::PhantomOnce => cell.looks == 1,
+                    Fault::PhantomFromThere => here == first,
+                    _ => true,
+                };
+                // Not the same to the last digit: the camera is not frozen.
+                shows.then(|| Features {
+                    x: 103.5,
+                    y: 78.0 + 0.01 * cell.looks as f64,
+                    r: 33.0,
+                })
+            }
             Fault::FalseCircle if cell.looks.is_multiple_of(7) => Some(Features {
                 x: 20.0,
                 y: 30.0,
@@ -115,7 +182,19 @@ impl Eye for Shared {
             }
             _ => seen,
         };
-        cell.old = seen.or(cell.old);
+        let (seen, frame) = match cell.fault {
+            Fault::FrozenPicture(after) => {
+                let number = cell.looks.min(after);
+                let seen = if cell.looks > after { cell.old } else { seen };
+                cell.old = seen;
+                let pixel = |x, y| Luma([(number * 7 + (x * y) as usize) as u8]);
+                (seen, Some(GrayImage::from_fn(16, 12, pixel)))
+            }
+            _ => {
+                cell.old = seen.or(cell.old);
+                (seen, None)
+            }
+        };
         let ball = seen.map(|features| Sighting {
             features,
             detection: Detection {
@@ -123,7 +202,7 @@ impl Eye for Shared {
                 score: 1.0,
             },
         });
-        Ok(Look { frame: None, ball })
+        Ok(Look { frame, ball })
     }
 }
 
@@ -140,23 +219,53 @@ impl Manipulator for Shared {
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
         let mut cell = self.0.borrow_mut();
         cell.moves += 1;
-        match cell.fault {
-            Fault::ArmStuck(after) if cell.moves > after => {}
-            Fault::LineDead(after) if cell.moves > after => {
-                let source = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
-                return Err(ArmError::Line {
-                    port: "ttyUSB0".into(),
-                    doing: "DRIVE".into(),
-                    source,
-                });
+        let (moves, from) = (cell.moves, cell.joints);
+        let gripping = !cell.closed && (target.0[4] - from.0[4]).to_degrees() < -10.0 && from.0[4] > 0.7;
+        let halted = match cell.fault {
+            Fault::ArmStuck(after) if moves > after => return Ok(from),
+            Fault::LineDead(after) if moves > after => {
+                return Err(cell.dead_line("DRIVE"));
             }
-            _ => cell.joints = target,
+            Fault::Halted(at) => moves == at,
+            Fault::HaltedTwice(at) => moves == at || moves == at + 1,
+            Fault::HaltedNear(r) => {
+                !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
+            }
+            Fault::HaltedGrips(times) => gripping && cell.halts < times,
+            Fault::HaltedClosed(way) => {
+                cell.closed_moves += usize::from(cell.closed);
+                cell.closed && cell.halts == 0 && cell.closed_moves == way
+            }
+            _ => false,
+        };
+        cell.joints = if halted {
+            from + JointDelta(std::array::from_fn(|i| 0.5 * (target.0[i] - from.0[i])))
+        } else {
+            target
+        };
+        if cell.held {
+            cell.ball = cell.truth.tool_point(&cell.joints);
+        }
+        if halted {
+            cell.halts += 1;
+            return Err(ArmError::ProximityStop {
+                port: "ttyUSB0".into(),
+                signal: 1001,
+                joints: cell.joints,
+            });
         }
         Ok(cell.joints)
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        self.0.borrow_mut().closed = gripper == Gripper::Closed;
+        let mut cell = self.0.borrow_mut();
+        cell.grips += 1;
+        if matches!(cell.fault, Fault::GripperDead(after) if cell.grips > after) {
+            return Err(cell.dead_line("CLOSEI"));
+        }
+        cell.closed = gripper == Gripper::Closed;
+        let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
+        cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
         Ok(())
     }
 
@@ -169,6 +278,10 @@ impl Manipulator for Shared {
 impl ProximitySensor for Shared {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let cell = self.0.borrow();
-        Ok(matches!(cell.fault, Fault::Near(at) if cell.moves == at))
+        match cell.fault {
+            Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
+            Fault::Near(at) => Ok(cell.moves == at),
+            _ => Ok(false),
+        }
     }
 }

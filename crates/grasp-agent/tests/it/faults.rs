@@ -2,8 +2,8 @@
 
 use grasp_agent::puma_val2::ArmError;
 use grasp_agent::{
-    Agent, AgentError, CameraModel, EventKind, EventLog, GaveUp, Hybrid, HybridSettings, PositionBased,
-    ServoSettings,
+    Agent, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp, Hybrid, HybridSettings,
+    LoggedEvent, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -19,17 +19,51 @@ fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, 
 fn without_a_fault_the_ball_is_gripped() {
     let (end, log, cell) = end_of(Fault::None);
     assert_eq!(end.unwrap().gave_up, None);
-    assert_eq!(log.events.last().unwrap().kind, EventKind::Gripped);
-    assert!(cell.0.borrow().closed && cell.miss() < 0.003, "{}", cell.miss());
+    let words: Vec<&str> = log.events.iter().map(|event| event.kind.word()).collect();
+    // What was seen at the goal is seen again, gripped, and seen no more.
+    let end = [
+        "at-goal",
+        "seen",
+        "gripping",
+        "gripped",
+        "withdrawn",
+        "not-seen",
+        "not-seen",
+        "lifted",
+        "not-seen",
+        "not-seen",
+    ];
+    assert!(words.ends_with(&end), "{words:?}");
+    assert!(
+        cell.0.borrow().closed && cell.0.borrow().held && cell.miss() < 0.003,
+        "{}",
+        cell.miss()
+    );
 }
 
 #[test]
 fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
     type Check = fn(&AgentError) -> bool;
-    let cases: [(Fault, Check); 4] = [
+    let cases: [(Fault, Check); 9] = [
         (Fault::NoFrame(3), |e| matches!(e, AgentError::Camera(_))),
         (Fault::FrozenFrame(3), |e| {
             matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        // With no ball in view, and with one.
+        (Fault::FrozenPicture(1), |e| {
+            matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        (Fault::FrozenPicture(2), |e| {
+            matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        (Fault::GripperDead(0), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
+        }),
+        (Fault::GripperDead(1), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
+        }),
+        (Fault::SensorDead(3), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
         }),
         (Fault::ArmStuck(3), |e| {
             matches!(e, AgentError::Arm(ArmError::NotReached { .. }))
@@ -48,6 +82,91 @@ fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
             "{fault:?}"
         );
         assert!(cell.0.borrow().stops > 0 && !cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
+    let mut without_lift = config();
+    without_lift.lift = None;
+    let mut agent = Agent::with_controller(without_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+    let cell = Shared::new(
+        CameraModel::paper(),
+        [0.6, 0.1, -0.1],
+        Fault::FrozenPicture(usize::MAX),
+    );
+    assert_eq!(
+        cell.run(&mut agent, &mut EventLog::default()).unwrap().gave_up,
+        None
+    );
+    // From now on what was seen last, the ball at the goal, is seen from everywhere.
+    let looks = cell.0.borrow().looks;
+    cell.0.borrow_mut().fault = Fault::FrozenPicture(looks);
+    let before = agent.clone();
+    let mut log = EventLog::default();
+    let error = cell.run(&mut agent, &mut log).unwrap_err();
+    assert!(matches!(error, AgentError::FrozenCamera { looks: 2 }), "{error}");
+    assert!(log.events.iter().any(|event| event.kind == EventKind::SameFrame));
+    assert!(!cell.0.borrow().closed && cell.0.borrow().stops > 0);
+    let replayed = log.replay(&before).unwrap_err();
+    assert!(
+        matches!(replayed, AgentError::FrozenCamera { looks: 2 }),
+        "{replayed}"
+    );
+}
+
+#[test]
+fn too_rapid_an_approach_is_taken_back_and_made_more_slowly() {
+    let limit = ApproachLimit {
+        radius: 20.0,
+        growth: 1.5,
+    };
+    // Up to the radius anything, beyond it up to the growth; the ends are still slow enough.
+    for (before, after, exceeded) in [
+        (5.0, 20.0, false),
+        (5.0, 20.1, true),
+        (20.0, 30.0, false),
+        (20.0, 30.1, true),
+        (40.0, 30.0, false),
+    ] {
+        assert_eq!(limit.exceeded(before, after), exceeded, "{before} to {after}");
+    }
+
+    let mut slow = config();
+    slow.approach = limit;
+    let mut agent = Agent::with_controller(slow, Hybrid::new(HybridSettings::paper())).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut log = EventLog::default();
+    let outcome = cell.run(&mut agent, &mut log).unwrap();
+    assert_eq!(outcome.gave_up, None);
+    let radius = |event: &LoggedEvent| match event.kind {
+        EventKind::Seen(sighting) => Some(sighting.features.r),
+        _ => None,
+    };
+    let fast: Vec<usize> = (0..log.events.len())
+        .filter(|&i| log.events[i].kind == EventKind::TooFast)
+        .collect();
+    assert!(!fast.is_empty());
+    for i in fast {
+        // Moved, Seen too near, TooFast, TakenBack: the arm is where it was before.
+        assert!(radius(&log.events[i - 1]).unwrap() > 20.0);
+        assert_eq!(log.events[i + 1].kind, EventKind::TakenBack);
+        assert_eq!(log.events[i + 1].joints, log.events[i - 3].joints);
+    }
+    // What was let pass was slow enough.
+    let mut last: Option<f64> = None;
+    for (i, event) in log.events.iter().enumerate() {
+        let taken_back = log
+            .events
+            .get(i + 1)
+            .is_some_and(|next| next.kind == EventKind::TooFast);
+        if let Some(r) = radius(event).filter(|_| !taken_back) {
+            assert!(
+                last.is_none_or(|last| !limit.exceeded(last, r)),
+                "{last:?} to {r}"
+            );
+            last = Some(r);
+        }
     }
 }
 
@@ -75,18 +194,124 @@ fn something_near_stops_the_arm_and_takes_it_back() {
     assert!(cell.0.borrow().stops > 0);
 }
 
+/// The words of the events from the first of this kind on.
+fn words_from(log: &EventLog, first: &str) -> Vec<&'static str> {
+    let words = log.events.iter().map(|event| event.kind.word());
+    words.skip_while(|word| *word != first).collect()
+}
+
 #[test]
-fn a_ball_that_is_not_gripped_is_reached_for_again() {
-    let mut with_lift = config();
-    with_lift.lift = Some(puma_val2::JointDelta::from_degrees([
-        0.0, -15.0, 0.0, 0.0, 18.01, 0.0,
-    ]));
-    with_lift.max_cycles = 12;
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
-    let mut agent = Agent::with_controller(with_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+fn an_arm_that_its_own_guard_halts_is_taken_back_and_goes_on() {
+    for fault in [Fault::Halted(3), Fault::HaltedTwice(3)] {
+        let (end, log, cell) = end_of(fault);
+        assert_eq!(end.unwrap().gave_up, None, "{fault:?}");
+        assert!(cell.0.borrow().held, "{fault:?}");
+        let near = words_from(&log, "too-near");
+        let twice = fault != Fault::Halted(3);
+        assert_eq!(near[1], "taken-back", "{fault:?}");
+        assert_eq!(near[2] == "too-near", twice, "{fault:?}: {near:?}");
+        // The arm has stopped by itself; it need not be told.
+        assert_eq!(cell.0.borrow().stops, 0, "{fault:?}");
+        let at = log
+            .events
+            .iter()
+            .position(|e| e.kind == EventKind::TooNear)
+            .unwrap();
+        let (before, halted, back) = (&log.events[at - 2], &log.events[at], &log.events[at + 1]);
+        assert_ne!(halted.joints, before.joints, "{fault:?}");
+        assert_eq!(back.joints == before.joints, !twice, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
+    let (end, log, cell) = end_of(Fault::HaltedGrips(1));
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let expected = [
+        "gripping",
+        "too-near",
+        "taken-back",
+        "seen",
+        "at-goal",
+        "seen",
+        "gripping",
+        "gripped",
+    ];
+    assert!(words_from(&log, "gripping").starts_with(&expected));
+    let (end, _, cell) = end_of(Fault::HaltedGrips(100));
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
+    assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn a_closed_hand_that_is_halted_has_not_succeeded() {
+    // On its way back, which was free: the ball is in that way and not in the jaws. It is gripped again.
+    let (end, log, cell) = end_of(Fault::HaltedClosed(1));
+    let expected = [
+        "gripped",
+        "withdrawn",
+        "too-near",
+        "taken-back",
+        "missed",
+        "recover",
+        "seen",
+    ];
+    assert!(words_from(&log, "gripped").starts_with(&expected), "{log:?}");
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    // As it lifts: what is in the jaws is not known.
+    let (end, log, _) = end_of(Fault::HaltedClosed(2));
+    let expected = ["lifted", "too-near", "taken-back", "gave-up"];
+    assert_eq!(words_from(&log, "lifted"), expected);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
+}
+
+#[test]
+fn where_every_move_is_halted_a_controller_that_can_aim_from_there_grips() {
+    // The hybrid is halted again and again on its way, and knows by then where the ball is.
+    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    for run in 0..10 {
+        let y = 0.05 * f64::from(run) - 0.25;
+        let cell = Shared::new(CameraModel::paper(), [0.6, y, -0.1], Fault::None);
+        assert_eq!(
+            cell.run(&mut agent, &mut EventLog::default()).unwrap().gave_up,
+            None
+        );
+    }
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.0, -0.1], Fault::HaltedNear(30.0));
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
-    // In this cell nothing ever holds the ball, so every grip is a miss.
+    assert_eq!(outcome.gave_up, None);
+    assert!(cell.0.borrow().held);
+    assert!(words_from(&log, "at-goal").is_empty());
+    let halts = log.events.iter().filter(|event| event.kind == EventKind::TooNear);
+    assert!(halts.count() >= 3);
+}
+
+#[test]
+fn a_circle_in_the_goal_that_is_no_ball_is_not_taken_for_a_success() {
+    for (fault, gripped) in [
+        (Fault::PhantomOnce, false),
+        (Fault::PhantomFromThere, true),
+        (Fault::PhantomEverywhere, true),
+    ] {
+        let (end, log, cell) = end_of(fault);
+        assert!(end.unwrap().gave_up.is_some(), "{fault:?}");
+        assert_eq!(!words_from(&log, "gripped").is_empty(), gripped, "{fault:?}");
+        assert_eq!(!words_from(&log, "missed").is_empty(), gripped, "{fault:?}");
+        assert!(!cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_ball_that_is_not_gripped_is_reached_for_again() {
+    let mut short = config();
+    short.max_cycles = 12;
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
+    let mut agent = Agent::with_controller(short, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut log = EventLog::default();
+    let outcome = cell.run(&mut agent, &mut log).unwrap();
     let missed = log
         .events
         .iter()
@@ -97,6 +322,26 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
         "{missed} {outcome:?}"
     );
     assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
+    let (end, log, cell) = end_of(Fault::ShowsInTheJaws);
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let expected = ["lifted", "seen", "seen", "lifted", "seen"];
+    assert_eq!(words_from(&log, "lifted"), expected);
+}
+
+#[test]
+fn every_search_begins_with_an_event() {
+    let (_, log, _) = end_of(Fault::None);
+    assert_eq!(log.events[1].kind, EventKind::Searching);
+    // A ball that is lost for good is recovered nowhere and searched anew.
+    let (end, log, _) = end_of(Fault::PhantomOnce);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
+    let last = words_from(&log, "recover");
+    assert!(last.contains(&"searching"), "{last:?}");
 }
 
 #[test]
@@ -131,10 +376,7 @@ fn what_was_learned_before_the_line_died_is_kept() {
 
 #[test]
 fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a_pose_out_of_limits() {
-    let mut checked = config();
-    checked.lift = Some(puma_val2::JointDelta::from_degrees([
-        0.0, -15.0, 0.0, 0.0, 18.01, 0.0,
-    ]));
+    let checked = config();
     for gain in [1.0, 0.5] {
         let servo = ServoSettings::paper().with_gain(gain);
         let mut agent = Agent::with_controller(checked.clone(), PositionBased::new(servo)).unwrap();

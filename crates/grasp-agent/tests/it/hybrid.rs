@@ -1,7 +1,7 @@
 //! The hybrid finds out what is wrong with the camera, and aims its grip by it.
 
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use grasp_agent::{Agent, CameraModel, EventLog, Hybrid, HybridSettings};
+use grasp_agent::{Agent, CameraModel, EventLog, GaveUp, Hybrid, HybridSettings};
 #[cfg(feature = "serde")]
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
 
@@ -10,16 +10,7 @@ use crate::cell::{Fault, Shared, config};
 #[test]
 fn the_camera_is_learned_from_moves_alone() {
     let nominal = CameraModel::paper();
-    let off = Isometry3::from_parts(
-        Translation3::new(0.01, -0.015, 0.01),
-        UnitQuaternion::from_scaled_axis(Vector3::new(0.08, -0.06, 0.1)),
-    );
-    let truth = CameraModel {
-        focal: nominal.focal * 1.2,
-        mount: nominal.mount * off,
-        ball_radius: nominal.ball_radius * 0.9,
-        ..nominal
-    };
+    let truth = wrong(1.0);
     let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
     for run in 0..40 {
         let azimuth = 0.04 * f64::from(run) - 0.8;
@@ -65,4 +56,83 @@ fn a_saved_belief_comes_back_and_other_files_are_refused() {
     let refused = Behaviour::load(&path, &BehaviourSpec::centering()).unwrap_err();
     assert!(refused.to_string().contains("belief"), "{refused}");
     assert!(Belief::load(&folder.path().join("none")).is_err());
+}
+
+/// A camera that differs from the nominal one as `share` of a heavy error.
+fn wrong(share: f64) -> CameraModel {
+    let nominal = CameraModel::paper();
+    let off = Isometry3::from_parts(
+        Translation3::new(0.01 * share, -0.015 * share, 0.01 * share),
+        UnitQuaternion::from_scaled_axis(Vector3::new(0.08, -0.06, 0.1) * share),
+    );
+    CameraModel {
+        focal: nominal.focal * (1.0 + 0.2 * share),
+        mount: nominal.mount * off,
+        ball_radius: nominal.ball_radius * (1.0 - 0.1 * share),
+        ..nominal
+    }
+}
+
+/// Runs on 20 balls in a cell with the camera `truth`; how many moves each of the last ten took.
+fn runs(agent: &mut Agent<Hybrid>, truth: CameraModel) -> Vec<usize> {
+    let mut cycles = Vec::new();
+    for run in 0..20 {
+        let (azimuth, rho) = (
+            0.032 * f64::from(run * 7 % 20) - 0.4,
+            0.55 + 0.005 * f64::from(run),
+        );
+        let height = -0.15 + 0.01 * f64::from(run % 13);
+        let cell = Shared::new(
+            truth,
+            [rho * azimuth.cos(), rho * azimuth.sin(), height],
+            Fault::None,
+        );
+        let outcome = cell.run(agent, &mut EventLog::default()).unwrap();
+        if outcome.gave_up != Some(GaveUp::NotFound) {
+            cycles.push(outcome.cycles);
+        }
+    }
+    cycles.split_off(cycles.len().saturating_sub(10))
+}
+
+/// Logarithm of the focal length over the nominal one, and its standard deviation.
+fn focal(agent: &Agent<Hybrid>) -> (f64, f64) {
+    let belief = agent.controller().belief();
+    (belief.mean()[0], belief.deviations()[0])
+}
+
+#[test]
+fn a_controller_that_begins_with_a_belief_goes_on_learning_from_there() {
+    let new = |hybrid| Agent::with_controller(config(), hybrid).unwrap();
+    let mut first = new(Hybrid::new(HybridSettings::paper()));
+    runs(&mut first, wrong(1.0));
+    let learned = first.controller().belief().clone();
+    let (mean, deviation) = focal(&first);
+    assert!(
+        (mean - 1.2_f64.ln()).abs() < 0.005 && deviation < 0.01,
+        "{mean} {deviation}"
+    );
+
+    // In the same cell, what was known before counts from the first run on.
+    let mut again = new(Hybrid::with_belief(HybridSettings::paper(), learned.clone()));
+    let cell = Shared::new(wrong(1.0), [0.6, 0.1, -0.1], Fault::None);
+    let outcome = cell.run(&mut again, &mut EventLog::default()).unwrap();
+    assert!(outcome.gave_up.is_none() && outcome.cycles <= 3, "{outcome:?}");
+    let after_one = focal(&again);
+    assert!(
+        after_one.1 < 0.01 && (after_one.0 - mean).abs() < 0.01,
+        "{after_one:?}"
+    );
+    runs(&mut again, wrong(1.0));
+    let after_all = focal(&again);
+    assert!(after_all.1 < deviation, "{after_all:?} from {deviation}");
+
+    // In a cell whose camera has been exchanged, that one is learned instead.
+    for share in [0.7, 0.3, 0.0, -0.3] {
+        let mut moved = new(Hybrid::with_belief(HybridSettings::paper(), learned.clone()));
+        let cycles = runs(&mut moved, wrong(share));
+        assert!(cycles.iter().all(|cycles| *cycles <= 5), "{share}: {cycles:?}");
+        let mean = focal(&moved).0;
+        assert!((mean - (1.0 + 0.2 * share).ln()).abs() < 0.005, "{share}: {mean}");
+    }
 }

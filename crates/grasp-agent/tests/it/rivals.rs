@@ -1,8 +1,10 @@
 //! Every rival reaches the ball with the right model.
 
+use grasp_agent::hough_heuristic::Features;
+use grasp_agent::puma_val2::Joints;
 use grasp_agent::{
-    Agent, CameraModel, Controller, EventLog, Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased,
-    ServoSettings,
+    Agent, CameraModel, Consequence, Controller, EventLog, Fuzzy, ImageBased, JacobianAt, JointLimits,
+    LookAhead, PositionBased, ServoSettings, Situation,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -26,5 +28,36 @@ fn every_rival_reaches_the_ball_with_the_right_model() {
             assert_eq!(outcome.gave_up, None, "{name} {ball:?}");
             assert!(outcome.cycles <= most, "{name} {ball:?}: {}", outcome.cycles);
         }
+    }
+}
+
+#[test]
+fn look_ahead_does_not_repeat_a_move_that_lost_the_ball_or_was_taken_back() {
+    let limits = JointLimits::paper();
+    let now = Situation {
+        features: Features {
+            x: 60.0,
+            y: 100.0,
+            r: 12.0,
+        },
+        joints: Joints::from_degrees([0.0, -80.0, 200.0, 0.0, 45.0, 0.0]),
+    };
+    let mut elsewhere = now;
+    elsewhere.joints.0[0] += 0.02;
+    for consequence in [Consequence::Lost, Consequence::TakenBack] {
+        let mut rival = LookAhead::new(ServoSettings::paper());
+        let first = rival.decide(&now, &limits).unwrap();
+        rival.judge(&Consequence::Seen(now));
+        assert_eq!(rival.decide(&now, &limits).unwrap(), first);
+        rival.judge(&consequence);
+        let second = rival.decide(&now, &limits).unwrap();
+        assert_ne!(second, first);
+        rival.judge(&consequence);
+        let third = rival.decide(&now, &limits).unwrap();
+        assert!(third != first && third != second);
+        // From another pose, and in another run, it is a move like any other.
+        assert_eq!(rival.decide(&elsewhere, &limits).unwrap(), first);
+        rival.begin();
+        assert_eq!(rival.decide(&now, &limits).unwrap(), first);
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::directions::code;
-use super::polar::LANES;
+use super::polar::{LANES, whole};
 use crate::edges::Candidate;
 
 /// Set in the mark of a pixel with an edge.
@@ -93,9 +93,9 @@ impl Level {
     /// The mark of the pixel, or None outside.
     #[inline]
     pub(super) fn mark(&self, x: f32, y: f32) -> Option<(u8, usize)> {
-        // Casts of what lies outside saturate at either end.
-        let (column, row) = ((x + 0.5) as i32 as usize, (y + 0.5) as i32 as usize);
-        if x < -0.5 || y < -0.5 || column >= self.width || row >= self.height {
+        // Numbers below 0 become very large ones.
+        let (column, row) = (whole(x).0 as usize, whole(y).0 as usize);
+        if column >= self.width || row >= self.height {
             return None;
         }
         let pixel = row * self.width + column;

@@ -12,6 +12,10 @@ const REACH: usize = 6;
 /// Fewer rays than these do not make a circle.
 const LEAST_NEAR: usize = 20;
 
+/// Nor does a smaller share of those in the frame, at first and once the outline has been moved to the edges: of balls of
+/// which two fifths are hidden some show little more.
+const LEAST_SHARE: [f32; 2] = [0.3, 0.4];
+
 /// What a candidate proved to be.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Proof {
@@ -156,6 +160,10 @@ pub(super) fn prove(
             let (dx, dy) = (better.x - other.x, better.y - other.y);
             (dx * dx + dy * dy).sqrt() + (better.r - other.r).abs()
         };
+        let visible: f32 = polar.visible.iter().sum();
+        if (near as f32) < LEAST_SHARE[round.min(1)] * visible {
+            return None;
+        }
         if near < LEAST_NEAR || !(apart(&start) <= 6.0 && better.r >= 3.0) {
             return None;
         }

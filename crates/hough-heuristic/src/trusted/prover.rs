@@ -2,6 +2,7 @@
 
 use image::GrayImage;
 
+use super::budget::PROOF;
 use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Grey, Polar, Ring};
@@ -72,7 +73,7 @@ pub(super) struct Prover<'a> {
 
 impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
-    pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
+    pub(super) fn prove(&mut self, candidate: &Candidate, looks: &mut u64) -> Option<Ring> {
         let coarsest = self.depth_for(candidate.r);
         // Noise hides the outline at the larger sizes, and leaves few samples at the smaller ones: whichever says more.
         let finest = if self.noise > NOISY {
@@ -82,7 +83,7 @@ impl Prover<'_> {
         };
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
-            let proof = self.prove_at(depth, &candidate.ring());
+            let proof = self.prove_at(depth, &candidate.ring(), looks);
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
             }
@@ -91,14 +92,14 @@ impl Prover<'_> {
         // short arc is sharp enough to be told from chance.
         if finest == coarsest && best.is_none_or(|first| !first.is_beyond_doubt()) {
             if coarsest < self.pyramid.depth() && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32 {
-                best = better(best, self.prove_at(coarsest + 1, &candidate.ring()));
+                best = better(best, self.prove_at(coarsest + 1, &candidate.ring(), looks));
             }
             if coarsest > 0
                 && let Some(first) = best
                 && first.depth == coarsest
                 && first.certainty >= 0.0
             {
-                best = better(best, self.prove_at(coarsest - 1, &first.in_frame()));
+                best = better(best, self.prove_at(coarsest - 1, &first.in_frame(), looks));
             }
         }
         let best = best?;
@@ -107,7 +108,8 @@ impl Prover<'_> {
     }
 
     /// The proof of a circle in pixels of the frame, in the frame that was halved so many times.
-    fn prove_at(&mut self, depth: usize, ring: &Ring) -> Option<Proof> {
+    fn prove_at(&mut self, depth: usize, ring: &Ring, looks: &mut u64) -> Option<Proof> {
+        *looks += PROOF;
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),

@@ -7,6 +7,8 @@
 
 #[path = "../../scenes/scenes.rs"]
 mod scenes;
+#[path = "../../scenes/simple.rs"]
+mod simple;
 
 mod any_frame;
 mod curves;

@@ -164,7 +164,7 @@ impl Studio<'_> {
                     }
                 }
             }
-            for (i, (light, value)) in row.iter_mut().zip(&shade).enumerate() {
+            for (i, (light, value)) in row.iter_mut().zip(&mut shade).enumerate() {
                 let xn = first + i as f32 * step;
                 let dd = 1.0 + xn * xn + yn * yn;
                 let b = xn * cx + yn * cy + cz;
@@ -172,8 +172,10 @@ impl Studio<'_> {
                 // Distance to the outline in pixels: the discriminant over its gradient.
                 let (gx, gy) = (2.0 * (b * cx - xn * k) * step, 2.0 * (b * cy - yn * k) * step);
                 let share = (0.5 + disc / (gx * gx + gy * gy).max(1e-20).sqrt()).clamp(0.0, 1.0);
-                *light += (albedo * value - *light) * share;
+                *light += (albedo * *value - *light) * share;
+                *value = share;
             }
+            canvas.note(y, origin, shade.iter().copied());
         }
     }
 

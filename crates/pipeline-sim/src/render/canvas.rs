@@ -8,12 +8,14 @@ pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) light: Vec<f32>,
+    /// Share of each pixel that is covered, for a canvas that is laid over another; empty for one that is not.
+    pub(super) cover: Vec<f32>,
+    /// What has been drawn on since [`Canvas::wipe`].
+    touched: Area,
     coverage: Vec<f32>,
     shade: Vec<f32>,
     /// Edges of the present polygon, but for level ones.
     edges: Vec<Edge>,
-    /// Those of them that cross the present row.
-    crossing: Vec<Edge>,
 }
 
 /// An edge of a polygon, from its upper end down.
@@ -27,6 +29,49 @@ struct Edge {
     slope: f64,
 }
 
+/// A rectangle of pixels: columns left..right of rows top..bottom.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Area {
+    pub(super) left: usize,
+    pub(super) right: usize,
+    pub(super) top: usize,
+    pub(super) bottom: usize,
+}
+
+impl Area {
+    pub(super) fn is_empty(&self) -> bool {
+        self.left >= self.right || self.top >= self.bottom
+    }
+
+    /// The smallest area that holds this one and the columns start..end of row y.
+    fn with(self, y: usize, start: usize, end: usize) -> Self {
+        if self.is_empty() {
+            return Self {
+                left: start,
+                right: end,
+                top: y,
+                bottom: y + 1,
+            };
+        }
+        Self {
+            left: self.left.min(start),
+            right: self.right.max(end),
+            top: self.top.min(y),
+            bottom: self.bottom.max(y + 1),
+        }
+    }
+
+    /// The area with `by` more pixels on every side, as far as a canvas of this size goes.
+    pub(super) fn grown(self, by: usize, (width, height): (usize, usize)) -> Self {
+        Self {
+            left: self.left.saturating_sub(by),
+            right: (self.right + by).min(width),
+            top: self.top.saturating_sub(by),
+            bottom: (self.bottom + by).min(height),
+        }
+    }
+}
+
 /// Scan lines per row of pixels; coverage is exact along x and sampled this finely along y.
 const SUBROWS: usize = 4;
 
@@ -36,10 +81,11 @@ impl Canvas {
             width,
             height,
             light: vec![0.0; width * height],
+            cover: Vec::new(),
+            touched: Area::default(),
             coverage: vec![0.0; width + 2],
             shade: vec![0.0; width + 2],
             edges: Vec::with_capacity(8),
-            crossing: Vec::with_capacity(8),
         }
     }
 
@@ -47,6 +93,58 @@ impl Canvas {
     pub(super) fn resize(&mut self, width: usize, height: usize) {
         if (self.width, self.height) != (width, height) {
             *self = Self::new(width, height);
+        }
+    }
+
+    /// Makes this a canvas of the given size that is laid over another, with nothing on it.
+    pub(super) fn clear_layer(&mut self, width: usize, height: usize) {
+        self.resize(width, height);
+        if self.cover.len() == self.light.len() {
+            self.wipe();
+        } else {
+            self.light.fill(0.0);
+            self.cover.clear();
+            self.cover.resize(width * height, 0.0);
+            self.touched = Area::default();
+        }
+    }
+
+    /// All of it.
+    pub(super) fn whole(&self) -> Area {
+        Area {
+            left: 0,
+            right: self.width,
+            top: 0,
+            bottom: self.height,
+        }
+    }
+
+    /// What has been drawn on.
+    pub(super) fn touched(&self) -> Area {
+        self.touched
+    }
+
+    /// Takes off what has been drawn, and two pixels around it, which a blur may have reached.
+    fn wipe(&mut self) {
+        let area = self.touched.grown(2, (self.width, self.height));
+        for y in area.top..area.bottom {
+            let row = y * self.width + area.left..y * self.width + area.right.max(area.left);
+            self.light[row.clone()].fill(0.0);
+            self.cover[row].fill(0.0);
+        }
+        self.touched = Area::default();
+    }
+
+    /// Notes that the columns start.. of row y are covered by these shares.
+    pub(super) fn note(&mut self, y: usize, start: usize, shares: impl ExactSizeIterator<Item = f32>) {
+        if self.cover.is_empty() {
+            return;
+        }
+        let end = start + shares.len();
+        self.touched = self.touched.with(y, start, end);
+        let row = &mut self.cover[y * self.width + start..y * self.width + end];
+        for (cover, share) in row.iter_mut().zip(shares) {
+            *cover += (1.0 - *cover) * share;
         }
     }
 
@@ -60,6 +158,7 @@ impl Canvas {
             let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
             if solid {
                 shade(y, start, row);
+                self.note(y, start, (start..end).map(|_| 1.0));
                 continue;
             }
             let shades = &mut self.shade[..end - start];
@@ -67,6 +166,9 @@ impl Canvas {
             for ((light, shade), share) in row.iter_mut().zip(&*shades).zip(&self.coverage[start..end]) {
                 *light += (shade - *light) * share;
             }
+            let shares = std::mem::take(&mut self.coverage);
+            self.note(y, start, shares[start..end].iter().copied());
+            self.coverage = shares;
         }
     }
 
@@ -82,6 +184,10 @@ impl Canvas {
                 let coverage = if solid { 1.0 } else { *coverage };
                 *value += (light - *value) * coverage * share;
             }
+            let shares = std::mem::take(&mut self.coverage);
+            let whole = |k: &f32| share * if solid { 1.0 } else { *k };
+            self.note(y, start, shares[start..end].iter().map(whole));
+            self.coverage = shares;
         }
     }
 
@@ -122,29 +228,23 @@ impl Canvas {
     /// Coverage of one row: the touched pixels start..end, and whether all of them are covered wholly.
     fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
         let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
-        self.crossing.clear();
+        let lines: [f64; SUBROWS] = std::array::from_fn(|i| above + (i as f64 + 0.5) / SUBROWS as f64);
+        let (mut lefts, mut rights) = ([f64::INFINITY; SUBROWS], [f64::NEG_INFINITY; SUBROWS]);
         for edge in &self.edges {
-            if edge.bottom >= above && edge.top <= below {
-                self.crossing.push(*edge);
+            if edge.bottom < above || edge.top > below {
+                continue;
+            }
+            for i in 0..SUBROWS {
+                let x = edge.x + (lines[i] - edge.top) * edge.slope;
+                let crosses = edge.top <= lines[i] && lines[i] < edge.bottom;
+                lefts[i] = if crosses && x < lefts[i] { x } else { lefts[i] };
+                rights[i] = if crosses && x > rights[i] { x } else { rights[i] };
             }
         }
         let mut spans = [(0.0_f64, -1.0_f64); SUBROWS];
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut inner_left, mut inner_right) = (f64::NEG_INFINITY, f64::INFINITY);
-        for (i, span) in spans.iter_mut().enumerate() {
-            let line = y as f64 - 0.5 + (i as f64 + 0.5) / SUBROWS as f64;
-            let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-            for edge in &self.crossing {
-                if edge.top <= line && line < edge.bottom {
-                    let x = edge.x + (line - edge.top) * edge.slope;
-                    if x < left {
-                        left = x;
-                    }
-                    if x > right {
-                        right = x;
-                    }
-                }
-            }
+        for (span, (left, right)) in spans.iter_mut().zip(lefts.into_iter().zip(rights)) {
             // Pixel x covers x - 0.5 .. x + 0.5; here its left border is at x.
             let (left, right) = ((left + 0.5).max(0.0), (right + 0.5).min(self.width as f64));
             if left < right {
@@ -170,13 +270,15 @@ impl Canvas {
             return Some((start, end, true));
         }
         let (from, to) = (from.clamp(start, end), to.clamp(start, end));
-        self.coverage[start..from].fill(0.0);
         self.coverage[from..to].fill(1.0);
-        self.coverage[to..end].fill(0.0);
-        for (left, right) in spans {
-            for x in (start..from).chain(to..end) {
-                let share = right.min(x as f64 + 1.0) - left.max(x as f64);
-                self.coverage[x] += share.max(0.0) as f32 / SUBROWS as f32;
+        for part in [start..from, to..end] {
+            for (x, coverage) in part.clone().zip(&mut self.coverage[part]) {
+                let x = x as f64;
+                *coverage = 0.0;
+                for (left, right) in &spans {
+                    let share = right.min(x + 1.0) - left.max(x);
+                    *coverage += share.max(0.0) as f32 / SUBROWS as f32;
+                }
             }
         }
         Some((start, end, false))

@@ -4,6 +4,7 @@ use hough_heuristic::image::GrayImage;
 use puma_val2::Joints;
 
 use crate::render::lens::soften;
+use crate::render::moving::Exposed;
 use crate::{Cell, Renderer};
 
 /// How a frame is taken while things move.
@@ -56,15 +57,60 @@ impl Renderer {
             let (cell, joints) = moment(0.5 * shot.exposure);
             return self.render(&cell, &joints);
         }
-        let fields: &[f64] = match shot.interlace {
+        let opened: &[f64] = match shot.interlace {
             Some(later) => &[0.0, later],
             None => &[0.0],
         };
+        let last = opened[opened.len() - 1];
+        // Frozen fields would only lose by being drawn from the middle between them.
+        let drawn = count > 1 && {
+            let exposed = Exposed {
+                middle: moment(0.5 * (last + shot.exposure)),
+                fields: opened
+                    .iter()
+                    .map(|t| [0.0, 0.5, 1.0].map(|part| moment(t + part * shot.exposure)))
+                    .collect(),
+            };
+            self.illuminate_moving(&exposed)
+        };
+        if !drawn {
+            self.illuminate_moments(opened, (shot.exposure, count), &mut moment);
+        }
+        let (cell, _) = moment(last);
+        self.exposure.blurred = shot.interlace.is_some();
+        self.develop(&cell)
+    }
+
+    /// As [`Renderer::take`], every moment drawn on its own.
+    #[cfg(test)]
+    pub(super) fn take_exactly(
+        &mut self,
+        shot: &Shot,
+        mut moment: impl FnMut(f64) -> (Cell, Joints),
+    ) -> &GrayImage {
+        let opened: &[f64] = match shot.interlace {
+            Some(later) => &[0.0, later],
+            None => &[0.0],
+        };
+        self.illuminate_moments(opened, (shot.exposure, shot.moments), &mut moment);
+        let (cell, _) = moment(opened[opened.len() - 1]);
+        self.exposure.blurred = shot.interlace.is_some();
+        self.develop(&cell)
+    }
+
+    /// Draws every moment of every field on its own.
+    fn illuminate_moments(
+        &mut self,
+        opened: &[f64],
+        (exposure, count): (f64, usize),
+        moment: &mut impl FnMut(f64) -> (Cell, Joints),
+    ) {
         let mut total = std::mem::take(&mut self.exposed);
         let mut woven = std::mem::take(&mut self.woven);
-        for (field, opened) in fields.iter().enumerate() {
+        let interlaced = opened.len() > 1;
+        for (field, opened) in opened.iter().enumerate() {
             for k in 0..count {
-                let t = opened + shot.exposure * (k as f64 + 0.5) / count as f64;
+                let t = opened + exposure * (k as f64 + 0.5) / count as f64;
                 let (cell, joints) = moment(t);
                 self.illuminate(&cell, &joints);
                 if k == 0 {
@@ -79,10 +125,11 @@ impl Renderer {
             }
             let share = 1.0 / count as f32;
             total.iter_mut().for_each(|sum| *sum *= share);
-            if shot.interlace.is_some() && total.len() == self.canvas.light.len() {
+            if interlaced && total.len() == self.canvas.light.len() {
                 // Lens and sensor blur what they see of each field; only then are the rows woven.
                 std::mem::swap(&mut self.canvas.light, &mut total);
-                soften(&mut self.canvas, self.scene.sensor.blur, &mut self.spare);
+                let whole = self.canvas.whole();
+                soften(&mut self.canvas, whole, self.scene.sensor.blur, &mut self.spare);
                 std::mem::swap(&mut self.canvas.light, &mut total);
             }
             if field == 0 {
@@ -99,8 +146,5 @@ impl Renderer {
             self.canvas.light.copy_from_slice(&woven);
         }
         (self.exposed, self.woven) = (total, woven);
-        let (cell, _) = moment(shot.interlace.unwrap_or(0.0));
-        self.exposure.blurred = shot.interlace.is_some();
-        self.develop(&cell)
     }
 }

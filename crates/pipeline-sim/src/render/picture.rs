@@ -1,0 +1,239 @@
+//! What a frame shows, part by part: background, table, and what lies and stands on it.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::render::Renderer;
+use crate::render::bodies::{Studio, plane_row};
+use crate::render::canvas::Canvas;
+use crate::render::shadow::{BallShadow, lamps, table_light};
+use crate::render::view::View;
+use crate::{Cell, Look, Thing};
+
+/// Near and far edge of the table along x, and its half width along y, metres.
+const TABLE: (f64, f64, f64) = (-0.45, 1.30, 1.15);
+/// Depth of the floor below the shoulder, metres.
+const FLOOR: f64 = -1.05;
+/// How far the walls are, metres.
+const WALLS: f64 = 3.2;
+
+impl Renderer {
+    /// Draws all of it.
+    pub(super) fn draw(&mut self, canvas: &mut Canvas, cell: &Cell, view: &View) {
+        self.lay_light(view, cell.table, &[cell]);
+        let studio = self.studio(cell, view);
+        if !fills_frame(view, cell) {
+            self.draw_backdrop(canvas, &studio);
+        }
+        self.draw_table(canvas, &studio);
+        for item in self.items(cell, view) {
+            self.draw_item(canvas, &studio, cell, &item);
+        }
+    }
+
+    /// Works out the light on the table, with the mean of the shadows that balls and holders of `cells` throw.
+    pub(super) fn lay_light(&mut self, view: &View, table: f64, cells: &[&Cell]) {
+        if view.eye().z <= table {
+            return;
+        }
+        let (total, _) = table_light(&self.scene);
+        let light = (self.scene.table.albedo * total) as f32;
+        let balls: Vec<BallShadow> = cells
+            .iter()
+            .map(|cell| BallShadow::new(&self.scene, &cell.ball, cell.holder, table))
+            .collect();
+        let share = 1.0 / balls.len().max(1) as f32;
+        let plane = table_plane(view, table);
+        self.light.lay(view, &plane, |u, v| {
+            let open = balls.iter().map(|ball| ball.factor(u, v)).sum::<f32>();
+            light * self.table.at(u, v) * (open * share)
+        });
+    }
+
+    /// What shading depends on.
+    pub(super) fn studio<'a>(&'a self, cell: &Cell, view: &'a View) -> Studio<'a> {
+        let (total, _) = table_light(&self.scene);
+        Studio {
+            view,
+            scene: &self.scene,
+            texture: &self.wood,
+            lamps: lamps(&self.scene),
+            table: cell.table,
+            bounce: self.scene.table.albedo * total,
+        }
+    }
+
+    /// Draws the table, seen from above, in the light last laid on it.
+    pub(super) fn draw_table(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
+        let view = studio.view;
+        if view.eye().z <= studio.table {
+            return;
+        }
+        let plane = table_plane(view, studio.table);
+        let (near, far, half) = TABLE;
+        let corners = [(near, -half), (far, -half), (far, half), (near, half)];
+        let mut polygon = Vec::with_capacity(8);
+        view.polygon(
+            &corners.map(|(x, y)| Point3::new(x, y, studio.table)),
+            &mut polygon,
+        );
+        let strength = self.scene.table.texture as f32;
+        canvas.fill(&polygon, |y, x0, row| {
+            plane_row(&plane, &self.wood, strength, (y, x0), row, |x| {
+                self.light.at(x, y)
+            });
+        });
+    }
+
+    /// All that is drawn over the table, in the order of drawing.
+    ///
+    /// What lies flat comes first; then what stands, far things before near ones; occluders, which are before the lens, last. Circles that
+    /// do not overlap are in the right order when sorted by power (squared distance less squared radius): their radical axes
+    /// separate them. A ball above a thing, or on its holder, overlaps it as seen from above: a level plane separates the two, and the one
+    /// on the far side of it comes first.
+    pub(super) fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
+        let eye = view.eye();
+        let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
+        let ball = cell.ball.centre;
+        let bottom = ball.z - cell.ball.radius;
+        let overlaps = |x: f64, y: f64, r: f64| (x - ball.x).hypot(y - ball.y) < r + cell.ball.radius;
+        // A thing where the holder stands, or in a ball that lies or is carried low, is left out.
+        let in_the_way = |t: &Thing| {
+            let foot = t.shape.footprint();
+            let at_holder = cell.holder.is_some_and(|h| {
+                (t.x - h.foot.x).hypot(t.y - h.foot.y) <= foot + h.radius.max(cell.ball.radius)
+            });
+            at_holder || (bottom < cell.table + t.shape.height() && overlaps(t.x, t.y, foot))
+        };
+        let things = || self.scene.things.iter().enumerate();
+        let mut items: Vec<Item> = things()
+            .filter(|(_, t)| t.shape.is_flat())
+            .map(|(i, _)| Item::Thing(i))
+            .collect();
+        // Each with its power, its top, and whether the ball is above it.
+        let mut standing: Vec<(f64, f64, bool, Item)> = things()
+            .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t))
+            .map(|(i, t)| {
+                let (foot, top) = (t.shape.footprint(), cell.table + t.shape.height());
+                (
+                    power(t.x, t.y, foot),
+                    top,
+                    overlaps(t.x, t.y, foot),
+                    Item::Thing(i),
+                )
+            })
+            .collect();
+        standing.extend(cell.holder.map(|h| {
+            let under = ball.z > h.top && overlaps(h.foot.x, h.foot.y, h.radius);
+            (power(h.foot.x, h.foot.y, h.radius), h.top, under, Item::Holder)
+        }));
+        standing.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Where the ball goes among them: by power, but after what it is above, and before what it is above as seen from below.
+        let of_ball = power(ball.x, ball.y, cell.ball.radius);
+        let by_power = standing.iter().filter(|(power, ..)| *power >= of_ball).count();
+        let seen_from_above = |top: f64| eye.z > top;
+        let after = standing
+            .iter()
+            .rposition(|(_, top, under, _)| *under && seen_from_above(*top))
+            .map_or(0, |i| i + 1);
+        let before = standing
+            .iter()
+            .position(|(_, top, under, _)| *under && !seen_from_above(*top))
+            .unwrap_or(standing.len());
+        let place = by_power.min(before).max(after);
+        items.extend(standing[..place].iter().map(|s| s.3));
+        items.push(Item::Ball);
+        items.extend(standing[place..].iter().map(|s| s.3));
+        items.extend((0..self.scene.occluders.len()).map(Item::Occluder));
+        items
+    }
+
+    pub(super) fn draw_item(&self, canvas: &mut Canvas, studio: &Studio<'_>, cell: &Cell, item: &Item) {
+        match item {
+            Item::Thing(i) => studio.thing(canvas, &self.scene.things[*i]),
+            Item::Ball => {
+                studio.sphere(canvas, &cell.ball.centre, cell.ball.radius, &studio.scene.ball);
+            }
+            Item::Holder => {
+                if let Some(h) = cell.holder {
+                    studio.cylinder(canvas, h.foot, h.radius, cell.table, h.top, &ROD);
+                }
+            }
+            Item::Occluder(i) => studio.occluder(canvas, &self.scene.occluders[*i]),
+        }
+    }
+
+    /// Draws floor and walls of the room.
+    pub(super) fn draw_backdrop(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
+        canvas.light.fill(0.30);
+        let mut polygon = Vec::with_capacity(8);
+        let n = self.walls.len() / 2;
+        let corner = |i: usize, z: f64| {
+            let (sin, cos) = (i as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+            Point3::new(WALLS * cos, WALLS * sin, z)
+        };
+        for (i, pair) in self.walls.chunks_exact(2).enumerate() {
+            for (light, low, high) in [(pair[0], FLOOR, 0.2), (pair[1], 0.2, 1.8)] {
+                let corners = [
+                    corner(i, low),
+                    corner(i + 1, low),
+                    corner(i + 1, high),
+                    corner(i, high),
+                ];
+                studio.view.polygon(&corners, &mut polygon);
+                canvas.fill(&polygon, |_, _, row| row.fill(light));
+            }
+        }
+        let floor: Vec<Point3<f64>> = (0..n).map(|i| corner(i, FLOOR)).collect();
+        studio.view.polygon(&floor, &mut polygon);
+        let plane = studio.view.plane(
+            &Point3::new(0.0, 0.0, FLOOR),
+            &Vector3::new(4.0, 0.0, 0.0),
+            &Vector3::new(0.0, 4.0, 0.0),
+        );
+        canvas.fill(&polygon, |y, x0, row| {
+            plane_row(&plane, studio.texture, 0.4, (y, x0), row, |_| 0.16);
+        });
+    }
+}
+
+/// How the holder looks.
+const ROD: Look = Look {
+    albedo: 0.35,
+    texture: 0.0,
+    gloss: 0.3,
+};
+
+/// Something drawn over the table.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Item {
+    /// The ball.
+    Ball,
+    /// What it stands on, or stood on.
+    Holder,
+    /// A thing of the scene.
+    Thing(usize),
+    /// An occluder of the scene.
+    Occluder(usize),
+}
+
+/// The map from pixels to homogeneous coordinates on the table, metres along x and y.
+pub(super) fn table_plane(view: &View, table: f64) -> Matrix3<f64> {
+    view.plane(&Point3::new(0.0, 0.0, table), &Vector3::x(), &Vector3::y())
+}
+
+/// Whether every ray of the frame meets the table.
+pub(super) fn fills_frame(view: &View, cell: &Cell) -> bool {
+    let (near, far, half) = TABLE;
+    if view.eye().z <= cell.table {
+        return false;
+    }
+    let plane = table_plane(view, cell.table);
+    let (w, h) = (view.width as f64, view.height as f64);
+    [(-1.0, -1.0), (w, -1.0), (-1.0, h), (w, h)]
+        .into_iter()
+        .all(|(x, y)| {
+            let p = plane * Vector3::new(x, y, 1.0);
+            let (u, v) = (p.x / p.z, p.y / p.z);
+            p.z > 0.0 && u > near && u < far && v.abs() < half
+        })
+}

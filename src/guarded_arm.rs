@@ -1,0 +1,63 @@
+//! An arm that its controller stops when something comes too near to the hand.
+
+use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, Transport, Val2Client};
+
+/// A [`Val2Client`] whose moves the controller itself watches ([`Val2Client::arm_proximity`]).
+///
+/// A stop ([`ArmError::ProximityStop`]) uses the guard up, so that the arm can be taken back the way it came; it is armed again as soon as
+/// a move has ended with nothing near.
+#[derive(Debug)]
+pub(crate) struct GuardedArm<T: Transport> {
+    client: Val2Client<T>,
+    signal: u16,
+    armed: bool,
+}
+
+impl<T: Transport> GuardedArm<T> {
+    /// Arms the guard on the input that `client` is set to for its sensors.
+    pub(crate) fn new(mut client: Val2Client<T>) -> Result<Self, ArmError> {
+        let signal = client.config().proximity_signal;
+        client.arm_proximity(signal)?;
+        Ok(Self {
+            client,
+            signal,
+            armed: true,
+        })
+    }
+
+    fn watched(
+        &mut self,
+        order: impl FnOnce(&mut Val2Client<T>) -> Result<Joints, ArmError>,
+    ) -> Result<Joints, ArmError> {
+        let outcome = order(&mut self.client);
+        if matches!(outcome, Err(ArmError::ProximityStop { .. })) {
+            self.armed = false;
+        } else if outcome.is_ok() && !self.armed && !self.client.signal(self.signal)? {
+            self.client.arm_proximity(self.signal)?;
+            self.armed = true;
+        }
+        outcome
+    }
+}
+
+impl<T: Transport> Manipulator for GuardedArm<T> {
+    fn joints(&mut self) -> Result<Joints, ArmError> {
+        self.client.joints()
+    }
+
+    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        self.watched(|client| client.move_by(delta))
+    }
+
+    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
+        self.watched(|client| client.move_to(target))
+    }
+
+    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+        self.client.set_gripper(gripper)
+    }
+
+    fn stop(&mut self) -> Result<(), ArmError> {
+        self.client.stop()
+    }
+}
