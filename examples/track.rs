@@ -85,7 +85,7 @@ struct Options {
     #[arg(long, value_name = "LEVELS")]
     noise: Option<f64>,
 
-    /// Begin with what an earlier run learned of the camera: its camera.belief
+    /// Begin with what an earlier run learned of the camera: its camera.belief; learning goes on from there in the --teach runs
     #[arg(long, value_name = "FILE")]
     belief: Option<PathBuf>,
 

@@ -30,9 +30,9 @@ pub struct AgentConfig {
     /// How fast the hand may come nearer to the ball.
     pub approach: ApproachLimit,
     /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still there; then it is lifted by
-    /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that is seen there is in the jaws if it stays in
-    /// its place in the image when the hand goes up by a third of that more. A ball that is not in the jaws is reached for again; a hand that is
-    /// stopped has not succeeded. `None`: closing the jaws at the goal is success, whatever is between them.
+    /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that keeps its place in the image as the hand goes up is
+    /// in the jaws. A ball that is not is reached for again; a hand that is stopped has not succeeded. `None`: closing the jaws at the goal is
+    /// success, whatever is between them.
     pub lift: Option<JointDelta>,
     /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
     /// end of what the ball stood on for example.

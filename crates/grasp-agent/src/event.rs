@@ -53,11 +53,11 @@ pub enum EventKind {
     TakenBack,
     /// Centre and radius are at the goal.
     AtGoal,
-    /// The gripper has been brought to the ball by this move.
+    /// The gripper has been brought to the ball by this move, the last one of two where the arm has to be moved first.
     Gripping(JointDelta),
     /// The gripper has closed.
     Gripped,
-    /// The hand, closed, has gone back to where the ball was last seen from.
+    /// The hand, closed, has gone back by a move of the grip, the last one to where the ball was last seen from.
     Withdrawn,
     /// The arm has lifted what it gripped.
     Lifted,

@@ -9,6 +9,13 @@ use crate::{
     Sighting, Situation,
 };
 
+mod gripping;
+
+use gripping::{Grips, is_same_place};
+
+/// So many moves that were taken back are too many.
+const OFTEN: usize = 3;
+
 /// Where the state machine stands.
 #[derive(Clone, Copy, Debug)]
 enum Phase {
@@ -47,8 +54,11 @@ pub(crate) struct Run<'a> {
     watch: &'a mut Watch,
     /// Moves in a row that were taken back.
     taken_back: usize,
-    /// Times that the way of the gripper to the ball was taken back.
-    grips_taken_back: usize,
+    /// All of them since the search.
+    barred: usize,
+    grips: Grips,
+    /// Whether what is seen has shown in more than one place of the image since the search began.
+    wandered: bool,
 }
 
 impl<'a> Run<'a> {
@@ -74,7 +84,9 @@ impl<'a> Run<'a> {
             losses: 0,
             last_seen: None,
             taken_back: 0,
-            grips_taken_back: 0,
+            barred: 0,
+            grips: Grips::default(),
+            wandered: false,
         }
     }
 
@@ -120,6 +132,7 @@ impl<'a> Run<'a> {
     fn search(&mut self) -> Result<Phase, AgentError> {
         let config = self.config;
         self.tell(EventKind::Searching, None);
+        (self.wandered, self.barred) = (false, 0);
         let rounds = std::iter::once(JointDelta::default()).chain(config.search_again.iter().copied());
         for (round, beside) in rounds.enumerate() {
             for pose in nearest_first(&config.search_poses, &self.joints) {
@@ -185,23 +198,20 @@ impl<'a> Run<'a> {
         Ok(Phase::Reach(after))
     }
 
-    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself: a
-    /// controller that can aim at it from here does; otherwise whatever is seen is not to be had, and the search begins anew.
+    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself, and a
+    /// controller that can aim at it from here does; where they do so in a row and it cannot, whatever is seen is not to be had, and the search
+    /// begins anew.
     fn after_taking_back(&mut self, from: Joints) -> Result<Phase, AgentError> {
-        const OFTEN: usize = 3;
         self.controller.judge(&Consequence::TakenBack);
         self.taken_back += 1;
-        let often = self.taken_back >= OFTEN;
-        let Some(sighting) = self.look()? else {
+        self.barred += 1;
+        let Some(seen) = self.look()? else {
             return Ok(self.lose(from));
         };
-        if !often {
-            return Ok(Phase::Reach(sighting));
-        }
-        self.taken_back = 0;
-        Ok(Phase::Grip {
-            seen: sighting,
-            at_goal: false,
+        Ok(if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
+            Phase::Grip { seen, at_goal: false }
+        } else {
+            Phase::Reach(seen)
         })
     }
 
@@ -229,109 +239,6 @@ impl<'a> Run<'a> {
             }
         }
         Ok(Phase::Search)
-    }
-
-    /// The move that brings the gripper to the ball, where the controller has one of its own.
-    fn aimed(&mut self, sighting: &Sighting) -> Option<JointDelta> {
-        let (now, limits) = (self.situation(sighting), &self.config.limits);
-        let delta = self.controller.grip(&now, limits)?;
-        limits.admit(&(self.joints + delta)).then_some(delta)
-    }
-
-    /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind. Away from the goal only a
-    /// controller that can aim from there goes for the ball.
-    fn grip(&mut self, seen: Sighting, at_goal: bool) -> Result<Phase, AgentError> {
-        const TRIES: usize = 3;
-        let from = self.joints;
-        // What shows for a moment only is no ball, and the jaws do not close on it.
-        let Some(sighting) = self.look()? else {
-            return Ok(self.lose(from));
-        };
-        if !is_same_place(&seen, &sighting) {
-            return Ok(Phase::Reach(sighting));
-        }
-        // After a stop on the way the aim is another.
-        let fixed = at_goal.then_some(self.config.grip);
-        let own = self.aimed(&sighting).filter(|_| self.grips_taken_back != 1);
-        let Some(delta) = own.or(fixed) else {
-            return Ok(Phase::Search);
-        };
-        if self.go_by(delta, EventKind::Gripping(delta))? == Went::Back {
-            self.grips_taken_back += 1;
-            self.cycles += 1;
-            if self.grips_taken_back >= TRIES {
-                return Ok(Phase::End(Some(GaveUp::Obstructed)));
-            }
-            return Ok(match self.look()? {
-                Some(sighting) => Phase::Reach(sighting),
-                None => self.lose(from),
-            });
-        }
-        self.arm.set_gripper(Gripper::Closed)?;
-        self.tell(EventKind::Gripped, None);
-        match self.config.lift {
-            Some(lift) => self.verify(&sighting, from, lift),
-            None => Ok(Phase::End(None)),
-        }
-    }
-
-    /// Looks whether the jaws hold what was seen, and opens them again if not.
-    fn verify(&mut self, seen: &Sighting, from: Joints, lift: JointDelta) -> Result<Phase, AgentError> {
-        let held = self.is_held(seen, from, lift)?;
-        // What was seen meanwhile was not the ball on its place.
-        self.last_seen = Some(*seen);
-        Ok(match held {
-            None => Phase::End(Some(GaveUp::Obstructed)),
-            Some(true) => Phase::End(None),
-            Some(false) => {
-                self.arm.set_gripper(Gripper::Open)?;
-                self.tell(EventKind::Missed, None);
-                self.cycles += 1;
-                Phase::Recover(from)
-            }
-        })
-    }
-
-    /// Whether the jaws hold the ball that was seen from `from`; `None` if the hand was stopped before that was known.
-    fn is_held(
-        &mut self,
-        seen: &Sighting,
-        from: Joints,
-        lift: JointDelta,
-    ) -> Result<Option<bool>, AgentError> {
-        // Back to where it was seen from: it must not be there any more, nor in the way, which was free before.
-        if self.go_to(from, EventKind::Withdrawn)? == Went::Back {
-            return Ok(Some(false));
-        }
-        let there = self.look_twice()?;
-        if there.is_some_and(|now| is_same_place(seen, &now)) {
-            return Ok(Some(false));
-        }
-        // Up: none must be seen that was left behind.
-        let limits = &self.config.limits;
-        let up = |share: f64| limits.nearest(&(from + JointDelta(lift.0.map(|turn| share * turn))));
-        if self.go_to(up(1.0), EventKind::Lifted)? == Went::Back {
-            return Ok(None);
-        }
-        let below = self.look_twice()?;
-        let Some(below) = below.filter(|now| now.features.r >= self.config.left_behind) else {
-            return Ok(Some(true));
-        };
-        // Unless it is the one in the jaws, which goes where the hand goes.
-        if self.go_to(up(4.0 / 3.0), EventKind::Lifted)? == Went::Back {
-            return Ok(None);
-        }
-        let along = self.look()?;
-        Ok(Some(along.is_some_and(|now| is_same_place(&below, &now))))
-    }
-
-    /// What is in view in two looks at the same place.
-    fn look_twice(&mut self) -> Result<Option<Sighting>, AgentError> {
-        let Some(first) = self.look()? else {
-            return Ok(None);
-        };
-        let again = self.look()?;
-        Ok(again.filter(|again| is_same_place(&first, again)))
     }
 
     fn situation(&self, sighting: &Sighting) -> Situation {
@@ -444,6 +351,9 @@ impl<'a> Run<'a> {
                 return Err(self.frozen());
             }
             if let Some(sighting) = ball {
+                self.wandered |= self
+                    .last_seen
+                    .is_some_and(|last| !is_same_place(&last, &sighting));
                 self.last_seen = Some(sighting);
                 return Ok(Some(sighting));
             }
@@ -471,12 +381,6 @@ impl<'a> Run<'a> {
 fn is_finite(sighting: &Sighting) -> bool {
     let f = sighting.features;
     f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0
-}
-
-/// Whether two sightings from one pose can be of one ball: the noise of any camera that can be worked with is less than this.
-fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
-    let (a, b) = (a.features, b.features);
-    (a.x - b.x).abs() < 10.0 && (a.y - b.y).abs() < 10.0 && (a.r - b.r).abs() < 6.0
 }
 
 /// Indices of `poses`, the one whose first joint is nearest to that of `joints` first.

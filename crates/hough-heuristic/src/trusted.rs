@@ -13,6 +13,8 @@ mod proof;
 mod prover;
 mod search;
 mod track;
+#[cfg(test)]
+mod twins;
 
 use image::GrayImage;
 
@@ -25,7 +27,7 @@ use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
 use measure::Measured;
-use polar::{Grey, Polar, Ring};
+use polar::{Polar, Ring};
 use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
 use search::{Outline, Search};
@@ -67,12 +69,12 @@ pub struct Trusted {
     config: TrustedConfig,
     circle: UnitCircle,
     outline: Outline,
-    maxima: Maxima,
+    /// Of the coarser sizes, one after the other, and of the finest.
+    edges: [Edges; 2],
     /// As many as a frame needed so far.
     sizes: Vec<Size>,
     /// How many of them belong to the last frame.
     depth: usize,
-    level: Level,
     collected: Collected,
     polar: Polar,
     proofs: Vec<Proof>,
@@ -126,10 +128,9 @@ impl Trusted {
         Ok(Self {
             outline: Outline::new(&circle),
             circle,
-            maxima: Maxima::new(SMOOTHING),
+            edges: [Edges::new(), Edges::new()],
             sizes: Vec::new(),
             depth: 0,
-            level: Level::default(),
             collected: Collected::default(),
             polar: Polar::default(),
             proofs: Vec::new(),
@@ -219,23 +220,21 @@ impl Trusted {
         };
         let smallest = pyramid.depth();
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
-        for depth in (finest..=smallest).rev() {
+        let contrast = self.config.contrast as f32;
+        let edges_of = |depth: usize, Edges { maxima, level }: &mut Edges| {
+            let grey = pyramid.grey(depth);
+            let pixels = grey.width * grey.height;
+            let noise = noise / (1 << depth) as f32 + ROUNDING;
+            let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
+            let points = maxima.find(grey.pixels, grey.width, threshold, pixels / PIXELS_PER_POINT);
+            level.fill(grey.width, grey.height, points);
+        };
+        let mut search = |depth: usize, level: &mut Level| {
             let scale = (1 << depth) as f32;
-            let Grey {
-                pixels,
-                width,
-                height,
-            } = pyramid.grey(depth);
-            let threshold = (STEP_GAIN * self.config.contrast as f32)
-                .max(NOISE_FACTOR * (noise / scale + ROUNDING) * self.maxima.noise_gain());
-            let points = self
-                .maxima
-                .find(pixels, width, threshold, width * height / PIXELS_PER_POINT);
-            self.level.fill(width, height, points);
             for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
                 let ring = proof.in_frame().shrunk(scale);
                 self.outline
-                    .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
+                    .explain(&self.circle, level, &ring, &mut self.budget.looks);
             }
             let least = if depth == finest { 3.2 } else { 8.0 };
             let most = if depth == smallest { f32::MAX } else { 20.0 };
@@ -252,11 +251,24 @@ impl Trusted {
                     mirror_slack: if noise > 12.0 { 0.35 } else { 0.28 },
                 },
                 prover: &mut prover,
-                level: &mut self.level,
+                level,
                 collected: &mut self.collected,
                 budget: &mut self.budget,
             });
-        }
+        };
+        let [coarse, fine] = &mut self.edges;
+        // The edges of the finest size take about as long as all that is done at the others.
+        both(
+            frame.len() >= LARGE_FRAME,
+            || edges_of(finest, fine),
+            || {
+                for depth in (finest + 1..=smallest).rev() {
+                    edges_of(depth, coarse);
+                    search(depth, &mut coarse.level);
+                }
+            },
+        );
+        search(finest, &mut fine.level);
         let candidates = &mut self.collected.candidates;
         candidates.sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight));
         for candidate in candidates.iter().filter(|candidate| !candidate.tried) {
@@ -362,6 +374,8 @@ const LEAST_SIDE: u32 = 12;
 const SMOOTHING: f32 = 0.8;
 /// How often a frame is halved at the most.
 const DEEPEST: usize = 5;
+/// Frames of so many pixels are worth a second thread.
+const LARGE_FRAME: usize = 1_000_000;
 /// The most candidates of a frame.
 const CANDIDATES: usize = 192;
 /// One point of this many pixels may be an edge; of more the strongest are taken.
@@ -389,6 +403,34 @@ fn circle_of(ring: &Ring) -> Circle {
         x: ring.x.into(),
         y: ring.y.into(),
         radius: ring.r.into(),
+    }
+}
+
+/// Does both, each on a thread of its own if that is wanted and can be had.
+fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
+    #[cfg(feature = "parallel")]
+    if apart {
+        rayon::join(one, other);
+        return;
+    }
+    let _ = apart;
+    one();
+    other();
+}
+
+/// The edges of a size.
+#[derive(Clone, Debug)]
+struct Edges {
+    maxima: Maxima,
+    level: Level,
+}
+
+impl Edges {
+    fn new() -> Self {
+        Self {
+            maxima: Maxima::new(SMOOTHING),
+            level: Level::default(),
+        }
     }
 }
 

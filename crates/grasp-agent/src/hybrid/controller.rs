@@ -307,10 +307,18 @@ impl Controller for Hybrid {
     }
 
     fn judge(&mut self, consequence: &Consequence) {
+        if *consequence == Consequence::Missed {
+            // What was seen before was seen of a ball in another place.
+            self.remember();
+            self.current.forget_sightings();
+            self.estimate = None;
+            return;
+        }
         (self.boldness, self.losses) = match consequence {
             Consequence::Seen(_) => ((1.5 * self.boldness).min(1.0), 0),
             Consequence::Lost => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses + 1),
             Consequence::TakenBack => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses),
+            Consequence::Missed => (self.boldness, self.losses),
         };
     }
 

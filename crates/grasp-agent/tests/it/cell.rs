@@ -35,7 +35,7 @@ pub(crate) enum Fault {
     Halted(usize),
     /// As before, and on the way back.
     HaltedTwice(usize),
-    /// It halts every move of the open hand, but of JT5, that shows the ball with a radius above this.
+    /// It halts the first three moves that show the ball with a radius above this.
     HaltedNear(f64),
     /// It halts so many ways of the gripper to the ball.
     HaltedGrips(usize),
@@ -43,8 +43,10 @@ pub(crate) enum Fault {
     HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
-    /// The ball, once it is in the jaws, shows at the border of the image.
-    ShowsInTheJaws,
+    /// The jaws squeeze the ball out the first time; where it lies then it cannot be seen from the lifted hand.
+    SqueezedOut,
+    /// The ball, once it is in the jaws, shows at the border of the image, from so many looks on.
+    ShowsInTheJaws(usize),
     /// The only circle ever seen is one in the middle of the goal: in the first look.
     PhantomOnce,
     /// From the pose of the first look.
@@ -67,6 +69,8 @@ pub(crate) struct Cell {
     grips: usize,
     halts: usize,
     closed_moves: usize,
+    looks_held: usize,
+    closed_at: Option<Joints>,
     old: Option<Features>,
 }
 
@@ -99,6 +103,8 @@ impl Shared {
             grips: 0,
             halts: 0,
             closed_moves: 0,
+            looks_held: 0,
+            closed_at: None,
             old: None,
         })))
     }
@@ -135,11 +141,19 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
-            Fault::ShowsInTheJaws if cell.held => Some(Features {
-                x: 87.0 + 0.01 * cell.looks as f64,
-                y: 141.0,
-                r: 27.0,
-            }),
+            Fault::SqueezedOut
+                if cell.closed && cell.closed_at.is_some_and(|at| at.0[1] - cell.joints.0[1] > 0.1) =>
+            {
+                None
+            }
+            Fault::ShowsInTheJaws(from) if cell.held => {
+                cell.looks_held += 1;
+                (cell.looks_held > from).then(|| Features {
+                    x: 87.0 + 0.01 * cell.looks as f64,
+                    y: 141.0,
+                    r: 27.0,
+                })
+            }
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
                     origin: "camera".into(),
@@ -229,7 +243,7 @@ impl Manipulator for Shared {
             Fault::Halted(at) => moves == at,
             Fault::HaltedTwice(at) => moves == at || moves == at + 1,
             Fault::HaltedNear(r) => {
-                !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
+                cell.halts < 3 && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
             Fault::HaltedClosed(way) => {
@@ -266,6 +280,11 @@ impl Manipulator for Shared {
         cell.closed = gripper == Gripper::Closed;
         let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
         cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
+        if cell.fault == Fault::SqueezedOut && cell.held && cell.halts == 0 {
+            (cell.held, cell.halts) = (false, 1);
+            cell.ball.y += 0.02;
+            cell.closed_at = Some(cell.joints);
+        }
         Ok(())
     }
 

@@ -326,11 +326,24 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
 
 #[test]
 fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
-    let (end, log, cell) = end_of(Fault::ShowsInTheJaws);
+    let at_once: &[_] = &["lifted", "seen", "seen"];
+    let then: &[_] = &["lifted", "seen", "seen", "lifted", "seen"];
+    for (from, expected) in [(0, at_once), (2, then)] {
+        let (end, log, cell) = end_of(Fault::ShowsInTheJaws(from));
+        assert_eq!(end.unwrap().gave_up, None);
+        assert!(cell.0.borrow().held);
+        assert_eq!(words_from(&log, "lifted"), expected);
+    }
+}
+
+#[test]
+fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
+    let (end, log, cell) = end_of(Fault::SqueezedOut);
     assert_eq!(end.unwrap().gave_up, None);
     assert!(cell.0.borrow().held);
-    let expected = ["lifted", "seen", "seen", "lifted", "seen"];
-    assert_eq!(words_from(&log, "lifted"), expected);
+    let missed = words_from(&log, "gripped");
+    let missed = missed.iter().filter(|word| **word == "missed");
+    assert_eq!(missed.count(), 1);
 }
 
 #[test]

@@ -97,7 +97,7 @@ struct Strip {
 
 /// Strips of fewer pixels are not worth a thread's waking.
 #[cfg(feature = "parallel")]
-const LEAST_STRIP: usize = if cfg!(test) { 300 } else { 150_000 };
+const LEAST_STRIP: usize = if cfg!(test) { 300 } else { 400_000 };
 
 /// Nor are strips of fewer rows.
 #[cfg(feature = "parallel")]

@@ -24,7 +24,7 @@ fn halve_rows(grey: &[u8], width: usize, half: &mut [u8]) {
     use rayon::prelude::*;
 
     /// Strips of fewer pixels are not worth a thread's waking.
-    const LEAST_STRIP: usize = if cfg!(test) { 60 } else { 500_000 };
+    const LEAST_STRIP: usize = if cfg!(test) { 60 } else { 1_500_000 };
     let count = rayon::current_num_threads().min(grey.len() / LEAST_STRIP).max(1);
     let rows = (grey.len() / width / 2).div_ceil(count).max(1);
     if count == 1 {

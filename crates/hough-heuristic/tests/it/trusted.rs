@@ -173,7 +173,7 @@ fn any_number_of_threads_finds_the_same() {
             height,
             noise,
             balls: 6,
-            radius: (20.0, 120.0),
+            radius: (20.0, 55.0),
             ..SCENE
         };
         let (frame, balls) = scene.render();

@@ -176,9 +176,11 @@ pub(super) fn soften(canvas: &mut Canvas, area: Area, sigma: f64, spare: &mut Ve
     let width = canvas.width;
     let (w, h) = (area.right - area.left, area.bottom - area.top);
     // The area as it was, and a row with a pixel more at either end.
-    spare.clear();
-    spare.resize(w * h + w + 2, 0.0);
-    let (before, mixed) = spare.split_at_mut(w * h);
+    let needed = w * h + w + 2;
+    if spare.len() < needed {
+        spare.resize(needed, 0.0);
+    }
+    let (before, mixed) = spare[..needed].split_at_mut(w * h);
     for values in [&mut canvas.light, &mut canvas.cover] {
         if values.is_empty() {
             continue;
@@ -226,8 +228,11 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
     kernel.iter_mut().for_each(|k| *k /= sum);
     kernel[0] *= 0.5;
     let (w, h) = (canvas.width, canvas.height);
-    spare.resize(w * h + w + 2 * reach, 0.0);
-    let (mixed, padded) = spare.split_at_mut(w * h);
+    let needed = w * h + w + 2 * reach;
+    if spare.len() < needed {
+        spare.resize(needed, 0.0);
+    }
+    let (mixed, padded) = spare[..needed].split_at_mut(w * h);
     for y in 0..h {
         let pairs = kernel.iter().enumerate().map(|(i, k)| {
             let (above, below) = (y.saturating_sub(i), (y + i).min(h - 1));

@@ -431,4 +431,27 @@ mod tests {
         // A ball that rolls on is not among them.
         assert!(!frames(&|t, cell| side(cell, 0.002 * t)));
     }
+
+    #[test]
+    fn a_frame_does_not_depend_on_those_before_it() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        let mut scene = Scene::generate(SceneKind::Clutter, &mut rng);
+        scene.sensor.read_noise = 0.0;
+        scene.sensor.shot_noise = 0.0;
+        let kinds = [
+            SceneKind::Motion,
+            SceneKind::Interlaced,
+            SceneKind::Distorted,
+            SceneKind::Things,
+            SceneKind::Interlaced,
+            SceneKind::Motion,
+        ];
+        let mut renderer = Renderer::new(&scene, 7);
+        let untouched = renderer.clone();
+        for kind in kinds {
+            let snapshot = Snapshot::draw(kind, &mut rng);
+            let after_others = snapshot.take(&mut renderer);
+            assert!(after_others == snapshot.take(&mut untouched.clone()), "{kind}");
+        }
+    }
 }

@@ -6,6 +6,8 @@ use crate::render::canvas::{Area, Canvas};
 
 /// Side of the squares of pixels that are taken to move alike.
 const SQUARE: usize = 16;
+/// Numbers that are worked on at once.
+const LANES: usize = 4;
 /// Motion of less than this is none, pixels.
 const STILL: f64 = 0.01;
 
@@ -154,7 +156,7 @@ impl Smear {
 
     /// The weighted sums of a square's row of pixels; what lies outside of the layer counts as 0.
     fn gather(&self, from: &[f32], base: isize) -> [f32; SQUARE] {
-        let mut sums = [0.0_f32; SQUARE];
+        let mut sums = [[0.0_f32; LANES]; SQUARE / LANES];
         for (offset, share) in &self.taps {
             let at = base + offset;
             let values = usize::try_from(at)
@@ -164,11 +166,14 @@ impl Smear {
                 Some(values) => values,
                 None => &beyond(from, at),
             };
-            for i in 0..SQUARE {
-                sums[i] += share * values[i];
+            for (sums, values) in sums.iter_mut().zip(values.as_chunks().0) {
+                let values: &[f32; LANES] = values;
+                for i in 0..LANES {
+                    sums[i] += share * values[i];
+                }
             }
         }
-        sums
+        std::array::from_fn(|i| sums[i / LANES][i % LANES])
     }
 }
 
