@@ -39,7 +39,7 @@ use search::{Outline, Search};
 /// smallest first. A circle whose outline runs along edges is fitted and becomes a candidate.
 ///
 /// **Proof.** A candidate is looked at where its radius is 12 to 24 px (8 to 12 px: the frame itself; in noise at up to three sizes,
-/// from 4.5 px on). On 64 rays across its outline
+/// from 4.5 px on), and one in doubt at a second size as well, for one unit of certainty. On 64 rays across its outline
 /// the strongest edge that runs along it is sought within 6 px on either side. If there were no circle, that edge would lie
 /// anywhere: within the tolerance by a known chance, be the picture as textured as it may. The number of false alarms
 /// is the number of circles that differ noticeably in the frame, times the probability that chance alone puts so many of
@@ -47,8 +47,8 @@ use search::{Outline, Search};
 /// score is `c / (c + 4)` with `c` minus its decimal logarithm: 0.5 stands for one false alarm in 10000 frames of
 /// pure chance, 0.6 for one in a million. Chance is not all there is: lamps, wheels and letters are round, and score high.
 ///
-/// **Measurement.** The circle is then followed down to the full size and fitted there, weighted by the slope; the inward
-/// bias that blur gives a ball that darkens towards its limb is taken out.
+/// **Measurement.** The circle is then followed down to the full size (in strong noise to half of it) and fitted there, weighted by the
+/// slope; the inward bias that blur gives a ball that darkens towards its limb is taken out.
 ///
 /// ```
 /// use hough_heuristic::image::{GrayImage, Luma};

@@ -12,9 +12,9 @@ const REACH: usize = 6;
 /// Fewer rays than these do not make a circle.
 const LEAST_NEAR: usize = 20;
 
-/// Nor does a smaller share of those in the frame, at first and once the outline has been moved to the edges: of the circles with a
-/// score of one half none in a hundred has less.
-const LEAST_SHARE: [f32; 2] = [0.46, 0.54];
+/// Nor does a smaller share of those in the frame, at first and once the outline has been moved to the edges: of balls of
+/// which two fifths are hidden some show little more.
+const LEAST_SHARE: [f32; 2] = [0.3, 0.4];
 
 /// What a candidate proved to be.
 #[derive(Clone, Copy, Debug, Default)]
@@ -146,7 +146,7 @@ pub(super) fn prove(
     } else {
         0
     };
-    let least = (3.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
+    let least = (2.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
     let mut ring = start;
     for round in 0..4 {
         let edges = Edges::around(&ring, grey, rays, polar, half, least);

@@ -16,6 +16,8 @@ const SMALL: f32 = 9.0;
 /// What noise that is, grey levels.
 const NOISY: f32 = 8.0;
 
+/// The least radius at which a circle is looked at a second time at half the size, pixels there.
+const LEAST_SECOND: f32 = 8.0;
 /// What a second look takes from the certainty.
 const SECOND_LOOK: f32 = 1.0;
 
@@ -81,25 +83,23 @@ impl Prover<'_> {
         };
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
-            *looks += PROOF;
-            let proof = self.prove_at(depth, &candidate.ring());
+            let proof = self.prove_at(depth, &candidate.ring(), looks);
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
             }
         }
-        // A short arc is told from chance where it is sharp: at twice the size, from where the first look led.
-        if let Some(first) = best
-            && finest == coarsest
-            && coarsest > 0
-            && first.certainty >= 0.0
-            && !first.is_beyond_doubt()
-        {
-            *looks += PROOF;
-            if let Some(mut second) = self.prove_at(coarsest - 1, &first.in_frame()) {
-                second.certainty -= SECOND_LOOK;
-                if second.certainty > first.certainty {
-                    best = Some(second);
-                }
+        // In doubt, the size on either side is asked too: the smaller forgives a smeared outline, and at the larger one a
+        // short arc is sharp enough to be told from chance.
+        if finest == coarsest && best.is_none_or(|first| !first.is_beyond_doubt()) {
+            if coarsest < self.pyramid.depth() && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32 {
+                best = better(best, self.prove_at(coarsest + 1, &candidate.ring(), looks));
+            }
+            if coarsest > 0
+                && let Some(first) = best
+                && first.depth == coarsest
+                && first.certainty >= 0.0
+            {
+                best = better(best, self.prove_at(coarsest - 1, &first.in_frame(), looks));
             }
         }
         let best = best?;
@@ -108,7 +108,8 @@ impl Prover<'_> {
     }
 
     /// The proof of a circle in pixels of the frame, in the frame that was halved so many times.
-    fn prove_at(&mut self, depth: usize, ring: &Ring) -> Option<Proof> {
+    fn prove_at(&mut self, depth: usize, ring: &Ring, looks: &mut u64) -> Option<Proof> {
+        *looks += PROOF;
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),
@@ -134,6 +135,18 @@ impl Prover<'_> {
             r *= 0.5;
         }
         depth
+    }
+}
+
+/// The better of two proofs, of which the second one has its price.
+fn better(first: Option<Proof>, second: Option<Proof>) -> Option<Proof> {
+    let second = second.map(|proof| Proof {
+        certainty: proof.certainty - SECOND_LOOK,
+        ..proof
+    });
+    match (first, second) {
+        (Some(first), Some(second)) if first.certainty >= second.certainty => Some(first),
+        (first, second) => second.or(first),
     }
 }
 

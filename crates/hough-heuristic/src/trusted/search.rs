@@ -14,8 +14,8 @@ pub(super) const LOOKS: usize = 32;
 pub(super) const DIRECTION_SLACK: u8 = 7;
 /// The least part of a normal along the line that the pair lies on.
 const LEAST_ALONG: f32 = 0.58;
-/// Of the outline so much is to lie on edges for a circle to be worth a proof: of those that prove to be circles 99 in 100 have it.
-const LEAST_SHARE: f32 = 0.44;
+/// Of the outline so much is to lie on edges, once it is fitted, for a circle to be worth a proof.
+const LEAST_SHARE: f32 = 0.4;
 /// The share of the outline that must lie on edges at the first look: of a ball hidden by two fifths little more is to be seen.
 const FIRST_SHARE: f32 = 0.44;
 /// How many mirrored partners of a point are tried.

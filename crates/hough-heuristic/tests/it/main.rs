@@ -9,6 +9,8 @@
 mod patterns;
 #[path = "../../scenes/scenes.rs"]
 mod scenes;
+#[path = "../../scenes/simple.rs"]
+mod simple;
 
 mod any_frame;
 mod curves;

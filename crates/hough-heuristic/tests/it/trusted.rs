@@ -13,6 +13,7 @@ use rand::{Rng, SeedableRng};
 
 use crate::patterns::patterns;
 use crate::scenes::{Scene, same};
+use crate::simple::{Difficulty, Kind, ONE};
 
 const SCENE: Scene = Scene {
     width: 240,
@@ -108,6 +109,43 @@ fn the_seed_decides_the_order_and_little_else() {
     }
 }
 
+/// How many balls of a kind of scene are found to 2 px, and how many other circles.
+fn found_of(kind: &Kind, seed: u64, frames: u64) -> (usize, usize) {
+    let mut detector = Trusted::new(TrustedConfig::default()).unwrap();
+    let (mut hits, mut others) = (0, 0);
+    for number in 0..frames {
+        let (frame, balls) = kind.render((768, 576), seed, number);
+        let found = detector.detect(&frame);
+        let is_found = |ball: &&Circle| found.iter().any(|one| same(&one.circle, ball, 2.0));
+        let hit = balls.iter().filter(is_found).count();
+        hits += hit;
+        others += found.len() - hit;
+    }
+    (hits, others)
+}
+
+#[test]
+fn balls_in_noise_are_found() {
+    for (noise, least) in [(10.0, 24), (25.0, 23), (40.0, 21)] {
+        let (hits, others) = found_of(&Kind { noise, ..ONE }, 21, 24);
+        assert!(
+            hits >= least && others <= 1,
+            "noise {noise}: {hits} of 24, and {others}"
+        );
+    }
+}
+
+#[test]
+fn balls_that_are_hidden_in_part_or_moved_are_found() {
+    for (difficulty, seed, least) in [(Difficulty::Occluded, 1, 25), (Difficulty::Moving, 3, 29)] {
+        let (hits, others) = found_of(&Kind { difficulty, ..ONE }, seed, 30);
+        assert!(
+            hits >= least && others <= 1,
+            "{difficulty:?}: {hits} of 30, and {others}"
+        );
+    }
+}
+
 #[test]
 fn frames_of_any_size_pass() {
     let mut detector = with(|config| config.min_radius = 4.0);
@@ -140,11 +178,12 @@ fn any_number_of_threads_finds_the_same() {
             ..SCENE
         };
         let (frame, balls) = scene.render();
-        let mut one = plain();
+        let detector = || with(|config| config.max_radius = 130.0);
+        let mut one = detector();
         pool(1).install(|| one.detect(&frame));
         assert!(2 * one.measurements().len() > balls.len());
         for threads in [2, 3, 8] {
-            let mut several = plain();
+            let mut several = detector();
             pool(threads).install(|| several.detect(&frame));
             assert_eq!(several.measurements(), one.measurements());
             assert_eq!(several.effort(), one.effort());
