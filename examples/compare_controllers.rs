@@ -16,8 +16,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, Controller, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased, JacobianAt,
-    Learned, LookAhead, Percept, PositionBased, ServoSettings,
+    Agent, BehaviourSpec, Controller, EventKind, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
+    JacobianAt, Learned, LookAhead, Percept, PositionBased, ServoSettings,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
@@ -140,7 +140,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut log = EventLog::default();
-                    let trial = match world.run(&mut agent, seed, &mut |event| log.note(event)) {
+                    let mut at_goal = None;
+                    let outcome = world.run(&mut agent, seed, &mut |event| {
+                        if event.kind == EventKind::AtGoal {
+                            at_goal.get_or_insert(event.cycle);
+                        }
+                        log.note(event);
+                    });
+                    let mut trial = match outcome {
                         Ok(Some(trial)) => trial,
                         Ok(None) => continue,
                         // A run that an arm or a camera ends is one that has failed, and no more.
@@ -152,6 +159,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         }
                     };
                     let success = if options.grip { trial.held } else { trial.reached };
+                    if let (Some(cycles), false) = (at_goal, options.grip) {
+                        // What comes after the goal was reached is another matter.
+                        trial.outcome.cycles = cycles;
+                    }
                     tally.add(success, &trial.outcome);
                     tally.collisions += trial.collisions;
                     if !success {
