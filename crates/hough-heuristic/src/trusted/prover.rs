@@ -69,12 +69,8 @@ impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
     pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
         let coarsest = self.depth_for(candidate.r);
-        // Noise hides the outline at the larger sizes, and leaves few samples at the smaller ones: whichever says more.
-        let finest = if self.noise > NOISY {
-            coarsest.saturating_sub(2)
-        } else {
-            coarsest
-        };
+        // A larger size tells exact outlines from others, a smaller one forgives dents and noise: whichever says more.
+        let finest = coarsest.saturating_sub(if self.noise > NOISY { 2 } else { 1 });
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
             let proof = self.prove_at(depth, candidate);
