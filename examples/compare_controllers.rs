@@ -25,11 +25,13 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use files::{writable_folder, write_whole};
+use program::ended;
 use table::{Row, Tally};
 use world::World;
 
 #[allow(dead_code, reason = "shared with the examples that write pictures")]
 mod files;
+mod program;
 #[path = "compare_controllers/table.rs"]
 mod table;
 #[path = "compare_controllers/world.rs"]
@@ -52,11 +54,11 @@ struct Options {
     seed: u64,
 
     /// Cells to draw for each level of errors
-    #[arg(long, value_name = "N", default_value_t = 16)]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
     draws: u64,
 
     /// Balls to go for in each cell
-    #[arg(long, value_name = "N", default_value_t = 30)]
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..))]
     starts: u64,
 
     /// Moves that the hybrid may make in each cell to learn it
@@ -83,19 +85,13 @@ struct Options {
     #[arg(long, value_name = "NAME", default_value_t)]
     detector: BallDetector,
 
-    /// Write the event log of every run that fails to failures/ in the folder
+    /// Write the event log of every run that fails or is broken off to failures/ in the folder
     #[arg(long)]
     logs: bool,
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -104,19 +100,41 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         .into_iter()
         .filter(|rival| rival.name.contains(&options.only))
         .collect();
+    if rivals.is_empty() {
+        return Err(format!("there is no controller with {:?} in its name", options.only).into());
+    }
+    let failures = Failures {
+        folder: options.logs.then(|| options.out.join("failures")),
+    };
     let mut rows = Vec::new();
     println!("{}", Row::HEADER);
     for level in &options.levels {
         let mut tallies = vec![Tally::default(); rivals.len()];
         for draw in 0..options.draws {
             let errors = seed_of(options.seed, &[1, draw]);
-            let mut world = if options.full_chain {
-                World::chain(*level, errors, options.detector)?
-            } else {
-                World::shortcut(*level, errors, options.grip)?
+            let new_world = || {
+                if options.full_chain {
+                    World::chain(*level, errors, options.detector, options.grip)
+                } else {
+                    World::shortcut(*level, errors, options.grip)
+                }
             };
+            let mut world = new_world()?;
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
-                let made = (rival.make)(&mut world, seed_of(options.seed, &[2, draw]), options.moves)?;
+                let run_of = |run: String| format!("{level} {} cell {draw} {run}", rival.name);
+                let made = match rival.made {
+                    Made::Once(ref controller) => controller(),
+                    Made::InEachCell => {
+                        let (hybrid, fault) =
+                            taught_hybrid(&mut world, seed_of(options.seed, &[2, draw]), options.moves)?;
+                        // What had been learned until then goes to work.
+                        if let Some(Fault { run, log, error }) = fault {
+                            failures.broken_off(&run_of(format!("teaching {run}")), &log, &*error)?;
+                            world = new_world()?;
+                        }
+                        Box::new(hybrid)
+                    }
+                };
                 tally.begin_draw();
                 let mut agent = Agent::with_controller(world.agent_config(), made)?;
                 for start in 0..options.starts {
@@ -127,18 +145,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         Ok(None) => continue,
                         // A run that an arm or a camera ends is one that has failed, and no more.
                         Err(error) => {
-                            eprintln!("{level}, {}, cell {draw}, ball {start}: {error}", rival.name);
+                            failures.broken_off(&run_of(format!("ball {start}")), &log, &*error)?;
                             tally.add_broken_off();
+                            world = new_world()?;
                             continue;
                         }
                     };
                     let success = if options.grip { trial.held } else { trial.reached };
                     tally.add(success, &trial.outcome);
-                    if options.logs && !success {
-                        let folder = options.out.join("failures");
-                        writable_folder(&folder)?;
-                        let name = format!("{level} {} cell {draw} ball {start}.json", rival.name);
-                        write_whole(&folder.join(name), &serde_json::to_vec_pretty(&log)?)?;
+                    tally.collisions += trial.collisions;
+                    if !success {
+                        failures.keep(&run_of(format!("ball {start}")), &log)?;
                     }
                 }
             }
@@ -158,20 +175,48 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A controller in the comparison, and how it is made for a cell: with that cell to learn in, a seed, and the moves it may make.
-struct Rival {
-    name: String,
-    make: Make,
+/// Where the event logs of runs that failed are kept, if they are.
+struct Failures {
+    folder: Option<PathBuf>,
 }
 
-type Made = Result<Box<dyn Controller>, Box<dyn Error>>;
-type Make = Box<dyn Fn(&mut World, u64, usize) -> Made>;
+impl Failures {
+    fn keep(&self, run: &str, log: &EventLog) -> Result<(), Box<dyn Error>> {
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        writable_folder(folder)?;
+        write_whole(
+            &folder.join(format!("{run}.json")),
+            &serde_json::to_vec_pretty(log)?,
+        )
+    }
+
+    /// A run that did not even come to an end.
+    fn broken_off(&self, run: &str, log: &EventLog, error: &dyn Error) -> Result<(), Box<dyn Error>> {
+        eprintln!("{run}: broken off: {error}");
+        self.keep(run, log)
+    }
+}
+
+/// A controller in the comparison, and how it is made.
+struct Rival {
+    name: String,
+    made: Made,
+}
+
+enum Made {
+    /// The same for every cell.
+    Once(Box<dyn Fn() -> Box<dyn Controller>>),
+    /// The hybrid, which learns each cell first.
+    InEachCell,
+}
 
 fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
     let servo = ServoSettings::paper();
     let fixed = |name: &str, make: Box<dyn Fn() -> Box<dyn Controller>>| Rival {
         name: name.into(),
-        make: Box::new(move |_, _, _| Ok(make())),
+        made: Made::Once(make),
     };
     let mut rivals = Vec::new();
     for (gain, tag) in [(1.0, "gain 1"), (0.5, "gain 0.5")] {
@@ -209,7 +254,7 @@ fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
     ));
     rivals.push(Rival {
         name: "hybrid".into(),
-        make: Box::new(taught_hybrid),
+        made: Made::InEachCell,
     });
     Ok(rivals)
 }
@@ -256,21 +301,38 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
         .collect())
 }
 
-/// The hybrid after at most `moves` moves in `cell`, learning nothing more.
-fn taught_hybrid(world: &mut World, seed: u64, moves: usize) -> Made {
+/// A run of teaching that was broken off.
+struct Fault {
+    run: u64,
+    log: EventLog,
+    error: Box<dyn Error>,
+}
+
+/// The hybrid after at most `moves` moves in `cell`, learning nothing more; after fewer if a run was broken off.
+fn taught_hybrid(
+    world: &mut World,
+    seed: u64,
+    moves: usize,
+) -> Result<(Hybrid, Option<Fault>), Box<dyn Error>> {
     let config = world.agent_config();
     let longest = config.max_cycles;
     let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
-    let mut made = 0;
+    let (mut made, mut fault) = (0, None);
     for run in 0.. {
         // A run more could take this many moves; a ball found nowhere takes none.
         if made + longest > moves || run > moves as u64 {
             break;
         }
-        let trial = world.run(&mut agent, seed_of(seed, &[run]), &mut |_| ())?;
-        made += trial.map_or(0, |trial| trial.outcome.cycles);
+        let mut log = EventLog::default();
+        match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| log.note(event)) {
+            Ok(trial) => made += trial.map_or(0, |trial| trial.outcome.cycles),
+            Err(error) => {
+                fault = Some(Fault { run, log, error });
+                break;
+            }
+        }
     }
-    Ok(Box::new(agent.into_controller().frozen()))
+    Ok((agent.into_controller().frozen(), fault))
 }
 
 /// A seed of its own for each use.

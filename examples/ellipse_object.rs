@@ -33,16 +33,21 @@ use puma_val2::{JointDelta, Joints};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
+use detour::Detour;
 use egg::{Egg, EggCamera};
 use files::{writable_folder, write_png};
 use overlay::Overlay;
+use program::ended;
 
+#[path = "ellipse_object/detour.rs"]
+mod detour;
 #[path = "ellipse_object/egg.rs"]
 mod egg;
 #[allow(dead_code, reason = "shared with the examples that write other files")]
 mod files;
 #[allow(dead_code, reason = "shared with the examples that draw circles")]
 mod overlay;
+mod program;
 
 /// Find, reach and grip eggs through rendered frames, ellipse detection and VAL II.
 ///
@@ -78,13 +83,7 @@ fn length(text: &str) -> Result<f64, String> {
 const ACROSS_TOLERANCE: f64 = 20.0;
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -120,23 +119,34 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             arm,
             mut sensor,
         } = rig.parts();
-        let mut camera = EggCamera::new(camera, cell, pose, egg, scene.clone(), rng.random());
-        let mut last = None;
+        let mut camera = EggCamera::new(camera, cell.clone(), pose, egg, scene.clone(), rng.random());
+        // The last look at the egg, and where the jaws closed: from the ball's centre, metres, and off straight across, degrees.
+        let (mut last, mut closed) = (None, None);
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
-        let outcome = agent.run(&mut eye, arm, &mut *sensor, &mut |event| {
-            if let (EventKind::Seen(_), Some(frame), Some(ellipse)) =
-                (&event.kind, event.frame, outline.get())
-            {
-                last = Some((frame.clone(), ellipse));
-            }
-        })?;
+        let params = cell.get().params;
+        let outcome = agent.run(
+            &mut eye,
+            &mut Detour { arm, params },
+            &mut *sensor,
+            &mut |event| match (&event.kind, event.frame, outline.get()) {
+                (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
+                    last = Some((frame.clone(), ellipse));
+                }
+                (EventKind::Gripping(_), ..) => {
+                    let miss = cell.with(|cell| cell.grip_miss(&event.joints));
+                    closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
+                }
+                (EventKind::Missed, ..) => closed = None,
+                _ => {}
+            },
+        )?;
         // The camera holds the rig until here.
         drop(eye);
         drop(camera);
-        let (miss, off) = (rig.grip_miss(), off_across(&rig, &egg));
         let round = options.length < 44.0;
-        let held = outcome.gave_up.is_none() && rig.holds_ball() && (round || off <= ACROSS_TOLERANCE);
+        let across = closed.is_some_and(|(_, off)| round || off <= ACROSS_TOLERANCE);
+        let held = outcome.gave_up.is_none() && rig.holds_ball() && across;
         gripped += usize::from(held);
         moves += if held { outcome.cycles } else { 0 };
         let seen = outcome.last_seen.map_or("-".into(), |sighting| {
@@ -148,11 +158,12 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             None if held => "gripped".into(),
             None => "not gripped: the jaws closed beside or along it".into(),
         };
+        let [miss, off] = closed.map_or(["-".into(), "-".into()], |(miss, off)| {
+            [1e3 * miss, off].map(|value| format!("{value:.1}"))
+        });
         println!(
-            "{run:4}  {:5}  {:4}  {seen:<32} {:9.1}  {off:16.1}  {result}",
-            outcome.cycles,
-            outcome.losses,
-            1e3 * miss
+            "{run:4}  {:5}  {:4}  {seen:<32} {miss:>9}  {off:>16}  {result}",
+            outcome.cycles, outcome.losses
         );
         if let Some((frame, ellipse)) = last {
             let mut overlay = Overlay::new(&frame);
@@ -269,9 +280,8 @@ impl Controller for AcrossTheEgg {
     }
 }
 
-/// How far the jaws are from closing straight across the egg, degrees.
-fn off_across(rig: &Rig, egg: &Egg) -> f64 {
-    let hand = rig.cell().get().params.wrist(&(rig.pose())());
-    let along_the_jaws = hand.rotation * Vector3::y();
+/// How far the jaws of the arm at `joints` are from closing straight across the egg, degrees.
+fn off_across(cell: &pipeline_sim::Cell, joints: &Joints, egg: &Egg) -> f64 {
+    let along_the_jaws = cell.params.wrist(joints).rotation * Vector3::y();
     along_the_jaws.dot(&egg.axis()).abs().min(1.0).asin().to_degrees()
 }

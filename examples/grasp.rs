@@ -19,8 +19,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind, Learned,
-    OnlineLearning, Outcome, Percept,
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind, JointLimits,
+    Learned, OnlineLearning, Outcome, Percept,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -34,6 +34,7 @@ use rand::{Rng, SeedableRng};
 
 use files::{writable_folder, write_png, write_whole};
 use options::{FormName, Options, RewardName};
+use program::ended;
 use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
 use stages::{Stages, Timed};
@@ -45,6 +46,7 @@ mod options;
 mod overlay;
 #[path = "grasp/plots.rs"]
 mod plots;
+mod program;
 #[path = "grasp/record.rs"]
 mod record;
 #[path = "grasp/results.rs"]
@@ -63,25 +65,26 @@ const ACTIONS_FINE: u64 = 4_000_000;
 const TRIALS: usize = 500;
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     // Whatever can be found wrong is found before the long work.
     writable_folder(&options.out)?;
+    if let Some(path) = &options.export {
+        writable_folder(match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        })?;
+    }
     let frames = Frames::new(&options.out.join("frames"))?;
+    let failures = emptied(&options.out.join("failures"))?;
     let mut detector = options.detector.build(options.seed)?;
     let pair = behaviours(options)?;
     let loaded = options
         .policy
         .as_ref()
-        .map(|folder| Taught::load(folder, &pair))
+        .map(|path| Taught::load(path, &pair))
         .transpose()?;
     let mut rig = open_rig(options)?;
     say(
@@ -109,22 +112,20 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let svg = plots::learning_curves(&[("centering", centering), ("approaching", approaching)])?;
         write_whole(&options.out.join("learning.svg"), svg.as_bytes())?;
     }
+    export(options, &taught.learned, &taught.limits)?;
 
     let workspace = Workspace::paper();
     let config = AgentConfig {
         goal: pair.goal(),
+        limits: taught.limits,
         ..AgentConfig::paper(workspace.search_poses())
     };
     let stages = Stages::default();
-    let learned = Learned::new(taught.centering, taught.approaching);
-    let learned = Timed {
-        inner: if options.keep_learning {
-            learned.learning(OnlineLearning::careful(options.seed))
-        } else {
-            learned
-        },
-        stages: stages.clone(),
-    };
+    let learned = stages.around(if options.keep_learning {
+        taught.learned.learning(OnlineLearning::careful(options.seed))
+    } else {
+        taught.learned
+    });
     let mut agent = Agent::with_controller(config, learned)?;
     let mut records = Vec::new();
     let mut sheet = ContactSheet::default();
@@ -153,19 +154,25 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             Ok(outcome) => {
                 record.ended(outcome, rig.holds_ball(), rig.contacts().collisions);
                 bar.suspend(|| say(options, &one_line(run, &record)));
-                records.push(record);
                 bar.inc(1);
             }
             Err(error) => {
                 broken_off = Some(format!("run {run} was broken off: {error}"));
-                break;
+                record.fault = Some(error.to_string());
             }
+        }
+        records.push(record);
+        if broken_off.is_some() {
+            break;
         }
     }
     bar.finish_and_clear();
     if options.keep_learning {
         // Also what was learned in a run that was broken off.
-        let (centering, approaching) = agent.into_controller().inner.into_behaviours();
+        let limits = agent.config().limits;
+        let learned = agent.into_controller().inner;
+        export(options, &learned, &limits)?;
+        let (centering, approaching) = learned.into_behaviours();
         for behaviour in [&centering, &approaching] {
             behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
         }
@@ -173,6 +180,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let summary = Summary::new(options.seed, training, &records);
     write_results(&options.out, &summary, &records, &sheet)?;
+    for (record, run) in records.iter().zip(1..).filter(|(record, _)| !record.grasped) {
+        let path = failures.join(format!("run{run:03}.json"));
+        write_whole(&path, &serde_json::to_vec_pretty(&record.log)?)?;
+    }
     print_out(&summary.table());
     say(options, &stages.to_string());
     say(options, &format!("results: {}", options.out.display()));
@@ -189,10 +200,10 @@ fn open_rig(options: &Options) -> Result<Rig, RigError> {
     }
 }
 
-/// Two behaviours and how they came about.
+/// What was learned, and how.
 struct Taught {
-    centering: Behaviour,
-    approaching: Behaviour,
+    learned: Learned,
+    limits: JointLimits,
     /// Learning curves, unless the behaviours were read from files.
     reports: Option<(TrainReport, TrainReport)>,
     r2: BTreeMap<String, f64>,
@@ -249,17 +260,48 @@ impl Taught {
         })
     }
 
-    /// Reads behaviours that were saved before.
-    fn load(folder: &Path, pair: &BehaviourPair) -> Result<Self, Box<dyn Error>> {
-        let [centering, approaching] = [&pair.centering, &pair.approaching]
-            .map(|spec| Behaviour::load(&policy_path(folder, spec), spec));
+    /// Reads what was saved before: a folder with two policies, or an exported file.
+    fn load(path: &Path, pair: &BehaviourPair) -> Result<Self, Box<dyn Error>> {
+        let (learned, limits) = if path.is_file() {
+            let text = std::fs::read_to_string(path)
+                .map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
+            let (learned, limits) =
+                Learned::from_json(&text).map_err(|error| format!("{}: {error}", path.display()))?;
+            let found = [learned.centering(), learned.approaching()].map(Behaviour::spec);
+            if found
+                .iter()
+                .zip([&pair.centering, &pair.approaching])
+                .any(|(found, spec)| found.goal != spec.goal)
+            {
+                return Err(format!(
+                    "{}: its goal is another one; give the --y-goal that it was learned for",
+                    path.display()
+                )
+                .into());
+            }
+            (learned, limits)
+        } else {
+            let [centering, approaching] = [&pair.centering, &pair.approaching]
+                .map(|spec| Behaviour::load(&policy_path(path, spec), spec));
+            (Learned::new(centering?, approaching?), JointLimits::paper())
+        };
         Ok(Self {
-            centering: centering?,
-            approaching: approaching?,
+            learned,
+            limits,
             reports: None,
             r2: BTreeMap::new(),
         })
     }
+}
+
+/// Writes the policy as JSON, if that is asked for.
+fn export(options: &Options, learned: &Learned, limits: &JointLimits) -> Result<(), Box<dyn Error>> {
+    let Some(path) = &options.export else {
+        return Ok(());
+    };
+    write_whole(path, learned.to_json(limits).as_bytes())?;
+    say(options, &format!("policy exported to {}", path.display()));
+    Ok(())
 }
 
 fn policy_path(folder: &Path, spec: &BehaviourSpec) -> PathBuf {
@@ -329,20 +371,8 @@ fn reach_for(
         arm,
         mut sensor,
     } = rig.parts();
-    let (mut camera, mut arm, mut detector) = (
-        Timed {
-            inner: camera,
-            stages: stages.clone(),
-        },
-        Timed {
-            inner: arm,
-            stages: stages.clone(),
-        },
-        Timed {
-            inner: detector,
-            stages: stages.clone(),
-        },
-    );
+    let (mut camera, mut arm, mut detector) =
+        (stages.around(camera), stages.around(arm), stages.around(detector));
     let mut written = Ok(());
     let mut eye = CameraEye::new(&mut camera, &mut detector);
     let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
@@ -353,18 +383,22 @@ fn reach_for(
     written.map(|()| outcome)
 }
 
+/// Makes a folder anew: files of an earlier run must not mix with those of this one.
+fn emptied(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
+    if folder.exists() {
+        std::fs::remove_dir_all(folder)
+            .map_err(|error| format!("{}: cannot be replaced: {error}", folder.display()))?;
+    }
+    writable_folder(folder)?;
+    Ok(folder.to_owned())
+}
+
 /// The folder of the frames: a picture is written when it is made.
 struct Frames(PathBuf);
 
 impl Frames {
-    /// Makes the folder anew: frames of an earlier run must not mix with these.
     fn new(folder: &Path) -> Result<Self, Box<dyn Error>> {
-        if folder.exists() {
-            std::fs::remove_dir_all(folder)
-                .map_err(|error| format!("{}: cannot be replaced: {error}", folder.display()))?;
-        }
-        writable_folder(folder)?;
-        Ok(Self(folder.to_owned()))
+        Ok(Self(emptied(folder)?))
     }
 
     fn write(&self, picture: &Picture) -> Result<(), Box<dyn Error>> {

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{Agent, AgentConfig, BehaviourPair, EventKind, Learned, Percept, YGoal};
+use grasp_agent::{Agent, BehaviourPair, EventKind, Learned, Percept, YGoal};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{
     ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn_best, score, search_percepts, search_starts,
@@ -29,6 +29,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use cpu::cpu_time;
 use files::{writable_folder, write_png, write_whole};
 use plot::{Panel, drawn};
+use program::ended;
 
 mod cpu;
 mod files;
@@ -37,6 +38,7 @@ mod on_the_arm;
 mod overlay;
 #[path = "paper_figures/plot.rs"]
 mod plot;
+mod program;
 #[path = "paper_figures/snapshots.rs"]
 mod snapshots;
 
@@ -57,18 +59,12 @@ struct Options {
     fine: u64,
 
     /// Arms, each with errors of its own, to take the behaviours to
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     arms: u64,
 }
 
 fn main() -> ExitCode {
-    match run(&Options::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
@@ -91,7 +87,8 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     let starts = search_starts(400, 1);
     let optimum = starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
     println!(
-        "approaching from 400 search starts, breadth-first optimum {optimum:.2} steps; kappa {}",
+        "Figure 6: approaching, learned with each simulator and reward, then tried in the exact plane from 400 starts of the search \
+         (breadth-first optimum {optimum:.2} steps, loop breaker {}); without search and recovery, so that a ball once lost stays lost",
         Learned::APPROACHING_KAPPA
     );
     println!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
@@ -215,7 +212,8 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
     for (figure, pushes, runs) in [(7, 0, 60), (8, 3, 3)] {
         for run in 0..runs {
             let mut agent = Agent::with_controller(config.clone(), taught.clone())?;
-            let (mut done, mut path) = (0, Vec::new());
+            // What was seen before each move; of several looks the last one.
+            let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
             let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
                 let there = cell.features(joints).is_some_and(|f| {
                     (99.0..=108.0).contains(&f.x)
@@ -227,19 +225,23 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                 }
             };
             cell.run(&mut agent, 500 + run, &mut world, &mut |event| {
-                if let EventKind::Seen(sighting) = event.kind {
-                    let (f, theta3) = (sighting.features, grasp_agent::theta3(&event.joints));
-                    let _ = writeln!(
-                        csv,
-                        "{figure},{run},{},{:.2},{:.2},{:.2},{theta3:.2}",
-                        path.len(),
-                        f.x,
-                        f.y,
-                        f.r
-                    );
-                    path.push((f, theta3));
+                gripped |= event.kind == EventKind::Gripped;
+                if let EventKind::Seen(sighting) = event.kind
+                    && !gripped
+                {
+                    if looked_at.replace(event.cycle) == Some(event.cycle) {
+                        path.pop();
+                    }
+                    path.push((sighting.features, grasp_agent::theta3(&event.joints)));
                 }
             })?;
+            for (step, (f, theta3)) in path.iter().enumerate() {
+                let _ = writeln!(
+                    csv,
+                    "{figure},{run},{step},{:.2},{:.2},{:.2},{theta3:.2}",
+                    f.x, f.y, f.r
+                );
+            }
             if figure == 7 {
                 reach.push(path);
             } else {
@@ -259,11 +261,16 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         };
         let mut paths: Vec<_> = reach.iter().filter(ends_here).collect();
         paths.sort_by(|a, b| a[0].0.r.total_cmp(&b[0].0.r));
-        let three = [
-            ("far", paths.first()),
-            ("middle", paths.get(paths.len() / 2)),
-            ("near", paths.last()),
-        ];
+        // "The starting position is chosen in such a way as to have the maximum off centering", at each of three distances.
+        let third = paths.len().div_ceil(3).max(1);
+        let mut thirds = paths.chunks(third);
+        let three = ["far", "middle", "near"].map(|start| {
+            let most = thirds.next().into_iter().flatten();
+            (
+                start,
+                most.max_by(|a, b| off_centre(&a[0].0).total_cmp(&off_centre(&b[0].0))),
+            )
+        });
         for (name, (low_end, high_end), feature) in FEATURES {
             let lines = three.iter().filter_map(|(start, path)| {
                 let along = path.as_ref()?.iter().enumerate();
@@ -288,6 +295,11 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         })
         .collect();
     write_whole(&options.out.join("figure8.svg"), drawn(&panels, 3)?.as_bytes())
+}
+
+/// How far off the goal a ball shows in the image, in halves of its sides.
+fn off_centre(f: &hough_heuristic::Features) -> f64 {
+    ((f.x - 103.5) / 96.0).hypot((f.y - 78.0) / 72.0)
 }
 
 /// A feature: its name, its goal, and how to read it.

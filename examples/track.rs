@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use grasp_agent::{
-    Agent, AgentConfig, Belief, CameraEye, EventKind, EventLog, Hybrid, HybridSettings, Outcome,
+    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, Hybrid, HybridSettings, Outcome,
 };
 use hough_heuristic::{CircleDetector, Features};
 use image::GrayImage;
@@ -29,21 +29,27 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use files::{writable_folder, write_whole};
+use program::ended;
 use stages::{Stages, Timed};
+use tally::{Counted, Tally};
 
 mod cpu;
 #[allow(dead_code, reason = "shared with the examples that write single pictures")]
 mod files;
+mod program;
 #[path = "track/shortcut.rs"]
 mod shortcut;
 mod stages;
+#[path = "track/tally.rs"]
+mod tally;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
-/// The controller makes --teach runs on balls at rest first, to learn the camera; then come the runs that count.
+/// In each cell the controller makes --teach runs on balls at rest first, to learn the camera; then come the runs that count. A ball is grasped
+/// when the jaws hold it and the controller says so. Runs in which nothing happened to the ball that should have are told apart.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Folder for track.csv, track.png (the first run, animated), camera.belief and the event logs of failures
+    /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the event logs of runs that failed or collided
     #[arg(long, value_name = "DIR", default_value = "out/track")]
     out: PathBuf,
 
@@ -55,9 +61,13 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 10)]
     runs: usize,
 
-    /// Runs to learn from before
+    /// Runs to learn from before, in each cell
     #[arg(long, value_name = "N", default_value_t = 40)]
     teach: usize,
+
+    /// Cells that the runs are spread over, each with errors drawn anew
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
+    cells: usize,
 
     /// What happens to the ball
     #[arg(long, value_enum, default_value_t = Fate::Push)]
@@ -67,7 +77,7 @@ struct Options {
     #[arg(long, value_name = "NAME", default_value_t)]
     detector: BallDetector,
 
-    /// No frames and no line: features straight from the geometry, in ten cells
+    /// No frames and no line: features straight from the geometry
     #[arg(long)]
     shortcut: bool,
 
@@ -75,7 +85,7 @@ struct Options {
     #[arg(long, value_name = "LEVELS")]
     noise: Option<f64>,
 
-    /// Begin with what an earlier run learned of the camera: its camera.belief
+    /// Begin with what an earlier run learned of the camera: its camera.belief; learning goes on from there in the --teach runs
     #[arg(long, value_name = "FILE")]
     belief: Option<PathBuf>,
 
@@ -84,8 +94,20 @@ struct Options {
     level: ErrorLevel,
 }
 
-/// From the gripper to the ball's centre: the jaws close on the ball up to this far, metres.
-const GRASP_TOLERANCE: f64 = 0.010;
+impl Options {
+    /// How many of the runs fall to this cell, the first being 0.
+    fn runs_in(&self, cell: usize) -> usize {
+        (self.runs + self.cells - 1 - cell) / self.cells
+    }
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("at least one is needed".into()),
+        Ok(count) => Ok(count),
+        Err(error) => Err(format!("{error}")),
+    }
+}
 
 /// What happens to the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -107,152 +129,158 @@ fn main() -> ExitCode {
     } else {
         run(&options)
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(done)
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
-    let mut detector = options.detector.build(options.seed)?;
-    let belief = options.belief.as_deref().map(Belief::load).transpose()?;
-    let mut scene = bright_ball_scene();
-    scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
-    let mut rig = Rig::emulated(false, &scene, options.seed)?;
-    let errors = options.level.draw(&mut rng);
-    let wrong = errors.apply(&rig.cell().get())?;
-    rig.cell().with(|cell| *cell = wrong);
+    let mut chain = Chain {
+        options,
+        detector: options.detector.build(options.seed)?,
+        stages: Stages::default(),
+        csv: String::from("run,move,x,y,r,event\n"),
+        film: Vec::new(),
+        tally: Tally::default(),
+    };
+    for cell in 0..options.cells {
+        chain.tally.begin_cell();
+        chain.go_for_balls(options.seed.wrapping_add(cell as u64), options.runs_in(cell))?;
+    }
+    write_whole(&options.out.join("track.csv"), chain.csv.as_bytes())?;
+    if !chain.film.is_empty() {
+        write_whole(&options.out.join("track.png"), &animated(&chain.film)?)?;
+    }
+    println!("{}\n{}", chain.stages, chain.tally);
+    println!("results: {}", options.out.display());
+    Ok(())
+}
 
-    let workspace = Workspace::paper();
-    let mut config = AgentConfig::paper(workspace.search_poses());
-    config.max_cycles = 120;
-    let settings = HybridSettings::paper();
-    let hybrid = match belief {
-        Some(belief) => Hybrid::with_belief(settings, belief),
-        None => Hybrid::new(settings),
-    };
-    let stages = Stages::default();
-    let timed = |inner| Timed {
-        inner,
-        stages: stages.clone(),
-    };
-    let mut agent = Agent::with_controller(config, timed(hybrid))?;
-    let (mut csv, mut film) = (String::from("run,move,x,y,r,event\n"), Vec::new());
-    let (mut grasped, mut moves, mut near) = (0, 0, 0);
-    for number in 0..options.teach + options.runs {
-        let teaching = number < options.teach;
-        if number == options.teach {
-            let controller = agent.controller().inner.clone().frozen();
-            agent = Agent::with_controller(agent.config().clone(), timed(controller))?;
-            println!("learned the camera from {number} runs");
+/// Rendered frames, circle detection, VAL II on a line, and what is written down of all that.
+struct Chain<'a> {
+    options: &'a Options,
+    detector: Box<dyn CircleDetector + Send>,
+    stages: Stages,
+    csv: String,
+    film: Vec<GrayImage>,
+    tally: Tally,
+}
+
+impl Chain<'_> {
+    /// In a cell with errors drawn anew: first balls at rest to learn from, then `runs` that count.
+    fn go_for_balls(&mut self, seed: u64, runs: usize) -> Result<(), Box<dyn Error>> {
+        let options = self.options;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut scene = bright_ball_scene();
+        scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
+        let mut rig = Rig::emulated(false, &scene, seed)?;
+        let errors = options.level.draw(&mut rng);
+        let wrong = errors.apply(&rig.cell().get())?;
+        rig.cell().with(|cell| *cell = wrong);
+
+        let workspace = Workspace::paper();
+        let mut config = AgentConfig::paper(workspace.search_poses());
+        config.max_cycles = 120;
+        let settings = HybridSettings::paper();
+        let hybrid = match &options.belief {
+            Some(file) => Hybrid::with_belief(settings, Belief::load(file)?),
+            None => Hybrid::new(settings),
+        };
+        let stages = self.stages.clone();
+        let mut agent = Agent::with_controller(config, stages.around(hybrid))?;
+        for number in 0..options.teach + runs {
+            let teaching = number < options.teach;
+            if number == options.teach {
+                let learned = agent.controller().inner.clone().frozen();
+                agent = Agent::with_controller(agent.config().clone(), stages.around(learned))?;
+            }
+            let (ball, _) = workspace
+                .sample_seen_ball(&rig.cell().get(), &mut rng)
+                .ok_or("no place of the workspace is in view from a search pose")?;
+            rig.place(&ball);
+            let fate = if teaching { Fate::Rest } else { options.ball };
+            let mut world = World::new(fate, rng.random());
+            let counted = (!teaching).then(|| self.tally.runs() + 1);
+            let (end, log) = self.run(&mut agent, &mut rig, &mut world, counted);
+            // Whatever it ended with: what was learned until then is kept.
+            let learned = agent.controller().inner.belief();
+            learned.save(&options.out.join("camera.belief"))?;
+            let Some(number) = counted else {
+                end?;
+                continue;
+            };
+            let (contacts, holds) = (rig.contacts(), rig.holds_ball());
+            let success = holds && matches!(&end, Ok(Outcome { gave_up: None, .. }));
+            self.tally.add(Counted {
+                happened: world.has_happened(),
+                success,
+                moves: end.as_ref().map_or(0, |outcome| outcome.cycles),
+                near: log
+                    .events
+                    .iter()
+                    .filter(|event| event.kind == EventKind::TooNear)
+                    .count(),
+                collisions: contacts.collisions,
+            });
+            if !success || contacts.collisions > 0 {
+                let file = options.out.join(format!("run-{number:03}.json"));
+                write_whole(&file, &serde_json::to_vec_pretty(&log)?)?;
+                let what = if success { "collision" } else { "not grasped" };
+                println!(
+                    "run {number}: {what}: {end:?}, {contacts:?}; events: {}",
+                    file.display()
+                );
+            }
         }
-        let (ball, _) = workspace
-            .sample_seen_ball(&rig.cell().get(), &mut rng)
-            .ok_or("no place of the workspace is in view from a search pose")?;
-        rig.place(&ball);
-        let fate = if teaching { Fate::Rest } else { options.ball };
-        let mut world = World::new(fate, rng.random());
-        let (shared, mut log) = (rig.cell().clone(), EventLog::default());
-        let mut miss = None;
+        Ok(())
+    }
+
+    /// One ball; `counted` is the number of a run that counts.
+    fn run(
+        &mut self,
+        agent: &mut Agent<Timed<Hybrid>>,
+        rig: &mut Rig,
+        world: &mut World,
+        counted: Option<usize>,
+    ) -> (Result<Outcome, AgentError>, EventLog) {
+        let (shared, mut log, mut gripped) = (rig.cell().clone(), EventLog::default(), false);
+        let (csv, film) = (&mut self.csv, &mut self.film);
         let RigParts {
             camera,
             arm,
             mut sensor,
         } = rig.parts();
+        let stages = &self.stages;
         let (mut camera, mut detector, mut arm) = (
-            Timed {
-                inner: camera,
-                stages: stages.clone(),
-            },
-            Timed {
-                inner: &mut *detector as &mut dyn CircleDetector,
-                stages: stages.clone(),
-            },
-            Timed {
-                inner: arm,
-                stages: stages.clone(),
-            },
+            stages.around(camera),
+            stages.around(&mut *self.detector as &mut dyn CircleDetector),
+            stages.around(arm),
         );
         let mut eye = CameraEye::new(&mut camera, &mut detector);
         let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
             log.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),
-                EventKind::TooNear if !teaching => near += 1,
-                EventKind::Gripping(_) => miss = Some(shared.with(|cell| cell.grip_miss(&event.joints))),
-                EventKind::Seen(sighting) if !teaching => {
-                    let (f, row) = (sighting.features, number - options.teach + 1);
-                    let _ = writeln!(
-                        csv,
-                        "{row},{},{:.2},{:.2},{:.2},{}",
-                        event.cycle, f.x, f.y, f.r, world.events
-                    );
+                EventKind::Gripped => gripped = true,
+                EventKind::Missed => gripped = false,
+                EventKind::Seen(sighting) if !gripped => {
+                    if let Some(row) = counted {
+                        let f = sighting.features;
+                        let _ = writeln!(
+                            csv,
+                            "{row},{},{:.2},{:.2},{:.2},{}",
+                            event.cycle, f.x, f.y, f.r, world.events
+                        );
+                    }
                 }
                 _ => {}
             }
-            if let (true, Some(frame)) = (number == options.teach, event.frame) {
-                film.push(resize(
-                    frame,
-                    frame.width() / 2,
-                    frame.height() / 2,
-                    FilterType::Triangle,
-                ));
+            if let (Some(1), Some(frame)) = (counted, event.frame) {
+                let (width, height) = (frame.width() / 2, frame.height() / 2);
+                film.push(resize(frame, width, height, FilterType::Triangle));
             }
         });
-        // Whatever it ended with: what was learned until then is kept.
-        let learned = agent.controller().inner.belief();
-        learned.save(&options.out.join("camera.belief"))?;
-        let success = matches!(&end, Ok(Outcome { gave_up: None, .. }))
-            && miss.is_some_and(|miss| miss < GRASP_TOLERANCE);
-        if teaching {
-            end?;
-            continue;
-        }
-        grasped += usize::from(success);
-        moves += end.as_ref().map_or(0, |outcome| outcome.cycles);
-        if !success {
-            let name = format!("failure-{:03}.json", number - options.teach + 1);
-            write_whole(&options.out.join(name), &serde_json::to_vec_pretty(&log)?)?;
-            println!(
-                "run {}: not grasped: {end:?}, {miss:?} m from the ball",
-                number - options.teach + 1
-            );
-        }
+        (end, log)
     }
-    write_whole(&options.out.join("track.csv"), csv.as_bytes())?;
-    if !film.is_empty() {
-        write_whole(&options.out.join("track.png"), &animated(&film)?)?;
-    }
-    println!("{stages}");
-    say_result(grasped, options.runs, moves, near);
-    println!("results: {}", options.out.display());
-    Ok(())
-}
-
-/// How it went.
-fn say_result(grasped: usize, runs: usize, moves: usize, near: usize) {
-    let runs = runs.max(1);
-    let (low, high) = interval(grasped, runs);
-    println!(
-        "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {near} stops by the proximity sensors",
-        100.0 * grasped as f64 / runs as f64,
-        moves as f64 / runs as f64
-    );
-}
-
-/// Wilson's interval of a share, percent.
-fn interval(successes: usize, runs: usize) -> (f64, f64) {
-    const Z: f64 = 1.96;
-    let (n, share) = (runs as f64, successes as f64 / runs as f64);
-    let middle = share + 0.5 * Z * Z / n;
-    let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
-    let scale = 100.0 / (1.0 + Z * Z / n);
-    (scale * (middle - half), scale * (middle + half))
 }
 
 /// What happens to one ball.
@@ -271,6 +299,16 @@ impl World {
             heading: None,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
         }
+    }
+
+    /// Whether all that was to happen to the ball has; for a ball that drifts until it is gripped, whether it has moved at all.
+    fn has_happened(&self) -> bool {
+        self.events
+            >= match self.fate {
+                Fate::Rest => 0,
+                Fate::Push => 3,
+                Fate::Jump | Fate::Drift => 1,
+            }
     }
 
     /// The arm has moved to `joints`.
@@ -312,6 +350,9 @@ impl World {
                     };
                     ways.into_iter().find(stays).unwrap_or_default()
                 });
+                if x.hypot(y) < 0.5 {
+                    return;
+                }
                 let mut next = centre;
                 (next.x, next.y) = (next.x + 0.020 * x, next.y + 0.020 * y);
                 cell.place_ball(next);

@@ -23,6 +23,10 @@ use clap::Parser;
 use puma_val2::PtyServer;
 use puma_val2::{Emulator, Profile, PumaParams, ServeConfig, TcpServer, char_time};
 
+use program::ended;
+
+mod program;
+
 /// An emulated VAL II controller with a PUMA 560.
 #[derive(Debug, Parser)]
 #[command(version)]
@@ -79,13 +83,7 @@ impl Server {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

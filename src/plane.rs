@@ -51,7 +51,7 @@ const MOST_STEPS: usize = 60;
 const CAMERA_BESIDE: f64 = 0.225;
 
 impl ExactPlane {
-    /// With `starts` exploring starts drawn from `rng`.
+    /// With `starts` exploring starts drawn from `rng`; with none, every episode begins with the ball as a search pose shows it.
     pub fn new(starts: usize, rng: &mut dyn Rng) -> Self {
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let drawn = (0..starts).filter_map(|_| {
@@ -61,10 +61,22 @@ impl ExactPlane {
             features.x = 0.5 * Features::WIDTH + CAMERA_BESIDE * features.r;
             Some(Percept::new(features, &joints))
         });
+        let mut starts: Vec<Percept> = drawn.collect();
+        if starts.is_empty() {
+            let features = Features {
+                x: 98.0,
+                y: 72.0,
+                r: 9.5,
+            };
+            starts.push(Percept {
+                features,
+                theta3: 40.0,
+            });
+        }
         Self {
             model: CameraModel::paper(),
             sight: SightRule::default(),
-            starts: drawn.collect(),
+            starts,
         }
     }
 
@@ -215,4 +227,20 @@ pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usi
     let reached = |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
     let fewest = cell.fewest_moves(joints, &moves, reached, MOST_STEPS as u32);
     Some(fewest.ok()?? as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_drawn_starts_there_is_one_to_learn_from() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let plane = ExactPlane::new(0, &mut rng);
+        let start = plane.start(&mut rng);
+        assert!(plane.after(&start, &JointDelta::default()).is_some());
+        let spec = BehaviourSpec::approaching();
+        let lesson = plane.learn(spec, 2_000, &mut rng, &mut |_| ()).expect("learns");
+        assert!(lesson.report.episodes > 0);
+    }
 }

@@ -9,6 +9,7 @@ use hough_heuristic::{CircleDetector, FrameSource};
 use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
+use puma_val2::nalgebra::Point3;
 use puma_val2::{
     ArmError, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, Profile, ProximitySensor,
     PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
@@ -176,6 +177,23 @@ impl Rig {
     pub fn place(&mut self, ball: &Ball) {
         self.cell.with(|cell| cell.place_ball(ball.centre));
         self.surroundings.begin();
+    }
+
+    /// Takes the ball and its holder out of the cell, opens the jaws, and takes the arm to `pose`; then the next ball can be placed.
+    ///
+    /// # Errors
+    /// What kept the arm from getting there.
+    pub fn clear_for(&mut self, pose: Joints) -> Result<(), ArmError> {
+        self.cell.with(|cell| {
+            cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
+            cell.holder = None;
+        });
+        self.arm.set_gripper(Gripper::Open)?;
+        match self.arm.move_to(pose) {
+            // An arm that stood close to what has just been taken away.
+            Err(ArmError::ProximityStop { .. }) => self.arm.move_to(pose).map(drop),
+            outcome => outcome.map(drop),
+        }
     }
 
     /// What the hand has done in the cell since the ball was placed.

@@ -7,7 +7,13 @@
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use grasp_agent::{
+    Behaviour, BehaviourPair, BehaviourSpec, EventKind, EventLog, JointLimits, Learned, YGoal,
+};
+use qtable::QTable;
 
 fn example(name: &str) -> Option<Command> {
     let tests = std::env::current_exe().ok()?;
@@ -104,6 +110,125 @@ fn grasp_refuses_missing_and_corrupt_policies() {
         return;
     };
     assert!(errors.contains("centering.policy"), "{errors}");
+}
+
+/// A policy that has learned nothing, as `--export` writes it.
+fn blank_policy(pair: BehaviourPair) -> String {
+    let blank = |spec: BehaviourSpec| {
+        let table = QTable::new(spec.states(), spec.actions()).expect("a table");
+        Behaviour::new(spec, table).expect("a table of its size")
+    };
+    Learned::new(blank(pair.centering), blank(pair.approaching)).to_json(&JointLimits::paper())
+}
+
+#[test]
+fn grasp_refuses_policies_that_it_cannot_run_and_says_why() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("policy.json");
+    let argument = path.to_str().expect("a plain path").to_owned();
+    let paper = blank_policy(BehaviourPair::paper_mended());
+    let wide = BehaviourPair::paper_mended()
+        .with_y_goal(YGoal::Section4)
+        .expect("it fits");
+    let cases = [
+        ("this is no policy".to_owned(), "expected"),
+        (paper[..paper.len() / 2].to_owned(), "line"),
+        (paper.replace("\"J3\"", "\"J2\""), "JT2 is moved twice"),
+        (blank_policy(wide), "--y-goal"),
+    ];
+    for (text, said) in cases {
+        std::fs::write(&path, text).expect("a file");
+        let Some(errors) = grasp_fails(folder.path(), &["--policy", &argument]) else {
+            return;
+        };
+        assert!(
+            errors.contains(&argument) && errors.contains(said),
+            "{errors} does not say {said}"
+        );
+    }
+
+    // Saved for other states than those that are asked for.
+    let fine = BehaviourPair::fine();
+    for spec in [fine.centering, BehaviourSpec::approaching_fine()] {
+        let table = QTable::new(spec.states(), spec.actions()).expect("a table");
+        let name = spec.name.trim_end_matches("_fine");
+        let path = folder.path().join(format!("{name}.policy"));
+        let behaviour = Behaviour::new(spec, table).expect("a table of its size");
+        behaviour.save(&path).expect("a file");
+    }
+    let argument = folder.path().to_str().expect("a plain path").to_owned();
+    let Some(errors) = grasp_fails(folder.path(), &["--policy", &argument]) else {
+        return;
+    };
+    assert!(
+        errors.contains("approaching.policy") && errors.contains("differs"),
+        "{errors}"
+    );
+}
+
+#[cfg(all(unix, feature = "serial"))]
+#[test]
+fn grasp_keeps_what_it_has_when_the_controller_dies() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (link, out) = (folder.path().join("puma"), folder.path().join("out"));
+    let policy = folder.path().join("policy.json");
+    std::fs::write(&policy, blank_policy(BehaviourPair::paper_mended())).expect("a file");
+    let (Some(mut emulator), Some(mut grasp)) = (example("val2_emulator"), example("grasp")) else {
+        return;
+    };
+    let emulator = emulator.arg("--link").arg(&link).stdin(Stdio::null());
+    let mut emulator = emulator
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("the emulator starts");
+    while !link.exists() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    grasp.args(["--quiet", "--keep-learning", "--port"]).arg(&link);
+    grasp
+        .arg("--policy")
+        .arg(&policy)
+        .arg("--export")
+        .arg(folder.path().join("learned.json"));
+    let mut grasp = grasp
+        .arg("--out")
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("grasp starts");
+    // Killed when the arm has looked around for a while.
+    let frames = || std::fs::read_dir(out.join("frames")).map_or(0, Iterator::count);
+    while frames() < 4 && grasp.try_wait().expect("a process").is_none() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    emulator
+        .kill()
+        .and_then(|()| emulator.wait())
+        .expect("the emulator ends");
+    let output = grasp.wait_with_output().expect("grasp ends");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("run 1 was broken off: the arm failed"),
+        "{errors}"
+    );
+    let log = std::fs::read(out.join("failures/run001.json")).expect("the log of the run");
+    let log: EventLog = serde_json::from_slice(&log).expect("a log");
+    let last = &log.events.last().expect("an event").kind;
+    assert!(
+        matches!(last, EventKind::Failed(cause) if errors.contains(cause.as_str())),
+        "{last:?}"
+    );
+    for (name, spec) in [
+        ("centering.policy", BehaviourSpec::centering()),
+        ("approaching.policy", BehaviourSpec::approaching()),
+    ] {
+        Behaviour::load(&out.join(name), &spec).expect("what was learned");
+    }
+    let learned = std::fs::read_to_string(folder.path().join("learned.json")).expect("the export");
+    Learned::from_json(&learned).expect("a policy");
+    assert!(out.join("summary.json").exists());
 }
 
 #[test]

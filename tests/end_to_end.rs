@@ -57,7 +57,8 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
                 })
                 .expect("the line holds");
             moves += outcome.cycles;
-            grasped += usize::from(outcome.gave_up.is_none() && rig.grip_miss() < 0.010);
+            grasped += usize::from(outcome.gave_up.is_none() && rig.holds_ball());
+            assert_eq!(rig.contacts().collisions, 0);
         }
         (grasped, moves, log)
     };

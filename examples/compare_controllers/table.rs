@@ -14,6 +14,8 @@ pub(crate) struct Tally {
     draws: Vec<(usize, usize)>,
     cycles: usize,
     losses: usize,
+    /// How often the hand ran into something; counted through the full chain only.
+    pub(crate) collisions: usize,
 }
 
 impl Tally {
@@ -75,12 +77,13 @@ pub(crate) struct Row {
     success: (f64, f64),
     cycles: f64,
     losses: f64,
+    collisions: usize,
     runs: usize,
 }
 
 impl Row {
     pub(crate) const HEADER: &str =
-        "level     controller                       success %     cycles  losses/run  runs";
+        "level     controller                         success %     cycles  losses/run  collisions  runs";
 
     pub(crate) fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
         let count = |part: fn(&(usize, usize)) -> usize| tally.draws.iter().map(part).sum::<usize>();
@@ -91,6 +94,7 @@ impl Row {
             success: tally.success(),
             cycles: tally.cycles as f64 / successes as f64,
             losses: tally.losses as f64 / runs as f64,
+            collisions: tally.collisions,
             runs,
         }
     }
@@ -104,28 +108,45 @@ impl fmt::Display for Row {
             success: (mean, half),
             cycles,
             losses,
+            collisions,
             runs,
         } = self;
+        // One cell has no interval, and no success no moves.
+        let interval = number(*half, |half| format!("+-{half:5.1}"));
+        let cycles = number(*cycles, |cycles| format!("{cycles:.1}"));
         write!(
             f,
-            "{:9} {name:30} {mean:6.1} +-{half:5.1} {cycles:9.1} {losses:11.2} {runs:5}",
+            "{:9} {name:32} {mean:6.1} {interval:7} {cycles:>9} {losses:11.2} {collisions:11} {runs:5}",
             level.to_string()
         )
     }
 }
 
+/// A number in words, none for what is none.
+fn number(value: f64, words: impl FnOnce(f64) -> String) -> String {
+    if value.is_finite() {
+        words(value)
+    } else {
+        String::new()
+    }
+}
+
 pub(crate) fn csv(rows: &[Row]) -> String {
-    let mut csv = String::from("level,controller,success_percent,half_interval,cycles,losses_per_run,runs\n");
+    let mut csv = String::from(
+        "level,controller,success_percent,half_interval,cycles,losses_per_run,collisions,runs\n",
+    );
     for Row {
         level,
         name,
         success: (mean, half),
         cycles,
         losses,
+        collisions,
         runs,
     } in rows
     {
-        csv += &format!("{level},\"{name}\",{mean:.3},{half:.3},{cycles:.3},{losses:.4},{runs}\n");
+        let [half, cycles] = [*half, *cycles].map(|value| number(value, |value| format!("{value:.3}")));
+        csv += &format!("{level},\"{name}\",{mean:.3},{half},{cycles},{losses:.4},{collisions},{runs}\n");
     }
     csv
 }

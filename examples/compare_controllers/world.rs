@@ -5,7 +5,7 @@ use std::error::Error;
 use grasp_agent::{Agent, AgentConfig, Controller, Event, EventKind, Outcome};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Workspace};
-use puma_grasp::{BallDetector, Rig, RigParts, TrialCell, bright_ball_scene};
+use puma_grasp::{BallDetector, Rig, TrialCell, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -21,6 +21,8 @@ pub(crate) struct Chain {
     rig: Rig,
     detector: Box<dyn CircleDetector + Send>,
     workspace: Workspace,
+    /// Whether the ball is gripped and lifted, or the run over at the goal.
+    with_grip: bool,
 }
 
 /// What came of one ball.
@@ -47,6 +49,7 @@ impl World {
         level: ErrorLevel,
         seed: u64,
         detector: BallDetector,
+        with_grip: bool,
     ) -> Result<Self, Box<dyn Error>> {
         let rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
         let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
@@ -56,13 +59,20 @@ impl World {
             rig,
             detector: detector.build(seed)?,
             workspace: Workspace::paper(),
+            with_grip,
         })))
     }
 
     pub(crate) fn agent_config(&self) -> AgentConfig {
         match self {
             Self::Shortcut(cell) => cell.agent_config(),
-            Self::Chain(chain) => AgentConfig::paper(chain.workspace.search_poses()),
+            Self::Chain(chain) => {
+                let paper = AgentConfig::paper(chain.workspace.search_poses());
+                AgentConfig {
+                    lift: paper.lift.filter(|_| chain.with_grip),
+                    ..paper
+                }
+            }
         }
     }
 
@@ -100,9 +110,8 @@ impl Chain {
         let Some((ball, _)) = self.workspace.sample_seen_ball(&cell, &mut rng) else {
             return Ok(None);
         };
+        self.rig.clear_for(self.workspace.search_poses()[3])?;
         self.rig.place(&ball);
-        let RigParts { arm, .. } = self.rig.parts();
-        arm.move_to(self.workspace.search_poses()[3])?;
         let mut reached = false;
         let outcome = self.rig.run_and_learn(agent, &mut *self.detector, &mut |event| {
             reached |= event.kind == EventKind::AtGoal;

@@ -13,7 +13,7 @@ use puma_grasp::BallDetector;
 /// camera's frames are rendered from the pose of the emulated arm.
 #[derive(Parser, Debug)]
 pub(crate) struct Options {
-    /// Folder for the results; made if need be, files of an earlier run in it are replaced
+    /// Folder for the results, among them the event log of each run that failed (failures/); made if need be, files of an earlier run in it are replaced
     #[arg(long, value_name = "DIR", default_value = "out/grasp")]
     pub(crate) out: PathBuf,
 
@@ -33,9 +33,14 @@ pub(crate) struct Options {
     #[arg(long, value_name = "ADDR")]
     pub(crate) tcp: Option<String>,
 
-    /// Folder with centering.policy and approaching.policy of an earlier run; skips training
-    #[arg(long, value_name = "DIR")]
+    /// What was learned before: a folder with centering.policy and approaching.policy of an earlier run, or a file written by --export; skips
+    /// training
+    #[arg(long, value_name = "PATH")]
     pub(crate) policy: Option<PathBuf>,
+
+    /// Write the policy as JSON that other programs can run, as docs/run_policy.py does
+    #[arg(long, value_name = "FILE")]
+    pub(crate) export: Option<PathBuf>,
 
     /// Go on learning at work, and save what was learned to the output folder
     #[arg(long)]

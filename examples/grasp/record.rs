@@ -1,6 +1,6 @@
 //! Keeps what happens in the runs: a row an event, a picture a frame.
 
-use grasp_agent::{Event, EventKind, Outcome};
+use grasp_agent::{Event, EventKind, EventLog, Outcome};
 use hough_heuristic::Features;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
@@ -13,11 +13,15 @@ pub(crate) struct RunRecord {
     /// The ball's centre, millimetres in the arm's world frame.
     pub(crate) ball_mm: [f64; 3],
     pub(crate) rows: Vec<Row>,
+    /// The same, complete: it can be replayed.
+    pub(crate) log: EventLog,
     /// Frames looked at.
     frames: usize,
     /// Whether the jaws are closed: what is seen then is not the ball, or is about to be told to have been missed.
     gripped: bool,
     pub(crate) outcome: Option<Outcome>,
+    /// Why the run was broken off, if it was.
+    pub(crate) fault: Option<String>,
     /// Whether the jaws hold the ball and the agent says so.
     pub(crate) grasped: bool,
     /// How often the hand ran into something.
@@ -51,9 +55,11 @@ impl RunRecord {
         Self {
             ball_mm,
             rows: Vec::new(),
+            log: EventLog::default(),
             frames: 0,
             gripped: false,
             outcome: None,
+            fault: None,
             grasped: false,
             collisions: 0,
             miss_mm: None,
@@ -62,6 +68,7 @@ impl RunRecord {
 
     /// Takes down an event; returns the picture of its frame, if it has one.
     pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
+        self.log.note(event);
         match event.kind {
             EventKind::Gripped => self.gripped = true,
             EventKind::Missed => self.gripped = false,

@@ -137,7 +137,10 @@ impl RunSummary {
                 }
             }),
             miss_mm: record.miss_mm.map(rounded),
-            reason: outcome.and_then(|o| o.gave_up).map(|reason| reason.to_string()),
+            reason: outcome
+                .and_then(|o| o.gave_up)
+                .map(|reason| reason.to_string())
+                .or_else(|| record.fault.clone()),
         }
     }
 }

@@ -26,7 +26,10 @@ pub(crate) struct Report {
 /// learning there.
 pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn Error>> {
     println!(
-        "\nlearned in          errors of the arm  goal   moves learned from  success %        moves of a success"
+        "\nFrom simulation to the arm: the behaviours at once, and after learning on there from so many moves"
+    );
+    println!(
+        "learned in          errors of the arm  goal   moves learned from  success %        moves of a success"
     );
     let mut csv =
         String::from("learned_in,errors,goal,moves_learned_from,success_percent,half_interval,moves\n");
@@ -55,11 +58,20 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
                     .filter(|moves| moves.is_finite())
                     .collect();
                 let moves = moves.iter().sum::<f64>() / moves.len() as f64;
+                // One arm has no interval, and no success no moves.
+                let half = (seeds > 1).then_some(half);
+                let interval = half.map_or(String::new(), |half| format!("+- {half:4.1}"));
+                let moves = if moves.is_finite() {
+                    format!("{moves:.1}")
+                } else {
+                    String::new()
+                };
                 println!(
-                    "{name:19} {level:18} {goal:5} {made:19}  {mean:5.1} +- {half:4.1} {moves:17.1}",
+                    "{name:19} {level:18} {goal:5} {made:19}  {mean:5.1} {interval:7} {moves:>17}",
                     level = level.to_string()
                 );
-                let _ = writeln!(csv, "{name},{level},{goal},{made},{mean:.2},{half:.2},{moves:.2}");
+                let half = half.map_or(String::new(), |half| format!("{half:.2}"));
+                let _ = writeln!(csv, "{name},{level},{goal},{made},{mean:.2},{half},{moves}");
                 if goal == "all" {
                     line.push((made as f64, mean));
                 }

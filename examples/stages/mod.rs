@@ -28,6 +28,14 @@ struct Spent {
 }
 
 impl Stages {
+    /// `inner` with a stopwatch of these around it.
+    pub(crate) fn around<T>(&self, inner: T) -> Timed<T> {
+        Timed {
+            inner,
+            stages: self.clone(),
+        }
+    }
+
     fn measured<T>(&self, stage: fn(&mut Spent) -> &mut Duration, work: impl FnOnce() -> T) -> T {
         let begin = cpu_time();
         let result = work();

@@ -2,26 +2,23 @@
 
 use std::error::Error;
 
-use grasp_agent::{Agent, AgentConfig, Hybrid, HybridSettings};
+use grasp_agent::{Agent, Hybrid, HybridSettings};
 use pipeline_sim::Cell;
 use puma_grasp::TrialCell;
 use puma_val2::Joints;
 
-use crate::{Fate, GRASP_TOLERANCE, Options, World, say_result};
-
-/// Cells that the runs are spread over, each with errors drawn anew, in each of which the controller learns first.
-const CELLS: usize = 10;
+use crate::{Counted, Fate, Options, Tally, World};
 
 pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let (mut grasped, mut moves, mut near, mut runs) = (0, 0, 0, 0);
-    for number in 0..CELLS {
+    let mut tally = Tally::default();
+    for number in 0..options.cells {
+        tally.begin_cell();
         let seed = options.seed.wrapping_add(number as u64);
         let cell = TrialCell::draw(options.level, seed)?;
         let mut config = cell.agent_config();
         config.max_cycles = 120;
         let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
-        let balls = (options.runs + CELLS - 1 - number) / CELLS;
-        for ball in 0..options.teach + balls {
+        for ball in 0..options.teach + options.runs_in(number) {
             let teaching = ball < options.teach;
             if ball == options.teach {
                 let learned = agent.controller().clone().frozen();
@@ -29,10 +26,11 @@ pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
             let fate = if teaching { Fate::Rest } else { options.ball };
             let mut world = World::new(fate, ball as u64);
-            // Nothing happens to the ball before it is seen.
-            let mut seen = false;
+            // Nothing happens to the ball before it is seen, nor when it is looked at again without a move, nor in the jaws.
+            let (mut seen, mut looked_from) = (false, None);
             let mut go_on = |cell: &mut Cell, joints: &Joints| {
-                if seen {
+                let moved = looked_from.replace(*joints) != Some(*joints);
+                if seen && moved && cell.held.is_none() {
                     world.go_on(cell, joints);
                 }
                 seen |= cell.features(joints).is_some();
@@ -41,13 +39,15 @@ pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             let Some(result) = result.filter(|_| !teaching) else {
                 continue;
             };
-            runs += 1;
-            let gripped = result.outcome.gave_up.is_none();
-            grasped += usize::from(gripped && result.miss.is_some_and(|miss| miss < GRASP_TOLERANCE));
-            moves += result.outcome.cycles;
-            near += result.near;
+            tally.add(Counted {
+                happened: world.has_happened(),
+                success: result.outcome.gave_up.is_none() && result.held,
+                moves: result.outcome.cycles,
+                near: result.near,
+                collisions: 0,
+            });
         }
     }
-    say_result(grasped, runs, moves, near);
+    println!("{tally}");
     Ok(())
 }

@@ -1,8 +1,10 @@
 //! The controller around the controller: search, reach, recover, grip, supervision, as one explicit state machine.
 
+use hough_heuristic::image::GrayImage;
 use puma_val2::{Joints, Manipulator, ProximitySensor};
 
 use crate::run::Run;
+use crate::watch::Watch;
 use crate::{AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, Learned, Sighting};
 
 /// The modules of section 2.2 of the paper around a [`Controller`], which moves the arm while the ball is in view: the paper's two
@@ -11,6 +13,7 @@ use crate::{AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, 
 pub struct Agent<C = Learned> {
     config: AgentConfig,
     controller: C,
+    watch: Watch,
 }
 
 /// How a run ended.
@@ -50,7 +53,11 @@ impl<C: Controller> Agent<C> {
     /// [`AgentError::Config`] for settings that cannot work.
     pub fn with_controller(config: AgentConfig, controller: C) -> Result<Self, AgentError> {
         config.check()?;
-        Ok(Self { config, controller })
+        Ok(Self {
+            config,
+            controller,
+            watch: Watch::default(),
+        })
     }
 
     /// The settings.
@@ -68,6 +75,12 @@ impl<C: Controller> Agent<C> {
         self.controller
     }
 
+    /// The same, as if the frame seen last had been `frame`: for a replay, which has no frames.
+    pub(crate) fn having_seen(mut self, frame: GrayImage) -> Self {
+        self.watch.pretend(frame);
+        self
+    }
+
     /// Searches the ball, reaches it and closes the gripper on it; what the controller learns on the way is kept.
     ///
     /// Every event goes to `observe` as it happens. The gripper is opened first.
@@ -83,7 +96,16 @@ impl<C: Controller> Agent<C> {
         observe: &mut dyn FnMut(&Event<'_>),
     ) -> Result<Outcome, AgentError> {
         self.controller.begin();
-        let result = Run::new(&self.config, &mut self.controller, eye, arm, proximity, observe).until_done();
+        let run = Run::new(
+            &self.config,
+            &mut self.controller,
+            &mut self.watch,
+            eye,
+            arm,
+            proximity,
+            observe,
+        );
+        let result = run.until_done();
         self.controller.end();
         result
     }

@@ -29,17 +29,18 @@ pub struct AgentConfig {
     pub looks: usize,
     /// How fast the hand may come nearer to the ball.
     pub approach: ApproachLimit,
-    /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still where it was; then it is
-    /// lifted by this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. A ball that is seen is not in the jaws, and is reached
-    /// for again; a hand that is stopped has not succeeded. `None`: closing the jaws at the goal is success, whatever is between them.
+    /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still there; then it is lifted by
+    /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that keeps its place in the image as the hand goes up is
+    /// in the jaws. A ball that is not is reached for again; a hand that is stopped has not succeeded. `None`: closing the jaws at the goal is
+    /// success, whatever is between them.
     pub lift: Option<JointDelta>,
     /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
     /// end of what the ball stood on for example.
     pub left_behind: f64,
     /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
     pub reach_tolerance: f64,
-    /// Frames in a row, each from another pose, that may show the ball at exactly the same place before the camera counts as
-    /// frozen \[2\].
+    /// Frames in a row, each from another pose, that may be the same as the one before, or show the ball at exactly the same place, before the
+    /// camera counts as frozen \[2\]. Nothing is gripped after a single one of them.
     pub same_frames: usize,
 }
 

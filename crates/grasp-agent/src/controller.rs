@@ -30,6 +30,8 @@ pub enum Consequence {
     Lost,
     /// Supervision has taken the arm back to where it was: something was too near, or the approach too fast.
     TakenBack,
+    /// It was not a move decided on: the gripper went for the ball, and was stopped or missed it. The ball may lie elsewhere now.
+    Missed,
 }
 
 /// Decides, from one sighting of the ball to the next, how the arm moves.

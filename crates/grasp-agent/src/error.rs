@@ -54,7 +54,7 @@ pub enum AgentError {
     Arm(#[from] ArmError),
     /// The camera delivers the same frame again and again while it is moved.
     #[error(
-        "the camera seems to be frozen: {looks} frames in a row, each from another pose, show the ball at exactly the same place"
+        "the camera seems to be frozen: {looks} frames in a row, each from another pose, are the same or show the ball at exactly the same place"
     )]
     FrozenCamera {
         /// How many frames.

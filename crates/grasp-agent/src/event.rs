@@ -20,7 +20,7 @@ pub struct Event<'a> {
 
 /// What can happen in a run.
 ///
-/// Every answer of arm, sensor and camera makes exactly one event, in the order of the answers, so that the events determine the
+/// Every answer of arm, sensor and camera makes an event, in the order of the answers, so that the events determine the
 /// run: see [`EventLog::replay`](crate::EventLog::replay).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -37,6 +37,8 @@ pub enum EventKind {
     Seen(Sighting),
     /// No ball is in the frame.
     NotSeen,
+    /// What was just looked at is the same, to the last pixel, as from the pose before: the camera may have stopped.
+    SameFrame,
     /// The controller chose this move and the arm has made it, or a part of it if [`EventKind::TooNear`] follows.
     Moved(JointDelta),
     /// The ball has left the frame during the last move.
@@ -51,11 +53,11 @@ pub enum EventKind {
     TakenBack,
     /// Centre and radius are at the goal.
     AtGoal,
-    /// The gripper has been brought to the ball by this move.
+    /// The gripper has been brought to the ball by this move, the last one of two where the arm has to be moved first.
     Gripping(JointDelta),
     /// The gripper has closed.
     Gripped,
-    /// The hand, closed, has gone back to where the ball was last seen from.
+    /// The hand, closed, has gone back by a move of the grip, the last one to where the ball was last seen from.
     Withdrawn,
     /// The arm has lifted what it gripped.
     Lifted,
@@ -76,6 +78,7 @@ impl EventKind {
             Self::AtSearchPose(_) => "search",
             Self::Seen(_) => "seen",
             Self::NotSeen => "not-seen",
+            Self::SameFrame => "same-frame",
             Self::Moved(_) => "moved",
             Self::Lost => "lost",
             Self::Recovering(_) => "recover",

@@ -1,5 +1,7 @@
 //! The paper's controller as text: both behaviours, and everything else that choosing by them takes.
 
+use std::fmt::Write as _;
+
 use puma_val2::Joint;
 
 use crate::behaviour::LOST_WEIGHT;
@@ -59,6 +61,26 @@ impl Learned {
             centering: Document::of(self.centering()),
             approaching: Document::of(self.approaching()),
         })
+    }
+
+    /// Centering and approaching as CSV tables, as [`Behaviour::to_csv`] writes them, with loop breakers and limits among the remarks before
+    /// them; [`Behaviour::from_csv`] reads each, without those.
+    ///
+    /// [`Behaviour::to_csv`]: crate::Behaviour::to_csv
+    /// [`Behaviour::from_csv`]: crate::Behaviour::from_csv
+    pub fn to_csv(&self, limits: &JointLimits) -> [String; 2] {
+        let mut remarks = String::new();
+        for word in WORDS {
+            let _ = writeln!(remarks, "# {word}");
+        }
+        let _ = writeln!(remarks, "# lost_weight {LOST_WEIGHT}");
+        for (joint, (low, high)) in Joint::ALL.into_iter().zip(limits.0) {
+            let [low, high] = [low, high].map(|end| rounded(end.to_degrees()));
+            let _ = writeln!(remarks, "# limits_degrees of {joint}: {low} to {high}");
+        }
+        let (centering, approaching) = self.kappa();
+        [(self.centering(), centering), (self.approaching(), approaching)]
+            .map(|(behaviour, kappa)| format!("{remarks}# loop_breaker {kappa}\n{}", behaviour.to_csv()))
     }
 
     /// Reads what [`Learned::to_json`] wrote, or another program in the same form: a frozen controller, and the limits, which come back to
@@ -142,6 +164,22 @@ mod tests {
         assert_eq!(read, limits);
         // And again, to the letter.
         assert_eq!(now.to_json(&read), then.to_json(&limits));
+    }
+
+    #[test]
+    fn the_tables_say_what_choosing_by_them_takes_and_come_back_equal() {
+        let learned = learned();
+        let [centering, approaching] = learned.to_csv(&JointLimits::paper());
+        assert!(centering.contains("# loop_breaker 12.5\n") && approaching.contains("# loop_breaker 30\n"));
+        for table in [&centering, &approaching] {
+            assert!(
+                table.contains("# limits_degrees of JT3: 120 to 215\n")
+                    && table.contains("# lost_weight 50\n")
+            );
+        }
+        let pair = BehaviourPair::paper_mended();
+        assert!(Behaviour::from_csv(pair.centering, &centering).unwrap() == *learned.centering());
+        assert!(Behaviour::from_csv(pair.approaching, &approaching).unwrap() == *learned.approaching());
     }
 
     #[test]

@@ -62,11 +62,11 @@ impl Learned {
     }
 
     /// The same with another loop breaker: what choosing an action again in the same state costs, see
-    /// [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a number above zero counts as 0.
+    /// [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a finite number above zero counts as 0.
     #[must_use]
     pub fn with_kappa(mut self, centering: f64, approaching: f64) -> Self {
-        self.centering.kappa = centering.max(0.0);
-        self.approaching.kappa = approaching.max(0.0);
+        let sound = |kappa: f64| if kappa.is_finite() { kappa.max(0.0) } else { 0.0 };
+        (self.centering.kappa, self.approaching.kappa) = (sound(centering), sound(approaching));
         self
     }
 
@@ -136,6 +136,10 @@ impl Controller for Learned {
     }
 
     fn judge(&mut self, consequence: &Consequence) {
+        if *consequence == Consequence::Missed {
+            // No action of theirs has come to this.
+            return;
+        }
         for half in [&mut self.centering, &mut self.approaching] {
             if let Some((settings, _)) = &self.learning {
                 half.learn(settings, consequence);
@@ -222,6 +226,7 @@ impl Half {
         let value = match consequence {
             Consequence::Seen(now) => self.worth(settings.gamma, &before, &now.percept()),
             Consequence::Lost | Consequence::TakenBack => Some(self.behaviour.spec().reward.lost),
+            Consequence::Missed => None,
         };
         let Some(value) = value else { return };
         let old = self.behaviour.table().value(state, action);

@@ -85,6 +85,7 @@ mod run;
 mod servo;
 mod spec;
 mod task;
+mod watch;
 
 pub use hough_heuristic;
 pub use nalgebra;

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use hough_heuristic::FrameError;
+use hough_heuristic::image::{GrayImage, Luma};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 
 use crate::{Agent, AgentError, Controller, Event, EventKind, Eye, Look, Outcome};
@@ -47,9 +48,10 @@ impl EventLog {
         let tape = RefCell::new(Tape {
             events: &self.events,
             next: 0,
+            frame: 0,
         });
         let mut log = Self::default();
-        let end = agent.run(
+        let end = agent.clone().having_seen(numbered(0)).run_and_learn(
             &mut Played(&tape),
             &mut Played(&tape),
             &mut Played(&tape),
@@ -71,18 +73,77 @@ impl EventLog {
     }
 }
 
-/// Whether two events are the same. A failure of camera or arm comes back in other words: its type is not in the log.
+/// Whether two events are the same. A failure of camera or arm comes back in the words of the replayed device, which quote those of then.
 fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
     match (&now.kind, &then.kind) {
-        (EventKind::Failed(_), EventKind::Failed(_)) => now.cycle == then.cycle && now.joints == then.joints,
+        (EventKind::Failed(cause), EventKind::Failed(cause_then)) => {
+            now.cycle == then.cycle && now.joints == then.joints && same_cause(cause, cause_then)
+        }
         _ => now == then,
     }
+}
+
+/// Whether `now` is what ended the run `then`: the same words, or the same device failing again.
+fn same_cause(now: &str, then: &str) -> bool {
+    let quoted = |by: Device| by.failed_in(then) && now == by.silence(failed_then(then)).to_string();
+    now == then || quoted(Device::Camera) || quoted(Device::Arm)
+}
+
+/// What a replayed device says when it is asked for the answer that failed.
+fn failed_then(cause: &str) -> String {
+    format!("this failed then: {cause}")
+}
+
+/// Who failed.
+#[derive(Clone, Copy)]
+enum Device {
+    Camera,
+    Arm,
+}
+
+impl Device {
+    /// Whether `cause` begins as the errors of this device do.
+    fn failed_in(self, cause: &str) -> bool {
+        let words = self.silence(String::new()).to_string();
+        let begin = words.split_inclusive(": ").next();
+        begin.is_some_and(|begin| cause.starts_with(begin))
+    }
+
+    /// The error of a device that has no answer, with the reason.
+    fn silence(self, reason: String) -> AgentError {
+        match self {
+            Self::Camera => AgentError::Camera(unseen(reason)),
+            Self::Arm => AgentError::Arm(unmoved(reason)),
+        }
+    }
+}
+
+fn unseen(reason: String) -> FrameError {
+    FrameError::Failed {
+        origin: NAME.into(),
+        reason,
+    }
+}
+
+fn unmoved(reason: String) -> ArmError {
+    ArmError::Refused {
+        port: NAME.into(),
+        sent: "an order".into(),
+        message: reason,
+    }
+}
+
+/// A frame that differs from that of every other number: what there was to see is not in the log, only whether it was the same.
+fn numbered(number: u32) -> GrayImage {
+    GrayImage::from_fn(4, 1, |x, _| Luma([number.to_le_bytes()[x as usize]]))
 }
 
 /// The answers of then, as a tape that plays on.
 struct Tape<'a> {
     events: &'a [LoggedEvent],
     next: usize,
+    /// Number of the frame shown last.
+    frame: u32,
 }
 
 impl Tape<'_> {
@@ -100,17 +161,27 @@ impl Tape<'_> {
     /// Why there is no answer: what the run ended with, or that the log is too short.
     fn silence(&self) -> String {
         match self.events.last().map(|event| &event.kind) {
-            Some(EventKind::Failed(reason)) => format!("this failed then: {reason}"),
+            Some(EventKind::Failed(cause)) => failed_then(cause),
             _ => "the log ends here".into(),
         }
     }
 
-    /// Whether the next answer was that something is near; moves on only if so.
-    fn near(&mut self) -> bool {
-        let rest = self.events.get(self.next..).unwrap_or_default();
-        let near = rest.first().is_some_and(|event| event.kind == EventKind::TooNear);
-        self.next += usize::from(near);
-        near
+    /// Whether the next event is `kind`; moves on only if so.
+    fn next_if(&mut self, kind: &EventKind) -> bool {
+        let next = self
+            .events
+            .get(self.next)
+            .is_some_and(|event| event.kind == *kind);
+        self.next += usize::from(next);
+        next
+    }
+
+    /// Fails if the next thing that happened was that the arm failed: of the orders that make no event when they succeed.
+    fn arm_holds(&self) -> Result<(), ArmError> {
+        match self.events.get(self.next).map(|event| &event.kind) {
+            Some(EventKind::Failed(cause)) if Device::Arm.failed_in(cause) => Err(unmoved(self.silence())),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -119,6 +190,7 @@ fn is_answer(kind: &EventKind) -> bool {
     !matches!(
         kind,
         EventKind::Searching
+            | EventKind::SameFrame
             | EventKind::Lost
             | EventKind::TooFast
             | EventKind::AtGoal
@@ -140,18 +212,23 @@ impl Played<'_, '_> {
         let mut tape = self.0.borrow_mut();
         match tape.answer() {
             Some(event) => Ok(event.joints),
-            None => Err(ArmError::Refused {
-                port: NAME.into(),
-                sent: "a move".into(),
-                message: tape.silence(),
-            }),
+            None => Err(unmoved(tape.silence())),
         }
     }
 }
 
 impl Manipulator for Played<'_, '_> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        self.stand()
+        // Asked before anything happens. An arm that failed after it had told where it stands has told it all the same.
+        let tape = self.0.borrow();
+        match tape.events.first() {
+            Some(LoggedEvent { kind, joints, .. })
+                if !matches!(kind, EventKind::Failed(_)) || *joints != Joints::default() =>
+            {
+                Ok(*joints)
+            }
+            _ => Err(unmoved(tape.silence())),
+        }
     }
 
     fn move_by(&mut self, _delta: JointDelta) -> Result<Joints, ArmError> {
@@ -163,6 +240,10 @@ impl Manipulator for Played<'_, '_> {
     }
 
     fn set_gripper(&mut self, _gripper: Gripper) -> Result<(), ArmError> {
+        let mut tape = self.0.borrow_mut();
+        tape.arm_holds()?;
+        // The opened gripper begins the run.
+        tape.next_if(&EventKind::Started);
         Ok(())
     }
 
@@ -173,23 +254,26 @@ impl Manipulator for Played<'_, '_> {
 
 impl ProximitySensor for Played<'_, '_> {
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        Ok(self.0.borrow_mut().near())
+        let mut tape = self.0.borrow_mut();
+        tape.arm_holds()?;
+        Ok(tape.next_if(&EventKind::TooNear))
     }
 }
 
 impl Eye for Played<'_, '_> {
     fn look(&mut self) -> Result<Look, FrameError> {
         let mut tape = self.0.borrow_mut();
-        match tape.answer().map(|event| event.kind) {
-            Some(EventKind::Seen(sighting)) => Ok(Look {
-                frame: None,
-                ball: Some(sighting),
-            }),
-            Some(EventKind::NotSeen) => Ok(Look::default()),
-            _ => Err(FrameError::Failed {
-                origin: NAME.into(),
-                reason: tape.silence(),
-            }),
+        let ball = match tape.answer().map(|event| event.kind) {
+            Some(EventKind::Seen(sighting)) => Some(sighting),
+            Some(EventKind::NotSeen) => None,
+            _ => return Err(unseen(tape.silence())),
+        };
+        if !tape.next_if(&EventKind::SameFrame) {
+            tape.frame = tape.frame.wrapping_add(1);
         }
+        Ok(Look {
+            frame: Some(numbered(tape.frame)),
+            ball,
+        })
     }
 }

@@ -3,10 +3,18 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 
+use crate::watch::Watch;
 use crate::{
     AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, Look, Outcome, Percept,
     Sighting, Situation,
 };
+
+mod gripping;
+
+use gripping::{Grips, is_same_place};
+
+/// So many moves that were taken back are too many.
+const OFTEN: usize = 3;
 
 /// Where the state machine stands.
 #[derive(Clone, Copy, Debug)]
@@ -43,19 +51,21 @@ pub(crate) struct Run<'a> {
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
-    /// The pose that the last look was taken from, and how many looks from different poses brought the same.
-    looked_from: Joints,
-    same: usize,
+    watch: &'a mut Watch,
     /// Moves in a row that were taken back.
     taken_back: usize,
-    /// Times that the way of the gripper to the ball was taken back.
-    grips_taken_back: usize,
+    /// All of them since the search.
+    barred: usize,
+    grips: Grips,
+    /// Whether what is seen has shown in more than one place of the image since the search began.
+    wandered: bool,
 }
 
 impl<'a> Run<'a> {
     pub(crate) fn new(
         config: &'a AgentConfig,
         controller: &'a mut dyn Controller,
+        watch: &'a mut Watch,
         eye: &'a mut dyn Eye,
         arm: &'a mut dyn Manipulator,
         proximity: &'a mut dyn ProximitySensor,
@@ -64,6 +74,7 @@ impl<'a> Run<'a> {
         Self {
             config,
             controller,
+            watch,
             eye,
             arm,
             proximity,
@@ -72,10 +83,10 @@ impl<'a> Run<'a> {
             cycles: 0,
             losses: 0,
             last_seen: None,
-            looked_from: Joints::default(),
-            same: 0,
             taken_back: 0,
-            grips_taken_back: 0,
+            barred: 0,
+            grips: Grips::default(),
+            wandered: false,
         }
     }
 
@@ -121,6 +132,7 @@ impl<'a> Run<'a> {
     fn search(&mut self) -> Result<Phase, AgentError> {
         let config = self.config;
         self.tell(EventKind::Searching, None);
+        (self.wandered, self.barred) = (false, 0);
         let rounds = std::iter::once(JointDelta::default()).chain(config.search_again.iter().copied());
         for (round, beside) in rounds.enumerate() {
             for pose in nearest_first(&config.search_poses, &self.joints) {
@@ -142,6 +154,10 @@ impl<'a> Run<'a> {
         let now = self.situation(&sighting);
         let percept = Percept::new(sighting.features, &self.joints);
         if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
+            // What is shown from two poses alike is not what is there: no reason to grip.
+            if self.watch.same() > 0 {
+                return Err(self.frozen());
+            }
             self.tell(EventKind::AtGoal, None);
             return Ok(Phase::Grip {
                 seen: sighting,
@@ -182,23 +198,20 @@ impl<'a> Run<'a> {
         Ok(Phase::Reach(after))
     }
 
-    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself: a
-    /// controller that can aim at it from here does; otherwise whatever is seen is not to be had, and the search begins anew.
+    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself, and a
+    /// controller that can aim at it from here does; where they do so in a row and it cannot, whatever is seen is not to be had, and the search
+    /// begins anew.
     fn after_taking_back(&mut self, from: Joints) -> Result<Phase, AgentError> {
-        const OFTEN: usize = 3;
         self.controller.judge(&Consequence::TakenBack);
         self.taken_back += 1;
-        let often = self.taken_back >= OFTEN;
-        let Some(sighting) = self.look()? else {
+        self.barred += 1;
+        let Some(seen) = self.look()? else {
             return Ok(self.lose(from));
         };
-        if !often {
-            return Ok(Phase::Reach(sighting));
-        }
-        self.taken_back = 0;
-        Ok(Phase::Grip {
-            seen: sighting,
-            at_goal: false,
+        Ok(if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
+            Phase::Grip { seen, at_goal: false }
+        } else {
+            Phase::Reach(seen)
         })
     }
 
@@ -226,87 +239,6 @@ impl<'a> Run<'a> {
             }
         }
         Ok(Phase::Search)
-    }
-
-    /// The move that brings the gripper to the ball, where the controller has one of its own.
-    fn aimed(&mut self, sighting: &Sighting) -> Option<JointDelta> {
-        let (now, limits) = (self.situation(sighting), &self.config.limits);
-        let delta = self.controller.grip(&now, limits)?;
-        limits.admit(&(self.joints + delta)).then_some(delta)
-    }
-
-    /// The paper's activation of the gripper: the fifth joint, then the jaws, and a look at what was left behind. Away from the goal only a
-    /// controller that can aim from there goes for the ball.
-    fn grip(&mut self, seen: Sighting, at_goal: bool) -> Result<Phase, AgentError> {
-        const TRIES: usize = 3;
-        let from = self.joints;
-        // What shows for a moment only is no ball, and the jaws do not close on it.
-        let Some(sighting) = self.look()? else {
-            return Ok(self.lose(from));
-        };
-        if !is_same_place(&seen, &sighting) {
-            return Ok(Phase::Reach(sighting));
-        }
-        // After a stop on the way the aim is another.
-        let fixed = at_goal.then_some(self.config.grip);
-        let own = self.aimed(&sighting).filter(|_| self.grips_taken_back != 1);
-        let Some(delta) = own.or(fixed) else {
-            return Ok(Phase::Search);
-        };
-        if self.go_by(delta, EventKind::Gripping(delta))? == Went::Back {
-            self.grips_taken_back += 1;
-            self.cycles += 1;
-            if self.grips_taken_back >= TRIES {
-                return Ok(Phase::End(Some(GaveUp::Obstructed)));
-            }
-            return Ok(match self.look()? {
-                Some(sighting) => Phase::Reach(sighting),
-                None => self.lose(from),
-            });
-        }
-        self.arm.set_gripper(Gripper::Closed)?;
-        self.tell(EventKind::Gripped, None);
-        match self.config.lift {
-            Some(lift) => self.verify(&sighting, from, lift),
-            None => Ok(Phase::End(None)),
-        }
-    }
-
-    /// Back to where the ball was seen from, where it must not be any more, and up, from where none must be seen that was left behind.
-    fn verify(&mut self, seen: &Sighting, from: Joints, lift: JointDelta) -> Result<Phase, AgentError> {
-        let (lifted, least) = (
-            self.config.limits.nearest(&(from + lift)),
-            self.config.left_behind,
-        );
-        let still_there: &dyn Fn(&Sighting) -> bool = &|now| is_same_place(seen, now);
-        let left_behind: &dyn Fn(&Sighting) -> bool = &|now| now.features.r >= least;
-        for (pose, done, is_ball) in [
-            (from, EventKind::Withdrawn, still_there),
-            (lifted, EventKind::Lifted, left_behind),
-        ] {
-            if self.go_to(pose, done)? == Went::Back {
-                // Whether the ball is in the jaws is not known.
-                return Ok(Phase::End(Some(GaveUp::Obstructed)));
-            }
-            if self.shows(is_ball)? {
-                self.arm.set_gripper(Gripper::Open)?;
-                self.tell(EventKind::Missed, None);
-                self.cycles += 1;
-                return Ok(Phase::Recover(from));
-            }
-        }
-        // What was seen since was not the ball.
-        self.last_seen = Some(*seen);
-        Ok(Phase::End(None))
-    }
-
-    /// Whether such a ball is in view, in two looks at one place.
-    fn shows(&mut self, is_ball: &dyn Fn(&Sighting) -> bool) -> Result<bool, AgentError> {
-        let Some(first) = self.look()?.filter(is_ball) else {
-            return Ok(false);
-        };
-        let again = self.look()?;
-        Ok(again.is_some_and(|again| is_same_place(&first, &again)))
     }
 
     fn situation(&self, sighting: &Sighting) -> Situation {
@@ -410,34 +342,29 @@ impl<'a> Run<'a> {
         for _ in 0..self.config.looks {
             let Look { frame, ball } = self.eye.look()?;
             let ball = ball.filter(is_finite);
+            let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
+            self.tell(kind, frame.as_ref());
+            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
+                self.tell(EventKind::SameFrame, None);
+            }
+            if self.watch.same() >= self.config.same_frames {
+                return Err(self.frozen());
+            }
             if let Some(sighting) = ball {
-                self.tell(EventKind::Seen(sighting), frame.as_ref());
-                self.check_alive(&sighting)?;
+                self.wandered |= self
+                    .last_seen
+                    .is_some_and(|last| !is_same_place(&last, &sighting));
                 self.last_seen = Some(sighting);
                 return Ok(Some(sighting));
             }
-            self.tell(EventKind::NotSeen, frame.as_ref());
-            self.same = 0;
         }
         Ok(None)
     }
 
-    /// A ball that stays at exactly the same place while the camera moves is an old frame.
-    fn check_alive(&mut self, sighting: &Sighting) -> Result<(), AgentError> {
-        const A_MOVE: f64 = 0.002;
-        let moved = (0..3).any(|i| (self.joints.0[i] - self.looked_from.0[i]).abs() > A_MOVE);
-        if !moved {
-            return Ok(());
+    fn frozen(&self) -> AgentError {
+        AgentError::FrozenCamera {
+            looks: self.watch.same() + 1,
         }
-        self.looked_from = self.joints;
-        let same = self
-            .last_seen
-            .is_some_and(|last| last.features == sighting.features);
-        self.same = if same { self.same + 1 } else { 0 };
-        if self.same >= self.config.same_frames {
-            return Err(AgentError::FrozenCamera { looks: self.same + 1 });
-        }
-        Ok(())
     }
 
     fn tell(&mut self, kind: EventKind, frame: Option<&GrayImage>) {
@@ -454,12 +381,6 @@ impl<'a> Run<'a> {
 fn is_finite(sighting: &Sighting) -> bool {
     let f = sighting.features;
     f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0
-}
-
-/// Whether two sightings from one pose can be of one ball: the noise of any camera that can be worked with is less than this.
-fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
-    let (a, b) = (a.features, b.features);
-    (a.x - b.x).abs() < 10.0 && (a.y - b.y).abs() < 10.0 && (a.r - b.r).abs() < 6.0
 }
 
 /// Indices of `poses`, the one whose first joint is nearest to that of `joints` first.

@@ -154,6 +154,7 @@ impl Boldness {
         self.0 = match consequence {
             Consequence::Seen(_) => (1.5 * self.0).min(1.0),
             Consequence::Lost | Consequence::TakenBack => (0.5 * self.0).max(1.0 / 64.0),
+            Consequence::Missed => self.0,
         };
     }
 

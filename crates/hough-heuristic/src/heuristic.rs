@@ -233,24 +233,3 @@ impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
         })
     }
 }
-
-/// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
-///
-/// For one-off use: the [`Heuristic`] on [`Canny`] edges with the default settings, and up to 32 circles. For a stream
-/// of frames build a detector once.
-///
-/// # Errors
-/// [`ConfigError::RadiusRange`] if the range is empty, or its lower end is below 1.
-pub fn detect_circles(
-    frame: &GrayImage,
-    min_radius: f64,
-    max_radius: f64,
-) -> Result<Vec<Detection>, ConfigError> {
-    let config = HeuristicConfig {
-        min_radius,
-        max_radius,
-        max_circles: 32,
-        ..HeuristicConfig::default()
-    };
-    Ok(Heuristic::with_canny(config)?.detect(frame))
-}

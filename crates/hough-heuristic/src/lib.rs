@@ -25,7 +25,7 @@
 //! # Detectors
 //!
 //! * [`Trusted`]: for real photographs. An unknown number of circles, each proven against chance and measured with its standard
-//!   error, in a bounded number of draws; goes beyond the paper.
+//!   error, in a bounded number of draws; goes beyond the paper. [`detect_circles`] is a call of it.
 //! * [`Heuristic`]: a random search that needs no memory but the edges themselves. The detector of the paper this project
 //!   follows (section 2.1).
 //! * [`RandomizedHough`] and [`StandardHough`]: the two transforms the paper compares it with. They accept circles by the
@@ -83,14 +83,14 @@ mod trusted;
 
 pub use circle::{Circle, Features};
 pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
-pub use detect::{CircleDetector, Detection, StageTimes, Stages};
+pub use detect::{CircleDetector, Detection, StageTimes, Stages, detect_circles};
 pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
 pub use error::ConfigError;
 pub use evidence::Acceptance;
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
 pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
-pub use heuristic::{Heuristic, HeuristicConfig, detect_circles};
+pub use heuristic::{Heuristic, HeuristicConfig};
 pub use image;
 pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;

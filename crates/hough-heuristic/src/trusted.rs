@@ -1,5 +1,6 @@
 //! The detector whose score can be trusted.
 
+mod budget;
 mod candidate;
 mod config;
 mod directions;
@@ -13,8 +14,8 @@ mod prover;
 mod search;
 mod strongest;
 mod track;
-
-use std::time::{Duration, Instant};
+#[cfg(test)]
+mod twins;
 
 use image::GrayImage;
 
@@ -22,14 +23,15 @@ pub use config::TrustedConfig;
 
 use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
+use budget::{Budget, MEASURING, Stage};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
 use measure::Measured;
-use polar::{Grey, Polar, Ring};
+use polar::{Polar, Ring};
 use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
-use search::{Budget, Outline, Search};
+use search::{Outline, Search};
 
 /// Finds an unknown number of circles, and says of each how sure it is and how exact.
 ///
@@ -71,12 +73,12 @@ pub struct Trusted {
     config: TrustedConfig,
     circle: UnitCircle,
     outline: Outline,
-    maxima: Maxima,
+    /// Of the coarser sizes, one after the other, and of the finest.
+    edges: [Edges; 2],
     /// As many as a frame needed so far.
     sizes: Vec<Size>,
     /// How many of them belong to the last frame.
     depth: usize,
-    level: Level,
     collected: Collected,
     polar: Polar,
     proofs: Vec<Proof>,
@@ -130,10 +132,9 @@ impl Trusted {
         Ok(Self {
             outline: Outline::new(&circle),
             circle,
-            maxima: Maxima::new(SMOOTHING),
+            edges: [Edges::new(), Edges::new()],
             sizes: Vec::new(),
             depth: 0,
-            level: Level::default(),
             collected: Collected::default(),
             polar: Polar::default(),
             proofs: Vec::new(),
@@ -163,7 +164,7 @@ impl Trusted {
         }
     }
 
-    /// Finds the circles of a frame with radii in this range into `measurements`.
+    /// Finds the circles of a frame with radii in this range, or about the one radius, into `measurements`.
     fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
         self.proofs.clear();
         self.measurements.clear();
@@ -172,12 +173,13 @@ impl Trusted {
         if frame.width() < LEAST_SIDE || frame.height() < LEAST_SIDE {
             return;
         }
-        let megapixels = frame.len() as f64 * 1e-6;
-        self.budget.most_draws = (f64::from(self.config.draws_per_megapixel) * megapixels).ceil() as u64;
-        self.budget.deadline = self
-            .config
-            .milliseconds_per_megapixel
-            .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3));
+        self.budget = Budget::new(&self.config, frame.len());
+        let radii = if radii.0 < radii.1 {
+            radii
+        } else {
+            let slack = 1.0 + 0.05 * radii.0;
+            (radii.0 - slack, radii.1 + slack)
+        };
         let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
         self.shrink(frame, radii.1);
         self.prove(frame, radii, noise);
@@ -222,23 +224,21 @@ impl Trusted {
         };
         let smallest = pyramid.depth();
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
-        for depth in (finest..=smallest).rev() {
+        let contrast = self.config.contrast as f32;
+        let edges_of = |depth: usize, Edges { maxima, level }: &mut Edges| {
+            let grey = pyramid.grey(depth);
+            let pixels = grey.width * grey.height;
+            let noise = noise / (1 << depth) as f32 + ROUNDING;
+            let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
+            let points = maxima.find(grey.pixels, grey.width, threshold, pixels / PIXELS_PER_POINT);
+            level.fill(grey.width, grey.height, points);
+        };
+        let mut search = |depth: usize, level: &mut Level| {
             let scale = (1 << depth) as f32;
-            let Grey {
-                pixels,
-                width,
-                height,
-            } = pyramid.grey(depth);
-            let threshold = (STEP_GAIN * self.config.contrast as f32)
-                .max(NOISE_FACTOR * (noise / scale + ROUNDING) * self.maxima.noise_gain());
-            let points = self
-                .maxima
-                .find(pixels, width, threshold, width * height / PIXELS_PER_POINT);
-            self.level.fill(width, height, points);
             for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
                 let ring = proof.in_frame().shrunk(scale);
                 self.outline
-                    .explain(&self.circle, &mut self.level, &ring, &mut self.budget.looks);
+                    .explain(&self.circle, level, &ring, &mut self.budget.looks);
             }
             let least = if depth == finest { 3.2 } else { 8.0 };
             let most = if depth == smallest { f32::MAX } else { 20.0 };
@@ -255,22 +255,31 @@ impl Trusted {
                     mirror_slack: if noise > 12.0 { 0.35 } else { 0.28 },
                 },
                 prover: &mut prover,
-                level: &mut self.level,
+                level,
                 collected: &mut self.collected,
                 budget: &mut self.budget,
             });
-        }
-        for candidate in self
-            .collected
-            .candidates
-            .iter()
-            .filter(|candidate| !candidate.tried)
-        {
-            if self.budget.is_late() {
+        };
+        let [coarse, fine] = &mut self.edges;
+        // The edges of the finest size take about as long as all that is done at the others.
+        both(
+            frame.len() >= LARGE_FRAME,
+            || edges_of(finest, fine),
+            || {
+                for depth in (finest + 1..=smallest).rev() {
+                    edges_of(depth, coarse);
+                    search(depth, &mut coarse.level);
+                }
+            },
+        );
+        search(finest, &mut fine.level);
+        let candidates = &mut self.collected.candidates;
+        candidates.sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight));
+        for candidate in candidates.iter().filter(|candidate| !candidate.tried) {
+            if self.budget.is_late() || self.budget.is_over(Stage::Proofs) {
                 break;
             }
-            self.budget.looks += search::PROOF;
-            prover.prove(candidate);
+            prover.prove(candidate, &mut self.budget.looks);
         }
     }
 
@@ -295,7 +304,10 @@ impl Trusted {
             {
                 continue;
             }
-            self.budget.looks += 4 * search::PROOF;
+            if self.budget.is_over(Stage::Measurements) {
+                break;
+            }
+            self.budget.looks += MEASURING;
             let measured = widest(Measuring {
                 pyramid,
                 proof,
@@ -305,8 +317,11 @@ impl Trusted {
             });
             let scale = (1 << proof.depth) as f32;
             let measured = measured.unwrap_or_else(|| Measured::roughly(proof.in_frame(), scale));
-            let circle = circle_of(&measured.ring);
+            let mut circle = circle_of(&measured.ring);
             let fits = (radii.0..=radii.1).contains(&circle.radius);
+            if self.config.min_radius >= self.config.max_radius {
+                circle.radius = self.config.max_radius;
+            }
             let placed = self
                 .config
                 .region
@@ -363,6 +378,8 @@ const LEAST_SIDE: u32 = 12;
 const SMOOTHING: f32 = 0.8;
 /// How often a frame is halved at the most.
 const DEEPEST: usize = 5;
+/// Frames of so many pixels are worth a second thread.
+const LARGE_FRAME: usize = 1_000_000;
 /// The most candidates of a frame.
 const CANDIDATES: usize = 192;
 /// One point of this many pixels may be an edge; of more the strongest are taken.
@@ -390,6 +407,34 @@ fn circle_of(ring: &Ring) -> Circle {
         x: ring.x.into(),
         y: ring.y.into(),
         radius: ring.r.into(),
+    }
+}
+
+/// Does both, each on a thread of its own if that is wanted and can be had.
+fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
+    #[cfg(feature = "parallel")]
+    if apart {
+        rayon::join(one, other);
+        return;
+    }
+    let _ = apart;
+    one();
+    other();
+}
+
+/// The edges of a size.
+#[derive(Clone, Debug)]
+struct Edges {
+    maxima: Maxima,
+    level: Level,
+}
+
+impl Edges {
+    fn new() -> Self {
+        Self {
+            maxima: Maxima::new(SMOOTHING),
+            level: Level::default(),
+        }
     }
 }
 

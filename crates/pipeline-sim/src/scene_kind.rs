@@ -320,8 +320,8 @@ impl Snapshot {
                 pose.0[i] + t * (goal.0[i] - pose.0[i]) + if wrist { 0.0 } else { aside[i] }
             }));
             if kind == SceneKind::Empty {
-                // The arm looks elsewhere; the ball, with its holder, is behind it.
-                joints.0[0] = -joints.0[0] + if joints.0[0] > 0.0 { -0.9 } else { 0.9 };
+                // The arm looks elsewhere, where things are but not the ball.
+                joints.0[0] += if joints.0[0] > 0.0 { -0.9 } else { 0.9 };
             }
             let seen = cell.features(&joints).is_some_and(|f| f.r > 6.0);
             let gone = cell

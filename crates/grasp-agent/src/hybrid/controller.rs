@@ -68,6 +68,8 @@ pub struct Hybrid {
     before: Belief,
     belief: Belief,
     remembered: Vec<Evidence>,
+    /// Whether something is remembered that is not yet part of the belief.
+    news: bool,
     current: Evidence,
     estimate: Option<Estimate>,
     learning: bool,
@@ -78,6 +80,8 @@ pub struct Hybrid {
     doubt: bool,
     /// Sightings for which a ball that has just moved is taken to be still moving.
     moving: usize,
+    /// Grips in this run so far: none of them has held the ball.
+    grips: i32,
 }
 
 /// The ball and the camera as they are taken to be at the moment.
@@ -123,6 +127,7 @@ impl Hybrid {
             before: belief.clone(),
             belief,
             remembered: Vec::new(),
+            news: false,
             current: Evidence::default(),
             estimate: None,
             learning: true,
@@ -130,6 +135,7 @@ impl Hybrid {
             losses: 0,
             doubt: false,
             moving: 0,
+            grips: 0,
         }
     }
 
@@ -150,6 +156,7 @@ impl Hybrid {
         // One sighting says where the ball is, and nothing of the camera.
         if self.learning && self.current.len() >= 2 {
             self.remembered.push(self.current.clone());
+            self.news = true;
             let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
             self.remembered.drain(..forgotten);
         }
@@ -257,6 +264,7 @@ impl Controller for Hybrid {
         self.losses = 0;
         self.doubt = false;
         self.moving = 0;
+        self.grips = 0;
     }
 
     fn arm_at(&mut self, joints: &Joints) {
@@ -299,10 +307,18 @@ impl Controller for Hybrid {
     }
 
     fn judge(&mut self, consequence: &Consequence) {
+        if *consequence == Consequence::Missed {
+            // What was seen before was seen of a ball in another place.
+            self.remember();
+            self.current.forget_sightings();
+            self.estimate = None;
+            return;
+        }
         (self.boldness, self.losses) = match consequence {
             Consequence::Seen(_) => ((1.5 * self.boldness).min(1.0), 0),
             Consequence::Lost => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses + 1),
             Consequence::TakenBack => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses),
+            Consequence::Missed => (self.boldness, self.losses),
         };
     }
 
@@ -313,7 +329,10 @@ impl Controller for Hybrid {
         let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
             .map(|i| estimate.covariance[(i, i)])
             .sum();
-        if uncertainty.sqrt() > self.settings.grip_certainty {
+        // What the agent's settings have missed once they miss again.
+        let enough = self.settings.grip_certainty * 4_f64.powi(self.grips);
+        self.grips = (self.grips + 1).min(10);
+        if uncertainty.sqrt() > enough {
             return None;
         }
         let links = self.current.links(&estimate.numbers);
@@ -326,7 +345,7 @@ impl Controller for Hybrid {
 
     fn end(&mut self) {
         self.remember();
-        if !self.learning || self.remembered.is_empty() {
+        if !self.learning || !std::mem::take(&mut self.news) {
             return;
         }
         let all: Vec<&Evidence> = self.remembered.iter().collect();

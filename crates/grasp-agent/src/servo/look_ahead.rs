@@ -92,7 +92,7 @@ impl Controller for LookAhead {
     }
 
     fn judge(&mut self, consequence: &Consequence) {
-        if !matches!(consequence, Consequence::Seen(_)) {
+        if matches!(consequence, Consequence::Lost | Consequence::TakenBack) {
             self.barred.extend(self.last);
         }
         self.last = None;

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::nalgebra::Point3;
 use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
@@ -16,6 +17,8 @@ pub(crate) enum Fault {
     None,
     NoFrame(usize),
     FrozenFrame(usize),
+    /// Frames, and after so many looks always the same one, with what was in it.
+    FrozenPicture(usize),
     Garbage,
     /// Every seventh look finds a circle that is not the ball.
     FalseCircle,
@@ -23,19 +26,27 @@ pub(crate) enum Fault {
     Phantoms,
     ArmStuck(usize),
     LineDead(usize),
+    /// After so many orders to the gripper.
+    GripperDead(usize),
+    /// After so many moves.
+    SensorDead(usize),
     Near(usize),
     /// The arm's own guard halts it halfway in this move.
     Halted(usize),
     /// As before, and on the way back.
     HaltedTwice(usize),
-    /// It halts every move of the open hand, but of JT5, that shows the ball with a radius above this.
+    /// It halts the first three moves that show the ball with a radius above this.
     HaltedNear(f64),
     /// It halts so many ways of the gripper to the ball.
     HaltedGrips(usize),
-    /// It halts every way of the closed hand.
-    HaltedClosed,
+    /// It halts the closed hand in its first or second way.
+    HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
+    /// The jaws squeeze the ball out the first time; where it lies then it cannot be seen from the lifted hand.
+    SqueezedOut,
+    /// The ball, once it is in the jaws, shows at the border of the image, from so many looks on.
+    ShowsInTheJaws(usize),
     /// The only circle ever seen is one in the middle of the goal: in the first look.
     PhantomOnce,
     /// From the pose of the first look.
@@ -52,11 +63,25 @@ pub(crate) struct Cell {
     pub(crate) closed: bool,
     pub(crate) held: bool,
     pub(crate) stops: usize,
-    looks: usize,
+    pub(crate) looks: usize,
     looked_first: Option<Joints>,
     moves: usize,
+    grips: usize,
     halts: usize,
+    closed_moves: usize,
+    looks_held: usize,
+    closed_at: Option<Joints>,
     old: Option<Features>,
+}
+
+impl Cell {
+    fn dead_line(&self, doing: &str) -> ArmError {
+        ArmError::Line {
+            port: "ttyUSB0".into(),
+            doing: doing.into(),
+            source: std::io::Error::from(std::io::ErrorKind::BrokenPipe),
+        }
+    }
 }
 
 #[derive(Clone)]
@@ -75,7 +100,11 @@ impl Shared {
             looks: 0,
             looked_first: None,
             moves: 0,
+            grips: 0,
             halts: 0,
+            closed_moves: 0,
+            looks_held: 0,
+            closed_at: None,
             old: None,
         })))
     }
@@ -112,6 +141,19 @@ impl Eye for Shared {
             (0.0..192.0).contains(&f.x) && (0.0..144.0).contains(&f.y) && (5.0..68.0).contains(&f.r)
         });
         let seen = match cell.fault {
+            Fault::SqueezedOut
+                if cell.closed && cell.closed_at.is_some_and(|at| at.0[1] - cell.joints.0[1] > 0.1) =>
+            {
+                None
+            }
+            Fault::ShowsInTheJaws(from) if cell.held => {
+                cell.looks_held += 1;
+                (cell.looks_held > from).then(|| Features {
+                    x: 87.0 + 0.01 * cell.looks as f64,
+                    y: 141.0,
+                    r: 27.0,
+                })
+            }
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
                     origin: "camera".into(),
@@ -154,7 +196,19 @@ impl Eye for Shared {
             }
             _ => seen,
         };
-        cell.old = seen.or(cell.old);
+        let (seen, frame) = match cell.fault {
+            Fault::FrozenPicture(after) => {
+                let number = cell.looks.min(after);
+                let seen = if cell.looks > after { cell.old } else { seen };
+                cell.old = seen;
+                let pixel = |x, y| Luma([(number * 7 + (x * y) as usize) as u8]);
+                (seen, Some(GrayImage::from_fn(16, 12, pixel)))
+            }
+            _ => {
+                cell.old = seen.or(cell.old);
+                (seen, None)
+            }
+        };
         let ball = seen.map(|features| Sighting {
             features,
             detection: Detection {
@@ -162,7 +216,7 @@ impl Eye for Shared {
                 score: 1.0,
             },
         });
-        Ok(Look { frame: None, ball })
+        Ok(Look { frame, ball })
     }
 }
 
@@ -184,20 +238,18 @@ impl Manipulator for Shared {
         let halted = match cell.fault {
             Fault::ArmStuck(after) if moves > after => return Ok(from),
             Fault::LineDead(after) if moves > after => {
-                let source = std::io::Error::from(std::io::ErrorKind::BrokenPipe);
-                return Err(ArmError::Line {
-                    port: "ttyUSB0".into(),
-                    doing: "DRIVE".into(),
-                    source,
-                });
+                return Err(cell.dead_line("DRIVE"));
             }
             Fault::Halted(at) => moves == at,
             Fault::HaltedTwice(at) => moves == at || moves == at + 1,
             Fault::HaltedNear(r) => {
-                !gripping && !cell.closed && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
+                cell.halts < 3 && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
-            Fault::HaltedClosed => cell.closed && cell.halts == 0,
+            Fault::HaltedClosed(way) => {
+                cell.closed_moves += usize::from(cell.closed);
+                cell.closed && cell.halts == 0 && cell.closed_moves == way
+            }
             _ => false,
         };
         cell.joints = if halted {
@@ -221,9 +273,18 @@ impl Manipulator for Shared {
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         let mut cell = self.0.borrow_mut();
+        cell.grips += 1;
+        if matches!(cell.fault, Fault::GripperDead(after) if cell.grips > after) {
+            return Err(cell.dead_line("CLOSEI"));
+        }
         cell.closed = gripper == Gripper::Closed;
         let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
         cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
+        if cell.fault == Fault::SqueezedOut && cell.held && cell.halts == 0 {
+            (cell.held, cell.halts) = (false, 1);
+            cell.ball.y += 0.02;
+            cell.closed_at = Some(cell.joints);
+        }
         Ok(())
     }
 
@@ -236,6 +297,10 @@ impl Manipulator for Shared {
 impl ProximitySensor for Shared {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let cell = self.0.borrow();
-        Ok(matches!(cell.fault, Fault::Near(at) if cell.moves == at))
+        match cell.fault {
+            Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
+            Fault::Near(at) => Ok(cell.moves == at),
+            _ => Ok(false),
+        }
     }
 }

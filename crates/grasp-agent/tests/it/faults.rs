@@ -2,8 +2,8 @@
 
 use grasp_agent::puma_val2::ArmError;
 use grasp_agent::{
-    Agent, AgentError, CameraModel, EventKind, EventLog, GaveUp, Hybrid, HybridSettings, PositionBased,
-    ServoSettings,
+    Agent, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp, Hybrid, HybridSettings,
+    LoggedEvent, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -44,10 +44,26 @@ fn without_a_fault_the_ball_is_gripped() {
 #[test]
 fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
     type Check = fn(&AgentError) -> bool;
-    let cases: [(Fault, Check); 4] = [
+    let cases: [(Fault, Check); 9] = [
         (Fault::NoFrame(3), |e| matches!(e, AgentError::Camera(_))),
         (Fault::FrozenFrame(3), |e| {
             matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        // With no ball in view, and with one.
+        (Fault::FrozenPicture(1), |e| {
+            matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        (Fault::FrozenPicture(2), |e| {
+            matches!(e, AgentError::FrozenCamera { .. })
+        }),
+        (Fault::GripperDead(0), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
+        }),
+        (Fault::GripperDead(1), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
+        }),
+        (Fault::SensorDead(3), |e| {
+            matches!(e, AgentError::Arm(ArmError::Line { .. }))
         }),
         (Fault::ArmStuck(3), |e| {
             matches!(e, AgentError::Arm(ArmError::NotReached { .. }))
@@ -66,6 +82,91 @@ fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
             "{fault:?}"
         );
         assert!(cell.0.borrow().stops > 0 && !cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
+    let mut without_lift = config();
+    without_lift.lift = None;
+    let mut agent = Agent::with_controller(without_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+    let cell = Shared::new(
+        CameraModel::paper(),
+        [0.6, 0.1, -0.1],
+        Fault::FrozenPicture(usize::MAX),
+    );
+    assert_eq!(
+        cell.run(&mut agent, &mut EventLog::default()).unwrap().gave_up,
+        None
+    );
+    // From now on what was seen last, the ball at the goal, is seen from everywhere.
+    let looks = cell.0.borrow().looks;
+    cell.0.borrow_mut().fault = Fault::FrozenPicture(looks);
+    let before = agent.clone();
+    let mut log = EventLog::default();
+    let error = cell.run(&mut agent, &mut log).unwrap_err();
+    assert!(matches!(error, AgentError::FrozenCamera { looks: 2 }), "{error}");
+    assert!(log.events.iter().any(|event| event.kind == EventKind::SameFrame));
+    assert!(!cell.0.borrow().closed && cell.0.borrow().stops > 0);
+    let replayed = log.replay(&before).unwrap_err();
+    assert!(
+        matches!(replayed, AgentError::FrozenCamera { looks: 2 }),
+        "{replayed}"
+    );
+}
+
+#[test]
+fn too_rapid_an_approach_is_taken_back_and_made_more_slowly() {
+    let limit = ApproachLimit {
+        radius: 20.0,
+        growth: 1.5,
+    };
+    // Up to the radius anything, beyond it up to the growth; the ends are still slow enough.
+    for (before, after, exceeded) in [
+        (5.0, 20.0, false),
+        (5.0, 20.1, true),
+        (20.0, 30.0, false),
+        (20.0, 30.1, true),
+        (40.0, 30.0, false),
+    ] {
+        assert_eq!(limit.exceeded(before, after), exceeded, "{before} to {after}");
+    }
+
+    let mut slow = config();
+    slow.approach = limit;
+    let mut agent = Agent::with_controller(slow, Hybrid::new(HybridSettings::paper())).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut log = EventLog::default();
+    let outcome = cell.run(&mut agent, &mut log).unwrap();
+    assert_eq!(outcome.gave_up, None);
+    let radius = |event: &LoggedEvent| match event.kind {
+        EventKind::Seen(sighting) => Some(sighting.features.r),
+        _ => None,
+    };
+    let fast: Vec<usize> = (0..log.events.len())
+        .filter(|&i| log.events[i].kind == EventKind::TooFast)
+        .collect();
+    assert!(!fast.is_empty());
+    for i in fast {
+        // Moved, Seen too near, TooFast, TakenBack: the arm is where it was before.
+        assert!(radius(&log.events[i - 1]).unwrap() > 20.0);
+        assert_eq!(log.events[i + 1].kind, EventKind::TakenBack);
+        assert_eq!(log.events[i + 1].joints, log.events[i - 3].joints);
+    }
+    // What was let pass was slow enough.
+    let mut last: Option<f64> = None;
+    for (i, event) in log.events.iter().enumerate() {
+        let taken_back = log
+            .events
+            .get(i + 1)
+            .is_some_and(|next| next.kind == EventKind::TooFast);
+        if let Some(r) = radius(event).filter(|_| !taken_back) {
+            assert!(
+                last.is_none_or(|last| !limit.exceeded(last, r)),
+                "{last:?} to {r}"
+            );
+            last = Some(r);
+        }
     }
 }
 
@@ -144,11 +245,26 @@ fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
 }
 
 #[test]
-fn a_hand_that_is_halted_before_it_has_lifted_has_not_succeeded() {
-    let (end, log, _) = end_of(Fault::HaltedClosed);
+fn a_closed_hand_that_is_halted_has_not_succeeded() {
+    // On its way back, which was free: the ball is in that way and not in the jaws. It is gripped again.
+    let (end, log, cell) = end_of(Fault::HaltedClosed(1));
+    let expected = [
+        "gripped",
+        "withdrawn",
+        "too-near",
+        "taken-back",
+        "missed",
+        "recover",
+        "seen",
+    ];
+    assert!(words_from(&log, "gripped").starts_with(&expected), "{log:?}");
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    // As it lifts: what is in the jaws is not known.
+    let (end, log, _) = end_of(Fault::HaltedClosed(2));
+    let expected = ["lifted", "too-near", "taken-back", "gave-up"];
+    assert_eq!(words_from(&log, "lifted"), expected);
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
-    let expected = ["gripped", "withdrawn", "too-near", "taken-back", "gave-up"];
-    assert_eq!(words_from(&log, "gripped"), expected);
 }
 
 #[test]
@@ -206,6 +322,28 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
         "{missed} {outcome:?}"
     );
     assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
+    let at_once: &[_] = &["lifted", "seen", "seen"];
+    let then: &[_] = &["lifted", "seen", "seen", "lifted", "seen"];
+    for (from, expected) in [(0, at_once), (2, then)] {
+        let (end, log, cell) = end_of(Fault::ShowsInTheJaws(from));
+        assert_eq!(end.unwrap().gave_up, None);
+        assert!(cell.0.borrow().held);
+        assert_eq!(words_from(&log, "lifted"), expected);
+    }
+}
+
+#[test]
+fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
+    let (end, log, cell) = end_of(Fault::SqueezedOut);
+    assert_eq!(end.unwrap().gave_up, None);
+    assert!(cell.0.borrow().held);
+    let missed = words_from(&log, "gripped");
+    let missed = missed.iter().filter(|word| **word == "missed");
+    assert_eq!(missed.count(), 1);
 }
 
 #[test]

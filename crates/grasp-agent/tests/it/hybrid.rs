@@ -1,7 +1,11 @@
 //! The hybrid finds out what is wrong with the camera, and aims its grip by it.
 
+use grasp_agent::hough_heuristic::Features;
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use grasp_agent::{Agent, CameraModel, EventLog, GaveUp, Hybrid, HybridSettings};
+use grasp_agent::puma_val2::Joints;
+use grasp_agent::{
+    Agent, CameraModel, Controller, EventLog, GaveUp, Hybrid, HybridSettings, JointLimits, Situation,
+};
 #[cfg(feature = "serde")]
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
 
@@ -135,4 +139,32 @@ fn a_controller_that_begins_with_a_belief_goes_on_learning_from_there() {
         let mean = focal(&moved).0;
         assert!((mean - (1.0 + 0.2 * share).ln()).abs() < 0.005, "{share}: {mean}");
     }
+}
+
+#[test]
+fn what_the_fixed_grip_has_missed_is_aimed_at() {
+    let limits = JointLimits::paper();
+    let mut hybrid = Hybrid::new(HybridSettings::paper());
+    hybrid.begin();
+    let at_goal = Situation {
+        features: Features {
+            x: 103.5,
+            y: 78.0,
+            r: 33.0,
+        },
+        joints: Joints::from_degrees([0.0, -55.0, 184.0, 0.0, 45.0, 0.0]),
+    };
+    hybrid.arm_at(&at_goal.joints);
+    // One sighting with a camera of which nothing is known: where the ball is, is not certain enough.
+    assert_eq!(hybrid.grip(&at_goal, &limits), None);
+    let tries = (0..4).map(|_| hybrid.grip(&at_goal, &limits));
+    let aim = tries
+        .flatten()
+        .next()
+        .expect("an aim of its own, sooner or later");
+    assert!((aim.degrees()[4] + 18.01).abs() < 1e-6, "{aim:?}");
+    // In the next run it is as careful as ever.
+    hybrid.begin();
+    hybrid.arm_at(&at_goal.joints);
+    assert_eq!(hybrid.grip(&at_goal, &limits), None);
 }

@@ -57,3 +57,14 @@ fn learning_goes_on_within_the_limits_until_it_is_frozen() {
     some_runs(&mut frozen, &mut EventLog::default());
     assert!(*frozen.controller().approaching() == before);
 }
+
+#[test]
+fn a_loop_breaker_that_is_none_counts_as_0() {
+    let learned = Learned::new(
+        blank(BehaviourSpec::centering()),
+        blank(BehaviourSpec::approaching()),
+    );
+    for kappa in [f64::INFINITY, f64::NAN, -1.0] {
+        assert_eq!(learned.clone().with_kappa(kappa, 7.0).kappa(), (0.0, 7.0));
+    }
+}

@@ -2,13 +2,13 @@
 
 use grasp_agent::qtable::QTable;
 use grasp_agent::{
-    Agent, AgentError, BehaviourPair, CameraModel, Controller, EventLog, Hybrid, HybridSettings, ImageBased,
-    JacobianAt, Learned, OnlineLearning, PositionBased, ServoSettings,
+    Agent, AgentError, BehaviourPair, CameraModel, Controller, EventKind, EventLog, Hybrid, HybridSettings,
+    ImageBased, JacobianAt, Learned, OnlineLearning, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
 
-const FAULTS: [Fault; 9] = [
+const FAULTS: [Fault; 10] = [
     Fault::None,
     Fault::Near(4),
     Fault::FalseCircle,
@@ -16,7 +16,8 @@ const FAULTS: [Fault; 9] = [
     Fault::HaltedTwice(3),
     Fault::HaltedNear(20.0),
     Fault::HaltedGrips(1),
-    Fault::HaltedClosed,
+    Fault::HaltedClosed(1),
+    Fault::HaltedClosed(2),
     Fault::PhantomFromThere,
 ];
 
@@ -25,12 +26,22 @@ fn replays<C: Controller + Clone>(controller: C, fault: Fault) {
     let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
     let mut log = EventLog::default();
     let end = cell.run(&mut agent.clone(), &mut log);
+    #[cfg(feature = "serde")]
+    {
+        let json = serde_json::to_vec_pretty(&log).unwrap();
+        let read: EventLog = serde_json::from_slice(&json).unwrap();
+        assert_eq!(read, log);
+        log = read;
+    }
     match (end, log.replay(&agent)) {
         (Ok(then), Ok((now, again))) => {
             assert_eq!(then, now);
             assert_eq!(log, again);
         }
-        (Err(_), Err(now)) => assert!(!matches!(now, AgentError::Replay { .. }), "{now}"),
+        (Err(then), Err(now)) => assert!(
+            std::mem::discriminant(&then) == std::mem::discriminant(&now),
+            "{fault:?}: {then}; {now}"
+        ),
         (then, now) => panic!("{then:?} and {now:?}"),
     }
 }
@@ -63,12 +74,59 @@ fn logs_of_learned_behaviours_replay_frozen_and_learning() {
 fn logs_of_runs_that_failed_replay_to_the_same_failure() {
     let servo = ServoSettings::paper();
     for fault in [
+        Fault::NoFrame(0),
         Fault::NoFrame(3),
         Fault::FrozenFrame(3),
+        Fault::FrozenPicture(1),
+        Fault::FrozenPicture(2),
         Fault::ArmStuck(3),
+        Fault::LineDead(0),
         Fault::LineDead(4),
+        Fault::GripperDead(0),
+        Fault::GripperDead(1),
+        Fault::SensorDead(0),
+        Fault::SensorDead(3),
     ] {
         replays(PositionBased::new(servo), fault);
+    }
+}
+
+#[test]
+fn a_failure_of_another_kind_is_another_run() {
+    let agent = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let log_of = |fault| {
+        let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
+        let mut log = EventLog::default();
+        cell.run(&mut agent.clone(), &mut log).unwrap_err();
+        log
+    };
+    let failed_with = |log: &EventLog, cause: &str| {
+        let mut log = log.clone();
+        log.events.last_mut().unwrap().kind = EventKind::Failed(cause.into());
+        log.replay(&agent)
+    };
+    let (camera, arm, frozen) = (
+        log_of(Fault::NoFrame(3)),
+        log_of(Fault::LineDead(4)),
+        log_of(Fault::FrozenPicture(2)),
+    );
+    let causes = [&camera, &arm, &frozen].map(|log| match &log.events.last().unwrap().kind {
+        EventKind::Failed(cause) => cause.clone(),
+        other => panic!("{other:?}"),
+    });
+    for (i, log) in [&camera, &arm, &frozen].into_iter().enumerate() {
+        for (j, cause) in causes.iter().enumerate() {
+            let replay = failed_with(log, cause).unwrap_err();
+            if (i, j) == (0, 1) {
+                // Where the camera failed, the sensors on the arm could have failed just as well.
+                continue;
+            }
+            assert_eq!(
+                matches!(replay, AgentError::Replay { .. }),
+                i != j,
+                "{i} {j}: {replay}"
+            );
+        }
     }
 }
 

@@ -6,4 +6,5 @@ mod faults;
 mod hybrid;
 mod learned;
 mod log;
+mod object;
 mod rivals;

@@ -1,8 +1,9 @@
 //! Circles that passed the first looks, waiting for a closer one.
 
+use super::budget::Budget;
 use super::polar::Ring;
 use super::proof::log10;
-use super::search::{Budget, Support};
+use super::search::Support;
 
 /// How often a circle is met before it is passed by.
 const MEETINGS: u32 = 3;
@@ -78,7 +79,7 @@ impl Collected {
 
     /// Whether nearly this circle has been met often enough.
     pub(super) fn is_known(&mut self, circle: &Candidate, budget: &mut Budget) -> bool {
-        budget.looks += self.candidates.len() as u64 / 4;
+        budget.looks += self.candidates.len() as u64 / 8;
         let known = self.candidates.iter_mut().find(|known| known.near(circle));
         known.is_some_and(|known| {
             known.met += 1;
@@ -88,7 +89,7 @@ impl Collected {
 
     /// Keeps the better of those that are nearly one; tells where it is if it was kept.
     pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
-        budget.looks += self.candidates.len() as u64 / 4;
+        budget.looks += self.candidates.len() as u64 / 8;
         let better = |known: &Candidate| candidate.weight > known.weight;
         let place = if let Some(place) = self.candidates.iter().position(|known| known.near(&candidate)) {
             place

@@ -8,11 +8,13 @@ use crate::{ConfigError, Region};
 /// The defaults are meant for every frame: there is no threshold to tune to a scene.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct TrustedConfig {
     /// The smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is searched too, which takes several times as
     /// long.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 280; min_radius..=100000).
+    /// The largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius` the radius is known: circles that measure within a
+    /// pixel and 5 % of it are reported, with that radius.
     pub max_radius: f64,
     /// The most circles reported (default 32; at least 1): the best.
     pub max_circles: usize,
@@ -21,8 +23,9 @@ pub struct TrustedConfig {
     pub min_score: f64,
     /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower finds fainter circles and takes longer; noise raises it.
     pub contrast: f64,
-    /// How many pairs may be drawn, for each million pixels of the frame (default 200000; at least 1). Bounds the work; less leaves out circles amid
-    /// dense texture.
+    /// How many pairs may be drawn, for each million pixels of the frame (default 40000; at least 1), a frame below a quarter of a million counting as
+    /// one. Sixteen looks go with each draw and bound all of the work that depends on what the frame shows. Less leaves out circles amid dense texture, more
+    /// finds little.
     pub draws_per_megapixel: u32,
     /// How long the search may take, milliseconds for each million pixels (default None: no clock is looked at; above 0). With a clock what is found
     /// depends on the machine too.
@@ -41,7 +44,7 @@ impl Default for TrustedConfig {
             max_circles: 32,
             min_score: 0.5,
             contrast: 8.0,
-            draws_per_megapixel: 200_000,
+            draws_per_megapixel: 40_000,
             milliseconds_per_megapixel: None,
             region: None,
             seed: 1,

@@ -8,9 +8,32 @@ pub(super) fn halve(grey: &[u8], width: usize, half: &mut Vec<u8>) -> (usize, us
     let (columns, rows) = (width / 2, height / 2);
     half.resize(columns * rows, 0);
     if columns > 0 {
-        widest(Halving { grey, width, half });
+        halve_rows(grey, width, half);
     }
     (columns, rows)
+}
+
+#[cfg(not(feature = "parallel"))]
+fn halve_rows(grey: &[u8], width: usize, half: &mut [u8]) {
+    widest(Halving { grey, width, half });
+}
+
+/// Large frames a strip of rows on each thread.
+#[cfg(feature = "parallel")]
+fn halve_rows(grey: &[u8], width: usize, half: &mut [u8]) {
+    use rayon::prelude::*;
+
+    /// Strips of fewer pixels are not worth a thread's waking.
+    const LEAST_STRIP: usize = if cfg!(test) { 60 } else { 1_500_000 };
+    let count = rayon::current_num_threads().min(grey.len() / LEAST_STRIP).max(1);
+    let rows = (grey.len() / width / 2).div_ceil(count).max(1);
+    if count == 1 {
+        widest(Halving { grey, width, half });
+    } else {
+        grey.par_chunks(2 * rows * width)
+            .zip(half.par_chunks_mut(rows * (width / 2)))
+            .for_each(|(grey, half)| widest(Halving { grey, width, half }));
+    }
 }
 
 struct Halving<'a> {

@@ -127,8 +127,12 @@ impl Polar {
         for step in 0..self.steps {
             let (near, far) = self.grey[step * stride..][..2 * stride].split_at(stride);
             let out = &mut self.outward[step * count..][..count];
-            out.fill(0.0);
-            for shift in MARGIN - half..=MARGIN + half {
+            let first = MARGIN - half;
+            let (near_by, far_by) = (&near[first..][..count], &far[first..][..count]);
+            for index in 0..count {
+                out[index] = (far_by[index] - near_by[index]) * share;
+            }
+            for shift in first + 1..=MARGIN + half {
                 let (near, far) = (&near[shift..][..count], &far[shift..][..count]);
                 for index in 0..count {
                     out[index] += (far[index] - near[index]) * share;
@@ -177,17 +181,16 @@ fn bilinear(
         fy[lane] = y - above;
         at[lane] = top * width as i32 + left;
     }
-    // Two pixels of a row as the two bytes of a word.
+    // Two pixels of a row as the two bytes of a word. They are always there; one check for four pixels is cheaper than a proof.
     let below = pixels.get(width..).unwrap_or_default();
-    let pair = |pixels: &[u8], at: i32| {
-        // Always there; the check is cheaper than a proof.
-        let pair = pixels.get(at as usize..).and_then(<[u8]>::first_chunk);
-        i32::from(u16::from_le_bytes(*pair.unwrap_or(&[0; 2])))
-    };
+    let above = &pixels[..below.len()];
     let (mut upper, mut lower) = ([0i32; LANES], [0i32; LANES]);
     for lane in 0..LANES {
-        upper[lane] = pair(pixels, at[lane]);
-        lower[lane] = pair(below, at[lane]);
+        let left = at[lane] as u32 as usize;
+        if left < below.len() - 1 {
+            upper[lane] = i32::from(u16::from_le_bytes([above[left], above[left + 1]]));
+            lower[lane] = i32::from(u16::from_le_bytes([below[left], below[left + 1]]));
+        }
     }
     let (mut a, mut b, mut c, mut d) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for lane in 0..LANES {

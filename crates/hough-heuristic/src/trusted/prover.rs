@@ -2,6 +2,7 @@
 
 use image::GrayImage;
 
+use super::budget::PROOF;
 use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Grey, Polar, Ring};
@@ -14,6 +15,9 @@ const LARGE: f32 = 24.0;
 const SMALL: f32 = 9.0;
 /// What noise that is, grey levels.
 const NOISY: f32 = 8.0;
+
+/// What a second look takes from the certainty.
+const SECOND_LOOK: f32 = 1.0;
 
 /// The frame and its halves.
 #[derive(Clone, Copy, Debug)]
@@ -67,15 +71,31 @@ pub(super) struct Prover<'a> {
 
 impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
-    pub(super) fn prove(&mut self, candidate: &Candidate) -> Option<Ring> {
+    pub(super) fn prove(&mut self, candidate: &Candidate, looks: &mut u64) -> Option<Ring> {
         let coarsest = self.depth_for(candidate.r);
         // A larger size tells exact outlines from others, a smaller one forgives dents and noise: whichever says more.
         let finest = coarsest.saturating_sub(if self.noise > NOISY { 2 } else { 1 });
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
-            let proof = self.prove_at(depth, candidate);
+            *looks += PROOF;
+            let proof = self.prove_at(depth, &candidate.ring());
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
+            }
+        }
+        // A short arc is told from chance where it is sharp: at twice the size, from where the first look led.
+        if let Some(first) = best
+            && finest == coarsest
+            && coarsest > 0
+            && first.certainty >= 0.0
+            && !first.is_beyond_doubt()
+        {
+            *looks += PROOF;
+            if let Some(mut second) = self.prove_at(coarsest - 1, &first.in_frame()) {
+                second.certainty -= SECOND_LOOK;
+                if second.certainty > first.certainty {
+                    best = Some(second);
+                }
             }
         }
         let best = best?;
@@ -83,14 +103,14 @@ impl Prover<'_> {
         best.is_beyond_doubt().then(|| best.in_frame())
     }
 
-    /// The proof in the frame that was halved so many times.
-    fn prove_at(&mut self, depth: usize, candidate: &Candidate) -> Option<Proof> {
+    /// The proof of a circle in pixels of the frame, in the frame that was halved so many times.
+    fn prove_at(&mut self, depth: usize, ring: &Ring) -> Option<Proof> {
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             grey: self.pyramid.grey(depth),
             circle: self.circle,
             polar: self.polar,
-            start: candidate.ring().shrunk(scale),
+            start: ring.shrunk(scale),
             setting: Setting {
                 noise: self.noise / scale + 0.3,
                 // Each size has a quarter of the places that the next larger one has.

@@ -1,7 +1,6 @@
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{
     Canny, CircleDetector, ConfigError, EdgeDetector, Heuristic, HeuristicConfig, Region, Sampling,
-    detect_circles,
 };
 
 use crate::scenes::{Scene, same};
@@ -63,7 +62,12 @@ fn several_balls_come_best_first() {
         ..Scene::default()
     };
     let (frame, balls) = scene.render();
-    let found = detect_circles(&frame, 15.0, 80.0).unwrap();
+    let config = HeuristicConfig {
+        max_radius: 80.0,
+        max_circles: 32,
+        ..HeuristicConfig::default()
+    };
+    let found = Heuristic::with_canny(config).unwrap().detect(&frame);
     assert_eq!(found.len(), 6, "{found:?}");
     for ball in &balls {
         assert!(found.iter().any(|f| same(&f.circle, ball, 0.5)), "{ball:?}");

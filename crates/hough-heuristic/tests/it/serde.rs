@@ -2,7 +2,7 @@ use std::fmt::Debug;
 
 use hough_heuristic::{
     Acceptance, CannyConfig, Circle, CurveSearchConfig, Detection, Ellipse, Features, FoundCurve,
-    HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling, StandardHoughConfig,
+    HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling, StandardHoughConfig, TrustedConfig,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -68,6 +68,11 @@ fn settings_come_back() {
         accept,
         ..StandardHoughConfig::default()
     });
+    comes_back(&TrustedConfig {
+        region: accept.region,
+        milliseconds_per_megapixel: Some(6.0),
+        ..TrustedConfig::default()
+    });
 }
 
 /// A stored configuration of no fields is the default, and a field that there is not is named.
@@ -85,6 +90,7 @@ fn what_is_not_stored_is_the_default() {
     may_be_partial::<HeuristicConfig>();
     may_be_partial::<RandomizedHoughConfig>();
     may_be_partial::<StandardHoughConfig>();
+    may_be_partial::<TrustedConfig>();
     let stored = r#"{"accept":{"theta":0.5,"max_circles":3},"cell":3.0}"#;
     let expected = StandardHoughConfig {
         accept: Acceptance {

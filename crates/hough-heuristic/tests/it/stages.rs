@@ -1,5 +1,5 @@
 use hough_heuristic::{
-    Acceptance, Circle, Detection, EdgeMap, EdgePixel, StageTimes, Stages, image, write_stages,
+    Acceptance, CannyConfig, Circle, Detection, EdgeMap, EdgePixel, StageTimes, Stages, image, write_stages,
 };
 
 use crate::detectors;
@@ -13,7 +13,7 @@ fn each_stage_of_each_detector_has_its_picture() {
         ..Scene::default()
     }
     .render();
-    for (name, mut detector) in detectors::all(Acceptance::default()) {
+    for (name, mut detector) in detectors::all_on(Acceptance::default(), CannyConfig::default()) {
         detector.keep_candidates(true);
         let found = detector.detect(&frame);
         assert!(!found.is_empty(), "{name}");

@@ -21,17 +21,15 @@ pub(super) struct Studio<'a> {
 }
 
 /// Pixels between two places where a plane's coordinates are worked out exactly.
-pub(super) const STRIDE: usize = 16;
+const STRIDE: usize = 16;
 
-/// Writes a row of a textured plane: `plane` takes pixels to homogeneous plane coordinates in metres, `light` gives the factor at a
-/// column.
+/// Writes a row of a textured plane of reflectance 1: `plane` takes pixels to homogeneous plane coordinates in metres.
 pub(super) fn plane_row(
     plane: &Matrix3<f64>,
     texture: &Texture,
     strength: f32,
     (y, x0): (usize, usize),
     row: &mut [f32],
-    light: impl Fn(usize) -> f32,
 ) {
     let base = plane * Vector3::new(x0 as f64, y as f64, 1.0);
     let step = plane.column(0);
@@ -65,28 +63,13 @@ pub(super) fn plane_row(
     }
     let mut k = 0;
     let mut from = place(0);
-    let mut from_light = light(x0);
-    while k < length {
+    while !even && k < length {
         let end = ((x0 + k + STRIDE) / STRIDE * STRIDE - x0).min(length);
-        let chunk = &mut row[k..end];
-        if !even {
-            let to = place(end);
-            let share = 1.0 / (end - k) as f64;
-            texture.walk(
-                level,
-                from,
-                ((to.0 - from.0) * share, (to.1 - from.1) * share),
-                strength,
-                chunk,
-            );
-            from = to;
-        }
-        let to_light = light(x0 + end);
-        let slope = (to_light - from_light) / (end - k) as f32;
-        for (i, value) in (0_i32..).zip(chunk) {
-            *value *= from_light + slope * i as f32;
-        }
-        (from_light, k) = (to_light, end);
+        let to = place(end);
+        let share = 1.0 / (end - k) as f64;
+        let step = ((to.0 - from.0) * share, (to.1 - from.1) * share);
+        texture.walk(level, from, step, strength, &mut row[k..end]);
+        (from, k) = (to, end);
     }
 }
 
@@ -291,7 +274,8 @@ impl Studio<'_> {
         let plane = self.view.plane(&corners[0], u, v);
         let strength = look.texture as f32;
         canvas.fill(&polygon, |y, x0, row| {
-            plane_row(&plane, self.texture, strength, (y, x0), row, |_| light);
+            plane_row(&plane, self.texture, strength, (y, x0), row);
+            row.iter_mut().for_each(|value| *value *= light);
         });
     }
 

@@ -16,8 +16,6 @@ pub(super) struct Canvas {
     shade: Vec<f32>,
     /// Edges of the present polygon, but for level ones.
     edges: Vec<Edge>,
-    /// Those of them that cross the present row.
-    crossing: Vec<Edge>,
 }
 
 /// An edge of a polygon, from its upper end down.
@@ -88,7 +86,6 @@ impl Canvas {
             coverage: vec![0.0; width + 2],
             shade: vec![0.0; width + 2],
             edges: Vec::with_capacity(8),
-            crossing: Vec::with_capacity(8),
         }
     }
 
@@ -231,29 +228,23 @@ impl Canvas {
     /// Coverage of one row: the touched pixels start..end, and whether all of them are covered wholly.
     fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
         let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
-        self.crossing.clear();
+        let lines: [f64; SUBROWS] = std::array::from_fn(|i| above + (i as f64 + 0.5) / SUBROWS as f64);
+        let (mut lefts, mut rights) = ([f64::INFINITY; SUBROWS], [f64::NEG_INFINITY; SUBROWS]);
         for edge in &self.edges {
-            if edge.bottom >= above && edge.top <= below {
-                self.crossing.push(*edge);
+            if edge.bottom < above || edge.top > below {
+                continue;
+            }
+            for i in 0..SUBROWS {
+                let x = edge.x + (lines[i] - edge.top) * edge.slope;
+                let crosses = edge.top <= lines[i] && lines[i] < edge.bottom;
+                lefts[i] = if crosses && x < lefts[i] { x } else { lefts[i] };
+                rights[i] = if crosses && x > rights[i] { x } else { rights[i] };
             }
         }
         let mut spans = [(0.0_f64, -1.0_f64); SUBROWS];
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut inner_left, mut inner_right) = (f64::NEG_INFINITY, f64::INFINITY);
-        for (i, span) in spans.iter_mut().enumerate() {
-            let line = y as f64 - 0.5 + (i as f64 + 0.5) / SUBROWS as f64;
-            let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-            for edge in &self.crossing {
-                if edge.top <= line && line < edge.bottom {
-                    let x = edge.x + (line - edge.top) * edge.slope;
-                    if x < left {
-                        left = x;
-                    }
-                    if x > right {
-                        right = x;
-                    }
-                }
-            }
+        for (span, (left, right)) in spans.iter_mut().zip(lefts.into_iter().zip(rights)) {
             // Pixel x covers x - 0.5 .. x + 0.5; here its left border is at x.
             let (left, right) = ((left + 0.5).max(0.0), (right + 0.5).min(self.width as f64));
             if left < right {
@@ -279,13 +270,15 @@ impl Canvas {
             return Some((start, end, true));
         }
         let (from, to) = (from.clamp(start, end), to.clamp(start, end));
-        self.coverage[start..from].fill(0.0);
         self.coverage[from..to].fill(1.0);
-        self.coverage[to..end].fill(0.0);
-        for (left, right) in spans {
-            for x in (start..from).chain(to..end) {
-                let share = right.min(x as f64 + 1.0) - left.max(x as f64);
-                self.coverage[x] += share.max(0.0) as f32 / SUBROWS as f32;
+        for part in [start..from, to..end] {
+            for (x, coverage) in part.clone().zip(&mut self.coverage[part]) {
+                let x = x as f64;
+                *coverage = 0.0;
+                for (left, right) in &spans {
+                    let share = right.min(x + 1.0) - left.max(x);
+                    *coverage += share.max(0.0) as f32 / SUBROWS as f32;
+                }
             }
         }
         Some((start, end, false))

@@ -5,19 +5,27 @@ use nalgebra::{Point2, Vector2};
 use crate::Camera;
 use crate::render::canvas::{Area, Canvas};
 
-/// Pixels from one place to the next at which a distortion is undone exactly.
-const CELL: usize = 4;
-/// How far from its exact place a pixel between them may be taken, pixels.
-const STRAIGHT: f64 = 0.005;
+/// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts of the focal length.
+const STEP: (f64, f64) = (16.0, 1.0 / 60.0);
+/// The same for places between which pixels of a row are taken from a straight line.
+const RUN: (f64, f64) = (4.0, 1.0 / 250.0);
 
 /// The map from a distorted frame to the ideal one it is taken from.
+///
+/// A distortion is undone exactly on a coarse grid. Between, cubic polynomials tell where every fourth pixel of every row comes from (every
+/// one in small frames), and those that follow lie on a straight line to the next: in all within .005 pixels of the exact place for lenses
+/// whose corners move by up to a tenth of the frame's width.
 #[derive(Clone, Debug)]
 pub(super) struct Warp {
     camera: Camera,
     /// The ideal camera, large enough to hold all that the distorted frame shows.
     pub(super) ideal: Camera,
-    /// For each pixel: position of the upper left of four source pixels, and the shares of its right and lower neighbours.
-    sources: Vec<(u32, f32, f32)>,
+    /// Pixels from one of the sources to the next.
+    run: usize,
+    /// Row after row, where pixels 0, `run`, ... and the last are taken from.
+    sources: Vec<[f32; 2]>,
+    /// Of them in a row.
+    columns: usize,
 }
 
 impl Warp {
@@ -29,68 +37,54 @@ impl Warp {
         }
         let (width, height) = camera.size();
         let (focal, principal) = (camera.focal_px(), camera.principal_point());
-        let ideal = |x: u32, y: u32| {
-            let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
-            principal + ray.xy() * focal
-        };
-        let border = (0..width)
-            .flat_map(|x| [(x, 0), (x, height - 1)])
-            .chain((0..height).flat_map(|y| [(0, y), (width - 1, y)]));
-        let (mut low, mut high) = (Point2::new(0.0_f64, 0.0), Point2::new(0.0_f64, 0.0));
-        for (x, y) in border {
-            let p = ideal(x, y);
-            (low, high) = (low.inf(&p), high.sup(&p));
-        }
-        let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
-        let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
-        let large = Camera::ideal(focal, Point2::from(principal - low), w, h);
+        let pixels = |(most, part): (f64, f64)| (part * focal).clamp(1.0, most);
+        let step = pixels(STEP);
+        let (across, down) = (
+            Nodes::new(width as usize, step),
+            Nodes::new(height as usize, step),
+        );
         // From place to place the answer changes little: the last one is where to look for the next.
         let mut last = (Point2::origin(), Point2::origin());
-        let mut exact = |x: u32, y: u32| {
-            let shown = Point2::from((Point2::new(f64::from(x), f64::from(y)) - principal) / focal);
+        let mut exact = |x: f64, y: f64| {
+            let shown = Point2::from((Point2::new(x, y) - principal) / focal);
             let undone = camera.distortion().undistort_near(shown, last);
             last = (shown, undone.unwrap_or(last.1));
-            principal + last.1.coords * focal - low
+            principal.coords + last.1.coords * focal
         };
-        let mut sources = vec![(0, 0.0, 0.0); width as usize * height as usize];
-        let mut put = |x: u32, y: u32, p: Vector2<f64>| {
-            let (i, j) = (p.x.floor(), p.y.floor());
-            sources[y as usize * width as usize + x as usize] =
-                ((j as u32) * w + i as u32, (p.x - i) as f32, (p.y - j) as f32);
-        };
-        let nodes = |length: u32| -> Vec<u32> {
-            let inner = (0..length.saturating_sub(1)).step_by(CELL);
-            inner.chain([length.saturating_sub(1)]).collect()
-        };
-        let (columns, rows) = (nodes(width), nodes(height));
-        let mut upper: Vec<Vector2<f64>> = columns.iter().map(|x| exact(*x, 0)).collect();
-        for (j, &top) in rows.iter().enumerate() {
-            let bottom = *rows.get(j + 1).unwrap_or(&top);
-            let lower: Vec<Vector2<f64>> = columns.iter().map(|x| exact(*x, bottom)).collect();
-            for (i, &left) in columns.iter().enumerate() {
-                let next = (i + 1).min(columns.len() - 1);
-                let right = columns[next];
-                let between = |x: u32, y: u32| {
-                    let fx = f64::from(x - left) / f64::from((right - left).max(1));
-                    let fy = f64::from(y - top) / f64::from((bottom - top).max(1));
-                    let (a, b) = (upper[i].lerp(&upper[next], fx), lower[i].lerp(&lower[next], fx));
-                    a.lerp(&b, fy)
-                };
-                // What is between bends most in the middle.
-                let (x, y) = ((left + right) / 2, (top + bottom) / 2);
-                let straight = (exact(x, y) - between(x, y)).norm() < STRAIGHT;
-                for y in top..bottom.max(top + 1) {
-                    for x in left..right.max(left + 1) {
-                        put(x, y, if straight { between(x, y) } else { exact(x, y) });
-                    }
-                }
+        let grid: Vec<Vector2<f64>> = (0..down.count)
+            .flat_map(|j| (0..across.count).map(move |i| (i, j)))
+            .map(|(i, j)| exact(across.place(i), down.place(j)))
+            .collect();
+        // The border bulges between two of its places by a small part of a pixel only.
+        let low = grid.iter().fold(Vector2::zeros(), |a: Vector2<f64>, p| a.inf(p));
+        let high = grid.iter().fold(Vector2::zeros(), |a: Vector2<f64>, p| a.sup(p));
+        let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
+        let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
+        let ideal = Camera::ideal(focal, principal - low, w, h);
+        let run = pixels(RUN) as usize;
+        let runs = (width as usize).div_ceil(run);
+        let ends: Vec<usize> = (0..=runs).map(|k| (k * run).min(width as usize - 1)).collect();
+        let shares: Vec<(usize, [f64; 4])> = ends.iter().map(|x| across.shares(*x)).collect();
+        let mut sources = Vec::with_capacity(ends.len() * height as usize);
+        let mut row = vec![Vector2::zeros(); across.count];
+        for y in 0..height as usize {
+            let (top, weights) = down.shares(y);
+            for (i, place) in row.iter_mut().enumerate() {
+                let node = |k: usize| grid[(top + k) * across.count + i] * weights[k];
+                *place = node(0) + node(1) + node(2) + node(3) - low;
             }
-            upper = lower;
+            sources.extend(shares.iter().map(|(left, weights)| {
+                let node = |k: usize| row[left + k] * weights[k];
+                let place = node(0) + node(1) + node(2) + node(3);
+                [place.x as f32, place.y as f32]
+            }));
         }
         Some(Self {
             camera: *camera,
-            ideal: large,
+            ideal,
+            run,
             sources,
+            columns: ends.len(),
         })
     }
 
@@ -102,13 +96,73 @@ impl Warp {
     /// Takes every pixel of `out` from `ideal`.
     pub(super) fn apply(&self, ideal: &Canvas, out: &mut Canvas) {
         let w = ideal.width;
-        for (light, (at, fx, fy)) in out.light.iter_mut().zip(&self.sources) {
-            let at = *at as usize;
-            let (a, b) = (ideal.light[at], ideal.light[at + 1]);
-            let (c, d) = (ideal.light[at + w], ideal.light[at + w + 1]);
-            let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
-            *light = upper + (lower - upper) * fy;
+        let rows = out.light.chunks_exact_mut(out.width.max(1));
+        for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
+            for ((k, run), ends) in row.chunks_mut(self.run).enumerate().zip(sources.windows(2)) {
+                // The last place of a row is that of its last pixel.
+                let length = self.run.min((out.width - 1 - k * self.run).max(1));
+                let share = 1.0 / length as f32;
+                // Whole pixels and their 65536ths.
+                let fixed = |v: f32| (v * 65536.0) as i64;
+                let (mut x, mut y) = (fixed(ends[0][0]), fixed(ends[0][1]));
+                let dx = fixed((ends[1][0] - ends[0][0]) * share);
+                let dy = fixed((ends[1][1] - ends[0][1]) * share);
+                for light in run {
+                    let at = (y >> 16) as usize * w + (x >> 16) as usize;
+                    let part = |v: i64| (v & 0xffff) as i32 as f32 / 65536.0;
+                    let Some(four) = ideal.light.get(at..at + w + 2) else {
+                        continue;
+                    };
+                    let upper = four[0] + (four[1] - four[0]) * part(x);
+                    let lower = four[w] + (four[w + 1] - four[w]) * part(x);
+                    *light = upper + (lower - upper) * part(y);
+                    (x, y) = (x + dx, y + dy);
+                }
+            }
         }
+    }
+}
+
+/// Evenly spaced places from the first to the last of a number of pixels.
+struct Nodes {
+    /// At least four.
+    count: usize,
+    spacing: f64,
+}
+
+impl Nodes {
+    /// At most `step` apart, but for a frame of one pixel.
+    fn new(length: usize, step: f64) -> Self {
+        let last = length.saturating_sub(1);
+        let count = ((last as f64 / step).ceil() as usize).max(3) + 1;
+        Self {
+            count,
+            spacing: last as f64 / (count - 1) as f64,
+        }
+    }
+
+    fn place(&self, node: usize) -> f64 {
+        node as f64 * self.spacing
+    }
+
+    /// The first of the four places next to a pixel, and their shares in the value of the cubic through all four there.
+    fn shares(&self, pixel: usize) -> (usize, [f64; 4]) {
+        if self.spacing <= 0.0 {
+            return (0, [1.0, 0.0, 0.0, 0.0]);
+        }
+        let at = pixel as f64 / self.spacing;
+        let first = (at.floor().max(1.0) as usize - 1).min(self.count - 4);
+        let t = at - first as f64;
+        let (a, b, c, d) = (t, t - 1.0, t - 2.0, t - 3.0);
+        (
+            first,
+            [
+                -b * c * d / 6.0,
+                a * c * d / 2.0,
+                -a * b * d / 2.0,
+                a * b * c / 6.0,
+            ],
+        )
     }
 }
 
@@ -122,9 +176,11 @@ pub(super) fn soften(canvas: &mut Canvas, area: Area, sigma: f64, spare: &mut Ve
     let width = canvas.width;
     let (w, h) = (area.right - area.left, area.bottom - area.top);
     // The area as it was, and a row with a pixel more at either end.
-    spare.clear();
-    spare.resize(w * h + w + 2, 0.0);
-    let (before, mixed) = spare.split_at_mut(w * h);
+    let needed = w * h + w + 2;
+    if spare.len() < needed {
+        spare.resize(needed, 0.0);
+    }
+    let (before, mixed) = spare[..needed].split_at_mut(w * h);
     for values in [&mut canvas.light, &mut canvas.cover] {
         if values.is_empty() {
             continue;
@@ -156,6 +212,9 @@ pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
     (side, 1.0 - 2.0 * side)
 }
 
+/// Pixels that are blurred at a time, so that their sums stay in registers.
+const BLOCK: usize = 16;
+
 /// Blurs the whole canvas by a Gaussian of standard deviation `sigma` pixels.
 pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
     let reach = (2.5 * sigma).ceil().min(40.0) as usize;
@@ -167,35 +226,53 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
         .collect();
     let sum = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
     kernel.iter_mut().for_each(|k| *k /= sum);
+    kernel[0] *= 0.5;
     let (w, h) = (canvas.width, canvas.height);
-    spare.clear();
-    spare.resize(w * h, 0.0);
-    for y in 0..h {
-        let out = &mut spare[y * w..(y + 1) * w];
-        for (i, k) in kernel.iter().enumerate() {
-            let (above, below) = (y.saturating_sub(i), (y + i).min(h - 1));
-            let (p, q) = (&canvas.light[above * w..][..w], &canvas.light[below * w..][..w]);
-            let k = if i == 0 { 0.5 * k } else { *k };
-            for ((o, a), b) in out.iter_mut().zip(p).zip(q) {
-                *o += k * (a + b);
-            }
-        }
+    let needed = w * h + w + 2 * reach;
+    if spare.len() < needed {
+        spare.resize(needed, 0.0);
     }
-    let mut padded = vec![0.0_f32; w + 2 * reach];
+    let (mixed, padded) = spare[..needed].split_at_mut(w * h);
     for y in 0..h {
-        let row = &spare[y * w..(y + 1) * w];
+        let pairs = kernel.iter().enumerate().map(|(i, k)| {
+            let (above, below) = (y.saturating_sub(i), (y + i).min(h - 1));
+            (
+                *k,
+                &canvas.light[above * w..][..w],
+                &canvas.light[below * w..][..w],
+            )
+        });
+        weigh(pairs, &mut mixed[y * w..][..w]);
+    }
+    for (row, out) in mixed.chunks_exact(w).zip(canvas.light.chunks_exact_mut(w)) {
         padded[..reach].fill(row[0]);
         padded[reach..reach + w].copy_from_slice(row);
         padded[reach + w..].fill(row[w - 1]);
-        let out = &mut canvas.light[y * w..(y + 1) * w];
-        out.fill(0.0);
-        for (i, k) in kernel.iter().enumerate() {
-            let (p, q) = (&padded[reach - i..][..w], &padded[reach + i..][..w]);
-            let k = if i == 0 { 0.5 * k } else { *k };
-            for ((o, a), b) in out.iter_mut().zip(p).zip(q) {
-                *o += k * (a + b);
+        let pairs = kernel.iter().enumerate();
+        let pairs = pairs.map(|(i, k)| (*k, &padded[reach - i..][..w], &padded[reach + i..][..w]));
+        weigh(pairs, out);
+    }
+}
+
+/// The sum of pairs of rows, each with its weight.
+fn weigh<'a>(pairs: impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone, out: &mut [f32]) {
+    let mut at = 0;
+    let mut blocks = out.chunks_exact_mut(BLOCK);
+    for block in &mut blocks {
+        let mut sums = [0.0_f32; BLOCK];
+        for (k, a, b) in pairs.clone() {
+            let (Some(a), Some(b)) = (a[at..].first_chunk::<BLOCK>(), b[at..].first_chunk::<BLOCK>()) else {
+                continue;
+            };
+            for i in 0..BLOCK {
+                sums[i] += k * (a[i] + b[i]);
             }
         }
+        block.copy_from_slice(&sums);
+        at += BLOCK;
+    }
+    for (i, value) in blocks.into_remainder().iter_mut().enumerate() {
+        *value = pairs.clone().map(|(k, a, b)| k * (a[at + i] + b[at + i])).sum();
     }
 }
 
@@ -203,6 +280,31 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
 mod tests {
     use super::*;
     use crate::Distortion;
+
+    /// How far pixels are taken from where the lens has them, at most.
+    fn worst(camera: &Camera) -> f64 {
+        let warp = Warp::new(camera).expect("distorts");
+        let (width, height) = camera.size();
+        let mut worst = 0.0_f64;
+        for (x, y) in (0..height)
+            .step_by(3)
+            .flat_map(|y| (0..width).step_by(5).map(move |x| (x, y)))
+        {
+            let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
+            let exact = warp.ideal.principal_point() + ray.xy() * camera.focal_px();
+            let run = &warp.sources[y as usize * warp.columns + x as usize / warp.run..];
+            let (from, to) = (run[0].map(f64::from), run[1].map(f64::from));
+            let start = x as usize / warp.run * warp.run;
+            let length = warp.run.min((width as usize - 1 - start).max(1));
+            let part = (x as usize - start) as f64 / length as f64;
+            let taken = Point2::new(
+                from[0] + part * (to[0] - from[0]),
+                from[1] + part * (to[1] - from[1]),
+            );
+            worst = worst.max((taken - exact).norm());
+        }
+        worst
+    }
 
     #[test]
     fn every_pixel_is_taken_from_where_the_lens_has_it() {
@@ -213,21 +315,60 @@ mod tests {
                 ..Distortion::default()
             };
             let camera = Camera::paper().with_distortion(lens).expect("does not fold");
-            let warp = Warp::new(&camera).expect("distorts");
-            let (width, height) = camera.size();
-            let mut worst = 0.0_f64;
-            for (x, y) in (0..height)
-                .step_by(3)
-                .flat_map(|y| (0..width).step_by(5).map(move |x| (x, y)))
-            {
-                let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
-                let exact = warp.ideal.principal_point() + ray.xy() * camera.focal_px();
-                let (at, fx, fy) = warp.sources[(y * width + x) as usize];
-                let (i, j) = (at % warp.ideal.size().0, at / warp.ideal.size().0);
-                let taken = Point2::new(f64::from(i) + f64::from(fx), f64::from(j) + f64::from(fy));
-                worst = worst.max((taken - exact).norm());
+            let off = worst(&camera);
+            assert!(off < 0.005, "{k1} {k2}: {off}");
+            for (width, height) in [(769, 577), (192, 144), (62, 46), (8, 6), (5, 2), (1, 1)] {
+                let small = camera.resized(width, height).expect("does not fold");
+                let off = worst(&small);
+                assert!(off < 0.005, "{k1} {k2} {width}x{height}: {off}");
+                let warp = Warp::new(&small).expect("distorts");
+                let (w, h) = warp.ideal.size();
+                let mut ideal = Canvas::new(w as usize, h as usize);
+                ideal.light.fill(0.5);
+                let mut out = Canvas::new(width as usize, height as usize);
+                warp.apply(&ideal, &mut out);
+                assert!(
+                    out.light.iter().all(|v| (v - 0.5).abs() < 1e-6),
+                    "{width}x{height}"
+                );
             }
-            assert!(worst < 0.01, "{k1} {k2}: {worst}");
+        }
+    }
+
+    #[test]
+    fn defocus_is_a_gaussian_cut_off_at_two_and_a_half_deviations() {
+        // Neither side is a multiple of a block; the border is continued.
+        let (w, h) = (53_usize, 41_usize);
+        let mut state = 1_u32;
+        let light: Vec<f32> = (0..w * h)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 8) as f32 / 16_777_216.0
+            })
+            .collect();
+        for sigma in [0.6, 1.0, 2.3, 3.5] {
+            let mut canvas = Canvas::new(w, h);
+            canvas.light.copy_from_slice(&light);
+            defocus(&mut canvas, sigma, &mut Vec::new());
+            let reach = (2.5 * sigma).ceil() as i64;
+            let weight = |d: i64| (-0.5 * (d as f64 / sigma).powi(2)).exp();
+            let sum: f64 = (-reach..=reach).map(weight).sum();
+            for (x, y) in [(0_i64, 0_i64), (26, 20), (52, 40), (50, 3), (15, 40)] {
+                let at = |x: i64, y: i64| {
+                    let (x, y) = (x.clamp(0, w as i64 - 1), y.clamp(0, h as i64 - 1));
+                    f64::from(light[y as usize * w + x as usize])
+                };
+                let exact: f64 = (-reach..=reach)
+                    .flat_map(|j| (-reach..=reach).map(move |i| (i, j)))
+                    .map(|(i, j)| weight(i) * weight(j) * at(x + i, y + j))
+                    .sum::<f64>()
+                    / (sum * sum);
+                let blurred = f64::from(canvas.light[y as usize * w + x as usize]);
+                assert!(
+                    (blurred - exact).abs() < 1e-5,
+                    "{sigma} {x} {y}: {blurred} {exact}"
+                );
+            }
         }
     }
 }

@@ -24,7 +24,7 @@ use canvas::Canvas;
 use lens::{Warp, defocus};
 use light_grid::LightGrid;
 use sensor::Exposure;
-use shadow::cast_things;
+use shadow::ThingShadows;
 use smear::Smear;
 use texture::{CoarseMap, Texture};
 use view::View;
@@ -53,7 +53,7 @@ pub struct Renderer {
     frames: u64,
     wood: Texture,
     /// Light on the table: stains and the shadows of the things.
-    table: CoarseMap,
+    table: ThingShadows,
     /// Brightness of the panels on the walls.
     walls: Vec<f32>,
     exposure: Exposure,
@@ -79,8 +79,8 @@ impl Renderer {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let wood = Texture::wood(0.60, &mut rng);
         let stains = 0.8 * scene.table.texture.clamp(0.0, 1.0) as f32;
-        let mut table = CoarseMap::stains(601, (-0.6, -1.2), 2.4, stains, &mut rng);
-        cast_things(&mut table, scene);
+        let stains = CoarseMap::stains(601, (-0.6, -1.2), 2.4, stains, &mut rng);
+        let table = ThingShadows::new(stains, scene);
         let walls = (0..48).map(|_| rng.random_range(0.12_f32..0.55)).collect();
         let exposure = Exposure::new(scene.sensor, &mut rng);
         Self {

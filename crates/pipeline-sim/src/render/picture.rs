@@ -32,6 +32,9 @@ impl Renderer {
 
     /// Works out the light on the table, with the mean of the shadows that balls and holders of `cells` throw.
     pub(super) fn lay_light(&mut self, view: &View, table: f64, cells: &[&Cell]) {
+        let things = self.scene.things.iter().enumerate();
+        let gone = things.filter(|(_, t)| cells.iter().any(|cell| in_the_way(t, cell)));
+        self.table.leave_out(gone.map(|(i, _)| i).collect());
         if view.eye().z <= table {
             return;
         }
@@ -72,12 +75,14 @@ impl Renderer {
         let (near, far, half) = TABLE;
         let corners = [(near, -half), (far, -half), (far, half), (near, half)];
         let mut polygon = Vec::with_capacity(8);
-        view.polygon(&corners.map(|(x, y)| Point3::new(x, y, studio.table)), &mut polygon);
+        view.polygon(
+            &corners.map(|(x, y)| Point3::new(x, y, studio.table)),
+            &mut polygon,
+        );
         let strength = self.scene.table.texture as f32;
         canvas.fill(&polygon, |y, x0, row| {
-            plane_row(&plane, &self.wood, strength, (y, x0), row, |x| {
-                self.light.at(x, y)
-            });
+            plane_row(&plane, &self.wood, strength, (y, x0), row);
+            self.light.shine(y, x0, row);
         });
     }
 
@@ -88,19 +93,9 @@ impl Renderer {
     /// separate them. A ball above a thing, or on its holder, overlaps it as seen from above: a level plane separates the two, and the one
     /// on the far side of it comes first.
     pub(super) fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
-        let eye = view.eye();
-        let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
-        let ball = cell.ball.centre;
-        let bottom = ball.z - cell.ball.radius;
+        let (eye, ball) = (view.eye(), cell.ball.centre);
         let overlaps = |x: f64, y: f64, r: f64| (x - ball.x).hypot(y - ball.y) < r + cell.ball.radius;
-        // A thing where the holder stands, or in a ball that lies or is carried low, is left out.
-        let in_the_way = |t: &Thing| {
-            let foot = t.shape.footprint();
-            let at_holder = cell.holder.is_some_and(|h| {
-                (t.x - h.foot.x).hypot(t.y - h.foot.y) <= foot + h.radius.max(cell.ball.radius)
-            });
-            at_holder || (bottom < cell.table + t.shape.height() && overlaps(t.x, t.y, foot))
-        };
+        let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
         let things = || self.scene.things.iter().enumerate();
         let mut items: Vec<Item> = things()
             .filter(|(_, t)| t.shape.is_flat())
@@ -108,7 +103,7 @@ impl Renderer {
             .collect();
         // Each with its power, its top, and whether the ball is above it.
         let mut standing: Vec<(f64, f64, bool, Item)> = things()
-            .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t))
+            .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t, cell))
             .map(|(i, t)| {
                 let (foot, top) = (t.shape.footprint(), cell.table + t.shape.height());
                 (
@@ -188,9 +183,22 @@ impl Renderer {
             &Vector3::new(0.0, 4.0, 0.0),
         );
         canvas.fill(&polygon, |y, x0, row| {
-            plane_row(&plane, studio.texture, 0.4, (y, x0), row, |_| 0.16);
+            plane_row(&plane, studio.texture, 0.4, (y, x0), row);
+            row.iter_mut().for_each(|value| *value *= 0.16);
         });
     }
+}
+
+/// Whether a thing is left out: one that stands where the holder stands, or in a ball that lies or is carried low.
+fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
+    let ball = cell.ball.centre;
+    let foot = thing.shape.footprint();
+    let at_holder = cell.holder.is_some_and(|h| {
+        (thing.x - h.foot.x).hypot(thing.y - h.foot.y) <= foot + h.radius.max(cell.ball.radius)
+    });
+    let in_ball = || (thing.x - ball.x).hypot(thing.y - ball.y) < foot + cell.ball.radius;
+    !thing.shape.is_flat()
+        && (at_holder || (ball.z - cell.ball.radius < cell.table + thing.shape.height() && in_ball()))
 }
 
 /// How the holder looks.

@@ -1,9 +1,11 @@
 //! Shadows on the table: those of the things, worked out once, and those of ball and holder, worked out for every frame.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::render::texture::CoarseMap;
-use crate::{Ball, Holder, Light, Scene, Shape};
+use crate::{Ball, Holder, Light, Scene, Shape, Thing};
 
 /// Directions toward points of a lamp's disc.
 const LAMP_POINTS: usize = 24;
@@ -31,49 +33,150 @@ pub(super) fn lamps(scene: &Scene) -> Vec<(Vector3<f64>, f64)> {
     scene.lights.iter().map(lamp).collect()
 }
 
-/// Darkens `map` where things keep the lamps' light off the table, and a little around their feet.
-pub(super) fn cast_things(map: &mut CoarseMap, scene: &Scene) {
-    let (_, shares) = table_light(scene);
-    for thing in scene.things.iter().filter(|t| !t.shape.is_flat()) {
-        let (foot, height) = (thing.shape.footprint(), thing.shape.height());
-        let lamps: Vec<(f64, Vec<Vector3<f64>>)> = scene
-            .lights
-            .iter()
-            .zip(&shares)
-            .map(|(light, share)| (*share, lamp_points(light, thing.turn)))
+/// What one thing takes from the light on the table: factors for a part of a map.
+#[derive(Clone, Debug)]
+struct Cast {
+    columns: Range<usize>,
+    rows: Range<usize>,
+    factors: Vec<f32>,
+}
+
+/// The light on the table apart from ball and holder: stains, and the shadows of the things that stand there.
+#[derive(Clone, Debug)]
+pub(super) struct ThingShadows {
+    /// Without the things.
+    bare: Vec<f32>,
+    /// With them.
+    map: CoarseMap,
+    /// Of each thing; `None` for what lies flat.
+    casts: Vec<Option<Cast>>,
+    /// Things that are not there at present.
+    left_out: Vec<usize>,
+}
+
+impl ThingShadows {
+    /// Darkens `stains` where things keep the lamps' light off the table, and a little around their feet.
+    pub(super) fn new(stains: CoarseMap, scene: &Scene) -> Self {
+        let casts: Vec<Option<Cast>> = scene.things.iter().map(|t| cast(&stains, scene, t)).collect();
+        let mut shadows = Self {
+            bare: stains.values.clone(),
+            map: stains,
+            casts,
+            left_out: Vec::new(),
+        };
+        for i in 0..shadows.casts.len() {
+            shadows.darken(i);
+        }
+        shadows
+    }
+
+    /// Factor on the table's light at (x, y).
+    pub(super) fn at(&self, x: f64, y: f64) -> f32 {
+        self.map.at(x, y)
+    }
+
+    /// Takes away the shadows of these things, in ascending order, and brings back those of all others.
+    pub(super) fn leave_out(&mut self, things: Vec<usize>) {
+        if things == self.left_out {
+            return;
+        }
+        let before = std::mem::replace(&mut self.left_out, things);
+        let come_and_gone: Vec<usize> = (0..self.casts.len())
+            .filter(|i| before.contains(i) != self.left_out.contains(i))
             .collect();
-        // The longest shadow that any point of a lamp throws.
-        let slope = |d: &Vector3<f64>| d.x.hypot(d.y) / d.z.max(1e-3);
-        let longest = lamps
-            .iter()
-            .flat_map(|(_, points)| points)
-            .map(slope)
-            .fold(0.0, f64::max);
-        let reach = foot + (height * longest).max(0.05);
-        let (columns, rows) = map.range(thing.x, thing.y, reach.min(map.size));
-        for j in rows {
-            for i in columns.clone() {
-                let (x, y) = map.place(i, j);
-                let (dx, dy) = (x - thing.x, y - thing.y);
-                let distance = dx.hypot(dy);
-                if distance > reach {
-                    continue;
+        for i in come_and_gone {
+            self.darken(i);
+        }
+    }
+
+    /// Works the light out anew where a thing throws its shadow.
+    fn darken(&mut self, thing: usize) {
+        let Some(Some(Cast { columns, rows, .. })) = self.casts.get(thing) else {
+            return;
+        };
+        let side = self.map.side;
+        for j in rows.clone() {
+            let row = j * side + columns.start..j * side + columns.end;
+            self.map.values[row.clone()].copy_from_slice(&self.bare[row]);
+        }
+        for (i, other) in self.casts.iter().enumerate() {
+            let Some(other) = other.as_ref().filter(|_| !self.left_out.contains(&i)) else {
+                continue;
+            };
+            let (left, right) = (
+                columns.start.max(other.columns.start),
+                columns.end.min(other.columns.end),
+            );
+            if left >= right {
+                continue;
+            }
+            for j in rows.start.max(other.rows.start)..rows.end.min(other.rows.end) {
+                let from = (j - other.rows.start) * other.columns.len() + left - other.columns.start;
+                let values = &mut self.map.values[j * side + left..j * side + right];
+                for (value, factor) in values.iter_mut().zip(&other.factors[from..]) {
+                    *value *= factor;
                 }
-                let (sin, cos) = thing.turn.sin_cos();
-                let from = Point3::new(dx * cos + dy * sin, dy * cos - dx * sin, 0.0);
-                // Things also hide part of the sky from the table near their feet.
-                let mut factor = 1.0 - 0.35 * (-gap(&thing.shape, &from) / 0.012).exp();
-                for (share, points) in &lamps {
-                    let blocked = points
-                        .iter()
-                        .filter(|d| d.z > 1e-3 && meets(&thing.shape, &from, d))
-                        .count();
-                    factor -= share * blocked as f64 / LAMP_POINTS as f64;
-                }
-                map.values[j * map.side + i] *= factor.max(0.02) as f32;
             }
         }
     }
+}
+
+/// The shadow of a thing on a map.
+fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
+    if thing.shape.is_flat() {
+        return None;
+    }
+    let (_, shares) = table_light(scene);
+    let (foot, height) = (thing.shape.footprint(), thing.shape.height());
+    let lamps: Vec<(f64, Vec<Vector3<f64>>)> = scene
+        .lights
+        .iter()
+        .zip(&shares)
+        .map(|(light, share)| (*share, lamp_points(light, thing.turn)))
+        .collect();
+    // The longest shadow that any point of a lamp throws.
+    let slope = |d: &Vector3<f64>| d.x.hypot(d.y) / d.z.max(1e-3);
+    let longest = lamps
+        .iter()
+        .flat_map(|(_, points)| points)
+        .map(slope)
+        .fold(0.0, f64::max);
+    let reach = foot + (height * longest).max(0.05);
+    let (columns, rows) = map.range(thing.x, thing.y, reach.min(map.size));
+    // Each point of a lamp looks at another place of the map's cell, so that edges of shadows are as soft as the map can show them.
+    let cell = map.size / (map.side - 1) as f64;
+    let within = |k: usize, step: f64| cell * ((k as f64 * step).fract() - 0.5);
+    let aside: [Vector3<f64>; LAMP_POINTS] =
+        std::array::from_fn(|k| Vector3::new(within(k, 0.754_877_7), within(k, 0.569_840_3), 0.0));
+    let (sin, cos) = thing.turn.sin_cos();
+    let mut factors = Vec::with_capacity(columns.len() * rows.len());
+    for j in rows.clone() {
+        for i in columns.clone() {
+            let (x, y) = map.place(i, j);
+            let (dx, dy) = (x - thing.x, y - thing.y);
+            if dx.hypot(dy) > reach {
+                factors.push(1.0);
+                continue;
+            }
+            let from = Point3::new(dx * cos + dy * sin, dy * cos - dx * sin, 0.0);
+            // Things also hide part of the sky from the table near their feet.
+            let mut factor = 1.0 - 0.35 * (-gap(&thing.shape, &from) / 0.012).exp();
+            for (share, points) in &lamps {
+                let blocked = points
+                    .iter()
+                    .zip(&aside)
+                    .filter(|(d, aside)| d.z > 1e-3 && meets(&thing.shape, &(from + **aside), d))
+                    .count();
+                factor -= share * blocked as f64 / LAMP_POINTS as f64;
+            }
+            factors.push(factor.max(0.02) as f32);
+        }
+    }
+    Some(Cast {
+        columns,
+        rows,
+        factors,
+    })
 }
 
 /// Distance from a point of the table to the foot of a shape that stands at the origin; 0 under it.
@@ -276,7 +379,7 @@ fn overlap(body: f64, lamp: f64, across: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Look, Thing};
+    use crate::Look;
 
     #[test]
     fn the_gloom_at_the_foot_of_a_box_has_the_shape_of_the_box() {
@@ -300,13 +403,13 @@ mod tests {
             }],
             ..Scene::plain()
         };
-        let mut map = CoarseMap {
+        let map = CoarseMap {
             side: 401,
             corner: (-0.2, -0.2),
             size: 0.4,
             values: vec![1.0; 401 * 401],
         };
-        cast_things(&mut map, &scene);
+        let map = ThingShadows::new(map, &scene);
         let (sin, cos) = 0.5_f64.sin_cos();
         // Ahead of an end, and as far from the middle but beside the box.
         let (end, beside) = (
@@ -314,5 +417,33 @@ mod tests {
             map.at(-0.053 * sin, 0.053 * cos),
         );
         assert!(end < 0.76 && beside > 0.98, "{end} {beside}");
+    }
+
+    #[test]
+    fn what_is_left_out_throws_no_shadow_and_all_comes_back_with_it() {
+        let scene = Scene::laboratory();
+        let stains = CoarseMap {
+            side: 601,
+            corner: (-0.6, -1.2),
+            size: 2.4,
+            values: vec![1.0; 601 * 601],
+        };
+        let all = ThingShadows::new(stains.clone(), &scene);
+        let mut shadows = all.clone();
+        // The first box and the cylinder beside it.
+        for gone in [vec![0], vec![0, 6], vec![6]] {
+            shadows.leave_out(gone.clone());
+            let mut fewer = scene.clone();
+            for i in gone.iter().rev() {
+                fewer.things.remove(*i);
+            }
+            assert_eq!(
+                shadows.map.values,
+                ThingShadows::new(stains.clone(), &fewer).map.values
+            );
+            assert_ne!(shadows.map.values, all.map.values);
+        }
+        shadows.leave_out(Vec::new());
+        assert_eq!(shadows.map.values, all.map.values);
     }
 }

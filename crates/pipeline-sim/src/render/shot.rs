@@ -13,8 +13,10 @@ use crate::{Cell, Renderer};
 pub struct Shot {
     /// Time the shutter is open, seconds. 0 freezes all motion.
     pub exposure: f64,
-    /// Moments, spread evenly over the exposure, that are drawn and averaged; 1 freezes all motion. Their number times the cost of one
-    /// frame is the cost of this one; one for every two pixels of motion is enough.
+    /// 1 freezes all motion. With more, the frame is drawn once, in the middle of its exposure, and each part of it is averaged along the way
+    /// it takes, as long as arm, ball and holder move evenly and not far (48 pixels either way). Otherwise, and for two frozen fields, this
+    /// many moments, spread evenly over the exposure of each field, are drawn and averaged at the cost of a frame each: one for every two
+    /// pixels of motion is enough.
     pub moments: usize,
     /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones.
     pub interlace: Option<f64>,

@@ -6,6 +6,8 @@ use crate::render::canvas::{Area, Canvas};
 
 /// Side of the squares of pixels that are taken to move alike.
 const SQUARE: usize = 16;
+/// Numbers that are worked on at once.
+const LANES: usize = 4;
 /// Motion of less than this is none, pixels.
 const STILL: f64 = 0.01;
 
@@ -138,38 +140,50 @@ impl Smear {
         let base = ((y + margin) * layer.width + left + margin) as isize;
         let n = right - left;
         let target = &mut out.light[y * out.width + left..y * out.width + right];
-        let mut light = [0.0_f32; SQUARE];
-        self.gather(&layer.light, base, n, &mut light);
+        let light = self.gather(&layer.light, base);
         if layer.cover.is_empty() {
-            target.copy_from_slice(&light[..n]);
+            match target.first_chunk_mut() {
+                Some(whole) if n == SQUARE => *whole = light,
+                _ => target.copy_from_slice(&light[..n]),
+            }
             return;
         }
-        let mut cover = [0.0_f32; SQUARE];
-        self.gather(&layer.cover, base, n, &mut cover);
+        let cover = self.gather(&layer.cover, base);
         for ((value, light), cover) in target.iter_mut().zip(&light).zip(&cover) {
             *value = *value * (1.0 - cover) + light;
         }
-        let shares = cover;
-        out.note(y, left, shares[..n].iter().copied());
     }
 
-    /// The weighted sums of `n` neighbouring pixels; what lies outside of the layer counts as 0.
-    fn gather(&self, from: &[f32], base: isize, n: usize, sums: &mut [f32; SQUARE]) {
+    /// The weighted sums of a square's row of pixels; what lies outside of the layer counts as 0.
+    fn gather(&self, from: &[f32], base: isize) -> [f32; SQUARE] {
+        let mut sums = [[0.0_f32; LANES]; SQUARE / LANES];
         for (offset, share) in &self.taps {
-            let Ok(at) = usize::try_from(base + offset) else {
-                continue;
+            let at = base + offset;
+            let values = usize::try_from(at)
+                .ok()
+                .and_then(|at| from.get(at..)?.first_chunk());
+            let values: &[f32; SQUARE] = match values {
+                Some(values) => values,
+                None => &beyond(from, at),
             };
-            if let Some(values) = from.get(at..at + SQUARE) {
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum += share * value;
-                }
-            } else if let Some(values) = from.get(at..(at + n).min(from.len())) {
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum += share * value;
+            for (sums, values) in sums.iter_mut().zip(values.as_chunks().0) {
+                let values: &[f32; LANES] = values;
+                for i in 0..LANES {
+                    sums[i] += share * values[i];
                 }
             }
         }
+        std::array::from_fn(|i| sums[i / LANES][i % LANES])
     }
+}
+
+/// Pixels of which some are outside of the layer.
+#[cold]
+fn beyond(from: &[f32], at: isize) -> [f32; SQUARE] {
+    std::array::from_fn(|i| {
+        let at = usize::try_from(at + i as isize).ok();
+        at.and_then(|at| from.get(at)).copied().unwrap_or(0.0)
+    })
 }
 
 /// The integral of the hat of width 2 and height 1 about 0, from far left to `x`.

@@ -4,12 +4,12 @@ use nalgebra::{Point2, Point3, Vector3};
 use puma_val2::Joints;
 
 use crate::camera::unit_outline;
+use crate::render::Renderer;
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
+use crate::render::picture::Item;
 use crate::render::shadow::lamps;
 use crate::render::view::View;
-use crate::render::Renderer;
-use crate::render::picture::Item;
 use crate::{Cell, Ellipse, Scene, Shape};
 
 /// What a round outline belongs to.

@@ -1,0 +1,76 @@
+//! What a frame may cost: counted, so that the same frame is always searched as far.
+
+use std::time::{Duration, Instant};
+
+use super::TrustedConfig;
+
+/// Looks that a draw takes, in the mean over dense texture; those of all draws are shared by what takes few and what takes many.
+const LOOKS_PER_DRAW: u64 = 16;
+/// The budget of smaller frames is that of one with so many million pixels: a circle costs the same in each.
+const LEAST_MEGAPIXELS: f64 = 0.25;
+
+/// What a proof costs at one size, in looks.
+pub(super) const PROOF: u64 = 1500;
+/// What a measurement costs, in looks.
+pub(super) const MEASURING: u64 = 1500;
+
+/// The parts of the work, each with looks of its own after those of the parts before it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Stage {
+    Search,
+    Proofs,
+    Measurements,
+}
+
+/// What may be spent, and what has been.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Budget {
+    pub(super) draws: u64,
+    /// Places looked at, or what takes as long as that.
+    pub(super) looks: u64,
+    most_draws: u64,
+    most_looks: u64,
+    deadline: Option<Instant>,
+    /// Whether the deadline has passed.
+    late: bool,
+    /// Whether any part was cut short.
+    pub(super) spent: bool,
+}
+
+impl Budget {
+    /// For a frame with so many pixels.
+    pub(super) fn new(config: &TrustedConfig, pixels: usize) -> Self {
+        let megapixels = pixels as f64 * 1e-6;
+        let draws = f64::from(config.draws_per_megapixel) * megapixels.max(LEAST_MEGAPIXELS);
+        let most_draws = draws.ceil() as u64;
+        Self {
+            most_draws,
+            most_looks: LOOKS_PER_DRAW * most_draws + 4 * (PROOF + MEASURING),
+            deadline: config
+                .milliseconds_per_megapixel
+                .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3)),
+            ..Self::default()
+        }
+    }
+
+    /// Whether this part of the work is to end.
+    #[inline(always)]
+    pub(super) fn is_over(&mut self, stage: Stage) -> bool {
+        let twentieths = match stage {
+            Stage::Search => 14,
+            Stage::Proofs => 17,
+            Stage::Measurements => 20,
+        };
+        let drawn = matches!(stage, Stage::Search) && self.draws >= self.most_draws;
+        let over = drawn || self.late || self.looks >= self.most_looks / 20 * twentieths;
+        self.spent |= over;
+        over
+    }
+
+    /// Looks at the clock, if there is one to be looked at.
+    pub(super) fn is_late(&mut self) -> bool {
+        self.late |= self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        self.spent |= self.late;
+        self.late
+    }
+}

@@ -1,0 +1,97 @@
+//! How well each form of the regression simulators describes the cell: fits to many seeds, and the interval that 95 % of fits lie in.
+//!
+//! ```text
+//! cargo run --release -p pipeline-sim --example regression_table [-- SAMPLES [SEEDS]]
+//! ```
+//!
+//! R² and root mean square errors (feature units) are those of as many other samples; the open-loop error is the mean error of y after 1, 3 and 5
+//! moves that the model does not see. For features noisy by 0, 0.125 and 0.5 units.
+#![allow(clippy::print_stdout, reason = "a program for the terminal")]
+
+use std::error::Error;
+
+use pipeline_sim::rand::SeedableRng;
+use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
+use pipeline_sim::{Ball, Cell, CentreModel, ReachForm, ReachModel, sample_moves};
+
+/// Runs of five moves for the open-loop error of a fit.
+const RUNS: usize = 200;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let count: usize = arguments.next().map_or(Ok(2083), |n| n.parse())?;
+    let seeds: u64 = arguments.next().map_or(Ok(20), |n| n.parse())?;
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    for noise in [0.0, 0.125, 0.5] {
+        println!(
+            "\n{count} samples with noise of {noise} units, {seeds} fits: mean ± 1.96 standard deviations\n"
+        );
+        println!("| form | R² of dy | R² of dr | error of y | error of r | y after 1 | 3 | 5 moves |");
+        println!("|---|---|---|---|---|---|---|---|");
+        for (name, form, edges) in [
+            ("`Linear`, one fit", ReachForm::Linear, &[][..]),
+            (
+                "`Linear` per elbow interval",
+                ReachForm::Linear,
+                &ReachModel::PAPER_ELBOW_EDGES[..],
+            ),
+            (
+                "`Rigid8` per elbow interval",
+                ReachForm::Rigid8,
+                &ReachModel::PAPER_ELBOW_EDGES[..],
+            ),
+            (
+                "`Rigid22` per elbow interval",
+                ReachForm::Rigid22,
+                &ReachModel::PAPER_ELBOW_EDGES[..],
+            ),
+            ("`RigidBody`, one fit", ReachForm::RigidBody, &[][..]),
+        ] {
+            let mut rows = Vec::new();
+            for seed in 0..seeds {
+                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+                let (_, training) = sample_moves(&cell, count, noise, &mut rng);
+                let (_, fresh) = sample_moves(&cell, count, noise, &mut rng);
+                let model = ReachModel::fit(&training, form, edges)?;
+                let quality = model.quality_on(&fresh);
+                let (y, r) = (&quality[0], &quality[1]);
+                let open = model.open_loop_error(&cell, 5, RUNS, &mut rng);
+                rows.push([
+                    y.r2,
+                    r.r2,
+                    y.rmse,
+                    r.rmse,
+                    open[0].y_mean,
+                    open[2].y_mean,
+                    open[4].y_mean,
+                ]);
+            }
+            println!("| {name} | {} |", spread(&rows).join(" | "));
+        }
+        let mut rows = Vec::new();
+        for seed in 0..seeds {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let (training, _) = sample_moves(&cell, count, noise, &mut rng);
+            let (plain, full) = (
+                CentreModel::fit_without_radius(&training)?,
+                CentreModel::fit(&training)?,
+            );
+            let (plain, full) = (&plain.quality()[0], &full.quality()[0]);
+            rows.push([plain.r2, plain.rmse, full.r2, full.rmse]);
+        }
+        println!("\n| centring: R² of dx on 1, d1 | error | on 1, d1, r d1 | error |\n|---|---|---|---|");
+        println!("| {} |", spread(&rows).join(" | "));
+    }
+    Ok(())
+}
+
+/// Mean and 1.96 standard deviations of each column.
+fn spread<const N: usize>(rows: &[[f64; N]]) -> [String; N] {
+    let n = rows.len() as f64;
+    std::array::from_fn(|k| {
+        let mean = rows.iter().map(|row| row[k]).sum::<f64>() / n;
+        let squares = rows.iter().map(|row| (row[k] - mean).powi(2)).sum::<f64>();
+        let wide = 1.96 * (squares / (n - 1.0).max(1.0)).sqrt();
+        format!("{mean:.4} ± {wide:.4}")
+    })
+}
