@@ -47,7 +47,7 @@ use search::{Outline, Search};
 /// of the edges on the outline (Hoeffding's bound of the binomial tail, over samples that do not overlap); a hundred times as much if
 /// more than a quarter of the circle lies outside of the frame. The score is `c / (c + 1)` with `c` minus its decimal logarithm, 0
 /// where that is negative: 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in 100, 0.8 for one in
-/// 10000. The bound is far from tight: of 1000 rendered frames without a circle, half of them noisy, 4 gave one with a score of 0.5 or
+/// 10000. The bound is far from tight: of 1000 rendered frames without a circle, half of them noisy, 6 gave one with a score of 0.5 or
 /// more. Chance is not all there is: wheels, holes, fingertips and letters are round, and score high. Lamps do not: an edge whose
 /// bright side is as bright as can be counts for nothing where the light falls off around it, for it is where the exposure ends.
 ///
