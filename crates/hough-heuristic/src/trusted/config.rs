@@ -18,7 +18,8 @@ pub struct TrustedConfig {
     pub max_radius: f64,
     /// The most circles reported (default 32; at least 1): the best.
     pub max_circles: usize,
-    /// The least score reported (default 0.5; 0..=1). Higher: fewer things that are hardly round. Lower: more that are mostly hidden.
+    /// The least score reported (default 0.5, at most one circle of pure chance in ten frames; 0..=1). Higher: fewer things that are hardly round.
+    /// Lower: little more, as what is below is mostly chance.
     pub min_score: f64,
     /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower finds fainter circles and takes longer; noise raises it.
     pub contrast: f64,

@@ -71,6 +71,12 @@ impl Polar {
         row - 0.5 * (self.steps - 1) as f32
     }
 
+    /// The grey level half a pixel inside of the distance of this row; there is one row more than distances.
+    #[inline(always)]
+    pub(super) fn grey(&self, row: usize, ray: usize) -> f32 {
+        self.grey[row.min(self.steps) * (self.rays + 2 * MARGIN) + MARGIN + ray]
+    }
+
     /// Samples the frame along the rays, up to `reach` pixels on either side of the outline, and averages the outward
     /// slopes over `2 half + 1` neighbouring directions (`half` at most 8).
     #[inline(always)]

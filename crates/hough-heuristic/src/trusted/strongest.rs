@@ -1,0 +1,148 @@
+//! The strongest edge along each ray across an outline, and which of them are no edges of things.
+
+use super::directions::Rays;
+use super::polar::{Grey, LANES, Polar, Ring};
+
+/// Directions that are looked in.
+pub(super) const RAYS: usize = 64;
+/// From here on grey levels are as bright as can be, but for what compression leaves.
+const CLIPPED: f32 = 245.0;
+/// By how much wider than for edges the window is for the light around, pixels.
+const FALL: usize = 4;
+/// The part of the edge that the light falls by from 3 to 6 px beyond it, from which on it is a glow: with lamps 0.1 to 0.5, with balls up to 0.03.
+const GLOW: f32 = 0.08;
+
+/// How far around a circle edges are sought, and how slopes are averaged.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    /// Pixels on either side of the outline.
+    pub(super) reach: usize,
+    /// Rays on either side that a slope is averaged over.
+    pub(super) half: usize,
+    /// The least slope of an edge, grey levels per pixel.
+    pub(super) least: f32,
+}
+
+/// The strongest edge along each ray.
+#[derive(Clone, Debug)]
+pub(super) struct Edges {
+    /// How far outside the outline, pixels.
+    pub(super) distance: [f32; RAYS],
+    /// Slope without its sign; 0 where there is no edge.
+    pub(super) slope: [f32; RAYS],
+    /// The step of the window that the edge was found at, from 1 on; 0 where there is no edge.
+    at: [i32; RAYS],
+}
+
+impl Edges {
+    /// Finds the strongest edge along the outline's normal on each ray.
+    #[inline(always)]
+    pub(super) fn around(
+        ring: &Ring,
+        grey: Grey<'_>,
+        rays: Rays<'_>,
+        polar: &mut Polar,
+        window: Window,
+    ) -> Self {
+        let Window { reach, half, least } = window;
+        polar.sample(grey, rays, ring, reach, half);
+        let mut edges = Self {
+            distance: [0.0; RAYS],
+            slope: [0.0; RAYS],
+            at: [0; RAYS],
+        };
+        for (block, at) in edges.at.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let visible = polar.visible.as_chunks::<LANES>().0[block];
+            let (mut best, mut place) = ([least; LANES], [0i32; LANES]);
+            let rows = polar
+                .outward
+                .chunks_exact(RAYS)
+                .zip(polar.along.chunks_exact(RAYS));
+            for (step, (outward, along)) in rows.enumerate() {
+                let outward = outward.as_chunks::<LANES>().0[block];
+                let along = along.as_chunks::<LANES>().0[block];
+                for lane in 0..LANES {
+                    let strength = (outward[lane].abs() - 0.7 * along[lane].abs()) * visible[lane];
+                    let better = -i32::from(strength > best[lane]);
+                    place[lane] = (better & (step as i32 + 1)) | (!better & place[lane]);
+                    best[lane] = strength.max(best[lane]);
+                }
+            }
+            *at = place;
+        }
+        for ray in 0..RAYS {
+            let Some(step) = (edges.at[ray] as usize).checked_sub(1) else {
+                edges.distance[ray] = 0.0;
+                edges.slope[ray] = 0.0;
+                continue;
+            };
+            let slope = |step: usize| polar.outward[step * RAYS + ray].abs();
+            let here = slope(step);
+            let mut place = step as f32;
+            if step > 0 && step + 1 < polar.steps {
+                let (before, behind) = (slope(step - 1), slope(step + 1));
+                let bend = 2.0 * here - before - behind;
+                if bend > 0.0 {
+                    place += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
+                }
+            }
+            edges.distance[ray] = polar.distance(place);
+            edges.slope[ray] = here;
+        }
+        edges
+    }
+
+    /// The grey level `pixels` away from the edge of a ray, on the dark side of it if positive; `beyond` is how much wider the
+    /// window sampled is than the one in which the edges were sought.
+    #[inline(always)]
+    fn grey(&self, polar: &Polar, ray: usize, pixels: i32, beyond: usize) -> f32 {
+        let step = self.at[ray] - 1 + beyond as i32;
+        // The edge lies between this row and the next.
+        let outward = polar.outward[step.max(0) as usize * RAYS + ray];
+        let row = if outward < 0.0 {
+            step + pixels
+        } else {
+            step + 1 - pixels
+        };
+        polar.grey(row.max(0) as usize, ray)
+    }
+
+    /// Whether an edge lies on the outline and its bright side is as bright as can be.
+    #[inline(always)]
+    fn is_clipped(&self, polar: &Polar, ray: usize, beyond: usize) -> bool {
+        self.slope[ray] > 0.0
+            && self.distance[ray].abs() <= 1.5
+            && self.grey(polar, ray, -2, beyond) >= CLIPPED
+    }
+
+    /// Whether a good part of the outline runs along what is as bright as can be.
+    pub(super) fn are_clipped(&self, polar: &Polar) -> bool {
+        (0..RAYS).filter(|&ray| self.is_clipped(polar, ray, 0)).count() >= RAYS / 8
+    }
+
+    /// Forgets the edges of what is as bright as can be if the light falls off around it: a lamp and its glow, whose outline is
+    /// where the exposure ends and not that of a thing.
+    pub(super) fn leave_out_glow(
+        &mut self,
+        ring: &Ring,
+        grey: Grey<'_>,
+        rays: Rays<'_>,
+        polar: &mut Polar,
+        window: Window,
+    ) {
+        polar.sample(grey, rays, ring, window.reach + FALL, window.half);
+        let (mut drop, mut fall) = (0.0, 0.0);
+        for ray in (0..RAYS).filter(|&ray| self.is_clipped(polar, ray, FALL)) {
+            let [bright, dark, far] = [-2, 3, 6].map(|pixels| self.grey(polar, ray, pixels, FALL));
+            drop += bright - dark;
+            fall += dark - far;
+        }
+        if fall > GLOW * drop {
+            for ray in 0..RAYS {
+                if self.is_clipped(polar, ray, FALL) {
+                    self.slope[ray] = 0.0;
+                }
+            }
+        }
+    }
+}
