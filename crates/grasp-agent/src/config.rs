@@ -131,8 +131,7 @@ impl AgentConfig {
         let (limits, zero) = (&self.limits.0, JointDelta::default());
         let beyond = |joint: &Joint| {
             let (low, high) = limits[joint.index()];
-            // Also what is not a number.
-            !(self.grip[*joint].abs() <= high - low)
+            self.grip[*joint].is_nan() || self.grip[*joint].abs() > high - low
         };
         if let Some(joint) = Joint::ALL
             .iter()
