@@ -68,7 +68,12 @@ fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Erro
             if !success {
                 let run = tally.runs();
                 let kept = keep_log(&options.out, &format!("run-{run:03}"), &log)?;
-                println!("run {run}: not grasped: {end:?}; {kept}");
+                let why = match (&end, result.and_then(|result| result.outcome.gave_up)) {
+                    (Err(error), _) => error.to_string(),
+                    (_, Some(reason)) => reason.to_string(),
+                    _ => "the jaws hold no ball, though none is seen either".into(),
+                };
+                println!("run {run}: not grasped: {why}; {kept}");
             }
         }
     }
