@@ -40,7 +40,7 @@ mod world;
 /// Compare controllers: drawn errors of arm and camera, drawn balls, the same for all. On the feature shortcut, or, with --full-chain, on
 /// rendered frames, circle detection and VAL II on a line; then fewer --draws and --starts will do.
 ///
-/// A run succeeds when the ball stands at the goal within 60 moves. All controllers have the same search, recovery and limits, and none
+/// A run succeeds when the ball's features are at the goal within 60 moves, with --grip when the jaws hold the ball in the end. All controllers have the same search, recovery and limits, and none
 /// turns a joint farther in one move than the largest step of the paper's behaviours. The hybrid first makes up to --moves moves in each drawn
 /// cell, on other balls than those it is compared on; `hybrid, untaught` makes none.
 #[derive(Parser, Debug)]
@@ -82,7 +82,7 @@ struct Options {
     full_chain: bool,
 
     /// How the circle is found in rendered frames: trusted, heuristic, rht, sht
-    #[arg(long, value_name = "NAME", default_value_t)]
+    #[arg(long, value_name = "NAME", default_value_t, requires = "full_chain")]
     detector: BallDetector,
 
     /// Write the event log of every run that fails or is broken off to failures/ in the folder
@@ -164,7 +164,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         trial.outcome.cycles = cycles;
                     }
                     tally.add(success, &trial.outcome);
-                    tally.collisions += trial.collisions;
+                    if let Some(collisions) = trial.collisions {
+                        *tally.collisions.get_or_insert(0) += collisions;
+                    }
                     if !success {
                         failures.keep(&run_of(format!("ball {start}")), &log)?;
                     }

@@ -70,6 +70,7 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     // Whatever can be found wrong is found before the long work.
+    options.check()?;
     writable_folder(&options.out)?;
     if let Some(path) = &options.export {
         writable_folder(match path.parent() {
@@ -133,9 +134,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut broken_off = None;
     let bar = progress_bar(options, options.runs as u64, "balls");
     for run in 1..=options.runs {
-        let (ball, _) = workspace
-            .sample_seen_ball(&rig.cell().get(), &mut rng)
-            .ok_or("no place of the workspace is in view from a search pose")?;
+        let Some((ball, _)) = workspace.sample_seen_ball(&rig.cell().get(), &mut rng) else {
+            broken_off = Some("no place of the workspace is in view from a search pose".into());
+            break;
+        };
         let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
         let cell = rig.cell().clone();
         let done = reach_for(&mut agent, &mut rig, &mut *detector, &ball, &mut |event| {
@@ -161,6 +163,16 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 record.fault = Some(error.to_string());
             }
         }
+        if !record.grasped {
+            let path = failures.join(format!("run{run:03}.json"));
+            let kept = serde_json::to_vec_pretty(&record.log)
+                .map_err(Box::from)
+                .and_then(|log| write_whole(&path, &log));
+            if let Err(error) = kept {
+                // No reason to lose what was learned.
+                broken_off.get_or_insert(format!("the events of run {run} were not kept: {error}"));
+            }
+        }
         records.push(record);
         if broken_off.is_some() {
             break;
@@ -171,19 +183,15 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         // Also what was learned in a run that was broken off.
         let limits = agent.config().limits;
         let learned = agent.into_controller().inner;
-        export(options, &learned, &limits)?;
-        let (centering, approaching) = learned.into_behaviours();
+        let (centering, approaching) = learned.clone().into_behaviours();
         for behaviour in [&centering, &approaching] {
             behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
         }
+        export(options, &learned, &limits)?;
     }
 
     let summary = Summary::new(options.seed, training, &records);
     write_results(&options.out, &summary, &records, &sheet)?;
-    for (record, run) in records.iter().zip(1..).filter(|(record, _)| !record.grasped) {
-        let path = failures.join(format!("run{run:03}.json"));
-        write_whole(&path, &serde_json::to_vec_pretty(&record.log)?)?;
-    }
     print_out(&summary.table());
     say(options, &stages.to_string());
     say(options, &format!("results: {}", options.out.display()));
@@ -219,7 +227,7 @@ impl Taught {
     ) -> Result<Self, Box<dyn Error>> {
         say(options, &format!("sampling {SAMPLES} moves in the cell"));
         let (centring, reaching) = sample_moves(cell, SAMPLES, FEATURE_NOISE, rng);
-        let form = match options.simulator {
+        let form = match options.simulator.unwrap_or(FormName::Rigid22) {
             FormName::Linear => ReachForm::Linear,
             FormName::Rigid8 => ReachForm::Rigid8,
             FormName::Rigid22 => ReachForm::Rigid22,
@@ -237,7 +245,7 @@ impl Taught {
             r2.insert(quality.output, quality.r2);
         }
         // The literal rewards are left as they come: nothing is chosen.
-        let trials = match options.reward {
+        let trials = match options.reward() {
             RewardName::Literal => 0,
             RewardName::Mended => TRIALS,
         };
@@ -311,7 +319,7 @@ fn policy_path(folder: &Path, spec: &BehaviourSpec) -> PathBuf {
 fn behaviours(options: &Options) -> Result<BehaviourPair, Box<dyn Error>> {
     let mended = BehaviourPair::paper_mended();
     let literal = BehaviourPair::paper_literal();
-    let rewards = match options.reward {
+    let rewards = match options.reward() {
         RewardName::Mended => mended,
         RewardName::Literal => literal,
     };

@@ -12,7 +12,7 @@
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
@@ -46,7 +46,8 @@ mod tally;
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
 /// In each cell the controller makes --teach runs on balls at rest first, to learn the camera; then come the runs that count. A ball is grasped
-/// when the jaws hold it and the controller says so. Runs in which nothing happened to the ball that should have are told apart.
+/// when the jaws hold it and the controller says so. Grasps before what was to happen to the ball had happened are left out and told apart; a run
+/// that failed before that counts as failed.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the event logs of runs that failed or collided
@@ -74,19 +75,19 @@ struct Options {
     ball: Fate,
 
     /// How the circle is found: trusted, heuristic, rht, sht
-    #[arg(long, value_name = "NAME", default_value_t)]
+    #[arg(long, value_name = "NAME", default_value_t, conflicts_with = "shortcut")]
     detector: BallDetector,
 
-    /// No frames and no line: features straight from the geometry
+    /// No frames and no line: features straight from the geometry. Only the event logs are written, and collisions are not counted
     #[arg(long)]
     shortcut: bool,
 
     /// Noise of the camera in the dark, grey levels; that of the scene unless given
-    #[arg(long, value_name = "LEVELS")]
+    #[arg(long, value_name = "LEVELS", conflicts_with = "shortcut")]
     noise: Option<f64>,
 
     /// Begin with what an earlier run learned of the camera: its camera.belief; learning goes on from there in the --teach runs
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "shortcut")]
     belief: Option<PathBuf>,
 
     /// Errors of the camera: none, moderate, heavy, extreme
@@ -142,9 +143,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         film: Vec::new(),
         tally: Tally::default(),
     };
+    // What has been done until a fault is worth keeping.
+    let mut done = Ok(());
     for cell in 0..options.cells {
         chain.tally.begin_cell();
-        chain.go_for_balls(options.seed.wrapping_add(cell as u64), options.runs_in(cell))?;
+        done = chain.go_for_balls(options.seed.wrapping_add(cell as u64), options.runs_in(cell));
+        if done.is_err() {
+            break;
+        }
     }
     write_whole(&options.out.join("track.csv"), chain.csv.as_bytes())?;
     if !chain.film.is_empty() {
@@ -152,7 +158,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     println!("{}\n{}", chain.stages, chain.tally);
     println!("results: {}", options.out.display());
-    Ok(())
+    done
+}
+
+/// Writes what happened in a run that is worth looking into, and says where.
+fn keep_log(folder: &Path, name: &str, log: &EventLog) -> Result<String, Box<dyn Error>> {
+    let file = folder.join(format!("{name}.json"));
+    write_whole(&file, &serde_json::to_vec_pretty(log)?)?;
+    Ok(format!("events: {}", file.display()))
 }
 
 /// Rendered frames, circle detection, VAL II on a line, and what is written down of all that.
@@ -206,10 +219,8 @@ impl Chain<'_> {
             learned.save(&options.out.join("camera.belief"))?;
             let Some(number) = counted else {
                 if let Err(error) = end {
-                    let file = options.out.join("teaching.json");
-                    write_whole(&file, &serde_json::to_vec_pretty(&log)?)?;
-                    let file = file.display();
-                    return Err(format!("teaching was broken off: {error}; events: {file}").into());
+                    let kept = keep_log(&options.out, "teaching", &log)?;
+                    return Err(format!("teaching was broken off: {error}; {kept}").into());
                 }
                 continue;
             };
@@ -224,16 +235,12 @@ impl Chain<'_> {
                     .iter()
                     .filter(|event| event.kind == EventKind::TooNear)
                     .count(),
-                collisions: contacts.collisions,
+                collisions: Some(contacts.collisions),
             });
             if !success || contacts.collisions > 0 {
-                let file = options.out.join(format!("run-{number:03}.json"));
-                write_whole(&file, &serde_json::to_vec_pretty(&log)?)?;
+                let kept = keep_log(&options.out, &format!("run-{number:03}"), &log)?;
                 let what = if success { "collision" } else { "not grasped" };
-                println!(
-                    "run {number}: {what}: {end:?}, {contacts:?}; events: {}",
-                    file.display()
-                );
+                println!("run {number}: {what}: {end:?}, {contacts:?}; {kept}");
             }
         }
         Ok(())

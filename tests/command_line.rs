@@ -166,6 +166,39 @@ fn grasp_refuses_policies_that_it_cannot_run_and_says_why() {
     );
 }
 
+#[test]
+fn options_that_would_have_no_effect_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("policy.json");
+    std::fs::write(&path, blank_policy(BehaviourPair::paper_mended())).expect("a file");
+    let argument = path.to_str().expect("a plain path").to_owned();
+    for more in [&["--fine"][..], &["--reward", "mended"]] {
+        let Some(errors) = grasp_fails(folder.path(), &[&["--policy", &argument], more].concat()) else {
+            return;
+        };
+        assert!(errors.contains("--fine and --reward"), "{errors}");
+    }
+    for (program, options) in [
+        ("grasp", &["--policy", &argument, "--simulator", "linear"][..]),
+        ("track", &["--shortcut", "--noise", "3"]),
+        ("track", &["--shortcut", "--detector", "rht"]),
+        ("track", &["--shortcut", "--belief", &argument]),
+        ("compare_controllers", &["--detector", "rht"]),
+    ] {
+        let Some(mut program) = example(program) else {
+            return;
+        };
+        let out = folder.path().join("out");
+        let output = program.arg("--out").arg(&out).args(options).output();
+        let output = output.expect("the program runs");
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.code() == Some(2) && errors.contains("--"),
+            "{options:?}: {errors}"
+        );
+    }
+}
+
 #[cfg(all(unix, feature = "serial"))]
 #[test]
 fn grasp_keeps_what_it_has_when_the_controller_dies() {

@@ -15,7 +15,7 @@ pub(crate) struct Tally {
     cycles: usize,
     losses: usize,
     /// How often the hand ran into something; counted through the full chain only.
-    pub(crate) collisions: usize,
+    pub(crate) collisions: Option<usize>,
 }
 
 impl Tally {
@@ -77,7 +77,7 @@ pub(crate) struct Row {
     success: (f64, f64),
     cycles: f64,
     losses: f64,
-    collisions: usize,
+    collisions: Option<usize>,
     runs: usize,
 }
 
@@ -114,9 +114,10 @@ impl fmt::Display for Row {
         // One cell has no interval, and no success no moves.
         let interval = number(*half, |half| format!("+-{half:5.1}"));
         let cycles = number(*cycles, |cycles| format!("{cycles:.1}"));
+        let collisions = collisions.map_or("-".into(), |count| count.to_string());
         write!(
             f,
-            "{:9} {name:32} {mean:6.1} {interval:7} {cycles:>9} {losses:11.2} {collisions:11} {runs:5}",
+            "{:9} {name:32} {mean:6.1} {interval:7} {cycles:>9} {losses:11.2} {collisions:>11} {runs:5}",
             level.to_string()
         )
     }
@@ -145,6 +146,7 @@ pub(crate) fn csv(rows: &[Row]) -> String {
         runs,
     } in rows
     {
+        let collisions = collisions.map_or(String::new(), |count| count.to_string());
         let [half, cycles] = [*half, *cycles].map(|value| number(value, |value| format!("{value:.3}")));
         csv += &format!("{level},\"{name}\",{mean:.3},{half},{cycles},{losses:.4},{collisions},{runs}\n");
     }

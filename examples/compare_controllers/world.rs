@@ -31,7 +31,7 @@ pub(crate) struct Trial {
     pub(crate) reached: bool,
     pub(crate) held: bool,
     /// Counted through the full chain only.
-    pub(crate) collisions: usize,
+    pub(crate) collisions: Option<usize>,
 }
 
 impl World {
@@ -90,7 +90,7 @@ impl World {
                     outcome: result.outcome,
                     reached: result.reached,
                     held: result.held,
-                    collisions: 0,
+                    collisions: None,
                 }))
             }
             Self::Chain(chain) => chain.run(agent, seed, observe),
@@ -121,7 +121,7 @@ impl Chain {
             outcome,
             reached,
             held: self.rig.holds_ball(),
-            collisions: self.rig.contacts().collisions,
+            collisions: Some(self.rig.contacts().collisions),
         }))
     }
 }

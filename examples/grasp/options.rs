@@ -34,8 +34,8 @@ pub(crate) struct Options {
     pub(crate) tcp: Option<String>,
 
     /// What was learned before: a folder with centering.policy and approaching.policy of an earlier run, or a file written by --export; skips
-    /// training
-    #[arg(long, value_name = "PATH")]
+    /// training. A folder is read with the --fine and --reward that it was learned with; a file says itself what is in it
+    #[arg(long, value_name = "PATH", conflicts_with = "simulator")]
     pub(crate) policy: Option<PathBuf>,
 
     /// Write the policy as JSON that other programs can run, as docs/run_policy.py does
@@ -50,9 +50,9 @@ pub(crate) struct Options {
     #[arg(long, value_name = "NAME", default_value_t, value_parser = detectors())]
     pub(crate) detector: BallDetector,
 
-    /// Reward while learning: the paper's formulas as printed do not teach the goal
-    #[arg(long, value_enum, default_value_t = RewardName::Mended)]
-    pub(crate) reward: RewardName,
+    /// Reward while learning: the paper's formulas as printed do not teach the goal [default: mended]
+    #[arg(long, value_enum)]
+    pub(crate) reward: Option<RewardName>,
 
     /// Learn approaching on 540 states instead of 90: fewer moves, longer training
     #[arg(long)]
@@ -62,9 +62,9 @@ pub(crate) struct Options {
     #[arg(long, value_enum, default_value_t = YGoalName::Equation6)]
     pub(crate) y_goal: YGoalName,
 
-    /// Form of the regression simulator
-    #[arg(long, value_enum, default_value_t = FormName::Rigid22)]
-    pub(crate) simulator: FormName,
+    /// Form of the regression simulator [default: rigid22]
+    #[arg(long, value_enum)]
+    pub(crate) simulator: Option<FormName>,
 
     /// Let the emulated arm take the time that a real one would
     #[arg(long, conflicts_with_all = ["port", "tcp"])]
@@ -73,6 +73,24 @@ pub(crate) struct Options {
     /// Print the final table only
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+impl Options {
+    /// The reward asked for.
+    pub(crate) fn reward(&self) -> RewardName {
+        self.reward.unwrap_or(RewardName::Mended)
+    }
+
+    /// Refuses what would have no effect.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        match &self.policy {
+            Some(path) if path.is_file() && (self.fine || self.reward.is_some()) => Err(format!(
+                "{}: an exported policy says itself how it was learned; leave out --fine and --reward",
+                path.display()
+            )),
+            _ => Ok(()),
+        }
+    }
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {

@@ -13,6 +13,8 @@ use crate::plot::{Panel, drawn, mean_and_interval};
 
 /// Moves on the arm after which the behaviours are looked at.
 const MOVES: [usize; 4] = [0, 500, 2_000, 10_000];
+/// Balls in a row that may come to no move: then there is nothing to learn from.
+const IDLE: usize = 100;
 /// Balls by which they are judged, frozen.
 const BALLS: u64 = 40;
 
@@ -105,12 +107,20 @@ fn one_arm(form: ReachForm, level: ErrorLevel, seed: u64) -> Result<Vec<(f64, f6
     let config = cell.agent_config();
     let learning = learned.learning(OnlineLearning::careful(seed));
     let mut agent = Agent::with_controller(config, learning)?;
-    let (mut made, mut ball) = (0, 0);
+    let (mut made, mut ball, mut idle) = (0, 0, 0);
     for moves in MOVES {
         while made < moves {
             let result = cell.run(&mut agent, 1_000_000 + ball, &mut |_, _| (), &mut |_| ())?;
-            made += result.map_or(0, |result| result.outcome.cycles);
+            let cycles = result.map_or(0, |result| result.outcome.cycles);
+            made += cycles;
             ball += 1;
+            idle = if cycles == 0 { idle + 1 } else { 0 };
+            if idle > IDLE {
+                return Err(format!(
+                    "the arm of seed {seed} with {level} errors came to no move in {idle} balls"
+                )
+                .into());
+            }
         }
         scores.push(score(&cell, &agent.controller().clone().frozen(), None)?);
     }

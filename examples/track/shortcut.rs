@@ -2,15 +2,22 @@
 
 use std::error::Error;
 
-use grasp_agent::{Agent, Hybrid, HybridSettings};
+use grasp_agent::{Agent, EventLog, Hybrid, HybridSettings};
 use pipeline_sim::Cell;
 use puma_grasp::TrialCell;
 use puma_val2::Joints;
 
-use crate::{Counted, Fate, Options, Tally, World};
+use crate::{Counted, Fate, Options, Tally, World, keep_log, writable_folder};
 
 pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    writable_folder(&options.out)?;
     let mut tally = Tally::default();
+    let done = go_for_balls(options, &mut tally);
+    println!("{tally}");
+    done
+}
+
+fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
     for number in 0..options.cells {
         tally.begin_cell();
         let seed = options.seed.wrapping_add(number as u64);
@@ -35,19 +42,40 @@ pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 }
                 seen |= cell.features(joints).is_some();
             };
-            let result = cell.run(&mut agent, 1_000 * seed + ball as u64, &mut go_on, &mut |_| ())?;
-            let Some(result) = result.filter(|_| !teaching) else {
+            let mut log = EventLog::default();
+            let ball_seed = seed.wrapping_mul(1_000).wrapping_add(ball as u64);
+            let end = cell.run(&mut agent, ball_seed, &mut go_on, &mut |event| log.note(event));
+            if teaching {
+                if let Err(error) = end {
+                    let kept = keep_log(&options.out, "teaching", &log)?;
+                    return Err(format!("teaching was broken off: {error}; {kept}").into());
+                }
                 continue;
+            }
+            let result = match &end {
+                Ok(Some(result)) => Some(result),
+                Ok(None) => continue,
+                Err(_) => None,
             };
+            let success = result.is_some_and(|result| result.outcome.gave_up.is_none() && result.held);
             tally.add(Counted {
                 happened: world.has_happened(),
-                success: result.outcome.gave_up.is_none() && result.held,
-                moves: result.outcome.cycles,
-                near: result.near,
-                collisions: 0,
+                success,
+                moves: result.map_or(0, |result| result.outcome.cycles),
+                near: result.map_or(0, |result| result.near),
+                collisions: None,
             });
+            if !success {
+                let run = tally.runs();
+                let kept = keep_log(&options.out, &format!("run-{run:03}"), &log)?;
+                let why = match (&end, result.and_then(|result| result.outcome.gave_up)) {
+                    (Err(error), _) => error.to_string(),
+                    (_, Some(reason)) => reason.to_string(),
+                    _ => "the jaws hold no ball, though none is seen either".into(),
+                };
+                println!("run {run}: not grasped: {why}; {kept}");
+            }
         }
     }
-    println!("{tally}");
     Ok(())
 }

@@ -11,7 +11,15 @@ pub(crate) struct Counted {
     pub(crate) moves: usize,
     /// Stops by the proximity sensors.
     pub(crate) near: usize,
-    pub(crate) collisions: usize,
+    /// None where they are not counted.
+    pub(crate) collisions: Option<usize>,
+}
+
+impl Counted {
+    /// Whether it is in the denominator: a grasp of a ball to which nothing had happened yet is no answer to what was asked, a failure always is.
+    fn counts(&self) -> bool {
+        self.happened || !self.success
+    }
 }
 
 /// All of them, by cell.
@@ -42,46 +50,86 @@ impl Tally {
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = || self.cells.iter().flatten();
-        let (counted, others): (Vec<&Counted>, Vec<&Counted>) = all().partition(|run| run.happened);
+        let (counted, others): (Vec<&Counted>, Vec<&Counted>) = all().partition(|run| run.counts());
         let successes = |runs: &[&Counted]| runs.iter().filter(|run| run.success).count();
-        let sum = |part: fn(&Counted) -> usize| all().map(part).sum::<usize>();
         let (grasped, runs) = (successes(&counted), counted.len());
         if self.cells.len() > 1 {
             let by_cell = self.cells.iter().map(|cell| {
-                let grasped = cell.iter().filter(|run| run.success).count();
-                format!("{grasped}/{}", cell.len())
+                let counted = || cell.iter().filter(|run| run.counts());
+                let grasped = counted().filter(|run| run.success).count();
+                format!("{grasped}/{}", counted().count())
             });
             writeln!(f, "grasped by cell: {}", by_cell.collect::<Vec<_>>().join(" "))?;
         }
-        let (low, high) = interval(grasped, runs);
-        write!(
-            f,
-            "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {} stops by the proximity sensors, \
-             {} collisions",
-            100.0 * grasped as f64 / runs.max(1) as f64,
-            counted.iter().map(|run| run.moves).sum::<usize>() as f64 / runs.max(1) as f64,
-            sum(|run| run.near),
-            sum(|run| run.collisions),
-        )?;
+        if runs == 0 {
+            write!(f, "no run to count")?;
+        } else {
+            let (low, high) = interval(grasped, runs);
+            write!(
+                f,
+                "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {} stops by the proximity sensors",
+                100.0 * grasped as f64 / runs as f64,
+                counted.iter().map(|run| run.moves).sum::<usize>() as f64 / runs as f64,
+                all().map(|run| run.near).sum::<usize>(),
+            )?;
+            if let Some(collisions) = all().map(|run| run.collisions).sum::<Option<usize>>() {
+                write!(f, ", {collisions} collisions")?;
+            }
+        }
         if !others.is_empty() {
             write!(
                 f,
-                "\nnot counted: {} runs in which what was to happen to the ball did not; {} of them grasped",
+                "\nnot counted: {} grasps before what was to happen to the ball had happened",
                 others.len(),
-                successes(&others)
             )?;
         }
         Ok(())
     }
 }
 
-/// Wilson's interval of a share, percent.
+/// Wilson's interval of a share of at least one run, percent.
 fn interval(successes: usize, runs: usize) -> (f64, f64) {
     const Z: f64 = 1.96;
-    let runs = runs.max(1);
     let (n, share) = (runs as f64, successes as f64 / runs as f64);
     let middle = share + 0.5 * Z * Z / n;
     let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
     let scale = 100.0 / (1.0 + Z * Z / n);
-    (scale * (middle - half), scale * (middle + half))
+    // None of the runs, or all of them: rounding must not lead out of what a share can be.
+    let [low, high] = [middle - half, middle + half].map(|end| (scale * end).clamp(0.0, 100.0).abs());
+    (low, high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(runs: &[(bool, bool)], collisions: Option<usize>) -> String {
+        let mut tally = Tally::default();
+        for (happened, success) in runs {
+            tally.add(Counted {
+                happened: *happened,
+                success: *success,
+                moves: 2,
+                near: 0,
+                collisions,
+            });
+        }
+        tally.to_string()
+    }
+
+    #[test]
+    fn a_failure_counts_whether_anything_had_happened_or_not() {
+        let told = told(&[(true, true), (false, false), (false, true)], Some(1));
+        assert!(told.starts_with("1 of 2 grasped (50.0 %"), "{told}");
+        assert!(told.contains("3 collisions"), "{told}");
+        assert!(told.ends_with("not counted: 1 grasps before what was to happen to the ball had happened"));
+    }
+
+    #[test]
+    fn what_is_not_there_is_not_told() {
+        assert_eq!(told(&[], None), "no run to count");
+        let none = told(&[(true, false); 20], None);
+        assert!(none.contains("interval 0.0..16.1)"), "{none}");
+        assert!(!none.contains("collisions"), "{none}");
+    }
 }

@@ -20,9 +20,10 @@ pub struct Agent<C = Learned> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// `None` when the gripper has closed at the goal and, unless [`AgentConfig::lift`] is `None`, what was seen there has been lifted;
-    /// otherwise why not.
+    /// otherwise why not. What is lifted is known from the camera alone, see there.
     pub gave_up: Option<GaveUp>,
-    /// Moves after the first sighting, recovery moves included, the grip not.
+    /// Moves after the first sighting, recovery moves included, the grip not; and one for each grip that failed, or was not begun because two looks
+    /// at the goal differed.
     pub cycles: usize,
     /// How often the ball was lost.
     pub losses: usize,

@@ -15,7 +15,8 @@ pub struct AgentConfig {
     pub search_again: Vec<JointDelta>,
     /// Intervals that must hold together before the gripper moves \[x 99..108, y 74..82, r 32..34\].
     pub goal: Vec<GoalInterval>,
-    /// From the goal pose to the grip [`J5` by -18.01 degrees\]: the paper's "the fifth joint is activated".
+    /// From the goal pose to the grip [`J5` by -18.01 degrees\]: the paper's "the fifth joint is activated". Where it would lead out of the
+    /// limits, and the controller has no grip of its own, the run ends with [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
     pub grip: JointDelta,
     /// Where the ball is looked for when it is lost, relative to the pose of the last sighting
     /// \[four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
@@ -23,7 +24,8 @@ pub struct AgentConfig {
     pub recovery: Vec<JointDelta>,
     /// The range that each joint is kept in [[`JointLimits::paper`]].
     pub limits: JointLimits,
-    /// Moves after the first sighting before the run is given up \[60\].
+    /// Moves after the first sighting before the run is given up \[60\]; two looks at the goal that show the ball at different places
+    /// count as one.
     pub max_cycles: usize,
     /// Frames to look at from one pose before the ball counts as not in view \[2\]. Sampling can miss a circle once.
     pub looks: usize,
@@ -31,8 +33,13 @@ pub struct AgentConfig {
     pub approach: ApproachLimit,
     /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still there; then it is lifted by
     /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that keeps its place in the image as the hand goes up is
-    /// in the jaws. A ball that is not is reached for again; a hand that is stopped has not succeeded. `None`: closing the jaws at the goal is
-    /// success, whatever is between them.
+    /// in the jaws. A ball that is not is reached for again; a hand that is stopped has not succeeded, nor has one that its limits keep from
+    /// half of this move ([`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft)). `None`: closing the jaws at the goal is success, whatever is
+    /// between them.
+    ///
+    /// The check is by exclusion. The jaws lie outside the camera's view, so a ball in them is not seen: no ball where it was and none below the
+    /// lifted hand, in two looks each, counts as held. A ball that left both views in another way, rolled off or knocked aside, passes for one
+    /// that is held, and so does one that the detector misses each time. Only a sensor in the jaws could tell.
     pub lift: Option<JointDelta>,
     /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
     /// end of what the ball stood on for example.
@@ -40,7 +47,7 @@ pub struct AgentConfig {
     /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
     pub reach_tolerance: f64,
     /// Frames in a row, each from another pose, that may be the same as the one before, or show the ball at exactly the same place, before the
-    /// camera counts as frozen \[2\]. Nothing is gripped after a single one of them.
+    /// camera counts as frozen \[2\]; at least 1. Nothing is gripped after a single one of them.
     pub same_frames: usize,
 }
 
@@ -120,6 +127,39 @@ impl AgentConfig {
                 "reach_tolerance is {}; it must be above 0",
                 self.reach_tolerance
             )));
+        }
+        let (limits, zero) = (&self.limits.0, JointDelta::default());
+        let beyond = |joint: &Joint| {
+            let (low, high) = limits[joint.index()];
+            self.grip[*joint].is_nan() || self.grip[*joint].abs() > high - low
+        };
+        if let Some(joint) = Joint::ALL
+            .iter()
+            .find(|joint| self.grip[**joint] != 0.0 && beyond(joint))
+        {
+            return Err(AgentError::Config(format!(
+                "the grip turns {joint} by {} degrees, farther than its working limits are apart",
+                self.grip[*joint].to_degrees()
+            )));
+        }
+        if self
+            .lift
+            .is_some_and(|lift| lift == zero || !lift.0.iter().all(|turn| turn.is_finite()))
+        {
+            return Err(AgentError::Config(
+                "the lift moves nothing, or is not finite; give a move, or None for no lift".into(),
+            ));
+        }
+        if !(self.left_behind.is_finite() && self.left_behind >= 0.0) {
+            return Err(AgentError::Config(format!(
+                "left_behind is {}; it must be a radius, 0 or above",
+                self.left_behind
+            )));
+        }
+        if self.same_frames == 0 {
+            return Err(AgentError::Config(
+                "same_frames is 0; every camera would count as frozen, give at least 1".into(),
+            ));
         }
         if self.looks == 0 {
             return Err(AgentError::Config(

@@ -105,7 +105,7 @@ pub enum GaveUp {
     NotFound,
     /// The goal was not reached within the allowed number of moves.
     OutOfCycles,
-    /// Every move that the controller could make leads out of the working limits.
+    /// Every move that the controller could make leads out of the working limits, or the grip at the goal does, or the lift after it.
     NoMoveLeft,
     /// Something was too near to the hand on its last way to the ball, again and again, or when what it had gripped was lifted.
     Obstructed,

@@ -53,6 +53,8 @@ pub(crate) enum Fault {
     PhantomFromThere,
     /// From everywhere.
     PhantomEverywhere,
+    /// The only circle ever seen is at one of two heights in turn; no frames after so many looks.
+    Restless(usize),
 }
 
 pub(crate) struct Cell {
@@ -181,6 +183,17 @@ impl Eye for Shared {
                     r: 33.0,
                 })
             }
+            Fault::Restless(most) if cell.looks > most => {
+                return Err(FrameError::Failed {
+                    origin: "camera".into(),
+                    reason: "looked at for too long".into(),
+                });
+            }
+            Fault::Restless(_) => Some(Features {
+                x: 103.5,
+                y: [75.0, 91.0][cell.looks % 2],
+                r: 33.0,
+            }),
             Fault::FalseCircle if cell.looks.is_multiple_of(7) => Some(Features {
                 x: 20.0,
                 y: 30.0,

@@ -1,9 +1,9 @@
 //! Bad input and faults: the arm stops, the cause is in the log and in a typed error, what was learned is kept.
 
-use grasp_agent::puma_val2::ArmError;
+use grasp_agent::puma_val2::{ArmError, JointDelta};
 use grasp_agent::{
-    Agent, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp, Hybrid, HybridSettings,
-    LoggedEvent, PositionBased, ServoSettings,
+    Agent, AgentConfig, AgentError, ApproachLimit, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp,
+    Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings, YGoal,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -438,4 +438,74 @@ fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
     cell.run(&mut agent, &mut EventLog::default()).unwrap();
     assert_ne!(*agent.controller().approaching(), after);
+}
+
+#[test]
+fn two_places_in_the_goal_in_turn_do_not_keep_a_run_going_for_ever() {
+    let mut wide = config();
+    wide.goal = BehaviourPair::paper_mended()
+        .with_y_goal(YGoal::Section4)
+        .unwrap()
+        .goal();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Restless(10_000));
+    let mut agent = Agent::with_controller(wide, PositionBased::new(ServoSettings::paper())).unwrap();
+    let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
+    assert_eq!(outcome.gave_up, Some(GaveUp::OutOfCycles));
+    assert!(!cell.0.borrow().closed);
+}
+
+/// The end of a run under the paper's settings, changed.
+fn end_with(change: impl Fn(&mut AgentConfig)) -> (grasp_agent::Outcome, Shared) {
+    let mut changed = config();
+    change(&mut changed);
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut agent = Agent::with_controller(changed, PositionBased::new(ServoSettings::paper())).unwrap();
+    (cell.run(&mut agent, &mut EventLog::default()).unwrap(), cell)
+}
+
+#[test]
+fn a_grip_that_leads_out_of_the_limits_is_not_made() {
+    let (outcome, cell) = end_with(|config| config.limits.0[4].0 = 30_f64.to_radians());
+    assert_eq!(outcome.gave_up, Some(GaveUp::NoMoveLeft));
+    assert!(!cell.0.borrow().closed);
+}
+
+#[test]
+fn a_lift_that_the_limits_do_not_allow_is_no_verification() {
+    let upward = |degrees: f64| {
+        move |config: &mut AgentConfig| {
+            // The wrist, which stands still while the ball is reached.
+            config.lift = Some(JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, 15.0, 0.0]));
+            config.limits.0[4].1 = (45.0 + degrees).to_radians();
+        }
+    };
+    for (room, gave_up) in [
+        (0.0, Some(GaveUp::NoMoveLeft)),
+        (9.0, Some(GaveUp::NoMoveLeft)),
+        (11.0, None),
+    ] {
+        assert_eq!(end_with(upward(room)).0.gave_up, gave_up, "{room}");
+    }
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused() {
+    type Change = fn(&mut AgentConfig);
+    let changes: [(&str, Change); 9] = [
+        ("same_frames", |c| c.same_frames = 0),
+        ("lift", |c| c.lift = Some(JointDelta::default())),
+        ("lift", |c| c.lift = Some(JointDelta([f64::NAN; 6]))),
+        ("left_behind", |c| c.left_behind = f64::NAN),
+        ("left_behind", |c| c.left_behind = -1.0),
+        ("left_behind", |c| c.left_behind = f64::INFINITY),
+        ("grip", |c| c.grip.0[4] = 4.0),
+        ("grip", |c| c.grip.0[0] = f64::NAN),
+        ("looks", |c| c.looks = 0),
+    ];
+    for (name, change) in changes {
+        let mut config = config();
+        change(&mut config);
+        let refused = Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap_err();
+        assert!(refused.to_string().contains(name), "{name}: {refused}");
+    }
 }
