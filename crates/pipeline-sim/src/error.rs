@@ -69,6 +69,15 @@ pub enum ProjectionError {
         /// Radius, metres.
         radius: f64,
     },
+    /// The sphere lies so far off the optical axis, wholly or in part, that the lens would have folded the image over before: it is not shown.
+    #[error(
+        "the ball is beyond what the lens shows: its centre is {:.1} degrees off the optical axis, and the distortion folds the image over nearer to it",
+        angle.to_degrees()
+    )]
+    BeyondLens {
+        /// Angle between the optical axis and the direction of the centre, radians.
+        angle: f64,
+    },
 }
 
 /// Why a ball does not count as seen.
