@@ -159,12 +159,47 @@ pub enum QuantityError {
         /// What was given.
         value: f64,
     },
+    /// A quantity is below zero.
+    #[error("{quantity} must not be below zero, but is {value}")]
+    Negative {
+        /// Which quantity.
+        quantity: String,
+        /// What was given.
+        value: f64,
+    },
+    /// A quantity that must be above zero is not.
+    #[error("{quantity} must be above zero, but is {value}")]
+    NotPositive {
+        /// Which quantity.
+        quantity: String,
+        /// What was given.
+        value: f64,
+    },
     /// A search over moves can follow one or two joints, not more.
     #[error("the moves turn {count} joints; a search can follow one or two")]
     Joints {
         /// Number of joints that any of the moves turns.
         count: usize,
     },
+}
+
+/// Refuses what is no finite number.
+pub(crate) fn finite(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        let quantity = quantity.into();
+        Err(QuantityError::NotFinite { quantity, value })
+    }
+}
+
+/// Refuses what is no finite number of zero or above.
+pub(crate) fn amount(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
+    let quantity = quantity.into();
+    if value < 0.0 && value.is_finite() {
+        return Err(QuantityError::Negative { quantity, value });
+    }
+    finite(quantity, value)
 }
 
 /// Refuses a range that is not finite and ascending.

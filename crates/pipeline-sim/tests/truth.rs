@@ -154,7 +154,7 @@ fn a_ball_carried_over_a_box_hides_the_box_and_one_behind_it_is_hidden() {
     let pose = Workspace::paper().search_poses()[3];
     let eye = cell.camera_pose(&pose).translation.vector;
     let mut low = cell;
-    low.ball.centre = nalgebra::Point3::new(0.75, 0.15, cell.table + 0.02);
+    low.ball.centre = Point3::new(0.75, 0.15, cell.table + 0.02);
     let toward = (eye.xy() - low.ball.centre.coords.xy()).normalize();
     let tall = Shape::Box {
         length: 0.05,
@@ -179,7 +179,7 @@ fn a_holder_without_its_ball_stands_where_it_stands() {
     let foot = cell.ball.centre.xy();
     let toward = (eye.xy() - foot.coords).normalize();
     let (x, y) = (foot.x + 0.05 * toward.x, foot.y + 0.05 * toward.y);
-    cell.ball.centre = nalgebra::Point3::new(
+    cell.ball.centre = Point3::new(
         foot.x + 0.25 * toward.x,
         foot.y + 0.25 * toward.y,
         cell.table + 0.02,
