@@ -8,7 +8,8 @@
 //! writes `out/rendered/KIND_NNN.png`, `truth.csv` (file,cx,cy,r,what,visible) and `frames.csv` (file,scene). (0, 0) is the centre of the
 //! top-left pixel. Truth holds every outline that is round to 5 % (axis ratio), at least 60 % visible and at least 5 px in radius (of a
 //! frame 768 wide; balls of the benchmark kinds always): the ball (`Target`) and whatever else is round, since a detector that finds the
-//! rim of a disc seen from above is right.
+//! rim of a disc seen from above is right. What is less visible (`--visible`) has no row: a frame whose ball is just below that shows most of
+//! a ball, yet looks empty in the truth. Ask for `--visible 0` and judge by the column `visible` where that matters.
 //!
 //! Kinds are those of `SceneKind` (the arm at work, as hard as it gets there), and those of `BenchmarkKind` (one difficulty at a time), with
 //! `cell` and `benchmark` for all of either. A kind's frames depend on the seed and on nothing else, whatever other kinds are drawn.
@@ -22,7 +23,8 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory as _, Parser};
 use image::ImageFormat;
 use indicatif::{ProgressBar, ProgressStyle};
 use pipeline_sim::{BenchmarkKind, Camera, Renderer, Round, Scene, SceneKind, Sighting, Snapshot};
@@ -39,7 +41,7 @@ struct Options {
     /// Frames of each kind.
     #[arg(long, default_value_t = 20)]
     frames: u64,
-    /// Kinds of scenes, separated by commas; `cell` and `benchmark` stand for all of theirs.
+    /// Kinds of scenes, separated by commas, each once; `cell` and `benchmark` stand for all of theirs.
     #[arg(long, value_delimiter = ',', default_value = "cell")]
     kinds: Vec<Kinds>,
     /// Width and height of the frames, pixels.
@@ -51,8 +53,9 @@ struct Options {
     /// Seed: same seed, same files.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Least visible share of an outline in the truth.
-    #[arg(long, default_value_t = 0.6)]
+    /// Least visible share of an outline in the truth, 0 to 1. A frame whose ball is less visible has no row for it and looks empty; with 0
+    /// everything that shows at all is listed.
+    #[arg(long, default_value_t = 0.6, value_parser = share)]
     visible: f64,
 }
 
@@ -110,6 +113,14 @@ impl Kind {
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse();
     let kinds: Vec<Kind> = options.kinds.iter().flat_map(|k| k.0.clone()).collect();
+    if let Some(name) = repeated(&kinds) {
+        let message = format!(
+            "the kind {name} is asked for more than once (`cell` and `benchmark` stand for all of theirs)"
+        );
+        Options::command()
+            .error(ErrorKind::ValueValidation, message)
+            .exit();
+    }
     std::fs::create_dir_all(&options.out)?;
     let mut truth = String::from("file,cx,cy,r,what,visible\n");
     let mut frames = String::from("file,scene\n");
@@ -178,6 +189,19 @@ fn counts(sighting: &Sighting, visible: f64, least_radius: f64) -> bool {
     round && sighting.visible >= visible && ellipse.circle().radius >= least_radius
 }
 
+/// The first kind that is named twice: its files would be written over.
+fn repeated(kinds: &[Kind]) -> Option<String> {
+    let names: Vec<String> = kinds.iter().map(|kind| kind.name()).collect();
+    let again = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
+    again.map(|i| names[i].clone())
+}
+
+/// A share of a whole.
+fn share(text: &str) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
+    number.ok_or_else(|| format!("{text} is not a share from 0 to 1"))
+}
+
 /// Width and height, as in `768x576`.
 fn size(text: &str) -> Result<(u32, u32), String> {
     let number = |part: &str| part.parse().ok().filter(|n| (16..=8192).contains(n));
@@ -202,4 +226,27 @@ fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 fn cpu_seconds() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(list: &str) -> Vec<Kind> {
+        let kinds = list.split(',').map(|name| name.parse::<Kinds>().expect("known"));
+        kinds.flat_map(|k| k.0).collect()
+    }
+
+    #[test]
+    fn shares_and_kinds_that_make_no_sense_are_refused() {
+        for text in ["-0.1", "1.01", "nan", "inf", "much"] {
+            let refused = share(text).expect_err("no share");
+            assert!(refused.contains(text), "{refused}");
+        }
+        assert_eq!(share("0"), Ok(0.0));
+        assert_eq!(share("1"), Ok(1.0));
+        assert_eq!(repeated(&kinds("cell,benchmark")), None);
+        assert_eq!(repeated(&kinds("cell,plain")).as_deref(), Some("plain"));
+        assert_eq!(repeated(&kinds("clean,many,clean")).as_deref(), Some("clean"));
+    }
 }

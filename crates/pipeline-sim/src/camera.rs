@@ -99,6 +99,29 @@ impl Distortion {
         sound.then_some(q)
     }
 
+    /// Whether the lens has not folded the image over on the way from the axis to `p`: only such directions are shown.
+    fn shows(&self, p: Point2<f64>) -> bool {
+        let s = p.coords.norm_squared();
+        // How fast the radial part grows with the distance from the axis: never slower than at either end or where this itself turns.
+        let growth = |s: f64| 1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3));
+        let last = growth(s);
+        if last.is_nan() || last <= 0.0 {
+            return false;
+        }
+        let (a, b, c) = (21.0 * self.k3, 10.0 * self.k2, 3.0 * self.k1);
+        let root = (b * b - 4.0 * a * c).sqrt();
+        let turns = [(-b + root) / (2.0 * a), (-b - root) / (2.0 * a), -c / b];
+        let turns = turns.into_iter().filter(|turn| (0.0..s).contains(turn));
+        let slowest = turns.map(growth).fold(last, f64::min);
+        // The tangential part changes that by no more than this.
+        let tangential = 6.0 * self.p1.hypot(self.p2) * s.sqrt();
+        if tangential == 0.0 || slowest > tangential {
+            return slowest > 0.0;
+        }
+        const STEPS: i32 = 128;
+        (1..=STEPS).all(|k| self.jacobian(p * (f64::from(k) / f64::from(STEPS))).determinant() > 0.0)
+    }
+
     /// Derivatives of [`Distortion::distort`].
     fn jacobian(&self, q: Point2<f64>) -> Matrix2<f64> {
         let (x, y) = (q.x, q.y);
@@ -260,9 +283,12 @@ impl Camera {
         &self.distortion
     }
 
-    /// The pixel that shows a point given in the camera frame; `None` for a point that is not in front of the camera.
+    /// The pixel that shows a point given in the camera frame; `None` for a point that is not in front of the camera, or so far off the axis
+    /// that the lens would have folded the image over before.
     pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
-        (point.z > 0.0).then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
+        (point.z > 0.0)
+            .then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
+            .flatten()
     }
 
     /// The direction, in the camera frame and with z = 1, that is seen at a pixel. Within the frame there always is one; for
@@ -295,18 +321,20 @@ impl Camera {
     ///
     /// # Errors
     /// [`ProjectionError`]: a radius that is not above zero, a camera inside the sphere, a sphere not wholly in front of the
-    /// camera.
+    /// camera, or one that reaches beyond the directions that the lens shows.
     pub fn project_sphere(&self, centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
         let outline = unit_outline(centre, radius)?;
         if self.distortion.is_none() {
             return Ok(Ellipse {
-                centre: self.to_pixel(outline.centre),
+                centre: self.principal + outline.centre.coords * self.focal_px,
                 major: outline.major * self.focal_px,
                 minor: outline.minor * self.focal_px,
                 angle: outline.angle,
             });
         }
-        Ok(Ellipse::of_outline(|t| self.to_pixel(outline.point(t))))
+        Ellipse::of_outline(|t| self.to_pixel(outline.point(t))).ok_or_else(|| ProjectionError::BeyondLens {
+            angle: centre.xy().coords.norm().atan2(centre.z),
+        })
     }
 
     /// The circle of equal mean radius for a sphere: the centre of [`Camera::project_sphere`]'s ellipse and the mean of its
@@ -356,13 +384,16 @@ impl Camera {
         Some(Point3::from(direction * (radius / sin)))
     }
 
-    fn to_pixel(self, p: Point2<f64>) -> Point2<f64> {
-        let p = if self.distortion.is_none() {
+    /// The pixel that shows the direction (p, 1); `None` beyond the fold of the lens.
+    fn to_pixel(self, p: Point2<f64>) -> Option<Point2<f64>> {
+        let image = if self.distortion.is_none() {
             p
-        } else {
+        } else if self.distortion.shows(p) {
             self.distortion.distort(p)
+        } else {
+            return None;
         };
-        self.principal + p.coords * self.focal_px
+        Some(self.principal + image.coords * self.focal_px)
     }
 
     /// Refuses a distortion that turns back before the farthest corner of the frame.

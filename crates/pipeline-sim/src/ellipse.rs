@@ -99,9 +99,13 @@ impl Ellipse {
         (1.0 - outside / TAU).clamp(0.0, 1.0)
     }
 
-    /// The ellipse with the area and second moments of a closed outline, given as a function of an angle 0..2 pi.
-    pub(crate) fn of_outline(point: impl Fn(f64) -> Point2<f64>) -> Self {
-        let points: [Point2<f64>; OUTLINE] = std::array::from_fn(|i| point(i as f64 * TAU / OUTLINE as f64));
+    /// The ellipse with the area and second moments of a closed outline, given as a function of an angle 0..2 pi. `None` if a point of
+    /// it has no place in the image.
+    pub(crate) fn of_outline(point: impl Fn(f64) -> Option<Point2<f64>>) -> Option<Self> {
+        let mut points = [Point2::origin(); OUTLINE];
+        for (i, place) in points.iter_mut().enumerate() {
+            *place = point(i as f64 * TAU / OUTLINE as f64)?;
+        }
         // Moments about the first point, by Green's theorem over the polygon, then about the centroid.
         let origin = points[0];
         let (mut area, mut mx, mut my, mut mxx, mut mxy, mut myy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -120,12 +124,12 @@ impl Ellipse {
         let (mean, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
         // A regular polygon has a little less spread than its circle; this makes an ellipse come out exactly.
         let polygon = 3.0 / (2.0 + (TAU / OUTLINE as f64).cos());
-        Self {
+        Some(Self {
             centre: Point2::new(origin.x + cx, origin.y + cy),
             major: 2.0 * ((mean + half) * polygon).sqrt(),
             minor: 2.0 * ((mean - half).max(0.0) * polygon).sqrt(),
             angle: 0.5 * (2.0 * xy).atan2(xx - yy),
-        }
+        })
     }
 }
 

@@ -69,6 +69,15 @@ pub enum ProjectionError {
         /// Radius, metres.
         radius: f64,
     },
+    /// The sphere lies so far off the optical axis, wholly or in part, that the lens would have folded the image over before: it is not shown.
+    #[error(
+        "the ball is beyond what the lens shows: its centre is {:.1} degrees off the optical axis, and the distortion folds the image over nearer to it",
+        angle.to_degrees()
+    )]
+    BeyondLens {
+        /// Angle between the optical axis and the direction of the centre, radians.
+        angle: f64,
+    },
 }
 
 /// Why a ball does not count as seen.
@@ -150,12 +159,47 @@ pub enum QuantityError {
         /// What was given.
         value: f64,
     },
+    /// A quantity is below zero.
+    #[error("{quantity} must not be below zero, but is {value}")]
+    Negative {
+        /// Which quantity.
+        quantity: String,
+        /// What was given.
+        value: f64,
+    },
+    /// A quantity that must be above zero is not.
+    #[error("{quantity} must be above zero, but is {value}")]
+    NotPositive {
+        /// Which quantity.
+        quantity: String,
+        /// What was given.
+        value: f64,
+    },
     /// A search over moves can follow one or two joints, not more.
     #[error("the moves turn {count} joints; a search can follow one or two")]
     Joints {
         /// Number of joints that any of the moves turns.
         count: usize,
     },
+}
+
+/// Refuses what is no finite number.
+pub(crate) fn finite(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        let quantity = quantity.into();
+        Err(QuantityError::NotFinite { quantity, value })
+    }
+}
+
+/// Refuses what is no finite number of zero or above.
+pub(crate) fn amount(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
+    let quantity = quantity.into();
+    if value < 0.0 && value.is_finite() {
+        return Err(QuantityError::Negative { quantity, value });
+    }
+    finite(quantity, value)
 }
 
 /// Refuses a range that is not finite and ascending.

@@ -58,15 +58,19 @@ impl Errors {
     /// ([`crate::SimulatedArm::with_errors`], [`crate::FeatureCamera`]).
     ///
     /// # Errors
-    /// [`CameraError`] for factors that are not above zero and shifts that are not finite.
+    /// [`CameraError`] names the factor that is not above zero, or the angle or shift that is not finite.
     pub fn apply(&self, nominal: &Cell) -> Result<Cell, CameraError> {
-        let angles = [self.roll, self.pitch, self.yaw];
-        for value in angles.into_iter().chain(self.camera_shift) {
+        let [x, y, z] = self.camera_shift;
+        for (quantity, value) in [
+            ("roll of the camera (rad)", self.roll),
+            ("pitch of the camera (rad)", self.pitch),
+            ("yaw of the camera (rad)", self.yaw),
+            ("shift of the camera along its x axis (m)", x),
+            ("shift of the camera along its y axis (m)", y),
+            ("shift of the camera along its z axis (m)", z),
+        ] {
             if !value.is_finite() {
-                return Err(CameraError::NotFinite {
-                    quantity: "error of the camera's mount",
-                    value,
-                });
+                return Err(CameraError::NotFinite { quantity, value });
             }
         }
         let radius = nominal.ball.radius * self.radius_factor;

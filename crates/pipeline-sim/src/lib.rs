@@ -37,6 +37,7 @@ mod reach_noise;
 mod render;
 mod samples;
 mod scene;
+mod scene_check;
 mod scene_kind;
 mod source;
 mod workspace;
@@ -60,7 +61,9 @@ pub use optimum::GoalBox;
 pub use reach_form::ReachForm;
 pub use reach_model::ReachModel;
 pub use render::{Renderer, Round, Shot, Sighting};
-pub use samples::{CentreSample, MoveLists, ReachSample, exploring_start, sample_moves, with_noise};
+pub use samples::{
+    CentreSample, MoveLists, ReachSample, exploring_start, sample_moves, try_sample_moves, with_noise,
+};
 pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
 pub use scene_kind::{SceneKind, Snapshot};
 pub use source::{CellCamera, FeatureCamera, SharedCell, SimulatedArm};

@@ -5,7 +5,11 @@ use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::{Ball, Cell};
+use crate::error::amount;
+use crate::{Ball, Cell, QuantityError};
+
+/// What errors call the noise on features.
+pub(crate) const NOISE: &str = "standard deviation of the features' noise (units)";
 
 /// One move of `JT2` and `JT3`, and the ball before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,13 +101,16 @@ pub fn exploring_start<R: Rng + ?Sized>(cell: &Cell, rng: &mut R) -> Option<(Cel
 /// [`MoveLists`] of the paper; kept if the arm stays within its working limits and the ball in sight.
 ///
 /// Features carry normal noise of standard deviation `noise` units. In a cell in which nothing can be seen or reached the
-/// vectors come back short.
+/// vectors come back short; with noise that is no finite number they come back empty ([`try_sample_moves`] refuses it).
 pub fn sample_moves<R: Rng + ?Sized>(
     cell: &Cell,
     count: usize,
     noise: f64,
     rng: &mut R,
 ) -> (Vec<CentreSample>, Vec<ReachSample>) {
+    if !noise.is_finite() {
+        return (Vec::new(), Vec::new());
+    }
     let moves = MoveLists::paper();
     let (mut centring, mut reaching) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for _ in 0..count {
@@ -137,6 +144,20 @@ pub fn sample_moves<R: Rng + ?Sized>(
     (centring, reaching)
 }
 
+/// As [`sample_moves`].
+///
+/// # Errors
+/// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of zero or above.
+pub fn try_sample_moves<R: Rng + ?Sized>(
+    cell: &Cell,
+    count: usize,
+    noise: f64,
+    rng: &mut R,
+) -> Result<(Vec<CentreSample>, Vec<ReachSample>), QuantityError> {
+    amount(NOISE, noise)?;
+    Ok(sample_moves(cell, count, noise, rng))
+}
+
 /// Starts and moves until one keeps the ball in sight and the arm within its limits.
 fn tried_sample<R: Rng + ?Sized, M>(
     cell: &Cell,
@@ -160,10 +181,15 @@ fn tried_sample<R: Rng + ?Sized, M>(
     None
 }
 
-/// `features` with normal noise of standard deviation `sigma` units on each; the radius stays above a tenth of a unit.
+/// `features` with normal noise of standard deviation `sigma` units on each; the radius stays above a tenth of a unit. With a
+/// `sigma` that is no finite number, none of the three is a number.
 pub fn with_noise<R: Rng + ?Sized>(features: Features, sigma: f64, rng: &mut R) -> Features {
     if sigma == 0.0 {
         return features;
+    }
+    if !sigma.is_finite() {
+        let [x, y, r] = [f64::NAN; 3];
+        return Features { x, y, r };
     }
     let mut draw = || -> f64 { StandardNormal.sample(rng) };
     Features {

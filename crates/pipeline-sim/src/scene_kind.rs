@@ -296,13 +296,18 @@ impl Snapshot {
         let workspace = Workspace::paper();
         let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
         if kind == SceneKind::Distorted {
-            let k1 = rng.random_range(-0.35..-0.10);
-            let lens = Distortion {
-                k1,
-                k2: rng.random_range(0.0..0.08),
-                ..Distortion::default()
+            // None of these folds the image; one that did would be drawn anew.
+            cell.camera = loop {
+                let k1 = rng.random_range(-0.35..-0.10);
+                let lens = Distortion {
+                    k1,
+                    k2: rng.random_range(0.0..0.08),
+                    ..Distortion::default()
+                };
+                if let Ok(camera) = Camera::paper().with_distortion(lens) {
+                    break camera;
+                }
             };
-            cell.camera = Camera::paper().with_distortion(lens).unwrap_or(cell.camera);
         }
         let poses = workspace.search_poses();
         loop {

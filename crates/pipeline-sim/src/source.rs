@@ -9,8 +9,10 @@ use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySen
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
+use crate::error::amount;
 use crate::errors::Drive;
-use crate::{Cell, Contact, Errors, Grasp, Renderer, with_noise};
+use crate::samples::NOISE;
+use crate::{Cell, Contact, Errors, Grasp, QuantityError, Renderer, with_noise};
 
 /// A cell that camera, arm and whoever pushes the ball have in common.
 ///
@@ -103,7 +105,7 @@ pub struct FeatureCamera<P> {
 
 impl<P: FnMut() -> Joints> FeatureCamera<P> {
     /// A camera in `cell` that looks from wherever `pose` says the joints are; its features carry normal noise of standard deviation
-    /// `noise` units, drawn from `seed`.
+    /// `noise` units, drawn from `seed`. With noise that is no finite number it finds nothing ([`FeatureCamera::try_new`] refuses it).
     pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Self {
         Self {
             cell,
@@ -113,8 +115,20 @@ impl<P: FnMut() -> Joints> FeatureCamera<P> {
         }
     }
 
-    /// What a detector would find; `None` if the ball counts as lost.
+    /// As [`FeatureCamera::new`].
+    ///
+    /// # Errors
+    /// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of zero or above.
+    pub fn try_new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Result<Self, QuantityError> {
+        amount(NOISE, noise)?;
+        Ok(Self::new(cell, pose, noise, seed))
+    }
+
+    /// What a detector would find; `None` if the ball counts as lost, or the noise is no finite number.
     pub fn look(&mut self) -> Option<Features> {
+        if !self.noise.is_finite() {
+            return None;
+        }
         let joints = (self.pose)();
         let features = self.cell.with(|cell| cell.features(&joints))?;
         Some(with_noise(features, self.noise, &mut self.rng))

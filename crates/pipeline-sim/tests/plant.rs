@@ -4,7 +4,7 @@ use hough_heuristic::Features;
 use nalgebra::{Point3, Vector3};
 use pipeline_sim::{
     Ball, BallPath, Cell, Contact, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell, SimulatedArm,
-    Workspace,
+    Workspace, sample_moves, try_sample_moves, with_noise,
 };
 use puma_val2::{Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::SeedableRng;
@@ -404,4 +404,56 @@ fn the_feature_camera_sees_what_the_cell_shows_with_noise() {
         .sum::<f64>()
         / 2000.0;
     assert!((spread.sqrt() - 0.5).abs() < 0.05, "{spread}");
+}
+
+#[test]
+fn each_error_of_the_mount_is_named() {
+    type Spoil = fn(&mut Errors);
+    let (cell, _) = at_goal();
+    let spoil: [(&str, Spoil); 6] = [
+        ("roll", |e| e.roll = f64::NAN),
+        ("pitch", |e| e.pitch = f64::INFINITY),
+        ("yaw", |e| e.yaw = f64::NAN),
+        ("along its x axis", |e| e.camera_shift[0] = f64::NAN),
+        ("along its y axis", |e| e.camera_shift[1] = f64::NAN),
+        ("along its z axis", |e| e.camera_shift[2] = f64::NEG_INFINITY),
+    ];
+    for (named, spoil) in spoil {
+        let mut errors = Errors::none();
+        spoil(&mut errors);
+        let refused = errors.apply(&cell).expect_err("not finite").to_string();
+        assert!(refused.contains(named), "{named}: {refused}");
+    }
+}
+
+#[test]
+fn noise_that_is_no_number_is_refused_and_leads_to_no_features() {
+    let (cell, goal) = at_goal();
+    let shared = SharedCell::new(cell);
+    let arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    for noise in [f64::NAN, f64::INFINITY, -0.5] {
+        let refused = FeatureCamera::try_new(shared.clone(), arm.pose(), noise, 1).expect_err("no noise");
+        assert!(refused.to_string().contains("noise"), "{refused}");
+        assert_eq!(
+            try_sample_moves(&cell, 5, noise, &mut rng)
+                .expect_err("no noise")
+                .to_string(),
+            refused.to_string()
+        );
+    }
+    assert_eq!(
+        FeatureCamera::new(shared.clone(), arm.pose(), f64::NAN, 1).look(),
+        None
+    );
+    let (centring, reaching) = sample_moves(&cell, 5, f64::NAN, &mut rng);
+    assert!(centring.is_empty() && reaching.is_empty());
+    let spoiled = with_noise(Cell::GOAL, f64::NAN, &mut rng);
+    assert!([spoiled.x, spoiled.y, spoiled.r].iter().all(|v| v.is_nan()));
+    let mut sound = FeatureCamera::try_new(shared, arm.pose(), 0.0, 1).expect("no noise at all");
+    assert_eq!(sound.look(), cell.features(&goal));
+    assert_eq!(
+        try_sample_moves(&cell, 5, 0.5, &mut rng).expect("sound").0.len(),
+        5
+    );
 }

@@ -247,3 +247,63 @@ fn a_camera_with_another_frame_shows_the_same_and_more() {
         Err(CameraError::NotPositive { .. })
     ));
 }
+
+#[test]
+fn directions_beyond_the_fold_are_not_shown() {
+    let lens = |k1, k2, k3, p1| Distortion {
+        k1,
+        k2,
+        k3,
+        p1,
+        p2: 0.5 * p1,
+    };
+    for (lens, folds) in [
+        (lens(-0.30, 0.01, 0.0, 0.0), true),
+        (lens(-0.35, 0.08, 0.0, 0.0), false),
+        (lens(-0.30, 0.03, 0.0, 0.01), true),
+        (lens(-0.60, 0.0, 0.0, 0.0), true),
+        // Back again on the far side of the fold.
+        (lens(-0.60, 0.13, 0.01, 0.0), true),
+        (lens(0.30, -0.10, 0.0, -0.02), true),
+        (lens(0.20, 0.05, 0.0, 0.0), false),
+    ] {
+        let camera = Camera::paper()
+            .with_distortion(lens)
+            .expect("does not fold in the frame");
+        let (mut shown, mut refused) = (0, 0);
+        for (i, k) in (0..400).flat_map(|i| (0..24).map(move |k| (i, k))) {
+            let (tangent, angle) = (0.015 * f64::from(i), f64::from(k) * 0.27);
+            let direction = Point3::new(tangent * angle.cos(), tangent * angle.sin(), 1.0);
+            let Some(pixel) = camera.project(&direction) else {
+                refused += 1;
+                // Nor has a ball there an outline.
+                let named = camera.project_sphere(&direction, 0.02);
+                assert!(
+                    matches!(named, Err(ProjectionError::BeyondLens { angle }) if (angle - tangent.atan()).abs() < 1e-9),
+                    "{named:?}"
+                );
+                continue;
+            };
+            // Whatever is said to lie in the frame is what the frame shows there.
+            if (-0.5..=767.5).contains(&pixel.x) && (-0.5..=575.5).contains(&pixel.y) {
+                shown += 1;
+                let back = camera.try_ray(pixel).expect("inside the frame");
+                assert!(
+                    (back - direction.coords).norm() < 1e-9,
+                    "{lens:?}: {direction} {back}"
+                );
+            }
+        }
+        assert!(shown > 500, "{shown}");
+        assert_eq!(refused > 0, folds, "{lens:?}: {refused}");
+    }
+    // A frame shows all that its rays meet.
+    let camera = Camera::paper()
+        .with_distortion(lens(-0.60, 0.0, 0.0, 0.01))
+        .expect("does not fold in the frame");
+    for (x, y) in (0..=48).flat_map(|i| (0..=36).map(move |j| (i, j))) {
+        let pixel = Point2::new(16.0 * f64::from(x) - 0.5, 16.0 * f64::from(y) - 0.5);
+        let back = camera.project(&Point3::from(camera.ray(pixel))).expect("shown");
+        assert!((back - pixel).norm() < 1e-6, "{pixel} {back}");
+    }
+}

@@ -1,10 +1,13 @@
 //! What the truth of a frame says is visible, and what hides what.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3, Vector3};
 use pipeline_sim::{
-    Ball, Cell, Distortion, Ellipse, Look, Occluder, Renderer, Round, Scene, Shape, Thing, Workspace,
+    Ball, Cell, Distortion, Ellipse, Look, Occluder, Renderer, Round, Scene, SceneKind, Shape, Snapshot,
+    Thing, Workspace,
 };
 use puma_val2::{JointDelta, Joints};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
 
 fn cell_at_goal() -> (Cell, Joints) {
     let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
@@ -151,7 +154,7 @@ fn a_ball_carried_over_a_box_hides_the_box_and_one_behind_it_is_hidden() {
     let pose = Workspace::paper().search_poses()[3];
     let eye = cell.camera_pose(&pose).translation.vector;
     let mut low = cell;
-    low.ball.centre = nalgebra::Point3::new(0.75, 0.15, cell.table + 0.02);
+    low.ball.centre = Point3::new(0.75, 0.15, cell.table + 0.02);
     let toward = (eye.xy() - low.ball.centre.coords.xy()).normalize();
     let tall = Shape::Box {
         length: 0.05,
@@ -176,7 +179,7 @@ fn a_holder_without_its_ball_stands_where_it_stands() {
     let foot = cell.ball.centre.xy();
     let toward = (eye.xy() - foot.coords).normalize();
     let (x, y) = (foot.x + 0.05 * toward.x, foot.y + 0.05 * toward.y);
-    cell.ball.centre = nalgebra::Point3::new(
+    cell.ball.centre = Point3::new(
         foot.x + 0.25 * toward.x,
         foot.y + 0.25 * toward.y,
         cell.table + 0.02,
@@ -261,4 +264,47 @@ fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
             }
         }
     }
+}
+
+#[test]
+fn whatever_the_truth_of_a_distorted_frame_lists_is_met_by_the_rays_of_the_frame() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut rows = 0;
+    for _ in 0..16 {
+        let scene = Scene::generate(SceneKind::Distorted, &mut rng);
+        let renderer = Renderer::new(&scene, 1);
+        for _ in 0..5 {
+            let snapshot = Snapshot::draw(SceneKind::Distorted, &mut rng);
+            let cell = &snapshot.cell;
+            let pose = cell.camera_pose(&snapshot.joints);
+            let eye = Point3::from(pose.translation.vector);
+            for row in snapshot.truth(&renderer) {
+                rows += 1;
+                let ray = cell.camera.try_ray(row.ellipse.centre);
+                let ray = pose
+                    * ray
+                        .expect("the lens shows the middle of what is seen")
+                        .normalize();
+                // How far the ray passes a ball, and where it meets a level.
+                let passes = |centre: Point3<f64>| (centre - eye).cross(&ray).norm();
+                let meets = |z: f64| eye + ray * ((z - eye.z) / ray.z);
+                let met = if row.what == Round::Target {
+                    passes(cell.ball.centre) < cell.ball.radius
+                } else {
+                    scene.things.iter().any(|thing| {
+                        let at = Point3::new(thing.x, thing.y, cell.table);
+                        let on = |z: f64| (meets(cell.table + z) - at).xy().norm();
+                        match thing.shape {
+                            Shape::Ball { radius } => passes(at + Vector3::z() * radius) < radius,
+                            Shape::Disc { radius, .. } => on(0.0) < radius,
+                            Shape::Cylinder { radius, height } => on(height) < radius,
+                            _ => false,
+                        }
+                    })
+                };
+                assert!(met, "{snapshot:?}: {row:?}");
+            }
+        }
+    }
+    assert!(rows > 80, "{rows}");
 }

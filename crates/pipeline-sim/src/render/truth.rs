@@ -53,7 +53,7 @@ struct Outline {
 
 impl Renderer {
     /// Every round outline that the frame of `cell` with the arm at `joints` shows, the ball's first; outlines of which nothing is
-    /// visible are left out. Exact but for [`Sighting::visible`], which is good to about a hundredth.
+    /// visible, or that reach beyond what the lens shows, are left out. Exact but for [`Sighting::visible`], which is good to about a hundredth.
     pub fn truth(&self, cell: &Cell, joints: &Joints) -> Vec<Sighting> {
         let pose = cell.camera_pose(joints);
         if pose.translation.vector.iter().any(|v| !v.is_finite()) {
@@ -174,9 +174,12 @@ impl Renderer {
         let ring = |what, centre: Point3<f64>, radius: f64| {
             let at = |t: f64| view.seen(&(centre + Vector3::new(t.cos(), t.sin(), 0.0) * radius));
             let ahead = (0..96).all(|i| at(f64::from(i) * std::f64::consts::TAU / 96.0).z > 0.01);
-            (ahead && radius > 0.0).then(|| Outline {
+            if !(ahead && radius > 0.0) {
+                return None;
+            }
+            Some(Outline {
                 what,
-                ellipse: Ellipse::of_outline(|t| cell.camera.project(&at(t)).unwrap_or_else(Point2::origin)),
+                ellipse: Ellipse::of_outline(|t| cell.camera.project(&at(t)))?,
                 points: around(&|t| Point2::from(at(t).xy() / at(t).z)),
             })
         };

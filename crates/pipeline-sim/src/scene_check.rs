@@ -1,0 +1,176 @@
+//! Which quantity of a scene or a shot makes no sense.
+
+use crate::error::{amount, finite};
+use crate::{Look, QuantityError, Scene, Sensor, Shape, Shot};
+
+impl Scene {
+    /// Whether every quantity is one that a scene can have. [`crate::Renderer`] does not ask: it draws of a senseless scene what makes
+    /// sense, and takes a gamma that is not above zero for 1.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the first quantity that is not finite, below zero, or, for gamma and a lamp's height, not above zero.
+    pub fn check(&self) -> Result<(), QuantityError> {
+        amount("ambient light", self.ambient)?;
+        for (i, light) in self.lights.iter().enumerate() {
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(light.toward.iter()) {
+                finite(format!("{axis} of the direction to lamp {i}"), *value)?;
+            }
+            above_zero(format!("z of the direction to lamp {i}"), light.toward.z)?;
+            amount(format!("intensity of lamp {i}"), light.intensity)?;
+            amount(format!("half angle of lamp {i} (rad)"), light.half_angle)?;
+        }
+        self.table.check("the table")?;
+        self.ball.check("the ball")?;
+        for (i, thing) in self.things.iter().enumerate() {
+            finite(format!("x of thing {i} (m)"), thing.x)?;
+            finite(format!("y of thing {i} (m)"), thing.y)?;
+            finite(format!("turn of thing {i} (rad)"), thing.turn)?;
+            thing.look.check(&format!("thing {i}"))?;
+            for (name, value) in thing.shape.lengths() {
+                amount(format!("{name} of thing {i} (m)"), value)?;
+            }
+        }
+        for (i, occluder) in self.occluders.iter().enumerate() {
+            for value in occluder.from.iter().chain(occluder.to.iter()) {
+                finite(format!("an end of occluder {i} (units)"), *value)?;
+            }
+            amount(format!("width of occluder {i} (units)"), occluder.width)?;
+            amount(format!("softness of occluder {i} (units)"), occluder.softness)?;
+            amount(format!("albedo of occluder {i}"), occluder.albedo)?;
+        }
+        self.sensor.check()
+    }
+}
+
+impl Sensor {
+    /// Whether a sensor can be like this.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the first quantity that is not finite or below zero; gamma must be above zero.
+    pub fn check(&self) -> Result<(), QuantityError> {
+        amount("read noise (grey levels)", self.read_noise)?;
+        amount("shot noise (grey levels)", self.shot_noise)?;
+        amount("blur (px)", self.blur)?;
+        amount("defocus (px)", self.defocus)?;
+        amount("vignetting", self.vignetting)?;
+        amount("exposure", self.exposure)?;
+        finite("gamma", self.gamma)?;
+        above_zero("gamma".to_owned(), self.gamma)
+    }
+}
+
+impl Shot {
+    /// Whether a frame can be taken like this. [`crate::Renderer::take`] does not ask.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the time that is not finite or below zero.
+    pub fn check(&self) -> Result<(), QuantityError> {
+        amount("exposure time (s)", self.exposure)?;
+        amount("time between the fields (s)", self.interlace.unwrap_or(0.0))
+    }
+}
+
+impl Look {
+    fn check(&self, of: &str) -> Result<(), QuantityError> {
+        amount(format!("albedo of {of}"), self.albedo)?;
+        amount(format!("texture of {of}"), self.texture)?;
+        amount(format!("gloss of {of}"), self.gloss)
+    }
+}
+
+impl Shape {
+    /// Its measures, by name.
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        match *self {
+            Self::Box {
+                length,
+                width,
+                height,
+            } => vec![("length", length), ("width", width), ("height", height)],
+            Self::Cylinder { radius, height } => vec![("radius", radius), ("height", height)],
+            Self::Disc { radius, inner } => vec![("radius", radius), ("inner radius", inner)],
+            Self::Ball { radius } => vec![("radius", radius)],
+            Self::Print { length, width, .. } | Self::Tape { length, width } => {
+                vec![("length", length), ("width", width)]
+            }
+        }
+    }
+}
+
+fn above_zero(quantity: String, value: f64) -> Result<(), QuantityError> {
+    if value > 0.0 {
+        Ok(())
+    } else {
+        Err(QuantityError::NotPositive { quantity, value })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point2, Vector3};
+    use rand::SeedableRng;
+    use rand::rngs::Xoshiro256PlusPlus;
+
+    use super::*;
+    use crate::{BenchmarkKind, Light, Occluder, SceneKind, Snapshot};
+
+    type Spoil = fn(&mut Scene);
+
+    #[test]
+    fn what_is_drawn_from_a_seed_makes_sense() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        for kind in SceneKind::ALL {
+            assert_eq!(Scene::generate(kind, &mut rng).check(), Ok(()), "{kind}");
+            assert_eq!(Snapshot::draw(kind, &mut rng).shot.check(), Ok(()), "{kind}");
+        }
+        for kind in BenchmarkKind::ALL {
+            let (scene, snapshot) = kind.draw((768, 576), &mut rng).expect("a frame of pixels");
+            assert_eq!(scene.check(), Ok(()), "{kind}");
+            assert_eq!(snapshot.shot.check(), Ok(()), "{kind}");
+        }
+        assert_eq!(Scene::laboratory().check(), Ok(()));
+        assert_eq!(Scene::plain().check(), Ok(()));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_named() {
+        let spoil: [(&str, Spoil); 12] = [
+            ("ambient light", |s| s.ambient = -1.0),
+            ("gamma", |s| s.sensor.gamma = -2.0),
+            ("gamma", |s| s.sensor.gamma = 0.0),
+            ("gamma", |s| s.sensor.gamma = f64::NAN),
+            ("read noise", |s| s.sensor.read_noise = f64::NAN),
+            ("defocus", |s| s.sensor.defocus = f64::INFINITY),
+            ("albedo of the table", |s| s.table.albedo = f64::NAN),
+            ("gloss of the ball", |s| s.ball.gloss = -0.1),
+            ("x of thing 1", |s| s.things[1].x = f64::NAN),
+            ("radius of thing 0", |s| {
+                s.things[0].shape = Shape::Ball { radius: -0.1 }
+            }),
+            ("z of the direction to lamp", |s| {
+                s.lights.push(Light {
+                    toward: -Vector3::z(),
+                    intensity: 1.0,
+                    half_angle: 0.1,
+                });
+            }),
+            ("softness of occluder 0", |s| {
+                s.occluders.push(Occluder {
+                    from: Point2::origin(),
+                    to: Point2::new(1.0, 1.0),
+                    width: 1.0,
+                    softness: f64::NAN,
+                    albedo: 0.1,
+                });
+            }),
+        ];
+        for (named, spoil) in spoil {
+            let mut scene = Scene::laboratory();
+            spoil(&mut scene);
+            let refused = scene.check().expect_err("makes no sense").to_string();
+            assert!(refused.starts_with(named), "{named}: {refused}");
+        }
+        let shot = Shot::pal(f64::NAN, 3).check().expect_err("no time").to_string();
+        assert!(shot.starts_with("exposure time"), "{shot}");
+    }
+}
