@@ -23,8 +23,8 @@ pub struct TrustedConfig {
     pub min_score: f64,
     /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower finds fainter circles and takes longer; noise raises it.
     pub contrast: f64,
-    /// How many pairs may be drawn, for each million pixels of the frame (default 50000; at least 1), a frame below a quarter of a million counting as
-    /// one. Sixteen looks go with each draw and bound all of the work that depends on what the frame shows. Less leaves out circles amid dense texture, more
+    /// How many pairs may be drawn, for each million pixels of the frame (default 50000; at least 1), a frame of less than a quarter of a million counting as
+    /// a quarter. Sixteen looks go with each draw and bound all of the work that depends on what the frame shows. Less leaves out circles amid dense texture, more
     /// finds little.
     pub draws_per_megapixel: u32,
     /// How long the search may take, milliseconds for each million pixels (default None: no clock is looked at; above 0). With a clock what is found
