@@ -3,12 +3,12 @@
 use grasp_agent::puma_val2::{ArmError, JointDelta};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, ApproachLimit, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp,
-    Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings, YGoal,
+    Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
 
-fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, Shared) {
+pub(crate) fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, Shared) {
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], fault);
     let mut agent = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
     let mut log = EventLog::default();
@@ -195,7 +195,7 @@ fn something_near_stops_the_arm_and_takes_it_back() {
 }
 
 /// The words of the events from the first of this kind on.
-fn words_from(log: &EventLog, first: &str) -> Vec<&'static str> {
+pub(crate) fn words_from(log: &EventLog, first: &str) -> Vec<&'static str> {
     let words = log.events.iter().map(|event| event.kind.word());
     words.skip_while(|word| *word != first).collect()
 }
@@ -224,50 +224,6 @@ fn an_arm_that_its_own_guard_halts_is_taken_back_and_goes_on() {
 }
 
 #[test]
-fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
-    let (end, log, cell) = end_of(Fault::HaltedGrips(1));
-    assert_eq!(end.unwrap().gave_up, None);
-    assert!(cell.0.borrow().held);
-    let expected = [
-        "gripping",
-        "too-near",
-        "taken-back",
-        "seen",
-        "at-goal",
-        "seen",
-        "gripping",
-        "gripped",
-    ];
-    assert!(words_from(&log, "gripping").starts_with(&expected));
-    let (end, _, cell) = end_of(Fault::HaltedGrips(100));
-    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
-    assert!(!cell.0.borrow().closed);
-}
-
-#[test]
-fn a_closed_hand_that_is_halted_has_not_succeeded() {
-    // On its way back, which was free: the ball is in that way and not in the jaws. It is gripped again.
-    let (end, log, cell) = end_of(Fault::HaltedClosed(1));
-    let expected = [
-        "gripped",
-        "withdrawn",
-        "too-near",
-        "taken-back",
-        "missed",
-        "recover",
-        "seen",
-    ];
-    assert!(words_from(&log, "gripped").starts_with(&expected), "{log:?}");
-    assert_eq!(end.unwrap().gave_up, None);
-    assert!(cell.0.borrow().held);
-    // As it lifts: what is in the jaws is not known.
-    let (end, log, _) = end_of(Fault::HaltedClosed(2));
-    let expected = ["lifted", "too-near", "taken-back", "gave-up"];
-    assert_eq!(words_from(&log, "lifted"), expected);
-    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
-}
-
-#[test]
 fn where_every_move_is_halted_a_controller_that_can_aim_from_there_grips() {
     // The hybrid is halted again and again on its way, and knows by then where the ball is.
     let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
@@ -287,63 +243,6 @@ fn where_every_move_is_halted_a_controller_that_can_aim_from_there_grips() {
     assert!(words_from(&log, "at-goal").is_empty());
     let halts = log.events.iter().filter(|event| event.kind == EventKind::TooNear);
     assert!(halts.count() >= 3);
-}
-
-#[test]
-fn a_circle_in_the_goal_that_is_no_ball_is_not_taken_for_a_success() {
-    for (fault, gripped) in [
-        (Fault::PhantomOnce, false),
-        (Fault::PhantomFromThere, true),
-        (Fault::PhantomEverywhere, true),
-    ] {
-        let (end, log, cell) = end_of(fault);
-        assert!(end.unwrap().gave_up.is_some(), "{fault:?}");
-        assert_eq!(!words_from(&log, "gripped").is_empty(), gripped, "{fault:?}");
-        assert_eq!(!words_from(&log, "missed").is_empty(), gripped, "{fault:?}");
-        assert!(!cell.0.borrow().closed, "{fault:?}");
-    }
-}
-
-#[test]
-fn a_ball_that_is_not_gripped_is_reached_for_again() {
-    let mut short = config();
-    short.max_cycles = 12;
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
-    let mut agent = Agent::with_controller(short, PositionBased::new(ServoSettings::paper())).unwrap();
-    let mut log = EventLog::default();
-    let outcome = cell.run(&mut agent, &mut log).unwrap();
-    let missed = log
-        .events
-        .iter()
-        .filter(|event| event.kind == EventKind::Missed)
-        .count();
-    assert!(
-        missed > 1 && outcome.gave_up == Some(GaveUp::OutOfCycles),
-        "{missed} {outcome:?}"
-    );
-    assert!(!cell.0.borrow().closed);
-}
-
-#[test]
-fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
-    let at_once: &[_] = &["lifted", "seen", "seen"];
-    let then: &[_] = &["lifted", "seen", "seen", "lifted", "seen"];
-    for (from, expected) in [(0, at_once), (2, then)] {
-        let (end, log, cell) = end_of(Fault::ShowsInTheJaws(from));
-        assert_eq!(end.unwrap().gave_up, None);
-        assert!(cell.0.borrow().held);
-        assert_eq!(words_from(&log, "lifted"), expected);
-    }
-}
-
-#[test]
-fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
-    let (end, log, cell) = end_of(Fault::SqueezedOut);
-    assert_eq!(end.unwrap().gave_up, None);
-    assert!(cell.0.borrow().held);
-    let missed = words_from(&log, "gripped");
-    let missed = missed.iter().filter(|word| **word == "missed");
-    assert_eq!(missed.count(), 1);
 }
 
 #[test]
@@ -410,7 +309,7 @@ fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a
 #[cfg(feature = "serde")]
 #[test]
 fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
-    use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning, qtable::QTable};
+    use grasp_agent::{Behaviour, Learned, OnlineLearning, qtable::QTable};
     let blank = |spec: &grasp_agent::BehaviourSpec| {
         let table = QTable::new(spec.states(), spec.actions()).unwrap();
         Behaviour::new(spec.clone(), table).unwrap()
@@ -438,54 +337,6 @@ fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
     cell.run(&mut agent, &mut EventLog::default()).unwrap();
     assert_ne!(*agent.controller().approaching(), after);
-}
-
-#[test]
-fn two_places_in_the_goal_in_turn_do_not_keep_a_run_going_for_ever() {
-    let mut wide = config();
-    wide.goal = BehaviourPair::paper_mended()
-        .with_y_goal(YGoal::Section4)
-        .unwrap()
-        .goal();
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Restless(10_000));
-    let mut agent = Agent::with_controller(wide, PositionBased::new(ServoSettings::paper())).unwrap();
-    let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
-    assert_eq!(outcome.gave_up, Some(GaveUp::OutOfCycles));
-    assert!(!cell.0.borrow().closed);
-}
-
-/// The end of a run under the paper's settings, changed.
-fn end_with(change: impl Fn(&mut AgentConfig)) -> (grasp_agent::Outcome, Shared) {
-    let mut changed = config();
-    change(&mut changed);
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
-    let mut agent = Agent::with_controller(changed, PositionBased::new(ServoSettings::paper())).unwrap();
-    (cell.run(&mut agent, &mut EventLog::default()).unwrap(), cell)
-}
-
-#[test]
-fn a_grip_that_leads_out_of_the_limits_is_not_made() {
-    let (outcome, cell) = end_with(|config| config.limits.0[4].0 = 30_f64.to_radians());
-    assert_eq!(outcome.gave_up, Some(GaveUp::NoMoveLeft));
-    assert!(!cell.0.borrow().closed);
-}
-
-#[test]
-fn a_lift_that_the_limits_do_not_allow_is_no_verification() {
-    let upward = |degrees: f64| {
-        move |config: &mut AgentConfig| {
-            // The wrist, which stands still while the ball is reached.
-            config.lift = Some(JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, 15.0, 0.0]));
-            config.limits.0[4].1 = (45.0 + degrees).to_radians();
-        }
-    };
-    for (room, gave_up) in [
-        (0.0, Some(GaveUp::NoMoveLeft)),
-        (9.0, Some(GaveUp::NoMoveLeft)),
-        (11.0, None),
-    ] {
-        assert_eq!(end_with(upward(room)).0.gave_up, gave_up, "{room}");
-    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 mod cell;
 mod faults;
+mod gripping;
 mod hybrid;
 mod learned;
 mod log;

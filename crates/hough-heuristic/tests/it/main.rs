@@ -22,3 +22,4 @@ mod serde;
 #[cfg(feature = "files")]
 mod stages;
 mod trusted;
+mod trusted_score;
