@@ -189,16 +189,25 @@ impl<'a> Run<'a> {
         (self.wandered, self.barred) = (false, 0);
         let mut last = LastLook::None;
         while let Some(view) = self.modules.search.next_view(&self.joints, last) {
-            let target = self.modules.supervision.limits().nearest(&view.pose);
-            last = if self.go_to(target, EventKind::AtSearchPose(view.number))? == Went::Back {
-                LastLook::Barred
-            } else if let Some(sighting) = self.look()? {
-                return Ok(State::Reach(sighting));
-            } else {
-                LastLook::Nothing
-            };
+            match self.look_from(&view.pose, EventKind::AtSearchPose(view.number))? {
+                Ok(ball) => return Ok(State::Reach(ball)),
+                Err(came) => last = came,
+            }
         }
         Ok(State::End(Some(GaveUp::NotFound)))
+    }
+
+    /// The ball from the pose nearest to `pose`, or what came of the look.
+    fn look_from(
+        &mut self,
+        pose: &Joints,
+        there: EventKind,
+    ) -> Result<Result<Sighting, LastLook>, AgentError> {
+        let target = self.modules.supervision.limits().nearest(pose);
+        Ok(match self.go_to(target, there)? {
+            Went::Back => Err(LastLook::Barred),
+            Went::There => self.look()?.ok_or(LastLook::Nothing),
+        })
     }
 
     /// One control cycle: sighting, decision, one joint move, next sighting.
@@ -273,15 +282,11 @@ impl<'a> Run<'a> {
             if self.cycles >= self.config.max_cycles {
                 return Ok(State::End(Some(GaveUp::OutOfCycles)));
             }
-            let target = self.modules.supervision.limits().nearest(&view.pose);
             self.cycles += 1;
-            last = if self.go_to(target, EventKind::Recovering(view.number))? == Went::Back {
-                LastLook::Barred
-            } else if let Some(sighting) = self.look()? {
-                return Ok(State::Reach(sighting));
-            } else {
-                LastLook::Nothing
-            };
+            match self.look_from(&view.pose, EventKind::Recovering(view.number))? {
+                Ok(ball) => return Ok(State::Reach(ball)),
+                Err(came) => last = came,
+            }
         }
         Ok(State::Search)
     }

@@ -34,14 +34,17 @@ impl Hand for Run<'_> {
     }
 
     fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError> {
-        let target = self.joints + delta;
+        let from = self.joints;
         let answer = self.devices.arm.move_by(delta);
-        self.go(Order::MoveBy(delta), answer, target, done)
+        let went = self.arrive(Order::MoveBy(delta), answer, from + delta, done)?;
+        self.back_if_near(went, from)
     }
 
     fn go_to(&mut self, target: Joints, done: EventKind) -> Result<Went, AgentError> {
+        let from = self.joints;
         let answer = self.devices.arm.move_to(target);
-        self.go(Order::MoveTo(target), answer, target, done)
+        let went = self.arrive(Order::MoveTo(target), answer, target, done)?;
+        self.back_if_near(went, from)
     }
 
     fn set_jaws(&mut self, jaws: Gripper) -> Result<(), AgentError> {
@@ -80,16 +83,7 @@ impl Run<'_> {
             .map(drop)
     }
 
-    /// What an order to go to `target` came to; the arm goes back if something is too near there.
-    fn go(
-        &mut self,
-        order: Order,
-        answer: Result<Joints, ArmError>,
-        target: Joints,
-        done: EventKind,
-    ) -> Result<Went, AgentError> {
-        let from = self.joints;
-        let went = self.arrive(order, answer, target, done)?;
+    fn back_if_near(&mut self, went: Went, from: Joints) -> Result<Went, AgentError> {
         if went == Went::Back {
             self.take_back(from)?;
         }
