@@ -85,6 +85,7 @@ mod run;
 mod servo;
 mod spec;
 mod task;
+mod taught_goal;
 mod watch;
 
 pub use hough_heuristic;
@@ -111,6 +112,7 @@ pub use reward::{Reward, RewardTerm};
 pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSettings};
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
 pub use task::BehaviourTask;
+pub use taught_goal::{Retargeted, TaughtGoal};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
