@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use grasp_agent::{Agent, AgentConfig, Controller, Event, EventKind, Outcome};
+use grasp_agent::{Agent, AgentConfig, Controller, Event, EventKind, Outcome, TaughtGoal};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Workspace};
 use puma_grasp::{BallDetector, Rig, TrialCell, bright_ball_scene};
@@ -76,6 +76,14 @@ impl World {
         }
     }
 
+    /// The goal as it shows where the jaws are around the ball; `None` where that is out of view. On the feature shortcut only.
+    pub(crate) fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, Box<dyn Error>> {
+        match self {
+            Self::Shortcut(cell) => Ok(cell.teach_goal(seed)?),
+            Self::Chain(_) => Ok(None),
+        }
+    }
+
     /// Lets `agent` go for the ball that `seed` places; `None` if no ball can be seen.
     pub(crate) fn run<C: Controller>(
         &mut self,
@@ -111,7 +119,7 @@ impl Chain {
             return Ok(None);
         };
         self.rig.clear_for(self.workspace.search_poses()[3])?;
-        self.rig.place(&ball);
+        self.rig.place(&ball)?;
         let mut reached = false;
         let outcome = self.rig.run_and_learn(agent, &mut *self.detector, &mut |event| {
             reached |= event.kind == EventKind::AtGoal;
