@@ -17,18 +17,26 @@ pub(crate) enum Balls {
 
 /// As `exploring_start`, with the ball in the arm's plane, or in the workspace only.
 fn start<R: Rng>(cell: &Cell, balls: Balls, rng: &mut R) -> Option<(Cell, Joints)> {
-    (0..100_000).find_map(|_| {
-        let (mut start, joints) = exploring_start(cell, rng)?;
-        let place = start.ball.centre;
-        match balls {
-            Balls::InWorkspace => Workspace::paper().contains(&place).then_some((start, joints)),
-            Balls::InPlane => {
-                // The camera sits 4.5 mm beside that plane, and the ball's radius of 20 mm shows as r.
-                let shown = start.features(&joints)?;
-                let x = 96.0 + shown.r * 4.5 / 20.0;
-                start.place_ball(cell.ball_showing(&joints, &Features { x, ..shown })?);
-                (start.circle(&joints).is_some() && start.reachable()).then_some((start, joints))
-            }
+    (0..100_000).find_map(|_| match balls {
+        Balls::InWorkspace => {
+            exploring_start(cell, rng).filter(|(start, _)| Workspace::paper().contains(&start.ball.centre))
+        }
+        Balls::InPlane => {
+            let (y, r) = (
+                rng.random_range(4.0..140.0),
+                rng.random_range(6.0_f64.ln()..60.0_f64.ln()).exp(),
+            );
+            // The camera sits 4.5 mm beside that plane, and the ball's radius of 20 mm shows as r.
+            let x = 96.0 + r * 4.5 / 20.0;
+            let jt3 = 170.0 + rng.random_range(-20.0..44.0);
+            let jt2 = rng.random_range(-125.0..-30.0);
+            let joints = Joints::from_degrees([0.0, jt2, jt3, 0.0, Cell::REACHING_JT5_DEGREES, 0.0]);
+            let mut start = *cell;
+            start.place_ball(cell.ball_showing(&joints, &Features { x, y, r })?);
+            let kept = start.ball.centre.z > start.table + start.ball.radius
+                && start.circle(&joints).is_some()
+                && start.reachable();
+            kept.then_some((start, joints))
         }
     })
 }
