@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use grasp_agent::{
     Agent, BehaviourSpec, Controller, EventKind, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
-    JacobianAt, Learned, LookAhead, Percept, PositionBased, ServoSettings,
+    JacobianAt, Learned, LookAhead, Percept, PositionBased, Retargeted, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
@@ -77,6 +77,10 @@ struct Options {
     #[arg(long)]
     grip: bool,
 
+    /// In each cell, show the goal on the arm first, the ball between the jaws, and let every controller have it
+    #[arg(long, conflicts_with = "full_chain")]
+    taught_goal: bool,
+
     /// Render frames, find the circle in them, and talk VAL II to an emulated controller
     #[arg(long)]
     full_chain: bool,
@@ -109,7 +113,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     println!("{}", Row::HEADER);
     for level in &options.levels {
-        let mut tallies = vec![Tally::default(); rivals.len()];
+        let (mut tallies, mut unshown) = (vec![Tally::default(); rivals.len()], 0);
         for draw in 0..options.draws {
             let errors = seed_of(options.seed, &[1, draw]);
             let new_world = || {
@@ -120,13 +124,23 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 }
             };
             let mut world = new_world()?;
+            let goal = if options.taught_goal {
+                world.teach_goal(seed_of(options.seed, &[5, draw]))?
+            } else {
+                None
+            };
+            // Where the goal cannot be shown, the cell is left with the one there is.
+            unshown += usize::from(options.taught_goal && goal.is_none());
+            let untaught = world.agent_config();
+            let config = goal.map_or(untaught.clone(), |goal| goal.applied_to(untaught));
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
                 let run_of = |run: String| format!("{level} {} cell {draw} {run}", rival.name);
                 let made = match rival.made {
-                    Made::Once(ref controller) => controller(),
+                    Made::Once(ref controller) => controller(goal.as_ref()),
                     Made::InEachCell => {
-                        let (hybrid, fault) =
-                            taught_hybrid(&mut world, seed_of(options.seed, &[2, draw]), options.moves)?;
+                        let agent = Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
+                        let seed = seed_of(options.seed, &[2, draw]);
+                        let (hybrid, fault) = taught_hybrid(&mut world, agent, seed, options.moves);
                         // What had been learned until then goes to work.
                         if let Some(Fault { run, log, error }) = fault {
                             failures.broken_off(&run_of(format!("teaching {run}")), &log, &*error)?;
@@ -136,7 +150,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     }
                 };
                 tally.begin_draw();
-                let mut agent = Agent::with_controller(world.agent_config(), made)?;
+                let mut agent = Agent::with_controller(config.clone(), made)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut log = EventLog::default();
@@ -178,6 +192,12 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             println!("{row}");
             rows.push(row);
         }
+        if unshown > 0 {
+            println!(
+                "{level}: in {unshown} of {} cells the ball between the jaws is out of the camera's view; the goal there is the untaught one",
+                options.draws
+            );
+        }
     }
     write_whole(&options.out.join("comparison.csv"), table::csv(&rows).as_bytes())?;
     write_whole(
@@ -218,58 +238,79 @@ struct Rival {
     made: Made,
 }
 
+/// Makes a controller for a goal that was taught, if one was.
+type Make = Box<dyn Fn(Option<&TaughtGoal>) -> Box<dyn Controller>>;
+
 enum Made {
     /// The same for every cell.
-    Once(Box<dyn Fn() -> Box<dyn Controller>>),
+    Once(Make),
     /// The hybrid, which learns each cell first.
     InEachCell,
 }
 
 fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
-    let servo = ServoSettings::paper();
-    let fixed = |name: &str, make: Box<dyn Fn() -> Box<dyn Controller>>| Rival {
+    let fixed = |name: &str, make: Make| Rival {
         name: name.into(),
         made: Made::Once(make),
     };
+    let servo = |gain: f64, goal: Option<&TaughtGoal>| {
+        let paper = ServoSettings::paper().with_gain(gain);
+        ServoSettings {
+            goal: goal.map_or(paper.goal, TaughtGoal::features),
+            ..paper
+        }
+    };
     let mut rivals = Vec::new();
     for (gain, tag) in [(1.0, "gain 1"), (0.5, "gain 0.5")] {
-        let servo = servo.with_gain(gain);
         rivals.push(fixed(
             &format!("position-based, {tag}"),
-            Box::new(move || Box::new(PositionBased::new(servo))),
+            Box::new(move |goal| Box::new(PositionBased::new(servo(gain, goal)))),
         ));
         for (at, which) in [(JacobianAt::Goal, "goal J"), (JacobianAt::Now, "current J")] {
             let name = format!("image-based {which}, {tag}");
             rivals.push(fixed(
                 &name,
-                Box::new(move || Box::new(ImageBased::new(servo, at))),
+                Box::new(move |goal| Box::new(ImageBased::new(servo(gain, goal), at))),
             ));
         }
     }
     for (gain, tag) in [(1.0, "gain 1"), (0.7, "gain 0.7"), (0.5, "gain 0.5")] {
-        let servo = servo.with_gain(gain);
         rivals.push(fixed(
             &format!("fuzzy, {tag}"),
-            Box::new(move || Box::new(Fuzzy::new(servo))),
+            Box::new(move |goal| Box::new(Fuzzy::new(servo(gain, goal)))),
         ));
     }
     rivals.push(fixed(
         "look-ahead",
-        Box::new(move || Box::new(LookAhead::new(servo))),
+        Box::new(move |goal| Box::new(LookAhead::new(servo(1.0, goal)))),
     ));
     for (name, learned) in learned(options)? {
-        rivals.push(fixed(name, Box::new(move || Box::new(learned.clone()))));
+        rivals.push(fixed(
+            name,
+            Box::new(move |goal| match goal {
+                None => Box::new(learned.clone()),
+                Some(goal) => Box::new(Retargeted::new(learned.clone(), *goal)),
+            }),
+        ));
     }
-    let untaught = Hybrid::new(HybridSettings::paper()).frozen();
     rivals.push(fixed(
         "hybrid, untaught",
-        Box::new(move || Box::new(untaught.clone())),
+        Box::new(|goal| Box::new(new_hybrid(goal).frozen())),
     ));
     rivals.push(Rival {
         name: "hybrid".into(),
         made: Made::InEachCell,
     });
     Ok(rivals)
+}
+
+/// The hybrid before it has made a move.
+fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
+    let hybrid = Hybrid::new(HybridSettings::paper());
+    match goal {
+        Some(goal) => hybrid.shown(goal),
+        None => hybrid,
+    }
 }
 
 /// The paper's controller, learned in simulation without errors: in the regression simulator, and in the exact plane.
@@ -324,12 +365,11 @@ struct Fault {
 /// The hybrid after at most `moves` moves in `cell`, learning nothing more; after fewer if a run was broken off.
 fn taught_hybrid(
     world: &mut World,
+    mut agent: Agent<Hybrid>,
     seed: u64,
     moves: usize,
-) -> Result<(Hybrid, Option<Fault>), Box<dyn Error>> {
-    let config = world.agent_config();
-    let longest = config.max_cycles;
-    let mut agent = Agent::with_controller(config, Hybrid::new(HybridSettings::paper()))?;
+) -> (Hybrid, Option<Fault>) {
+    let longest = agent.config().max_cycles;
     let (mut made, mut fault) = (0, None);
     for run in 0.. {
         // A run more could take this many moves; a ball found nowhere takes none.
@@ -345,7 +385,7 @@ fn taught_hybrid(
             }
         }
     }
-    Ok((agent.into_controller().frozen(), fault))
+    (agent.into_controller().frozen(), fault)
 }
 
 /// A seed of its own for each use.

@@ -54,6 +54,18 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 10)]
     seeds: u64,
 
+    /// The first of them
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    first_seed: u64,
+
+    /// Balls where the search finds them, to try what was learned on
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(1..))]
+    starts: u16,
+
+    /// Figure 6 and its table only
+    #[arg(long)]
+    learning_only: bool,
+
     /// Actions to learn by with the fine preset of 540 states
     #[arg(long, value_name = "N", default_value_t = 4_000_000)]
     fine: u64,
@@ -70,6 +82,10 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
     let taught = figure_6(options)?;
+    if options.learning_only {
+        println!("figures: {}", options.out.display());
+        return Ok(());
+    }
     figures_7_and_8(options, &taught)?;
     write_png(
         &options.out.join("figure9.png"),
@@ -84,18 +100,19 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 
 /// Learning, many seeds: curves of both behaviours, and how the learned tables do from the search poses.
 fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
-    let starts = search_starts(400, 1);
+    let starts = search_starts(usize::from(options.starts), options.first_seed.wrapping_add(1));
     let optimum = starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
     println!(
-        "Figure 6: approaching, learned with each simulator and reward, then tried in the exact plane from 400 starts of the search \
+        "Figure 6: approaching, learned with each simulator and reward, then tried in the exact plane from {} starts of the search \
          (breadth-first optimum {optimum:.2} steps, loop breaker {}); without search and recovery, so that a ball once lost stays lost",
+        starts.len(),
         Learned::APPROACHING_KAPPA
     );
     println!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
     let mut curves: Vec<(&str, Vec<Vec<Record>>)> =
         vec![("centering", Vec::new()), ("approaching", Vec::new())];
     let mut taught = None;
-    for seed in 0..options.seeds {
+    for seed in options.first_seed..options.first_seed.saturating_add(options.seeds) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let plane = ExactPlane::new(20_000, &mut rng);
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
@@ -112,7 +129,9 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let quiet = &mut |_: &qtable::Progress| ();
         let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
         let centering = learn_best(mended.centering, &rigid, &anywhere, 60_000, &mut rng, quiet)?;
-        let found = search_percepts(1_000, 1_000_000 + seed);
+        let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
+        // A table of more states has more corners in which a ball can be lost.
+        let more_found = search_percepts(10_000, seed.wrapping_add(1_000_000));
         let rng = &mut rng;
         let timed = |learn: &mut dyn FnMut() -> Result<Lesson, LearnError>| {
             let begin = cpu_time();
@@ -142,7 +161,9 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
             ),
             (
                 "exact plane, fine",
-                timed(&mut || plane.learn_best(fine.approaching.clone(), &found, options.fine, rng, quiet)),
+                timed(&mut || {
+                    plane.learn_best(fine.approaching.clone(), &more_found, options.fine, rng, quiet)
+                }),
             ),
             (
                 "rigid regression, mended",
@@ -168,7 +189,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     }
     let mut csv = String::from("behaviour,seed,actions,success_share,mean_td_error\n");
     for (name, seeds) in &curves {
-        for (seed, curve) in seeds.iter().enumerate() {
+        for (seed, curve) in (options.first_seed..).zip(seeds) {
             for record in curve {
                 let cell = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.5}"));
                 let (share, error) = (cell(record.success_share), cell(record.mean_td_error));

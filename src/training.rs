@@ -3,7 +3,7 @@
 use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Episode, Learned, Percept};
 use pipeline_sim::{CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample};
 use puma_val2::{Joint, JointDelta};
-use qtable::{Action, Progress, QTable, Record, Schedule, TrainConfig, TrainReport, train_in_blocks};
+use qtable::{Action, Progress, QTable, Record, Schedule, State, TrainConfig, TrainReport, train_in_blocks};
 use rand::{Rng, RngExt};
 
 /// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted to samples.
@@ -106,8 +106,8 @@ pub fn learn(
 }
 
 /// As [`learn`], and keeps the best of the tables met on the way: in the second half of the run, at every record of the learning
-/// curve, the greedy policy goes for the ball from each of `trials` in the simulator, and the table that needs the fewest steps stays.
-/// Without trials it is the last one.
+/// curve, the greedy policy goes for the ball from each of `trials` in the simulator, and the table that needs the fewest steps stays,
+/// with an action that lost the ball in a trial not chosen in its state any more. Without trials it is the last one.
 ///
 /// A table on coarse states is never at rest: with each update the policy may lose a way here and find one there.
 ///
@@ -190,9 +190,10 @@ pub(crate) fn learn_in(
         report.episodes += done.episodes;
         if !trials.is_empty() && 2 * to > config.actions {
             let behaviour = Behaviour::new(spec.clone(), table.clone())?;
-            let steps = steps_from(trials, &behaviour, &mut simulate);
-            if best.as_ref().is_none_or(|(fewest, ..)| steps < *fewest) {
-                best = Some((steps, to, table.clone()));
+            let fewest = best.as_ref().map_or(usize::MAX, |(fewest, ..)| *fewest);
+            let (tried, without) = without_losses(trials, behaviour, fewest, &mut simulate)?;
+            if tried.steps < fewest {
+                best = Some((tried.steps, to, without));
             }
         }
     }
@@ -213,36 +214,90 @@ fn between(schedule: &Schedule, from: u64, to: u64) -> Result<Schedule, qtable::
     Ok(Schedule::piecewise(&[(0, start), (to - from, end)])?)
 }
 
-/// Steps to the goal from all of `trials` together, greedy and with the loop breaker of approaching.
-fn steps_from(
-    trials: &[Percept],
-    behaviour: &Behaviour,
-    mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
-) -> usize {
+/// What the greedy policy, with the loop breaker of approaching, came to from a number of starts together.
+#[derive(Debug, Default)]
+struct Trials {
+    /// Steps to the goal; a trial that did not reach it counts as [`Trials::FAILED`].
+    steps: usize,
+    /// The states and actions that lost the ball.
+    lost_by: Vec<(State, Action)>,
+}
+
+impl Trials {
     const MOST: usize = 60;
-    /// What a trial counts that does not reach the goal: more than any detour.
-    const FAILED: usize = 5 * MOST;
-    let spec = behaviour.spec();
-    let deltas: Vec<JointDelta> = (0..spec.actions()).map(|a| spec.delta(Action(a))).collect();
-    let mut steps = |start: &Percept| {
-        let (mut now, mut episode) = (*start, Episode::new(behaviour));
-        for step in 0..MOST {
-            if spec.at_goal(&now) {
-                return Some(step);
+    /// More than any detour.
+    const FAILED: usize = 5 * Self::MOST;
+
+    fn of(
+        starts: &[Percept],
+        behaviour: &Behaviour,
+        mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+    ) -> Self {
+        let spec = behaviour.spec();
+        let deltas: Vec<JointDelta> = (0..spec.actions()).map(|a| spec.delta(Action(a))).collect();
+        let mut trials = Self::default();
+        let mut steps = |start: &Percept| {
+            let (mut now, mut episode) = (*start, Episode::new(behaviour));
+            for step in 0..Self::MOST {
+                if spec.at_goal(&now) {
+                    return Some(step);
+                }
+                let elbow = now.theta3 + THETA3_ZERO;
+                let admitted = |action: Action| {
+                    let turned = elbow + deltas[action.0][Joint::J3].to_degrees();
+                    (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
+                };
+                let state = spec.state(&now).ok()?;
+                let action = behaviour.choose(state, &episode, Learned::APPROACHING_KAPPA, admitted)?;
+                episode.chose(state, action);
+                let Some(after) = simulate(&now, &deltas[action.0]) else {
+                    trials.lost_by.push((state, action));
+                    return None;
+                };
+                now = after;
             }
-            let elbow = now.theta3 + THETA3_ZERO;
-            let admitted = |action: Action| {
-                let turned = elbow + deltas[action.0][Joint::J3].to_degrees();
-                (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
-            };
-            let state = spec.state(&now).ok()?;
-            let action = behaviour.choose(state, &episode, Learned::APPROACHING_KAPPA, admitted)?;
-            episode.chose(state, action);
-            now = simulate(&now, &deltas[action.0])?;
+            None
+        };
+        trials.steps = starts
+            .iter()
+            .map(|start| steps(start).unwrap_or(Self::FAILED))
+            .sum();
+        trials
+    }
+
+    /// Steps that no table can save by losing no ball any more.
+    fn at_least(&self) -> usize {
+        self.steps
+            .saturating_sub(Self::FAILED.saturating_mul(self.lost_by.len()))
+    }
+}
+
+/// `table` without the actions by which its greedy policy loses the ball from `starts`, and what it comes to then.
+///
+/// A state is a region, and an action that is the best in nearly all of it may lose the ball from one of its corners: on average that costs too
+/// little to be noticed. Such an action gets the lowest value of its state. Not done where even without losses it would take `fewest` steps or more.
+fn without_losses(
+    starts: &[Percept],
+    mut behaviour: Behaviour,
+    fewest: usize,
+    mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+) -> Result<(Trials, QTable), LearnError> {
+    /// What takes the place of an action may lose the ball as well.
+    const ROUNDS: usize = 5;
+    let mut tried = Trials::of(starts, &behaviour, &mut simulate);
+    for _ in 0..ROUNDS {
+        if tried.lost_by.is_empty() || tried.at_least() >= fewest {
+            break;
         }
-        None
-    };
-    trials.iter().map(|start| steps(start).unwrap_or(FAILED)).sum()
+        let mut table = behaviour.table().clone();
+        for (state, action) in &tried.lost_by {
+            let lowest = table.row(*state).iter().copied().fold(f64::INFINITY, f64::min);
+            table.set(*state, *action, lowest)?;
+        }
+        behaviour = Behaviour::new(behaviour.spec().clone(), table)?;
+        tried = Trials::of(starts, &behaviour, &mut simulate);
+    }
+    Ok((tried, behaviour.into_table()))
 }
 
 /// Why a behaviour could not be learned.
@@ -255,4 +310,61 @@ pub enum LearnError {
     /// What was learned does not fit the behaviour.
     #[error(transparent)]
     Behaviour(#[from] BehaviourError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use grasp_agent::{ArmPlane, CameraModel, JointLimits};
+    use hough_heuristic::Features;
+
+    #[test]
+    fn an_action_that_loses_the_ball_in_a_trial_is_not_chosen_in_its_state_any_more() {
+        let spec = BehaviourSpec::approaching_fine();
+        let seen = |y, r| Percept {
+            features: Features { x: 98.7, y, r },
+            theta3: 40.0,
+        };
+        // One state, from whose corner the longest move toward the ball loses it.
+        let (corner, inside) = (seen(73.2, 11.87), seen(67.0, 10.7));
+        let state = spec.state(&corner).expect("finite");
+        assert_eq!(spec.state(&inside).expect("finite"), state);
+        let actions = || (0..spec.actions()).map(Action);
+        let turns = |action: Action, j2: f64, j3: f64| {
+            let [_, a, b, ..] = spec.delta(action).degrees();
+            (a - j2).abs() < 1e-9 && (b - j3).abs() < 1e-9
+        };
+        let long = actions().find(|a| turns(*a, 20.0, -16.0)).expect("the paper's");
+        let short = actions().find(|a| turns(*a, 6.0, -1.6)).expect("the paper's");
+        let mut table = QTable::new(spec.states(), spec.actions()).expect("not empty");
+        table.set(state, long, 740.0).expect("in the table");
+        table.set(state, short, 700.0).expect("in the table");
+        let behaviour = Behaviour::new(spec, table).expect("fits");
+
+        let model = CameraModel::paper();
+        let mut plane = ArmPlane::new(&model, JointLimits::paper());
+        let sight = pipeline_sim::SightRule::default();
+        let mut simulate = |percept: &Percept, delta: &JointDelta| {
+            let after = plane.after(percept, delta)?;
+            sight.sees_features(&after.features).then_some(after)
+        };
+        let lost_by =
+            |behaviour: &Behaviour,
+             start: Percept,
+             simulate: &mut dyn FnMut(&Percept, &JointDelta) -> Option<Percept>| {
+                Trials::of(&[start], behaviour, simulate).lost_by
+            };
+        assert!(lost_by(&behaviour, corner, &mut simulate).contains(&(state, long)));
+        assert!(!lost_by(&behaviour, inside, &mut simulate).contains(&(state, long)));
+        let starts = [corner, inside];
+        let (_, table) =
+            without_losses(&starts, behaviour.clone(), usize::MAX, &mut simulate).expect("sets values");
+        let without = Behaviour::new(behaviour.spec().clone(), table).expect("fits");
+        let chosen = without.choose(state, &Episode::new(&without), 0.0, |_| true);
+        assert_eq!(chosen, Some(short));
+        // Where another table does better anyhow, nothing is changed.
+        let (_, table) =
+            without_losses(&starts, behaviour.clone(), 0, &mut simulate).expect("changes nothing");
+        assert_eq!(table, *behaviour.table());
+    }
 }

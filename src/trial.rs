@@ -1,11 +1,13 @@
 //! Trials on the feature shortcut: one ball in a cell that may be wrong, and an agent that goes for it, without rendering.
 
-use grasp_agent::{Agent, AgentConfig, AgentError, Controller, Event, Eye, Look, Outcome, Sighting};
+use grasp_agent::{
+    Agent, AgentConfig, AgentError, Controller, Event, Eye, ImageBased, Look, Outcome, Sighting, TaughtGoal,
+};
 use hough_heuristic::{Detection, Features, FrameError};
 use pipeline_sim::{
     Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Hand, SharedCell, SimulatedArm, Workspace,
 };
-use puma_val2::{ArmError, Joints, Manipulator, ProximitySensor};
+use puma_val2::{ArmError, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
@@ -124,6 +126,53 @@ impl TrialCell {
     /// The poses from which balls are looked for.
     pub fn search_poses(&self) -> [Joints; 6] {
         self.workspace.search_poses()
+    }
+
+    /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5` is taken back, and the camera looks a few
+    /// times. Where the ball is not well in view then, a shorter or a longer turn is tried. `None` where it is with none of them.
+    ///
+    /// # Errors
+    /// What the arm reports.
+    pub fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, ArmError> {
+        /// What is added to the grip's turn, degrees, in the order it is tried.
+        const TURNS: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
+        let from = Joints::from_degrees(ImageBased::GOAL_POSE);
+        let config = self.agent_config();
+        for more in TURNS {
+            let mut grip = config.grip;
+            grip.0[Joint::J5.index()] += more.to_radians();
+            if let Some(seen) = self.seen_after_taking_back(&grip, from, seed)? {
+                return Ok(TaughtGoal::new(&config.goal, seen, from, grip));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The ball as it shows on average from `from`, having been between the jaws when `grip` led there; `None` if it is not well in view.
+    fn seen_after_taking_back(
+        &self,
+        grip: &JointDelta,
+        from: Joints,
+        seed: u64,
+    ) -> Result<Option<Features>, ArmError> {
+        const LOOKS: usize = 20;
+        let shared = SharedCell::new(self.cell);
+        let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
+        arm.move_to(from + *grip)?;
+        let gripping = arm.pose()();
+        shared.with(|cell| cell.place_ball(cell.tool_point(&gripping)));
+        arm.move_to(from)?;
+        let mut camera = FeatureCamera::new(shared, arm.pose(), self.errors.feature_noise, seed);
+        let seen: Option<Vec<Features>> = (0..LOOKS).map(|_| camera.look()).collect();
+        let mean = |seen: Vec<Features>| {
+            let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / LOOKS as f64;
+            Features {
+                x: mean(|f| f.x),
+                y: mean(|f| f.y),
+                r: mean(|f| f.r),
+            }
+        };
+        Ok(seen.map(mean).filter(well_inside))
     }
 
     /// Lets `agent` go for the ball that `seed` places among those that can be seen from the search poses. `world` is called after each look,

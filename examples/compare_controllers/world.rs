@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use grasp_agent::{Agent, AgentConfig, Controller, Event, EventKind, Outcome};
+use grasp_agent::{Agent, AgentConfig, Controller, Event, EventKind, Outcome, TaughtGoal};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Workspace};
 use puma_grasp::{BallDetector, Rig, TrialCell, bright_ball_scene};
@@ -73,6 +73,14 @@ impl World {
                     ..paper
                 }
             }
+        }
+    }
+
+    /// The goal as it shows where the jaws are around the ball; `None` where that is out of view. On the feature shortcut only.
+    pub(crate) fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, Box<dyn Error>> {
+        match self {
+            Self::Shortcut(cell) => Ok(cell.teach_goal(seed)?),
+            Self::Chain(_) => Ok(None),
         }
     }
 

@@ -49,6 +49,11 @@ impl Behaviour {
         &self.table
     }
 
+    /// What it has learned, by itself.
+    pub fn into_table(self) -> QTable {
+        self.table
+    }
+
     /// The action with the highest Q in `state` after the loop breaker, among those that `allowed` admits.
     ///
     /// The loop breaker takes `kappa` off an action's Q when the same action has already been chosen in the same state during this

@@ -30,6 +30,16 @@ pub enum BehaviourError {
         /// The behaviour that was asked for.
         name: String,
     },
+    /// A setting that nothing can be learned by.
+    #[error("{quantity} of learning at work is {value}; it must be {allowed}")]
+    Learning {
+        /// Which one.
+        quantity: &'static str,
+        /// What was given.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// Text that is no behaviour, or none of the one asked for.
     #[error("this text is no behaviour that can be used here: {what}")]
     Text {

@@ -6,7 +6,8 @@ use qtable::rand::{RngExt, SeedableRng};
 use qtable::{Action, QTable, State};
 
 use crate::{
-    Behaviour, BehaviourSpec, Consequence, Controller, Episode, GaveUp, JointLimits, Percept, Situation,
+    Behaviour, BehaviourError, BehaviourSpec, Consequence, Controller, Episode, GaveUp, JointLimits, Percept,
+    Situation,
 };
 
 /// Centering and approaching (section 3 of the paper), each choosing for its own joints in every cycle.
@@ -22,20 +23,81 @@ pub struct Learned {
 
 /// How learning goes on at work.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Untested")
+)]
 pub struct OnlineLearning {
-    /// Discount factor \[0.9\], in 0..1.
-    pub gamma: f64,
-    /// Learning rate \[0.1\], in 0..=1.
-    pub alpha: f64,
-    /// Boltzmann temperature in units of Q \[0.3\], above zero; the higher, the more is tried.
-    pub temperature: f64,
-    /// Seed of what is tried.
-    pub seed: u64,
+    gamma: f64,
+    alpha: f64,
+    temperature: f64,
+    seed: u64,
+}
+
+/// The same as it comes from a file.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Untested {
+    gamma: f64,
+    alpha: f64,
+    temperature: f64,
+    seed: u64,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Untested> for OnlineLearning {
+    type Error = BehaviourError;
+
+    fn try_from(untested: Untested) -> Result<Self, BehaviourError> {
+        let Untested {
+            gamma,
+            alpha,
+            temperature,
+            seed,
+        } = untested;
+        Self::new(gamma, alpha, temperature, seed)
+    }
 }
 
 impl OnlineLearning {
-    /// The settings in the brackets of the fields: careful enough that what was learned in simulation is not forgotten.
+    /// With a discount factor, a learning rate, a Boltzmann temperature in units of Q, and the seed of what is tried.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Learning`] for a `gamma` that is not in 0..1 (at 1 a goal that is kept would be worth infinitely much), an `alpha` that is not
+    /// in 0..=1, a `temperature` that is not a finite number above zero.
+    pub fn new(gamma: f64, alpha: f64, temperature: f64, seed: u64) -> Result<Self, BehaviourError> {
+        let sound = [
+            (
+                "gamma",
+                gamma,
+                (0.0..1.0).contains(&gamma),
+                "0 or above, and below 1",
+            ),
+            ("alpha", alpha, (0.0..=1.0).contains(&alpha), "from 0 to 1"),
+            (
+                "temperature",
+                temperature,
+                temperature.is_finite() && temperature > 0.0,
+                "a finite number above 0",
+            ),
+        ];
+        match sound.into_iter().find(|(_, _, sound, _)| !sound) {
+            Some((quantity, value, _, allowed)) => Err(BehaviourError::Learning {
+                quantity,
+                value,
+                allowed,
+            }),
+            None => Ok(Self {
+                gamma,
+                alpha,
+                temperature,
+                seed,
+            }),
+        }
+    }
+
+    /// Discount factor 0.9, learning rate 0.1, temperature 0.3: careful enough that what was learned in simulation is not forgotten.
     pub fn careful(seed: u64) -> Self {
         Self {
             gamma: 0.9,
@@ -43,6 +105,26 @@ impl OnlineLearning {
             temperature: 0.3,
             seed,
         }
+    }
+
+    /// Discount factor, in 0..1.
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// Learning rate, in 0..=1.
+    pub fn alpha(&self) -> f64 {
+        self.alpha
+    }
+
+    /// Boltzmann temperature in units of Q, above zero; the higher, the more is tried.
+    pub fn temperature(&self) -> f64 {
+        self.temperature
+    }
+
+    /// Seed of what is tried.
+    pub fn seed(&self) -> u64 {
+        self.seed
     }
 }
 

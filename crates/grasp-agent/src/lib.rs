@@ -125,6 +125,7 @@ mod servo;
 mod spec;
 mod supervision;
 mod task;
+mod taught_goal;
 mod watch;
 
 pub use hough_heuristic;
@@ -157,6 +158,7 @@ pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSe
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
 pub use supervision::{Arrival, Guard, Supervision, Verdict};
 pub use task::BehaviourTask;
+pub use taught_goal::{Retargeted, TaughtGoal};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -57,7 +57,8 @@ impl BehaviourPair {
         }
     }
 
-    /// [`BehaviourPair::paper_mended`] with 540 states for approaching ([`BehaviourSpec::approaching_fine`]).
+    /// [`BehaviourPair::paper_mended`] with 540 states for approaching, and a lost ball that stays lost
+    /// ([`BehaviourSpec::approaching_fine`]).
     pub fn fine() -> Self {
         Self {
             approaching: BehaviourSpec::approaching_fine(),
@@ -109,7 +110,14 @@ mod tests {
         }
         assert!(!literal.approaching.reward.absorbing && mended.approaching.reward.absorbing);
         assert_eq!(literal.approaching.space, mended.approaching.space);
-        assert_eq!(mended.approaching.reward, fine.approaching.reward);
+        let lost = mended.approaching.reward.lost;
+        assert_eq!(
+            fine.approaching.reward,
+            Reward {
+                lost: 10.0 * lost,
+                ..mended.approaching.reward
+            }
+        );
     }
 
     /// From the gripper to the ball after the paper's turn of the fifth joint, at the worst place of the goal, metres.

@@ -1,6 +1,12 @@
 //! What is believed of camera, ball and gears: thirteen numbers and how sure they are.
 
-use nalgebra::{Isometry3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
+use hough_heuristic::Features;
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
+};
+use puma_val2::Joints;
+
+use super::fit::{sensitivity, vector};
 
 #[cfg(feature = "serde")]
 use crate::BehaviourError;
@@ -141,6 +147,46 @@ impl Belief {
             0.5 * (information + information.transpose()),
             self.noise,
         )
+    }
+
+    /// What is believed once a ball, known to be at `ball` but for `unsure` metres along each axis, has shown as `features` with the arm at
+    /// `joints`; the same as before where that cannot be.
+    pub(crate) fn having_seen(
+        self,
+        nominal: &CameraModel,
+        joints: &Joints,
+        (ball, unsure): (&Point3<f64>, f64),
+        features: &Features,
+    ) -> Self {
+        const ITERATIONS: usize = 10;
+        let (before, prior) = (self.numbers(), self.information_matrix());
+        let view = |numbers: &Numbers, ball: &Point3<f64>| corrected(nominal, numbers).view(joints, ball);
+        let (mut numbers, mut information) = (before, prior);
+        for _ in 0..ITERATIONS {
+            let Some((expected, by_all)) = sensitivity(&numbers, ball, view) else {
+                return self;
+            };
+            let by_numbers = by_all.fixed_columns::<LEARNED>(0);
+            let by_place = by_all.fixed_columns::<3>(LEARNED);
+            let spread =
+                Matrix3::identity() * self.noise.powi(2) + by_place * by_place.transpose() * unsure.powi(2);
+            let Some(weight) = spread.try_inverse() else {
+                return self;
+            };
+            let off = vector(features) - vector(&expected);
+            information = prior + by_numbers.transpose() * weight * by_numbers;
+            let gradient = by_numbers.transpose() * weight * off - prior * (numbers - before);
+            let Some(step) = information.cholesky().map(|c| c.solve(&gradient)) else {
+                return self;
+            };
+            numbers += step;
+        }
+        let finite = numbers.iter().chain(information.iter()).all(|v| v.is_finite());
+        if finite {
+            Self::of(numbers, information, self.noise)
+        } else {
+            self
+        }
     }
 
     pub(crate) fn with_noise(self, noise: f64) -> Self {

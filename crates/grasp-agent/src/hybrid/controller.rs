@@ -7,7 +7,7 @@ use puma_val2::{Joint, JointDelta, Joints};
 use super::belief::{Belief, Numbers, Prior, corrected};
 use super::evidence::{Evidence, Links};
 use super::fit::{Fit, WITH_BALL, deviations, sensitivity};
-use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits};
+use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits, TaughtGoal};
 
 /// What a [`Hybrid`] is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +100,8 @@ const MOVED: (f64, f64) = (5.0, 3.0);
 const FAR_OFF: f64 = 40.0;
 /// For so many sightings after it has moved, a ball that has moved again is believed at once.
 const STILL_MOVING: usize = 3;
+/// A ball that is shown between the jaws is in their middle to so many metres.
+const SHOWN: f64 = 0.002;
 /// Room to the border of the frame, feature units.
 const MARGIN: f64 = 4.0;
 /// Radius up to which a ball is far enough to be seen, and the largest that a move may lead to, feature units.
@@ -138,6 +140,19 @@ impl Hybrid {
             moving: 0,
             grips: 0,
         }
+    }
+
+    /// The same with a goal that was shown on the arm. That the ball was between the jaws then says much of the camera: the jaws are where the
+    /// arm says they are.
+    #[must_use]
+    pub fn shown(mut self, goal: &TaughtGoal) -> Self {
+        let (nominal, from) = (&self.settings.nominal, goal.seen_from());
+        let ball = nominal.tool_point(&(from + goal.grip()));
+        let seen = |belief: Belief| belief.having_seen(nominal, &from, (&ball, SHOWN), &goal.features());
+        (self.before, self.belief) = (seen(self.before), seen(self.belief));
+        self.settings.goal = goal.features();
+        self.settings.grip_turn = goal.grip()[Joint::J5];
+        self
     }
 
     /// The same, learning nothing from one run to the next any more.

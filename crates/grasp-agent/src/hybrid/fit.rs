@@ -122,7 +122,7 @@ fn seen(model: &CameraModel, wrist: &Isometry3<f64>, ball: &Point3<f64>) -> Opti
     model.outline(&place).map(|f| vector(&f))
 }
 
-fn vector(f: &Features) -> Vector3<f64> {
+pub(crate) fn vector(f: &Features) -> Vector3<f64> {
     Vector3::new(f.x, f.y, f.r)
 }
 

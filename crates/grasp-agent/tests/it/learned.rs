@@ -2,7 +2,8 @@
 
 use grasp_agent::qtable::QTable;
 use grasp_agent::{
-    Agent, Behaviour, BehaviourSpec, CameraModel, EventKind, EventLog, Learned, OnlineLearning,
+    Agent, Behaviour, BehaviourError, BehaviourSpec, CameraModel, EventKind, EventLog, Learned,
+    OnlineLearning,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -28,10 +29,7 @@ fn learning_goes_on_within_the_limits_until_it_is_frozen() {
             blank(BehaviourSpec::approaching()),
         )
     };
-    let settings = OnlineLearning {
-        temperature: 10.0,
-        ..OnlineLearning::careful(5)
-    };
+    let settings = OnlineLearning::new(0.9, 0.1, 10.0, 5).unwrap();
     let mut agent = Agent::with_controller(config(), new().learning(settings)).unwrap();
     let mut log = EventLog::default();
     some_runs(&mut agent, &mut log);
@@ -67,4 +65,39 @@ fn a_loop_breaker_that_is_none_counts_as_0() {
     for kappa in [f64::INFINITY, f64::NAN, -1.0] {
         assert_eq!(learned.clone().with_kappa(kappa, 7.0).kappa(), (0.0, 7.0));
     }
+}
+
+#[test]
+fn settings_by_which_nothing_can_be_learned_are_refused_by_name() {
+    let careful = OnlineLearning::careful(3);
+    let [gamma, alpha, temperature] = [careful.gamma(), careful.alpha(), careful.temperature()];
+    assert_eq!(
+        OnlineLearning::new(gamma, alpha, temperature, careful.seed()).unwrap(),
+        careful
+    );
+    assert!(OnlineLearning::new(0.0, 1.0, 1e-9, 0).is_ok());
+    let (nan, infinite) = (f64::NAN, f64::INFINITY);
+    let refused = |gamma, alpha, temperature| match OnlineLearning::new(gamma, alpha, temperature, 0) {
+        Err(BehaviourError::Learning { quantity, .. }) => quantity,
+        other => panic!("{other:?}"),
+    };
+    for bad in [1.0, 1.5, -0.1, nan, infinite] {
+        assert_eq!(refused(bad, alpha, temperature), "gamma", "{bad}");
+    }
+    for bad in [1.1, -0.1, nan, infinite] {
+        assert_eq!(refused(gamma, bad, temperature), "alpha", "{bad}");
+    }
+    for bad in [0.0, -1.0, nan, infinite] {
+        assert_eq!(refused(gamma, alpha, bad), "temperature", "{bad}");
+    }
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn settings_from_a_file_are_tested_like_others() {
+    let careful = OnlineLearning::careful(3);
+    let json = serde_json::to_string(&careful).unwrap();
+    assert_eq!(serde_json::from_str::<OnlineLearning>(&json).unwrap(), careful);
+    let refused = serde_json::from_str::<OnlineLearning>(&json.replace("0.9", "1.0")).unwrap_err();
+    assert!(refused.to_string().contains("gamma"), "{refused}");
 }
