@@ -115,7 +115,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             half_length: 0.5e-3 * options.length,
             heading: rng.random_range(0.0..std::f64::consts::PI),
         };
-        rig.place(&place);
+        rig.place_making_room(&place)?;
         let (cell, pose) = (rig.cell().clone(), rig.pose());
         let RigParts {
             camera,

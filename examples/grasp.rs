@@ -20,7 +20,7 @@ use std::time::Instant;
 use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind, JointLimits,
-    Learned, OnlineLearning, Outcome, Percept,
+    Learned, OnlineLearning, Outcome, Percept, SavedController, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -80,6 +80,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     let frames = Frames::new(&options.out.join("frames"))?;
     let failures = emptied(&options.out.join("failures"))?;
+    let saved_runs = emptied(&options.out.join("saved"))?;
     let mut detector = options.detector.build(options.seed)?;
     let pair = behaviours(options)?;
     let loaded = options
@@ -122,12 +123,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         ..AgentConfig::paper(workspace.search_poses())
     };
     let stages = Stages::default();
-    let learned = stages.around(if options.keep_learning {
-        taught.learned.learning(OnlineLearning::careful(options.seed))
-    } else {
-        taught.learned
-    });
-    let mut agent = Agent::with_controller(config, learned)?;
+    let mut agent = Agent::with_controller(config, stages.around(taught.learned))?;
     let mut records = Vec::new();
     let mut sheet = ContactSheet::default();
     // What has been done until a fault is worth keeping.
@@ -138,7 +134,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             broken_off = Some("no place of the workspace is in view from a search pose".into());
             break;
         };
-        let mut record = RunRecord::new((ball.centre.coords * 1000.0).into());
+        // Each run tries by a seed of its own, so that it can be made again without those before it.
+        let learning = options
+            .keep_learning
+            .then(|| OnlineLearning::careful(options.seed.wrapping_add(run as u64)));
+        let learned = &mut agent.controller_mut().inner;
+        let controller = SavedController::of_learned(learned, learning);
+        if let Some(settings) = learning {
+            *learned = learned.clone().learning(settings);
+        }
+        let saved = SavedRun::before(&agent, controller);
+        let mut record = RunRecord::new((ball.centre.coords * 1000.0).into(), saved);
         let cell = rig.cell().clone();
         let done = reach_for(&mut agent, &mut rig, &mut *detector, &ball, &mut |event| {
             if let EventKind::Gripping(_) = event.kind {
@@ -163,14 +169,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 record.fault = Some(error.to_string());
             }
         }
-        if !record.grasped {
-            let path = failures.join(format!("run{run:03}.json"));
-            let kept = serde_json::to_vec_pretty(&record.log)
-                .map_err(Box::from)
-                .and_then(|log| write_whole(&path, &log));
-            if let Err(error) = kept {
+        for (folder, keep) in [(&failures, !record.grasped), (&saved_runs, options.save_runs)] {
+            let path = folder.join(format!("run{run:03}.json"));
+            if keep && let Err(error) = write_whole(&path, record.saved.to_json().as_bytes()) {
                 // No reason to lose what was learned.
-                broken_off.get_or_insert(format!("the events of run {run} were not kept: {error}"));
+                broken_off.get_or_insert(format!("run {run} was not kept: {error}"));
             }
         }
         records.push(record);
@@ -372,7 +375,7 @@ fn reach_for(
     ball: &Ball,
     observe: &mut Observe<'_>,
 ) -> Result<Outcome, Box<dyn Error>> {
-    rig.place(ball);
+    rig.place_making_room(ball)?;
     let stages = agent.controller().stages.clone();
     let RigParts {
         camera,

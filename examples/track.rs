@@ -17,7 +17,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, Hybrid, HybridSettings, Outcome,
+    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, Hybrid, HybridSettings, Outcome,
+    SavedController, SavedRun,
 };
 use hough_heuristic::{CircleDetector, Features};
 use image::GrayImage;
@@ -50,7 +51,7 @@ mod tally;
 /// that failed before that counts as failed.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the event logs of runs that failed or collided
+    /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the runs that failed or collided, for the example replay
     #[arg(long, value_name = "DIR", default_value = "out/track")]
     out: PathBuf,
 
@@ -78,7 +79,7 @@ struct Options {
     #[arg(long, value_name = "NAME", default_value_t, conflicts_with = "shortcut")]
     detector: BallDetector,
 
-    /// No frames and no line: features straight from the geometry. Only the event logs are written, and collisions are not counted
+    /// No frames and no line: features straight from the geometry. Only runs that failed are written, and collisions are not counted
     #[arg(long)]
     shortcut: bool,
 
@@ -161,10 +162,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     done
 }
 
-/// Writes what happened in a run that is worth looking into, and says where.
-fn keep_log(folder: &Path, name: &str, log: &EventLog) -> Result<String, Box<dyn Error>> {
+/// Writes what happened in a run that is worth looking into, for the example `replay`, and says where.
+fn keep_run(folder: &Path, name: &str, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
     let file = folder.join(format!("{name}.json"));
-    write_whole(&file, &serde_json::to_vec_pretty(log)?)?;
+    write_whole(&file, saved.to_json().as_bytes())?;
     Ok(format!("events: {}", file.display()))
 }
 
@@ -209,17 +210,17 @@ impl Chain<'_> {
             let (ball, _) = workspace
                 .sample_seen_ball(&rig.cell().get(), &mut rng)
                 .ok_or("no place of the workspace is in view from a search pose")?;
-            rig.place(&ball);
+            rig.place_making_room(&ball)?;
             let fate = if teaching { Fate::Rest } else { options.ball };
             let mut world = World::new(fate, rng.random());
             let counted = (!teaching).then(|| self.tally.runs() + 1);
-            let (end, log) = self.run(&mut agent, &mut rig, &mut world, counted);
+            let (end, saved) = self.run(&mut agent, &mut rig, &mut world, counted);
             // Whatever it ended with: what was learned until then is kept.
             let learned = agent.controller().inner.belief();
             learned.save(&options.out.join("camera.belief"))?;
             let Some(number) = counted else {
                 if let Err(error) = end {
-                    let kept = keep_log(&options.out, "teaching", &log)?;
+                    let kept = keep_run(&options.out, "teaching", &saved)?;
                     return Err(format!("teaching was broken off: {error}; {kept}").into());
                 }
                 continue;
@@ -230,7 +231,8 @@ impl Chain<'_> {
                 happened: world.has_happened(),
                 success,
                 moves: end.as_ref().map_or(0, |outcome| outcome.cycles),
-                near: log
+                near: saved
+                    .log()
                     .events
                     .iter()
                     .filter(|event| event.kind == EventKind::TooNear)
@@ -238,7 +240,7 @@ impl Chain<'_> {
                 collisions: Some(contacts.collisions),
             });
             if !success || contacts.collisions > 0 {
-                let kept = keep_log(&options.out, &format!("run-{number:03}"), &log)?;
+                let kept = keep_run(&options.out, &format!("run-{number:03}"), &saved)?;
                 let what = if success { "collision" } else { "not grasped" };
                 println!("run {number}: {what}: {end:?}, {contacts:?}; {kept}");
             }
@@ -253,8 +255,9 @@ impl Chain<'_> {
         rig: &mut Rig,
         world: &mut World,
         counted: Option<usize>,
-    ) -> (Result<Outcome, AgentError>, EventLog) {
-        let (shared, mut log, mut gripped) = (rig.cell().clone(), EventLog::default(), false);
+    ) -> (Result<Outcome, AgentError>, SavedRun) {
+        let mut saved = SavedRun::before(agent, SavedController::of_hybrid(&agent.controller().inner));
+        let (shared, mut gripped) = (rig.cell().clone(), false);
         let (csv, film) = (&mut self.csv, &mut self.film);
         let RigParts {
             camera,
@@ -269,7 +272,7 @@ impl Chain<'_> {
         );
         let mut eye = CameraEye::new(&mut camera, &mut detector);
         let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
-            log.note(event);
+            saved.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),
                 EventKind::Gripped => gripped = true,
@@ -291,7 +294,7 @@ impl Chain<'_> {
                 film.push(resize(frame, width, height, FilterType::Triangle));
             }
         });
-        (end, log)
+        (end, saved)
     }
 }
 

@@ -48,7 +48,7 @@ pub use puma_val2;
 pub use qtable;
 
 pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts};
-pub use rig::{Rig, RigError, RigParts};
+pub use rig::{PlaceError, Rig, RigError, RigParts};
 pub use setup::{BallDetector, UnknownDetector, bright_ball_scene};
 pub use surroundings::Contacts;
 pub use training::{LearnError, Lesson, Simulator, learn, learn_best, schedule};

@@ -174,9 +174,43 @@ impl Rig {
     }
 
     /// Puts the ball, on a holder, at another place, out of the jaws if they held it; contacts are counted from here on.
-    pub fn place(&mut self, ball: &Ball) {
-        self.cell.with(|cell| cell.place_ball(ball.centre));
+    ///
+    /// # Errors
+    /// [`PlaceError::InHand`] where ball or holder would stand in the hand, which rests there; then nothing has changed.
+    pub fn place(&mut self, ball: &Ball) -> Result<(), PlaceError> {
+        let joints = (self.pose)();
+        let placed = self.cell.with(|cell| {
+            let (mut there, mut nowhere) = (*cell, *cell);
+            there.place_ball(ball.centre);
+            take_away(&mut nowhere);
+            // A hand that overlaps the table does so wherever the ball is.
+            let free = !there.collides(&joints) || nowhere.collides(&joints);
+            if free {
+                *cell = there;
+            }
+            free
+        });
+        if !placed {
+            return Err(PlaceError::InHand {
+                ball_mm: (ball.centre.coords * 1000.0).into(),
+            });
+        }
         self.surroundings.begin();
+        Ok(())
+    }
+
+    /// As [`Rig::place`]; where the hand is in the way the arm first goes to VAL's READY pose, straight up.
+    ///
+    /// # Errors
+    /// What kept the arm from getting there.
+    pub fn place_making_room(&mut self, ball: &Ball) -> Result<(), PlaceError> {
+        match self.place(ball) {
+            Err(PlaceError::InHand { .. }) => {
+                self.clear_for(Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]))?;
+                self.place(ball)
+            }
+            placed => placed,
+        }
     }
 
     /// Takes the ball and its holder out of the cell, opens the jaws, and takes the arm to `pose`; then the next ball can be placed.
@@ -184,10 +218,7 @@ impl Rig {
     /// # Errors
     /// What kept the arm from getting there.
     pub fn clear_for(&mut self, pose: Joints) -> Result<(), ArmError> {
-        self.cell.with(|cell| {
-            cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
-            cell.holder = None;
-        });
+        self.cell.with(take_away);
         self.arm.set_gripper(Gripper::Open)?;
         match self.arm.move_to(pose) {
             // An arm that stood close to what has just been taken away.
@@ -286,6 +317,12 @@ impl std::fmt::Debug for Rig {
     }
 }
 
+/// Takes the ball and its holder out of the cell.
+fn take_away(cell: &mut Cell) {
+    cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
+    cell.holder = None;
+}
+
 /// The cell that a rig begins with.
 fn paper_cell() -> SharedCell {
     SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)))
@@ -364,6 +401,24 @@ impl<M: Manipulator> Manipulator for ArmInCell<M> {
     fn stop(&mut self) -> Result<(), ArmError> {
         self.arm.stop()
     }
+}
+
+/// Why a ball could not be placed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlaceError {
+    /// Ball or holder would stand in the hand.
+    #[error(
+        "a ball at {:.0} {:.0} {:.0} mm would stand in the hand, which rests there; take the arm away first",
+        ball_mm[0], ball_mm[1], ball_mm[2]
+    )]
+    InHand {
+        /// The ball's centre, millimetres.
+        ball_mm: [f64; 3],
+    },
+    /// The arm could not be taken away.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
 }
 
 /// Why a rig could not be set up.

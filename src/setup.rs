@@ -68,6 +68,7 @@ impl BallDetector {
                     min_radius: RADII.0,
                     max_radius: RADII.1,
                     max_circles: 1,
+                    min_score: MIN_SCORE,
                     seed,
                     ..TrustedConfig::default()
                 };
@@ -102,6 +103,10 @@ impl BallDetector {
         })
     }
 }
+
+/// Least score of a circle that the arm goes for. An arm looks at many frames without a ball in them and follows what it sees: a curve of the
+/// clutter that scores half leads it astray, while the ball itself scores above .9 unless the border cuts it.
+const MIN_SCORE: f64 = 0.8;
 
 /// The shaded side of the ball is hardly brighter than the table: edges must be taken that are weaker than usual.
 fn weak_edges() -> Result<Canny, ConfigError> {

@@ -11,7 +11,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use grasp_agent::{
-    Behaviour, BehaviourPair, BehaviourSpec, EventKind, EventLog, JointLimits, Learned, YGoal,
+    Behaviour, BehaviourPair, BehaviourSpec, EventKind, JointLimits, Learned, SavedRun, YGoal,
 };
 use qtable::QTable;
 
@@ -246,9 +246,10 @@ fn grasp_keeps_what_it_has_when_the_controller_dies() {
         errors.contains("run 1 was broken off: the arm failed"),
         "{errors}"
     );
-    let log = std::fs::read(out.join("failures/run001.json")).expect("the log of the run");
-    let log: EventLog = serde_json::from_slice(&log).expect("a log");
-    let last = &log.events.last().expect("an event").kind;
+    let file = out.join("failures/run001.json");
+    let text = std::fs::read_to_string(&file).expect("the run");
+    let saved = SavedRun::from_json(&text).expect("a saved run");
+    let last = &saved.log().events.last().expect("an event").kind;
     assert!(
         matches!(last, EventKind::Failed(cause) if errors.contains(cause.as_str())),
         "{last:?}"
@@ -262,6 +263,42 @@ fn grasp_keeps_what_it_has_when_the_controller_dies() {
     let learned = std::fs::read_to_string(folder.path().join("learned.json")).expect("the export");
     Learned::from_json(&learned).expect("a policy");
     assert!(out.join("summary.json").exists());
+    replays(&file, &text);
+}
+
+/// Another program makes a run of which the arm failed again from the file alone, and sees whether something is changed in it.
+fn replays(file: &Path, text: &str) {
+    let replayed = |file: &Path, options: &[&str]| {
+        let (again, errors) = output(example("replay")?.args(options).arg(file));
+        Some((
+            again.status.code(),
+            String::from_utf8_lossy(&again.stdout).into_owned(),
+            errors,
+        ))
+    };
+    let Some((code, said, errors)) = replayed(file, &[]) else {
+        return;
+    };
+    assert_eq!(code, Some(0), "{said}{errors}");
+    assert!(
+        said.contains("the same") && said.contains("the arm failed"),
+        "{said}"
+    );
+
+    let other = file.with_file_name("other.json");
+    std::fs::write(&other, text.replacen("\"AtSearchPose\":", "\"Recovering\":", 1)).expect("a file");
+    let (code, said, errors) = replayed(&other, &["--events"]).expect("it was there");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("another course from event 2 on"), "{said}");
+    assert!(errors.starts_with("error: 1 of 1 runs"), "{errors}");
+
+    std::fs::write(&other, &text[..text.len() / 2]).expect("a file");
+    let (code, _, errors) = replayed(&other, &[]).expect("it was there");
+    assert_eq!(code, Some(1), "{errors}");
+    assert!(
+        errors.contains("other.json") && errors.contains("no saved run"),
+        "{errors}"
+    );
 }
 
 #[test]

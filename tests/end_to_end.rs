@@ -50,7 +50,7 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
             let (ball, _) = Workspace::paper()
                 .sample_seen_ball(&cell, &mut rng)
                 .expect("a ball in view");
-            rig.place(&ball);
+            rig.place(&ball).expect("away from the hand");
             let outcome = rig
                 .run(&agent, &mut *detector(), &mut |event| {
                     log.push((event.kind.clone(), event.joints));
@@ -74,7 +74,7 @@ fn a_ball_out_of_view_is_reported_and_not_gripped() {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
     let agent = agent(&rig, 1);
     // Behind the arm.
-    rig.place(&Ball::at(-0.6, 0.0, -0.1));
+    rig.place(&Ball::at(-0.6, 0.0, -0.1)).expect("away from the hand");
     let mut searched = Vec::new();
     let outcome = rig
         .run(&agent, &mut *detector(), &mut |event| {

@@ -18,7 +18,8 @@ const BEHIND_THE_ARM: [f64; 3] = [-0.6, 0.0, -0.1];
 
 fn rig(ball: [f64; 3]) -> Rig {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), 5).expect("an emulated controller");
-    rig.place(&Ball::at(ball[0], ball[1], ball[2]));
+    rig.place(&Ball::at(ball[0], ball[1], ball[2]))
+        .expect("away from the hand");
     rig
 }
 
@@ -296,7 +297,8 @@ fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
         let server = PtyServer::spawn(emulator, ServeConfig::default()).expect("a pseudo-terminal");
         let path = server.path().to_string_lossy().into_owned();
         let mut rig = Rig::on_port(&path, &bright_ball_scene(), 5).expect("the controller answers");
-        rig.place(&Ball::at(IN_VIEW[0], IN_VIEW[1], IN_VIEW[2]));
+        rig.place(&Ball::at(IN_VIEW[0], IN_VIEW[1], IN_VIEW[2]))
+            .expect("away from the hand");
         let (mut agent, mut log, mut moves) = (agent(), EventLog::default(), 0);
         let mut server = Some(server);
         let mut detector = BallDetector::Trusted.build(1).expect("valid settings");

@@ -6,7 +6,7 @@ use grasp_agent::{
     ServoSettings, Situation,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, FeatureCamera, Grasp, Workspace};
-use puma_grasp::{FeatureEye, Rig, RigParts, TrialCell, bright_ball_scene};
+use puma_grasp::{FeatureEye, PlaceError, Rig, RigParts, TrialCell, bright_ball_scene};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints};
 
 fn rig() -> Rig {
@@ -30,7 +30,7 @@ fn ball_and_goal() -> (Ball, Joints, Joints) {
 fn the_controller_stops_the_arm_before_a_ball_in_its_way_and_the_guard_is_armed_again() {
     let (ball, goal, grip) = ball_and_goal();
     let mut rig = rig();
-    rig.place(&ball);
+    rig.place(&ball).expect("away from the hand");
     // Beside the ball, with a finger on each side of where it is not, and slowly toward it.
     let beside = grip + JointDelta::from_degrees([4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let across = JointDelta::from_degrees([-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -56,7 +56,7 @@ fn the_controller_stops_the_arm_before_a_ball_in_its_way_and_the_guard_is_armed_
 fn the_ball_goes_with_the_jaws_and_is_pushed_by_fingers() {
     let (ball, goal, grip) = ball_and_goal();
     let mut rig = rig();
-    rig.place(&ball);
+    rig.place(&ball).expect("away from the hand");
     {
         let RigParts { arm, .. } = rig.parts();
         arm.move_to(goal).expect("free");
@@ -70,8 +70,26 @@ fn the_ball_goes_with_the_jaws_and_is_pushed_by_fingers() {
     assert_eq!((contacts.collisions, contacts.grasp), (0, Some(Grasp::Held)));
     assert!((rig.cell().get().ball.centre - ball.centre).norm() > 0.1);
     // Placed elsewhere, it is out of the jaws, and what comes of it is counted anew.
-    rig.place(&ball);
+    rig.place(&ball).expect("away from the hand");
     assert!(!rig.holds_ball() && rig.contacts().grasp.is_none());
+}
+
+#[test]
+fn a_ball_is_not_placed_in_the_hand() {
+    let (ball, _, grip) = ball_and_goal();
+    let mut rig = rig();
+    rig.place(&Ball::at(-0.6, 0.0, -0.1)).expect("away from the hand");
+    rig.parts().arm.move_to(grip).expect("free");
+    let before = rig.cell().get();
+    // With the hand a finger's width to the side.
+    let aside = Ball::at(ball.centre.x, ball.centre.y + 0.04, ball.centre.z);
+    let refused = rig.place(&aside).expect_err("a finger is there");
+    assert!(matches!(refused, PlaceError::InHand { .. }), "{refused}");
+    assert_eq!(rig.cell().get(), before);
+    rig.place_making_room(&aside).expect("the arm makes room");
+    assert!((rig.cell().get().ball.centre - aside.centre).norm() < 1e-9);
+    let (joints, cell) = (rig.pose()(), rig.cell().get());
+    assert!(!cell.collides(&joints));
 }
 
 /// Servoing that once, with the ball near, drives a finger onto it.
@@ -114,7 +132,7 @@ fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
     let config = AgentConfig::paper(Workspace::paper().search_poses());
     let mut agent = Agent::with_controller(config, Clumsy::default()).expect("valid settings");
     for ball in [Ball::at(0.6, 0.1, -0.1), Ball::at(0.55, -0.2, -0.05)] {
-        rig.place(&ball);
+        rig.place(&ball).expect("away from the hand");
         let mut eye = FeatureEye(FeatureCamera::new(rig.cell().clone(), rig.pose(), 0.0, 1));
         let mut log = EventLog::default();
         let RigParts { arm, mut sensor, .. } = rig.parts();

@@ -119,7 +119,7 @@ impl Chain {
             return Ok(None);
         };
         self.rig.clear_for(self.workspace.search_poses()[3])?;
-        self.rig.place(&ball);
+        self.rig.place(&ball)?;
         let mut reached = false;
         let outcome = self.rig.run_and_learn(agent, &mut *self.detector, &mut |event| {
             reached |= event.kind == EventKind::AtGoal;

@@ -13,7 +13,7 @@ use puma_grasp::BallDetector;
 /// camera's frames are rendered from the pose of the emulated arm.
 #[derive(Parser, Debug)]
 pub(crate) struct Options {
-    /// Folder for the results, among them the event log of each run that failed (failures/); made if need be, files of an earlier run in it are replaced
+    /// Folder for the results, among them each run that failed, for the example replay (failures/); made if need be, files of an earlier run in it are replaced
     #[arg(long, value_name = "DIR", default_value = "out/grasp")]
     pub(crate) out: PathBuf,
 
@@ -41,6 +41,10 @@ pub(crate) struct Options {
     /// Write the policy as JSON that other programs can run, as docs/run_policy.py does
     #[arg(long, value_name = "FILE")]
     pub(crate) export: Option<PathBuf>,
+
+    /// Keep every run for the example replay (saved/), not only those that fail
+    #[arg(long)]
+    pub(crate) save_runs: bool,
 
     /// Go on learning at work, and save what was learned to the output folder
     #[arg(long)]

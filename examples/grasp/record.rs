@@ -1,6 +1,6 @@
 //! Keeps what happens in the runs: a row an event, a picture a frame.
 
-use grasp_agent::{Event, EventKind, EventLog, Outcome};
+use grasp_agent::{Event, EventKind, Outcome, SavedRun};
 use hough_heuristic::Features;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
@@ -14,7 +14,7 @@ pub(crate) struct RunRecord {
     pub(crate) ball_mm: [f64; 3],
     pub(crate) rows: Vec<Row>,
     /// The same, complete: it can be replayed.
-    pub(crate) log: EventLog,
+    pub(crate) saved: SavedRun,
     /// Frames looked at.
     frames: usize,
     /// Whether the jaws are closed: what is seen then is not the ball, or is about to be told to have been missed.
@@ -51,11 +51,11 @@ pub(crate) struct Picture {
 }
 
 impl RunRecord {
-    pub(crate) fn new(ball_mm: [f64; 3]) -> Self {
+    pub(crate) fn new(ball_mm: [f64; 3], saved: SavedRun) -> Self {
         Self {
             ball_mm,
             rows: Vec::new(),
-            log: EventLog::default(),
+            saved,
             frames: 0,
             gripped: false,
             outcome: None,
@@ -68,7 +68,7 @@ impl RunRecord {
 
     /// Takes down an event; returns the picture of its frame, if it has one.
     pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
-        self.log.note(event);
+        self.saved.note(event);
         match event.kind {
             EventKind::Gripped => self.gripped = true,
             EventKind::Missed => self.gripped = false,

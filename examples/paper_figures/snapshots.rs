@@ -41,7 +41,7 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
     let (ball, _) = workspace
         .sample_seen_ball(&rig.cell().get(), &mut rng)
         .ok_or("no place of the workspace is in view from a search pose")?;
-    rig.place(&ball);
+    rig.place(&ball)?;
     let table = rig.cell().get().table;
     let (mut moments, mut gripped) = (Vec::new(), false);
     rig.run(&agent, &mut *detector, &mut |event| {

@@ -2,12 +2,12 @@
 
 use std::error::Error;
 
-use grasp_agent::{Agent, EventLog, Hybrid, HybridSettings};
+use grasp_agent::{Agent, Hybrid, HybridSettings, SavedController, SavedRun};
 use pipeline_sim::Cell;
 use puma_grasp::TrialCell;
 use puma_val2::Joints;
 
-use crate::{Counted, Fate, Options, Tally, World, keep_log, writable_folder};
+use crate::{Counted, Fate, Options, Tally, World, keep_run, writable_folder};
 
 pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
@@ -42,12 +42,12 @@ fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Erro
                 }
                 seen |= cell.features(joints).is_some();
             };
-            let mut log = EventLog::default();
+            let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
             let ball_seed = seed.wrapping_mul(1_000).wrapping_add(ball as u64);
-            let end = cell.run(&mut agent, ball_seed, &mut go_on, &mut |event| log.note(event));
+            let end = cell.run(&mut agent, ball_seed, &mut go_on, &mut |event| saved.note(event));
             if teaching {
                 if let Err(error) = end {
-                    let kept = keep_log(&options.out, "teaching", &log)?;
+                    let kept = keep_run(&options.out, "teaching", &saved)?;
                     return Err(format!("teaching was broken off: {error}; {kept}").into());
                 }
                 continue;
@@ -67,7 +67,7 @@ fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Erro
             });
             if !success {
                 let run = tally.runs();
-                let kept = keep_log(&options.out, &format!("run-{run:03}"), &log)?;
+                let kept = keep_run(&options.out, &format!("run-{run:03}"), &saved)?;
                 let why = match (&end, result.and_then(|result| result.outcome.gave_up)) {
                     (Err(error), _) => error.to_string(),
                     (_, Some(reason)) => reason.to_string(),

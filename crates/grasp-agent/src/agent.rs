@@ -3,16 +3,23 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::{Joints, Manipulator, ProximitySensor};
 
-use crate::run::Run;
+use crate::run::{Devices, Modules, Run};
 use crate::watch::Watch;
-use crate::{AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, Learned, Sighting};
+use crate::{
+    AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, Guard, Learned, PoseSearch, Recovery,
+    RecoveryMoves, Search, Sighting, Supervision,
+};
 
-/// The modules of section 2.2 of the paper around a [`Controller`], which moves the arm while the ball is in view: the paper's two
-/// learned behaviours ([`Agent::new`]) or any other ([`Agent::with_controller`]).
+/// The modules of section 2.2 of the paper, and the state machine that links them.
+///
+/// Rotation and reaching are a [`Controller`]'s, the paper's two learned behaviours ([`Agent::new`]) or any other ([`Agent::with_controller`]).
+/// Search, recovery and supervision are those of the settings, or others: [`Agent::searching_by`], [`Agent::recovering_by`],
+/// [`Agent::supervised_by`].
 #[derive(Clone, Debug)]
 pub struct Agent<C = Learned> {
     config: AgentConfig,
     controller: C,
+    modules: Modules,
     watch: Watch,
 }
 
@@ -54,11 +61,42 @@ impl<C: Controller> Agent<C> {
     /// [`AgentError::Config`] for settings that cannot work.
     pub fn with_controller(config: AgentConfig, controller: C) -> Result<Self, AgentError> {
         config.check()?;
+        let modules = Modules {
+            search: Box::new(PoseSearch::new(
+                config.search_poses.clone(),
+                config.search_again.clone(),
+            )),
+            recovery: Box::new(RecoveryMoves::new(config.recovery.clone())),
+            supervision: Box::new(Guard::of(&config)),
+        };
         Ok(Self {
             config,
             controller,
+            modules,
             watch: Watch::default(),
         })
+    }
+
+    /// The same with another search, in the place of the one from [`AgentConfig::search_poses`].
+    #[must_use]
+    pub fn searching_by(mut self, search: impl Search + 'static) -> Self {
+        self.modules.search = Box::new(search);
+        self
+    }
+
+    /// The same with another recovery, in the place of [`AgentConfig::recovery`].
+    #[must_use]
+    pub fn recovering_by(mut self, recovery: impl Recovery + 'static) -> Self {
+        self.modules.recovery = Box::new(recovery);
+        self
+    }
+
+    /// The same with another supervision, in the place of the one by [`AgentConfig::limits`], [`AgentConfig::approach`] and
+    /// [`AgentConfig::reach_tolerance`].
+    #[must_use]
+    pub fn supervised_by(mut self, supervision: impl Supervision + 'static) -> Self {
+        self.modules.supervision = Box::new(supervision);
+        self
     }
 
     /// The settings.
@@ -74,6 +112,24 @@ impl<C: Controller> Agent<C> {
     /// The controller, with what it has learned so far.
     pub fn into_controller(self) -> C {
         self.controller
+    }
+
+    /// The controller, to be changed from outside between two runs.
+    pub fn controller_mut(&mut self) -> &mut C {
+        &mut self.controller
+    }
+
+    /// What the camera showed last.
+    #[cfg(feature = "serde")]
+    pub(crate) fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// The same, with another memory of what the camera showed last.
+    #[cfg(feature = "serde")]
+    pub(crate) fn watching(mut self, watch: Watch) -> Self {
+        self.watch = watch;
+        self
     }
 
     /// The same, as if the frame seen last had been `frame`: for a replay, which has no frames.
@@ -100,10 +156,9 @@ impl<C: Controller> Agent<C> {
         let run = Run::new(
             &self.config,
             &mut self.controller,
+            &mut self.modules,
             &mut self.watch,
-            eye,
-            arm,
-            proximity,
+            Devices { eye, arm, proximity },
             observe,
         );
         let result = run.until_done();

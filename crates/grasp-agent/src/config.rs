@@ -38,7 +38,7 @@ pub struct AgentConfig {
     /// between them.
     ///
     /// The check is by exclusion. The jaws lie outside the camera's view, so a ball in them is not seen: no ball where it was and none below the
-    /// lifted hand, in two looks each, counts as held. A ball that left both views in another way, rolled off or knocked aside, passes for one
+    /// lifted hand, in two looks each, counts as held. A ball that is seen where it was has been missed. A ball that left both views in another way, rolled off or knocked aside, passes for one
     /// that is held, and so does one that the detector misses each time. Only a sensor in the jaws could tell.
     pub lift: Option<JointDelta>,
     /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
@@ -47,7 +47,8 @@ pub struct AgentConfig {
     /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
     pub reach_tolerance: f64,
     /// Frames in a row, each from another pose, that may be the same as the one before, or show the ball at exactly the same place, before the
-    /// camera counts as frozen \[2\]; at least 1. Nothing is gripped after a single one of them.
+    /// camera counts as frozen \[2\]; at least 1. Nothing is gripped
+    /// after a single one of them, and after one no grip is verified: with the jaws closed, one is enough.
     pub same_frames: usize,
 }
 

@@ -76,6 +76,9 @@ pub enum AgentError {
         /// The first event that differs.
         event: usize,
     },
+    /// Text that is no saved run.
+    #[error("this text is no saved run: {0}")]
+    SavedRun(String),
     /// A configuration that cannot work.
     #[error("agent configuration: {0}")]
     Config(String),

@@ -42,11 +42,8 @@ impl Behaviour {
         for line in Conventions::default().lines() {
             let _ = writeln!(csv, "# {line}");
         }
-        for GoalInterval { input, low, high } in &spec.goal {
-            let _ = writeln!(
-                csv,
-                "# at the goal {input:?} is from {low} to {high}, both ends included"
-            );
+        for interval in &spec.goal {
+            let _ = writeln!(csv, "# at the goal {}", goal_line(interval));
         }
         for input in &spec.inputs {
             let _ = write!(csv, "{input:?} from,{input:?} to,");
@@ -86,9 +83,10 @@ impl Behaviour {
     ///
     /// # Errors
     /// [`BehaviourError::Text`], with the line: intervals or actions that are not those of `spec`, a value that is no finite number, a wrong
-    /// number of lines or columns.
+    /// number of lines or columns, remarks that state another frame, zero of theta 3 or goal; and what [`Behaviour::from_json`] refuses of `spec`.
     pub fn from_csv(spec: BehaviourSpec, text: &str) -> Result<Self, BehaviourError> {
         let blank = Self::new(spec, blank_table(shape_of(text)?)?)?;
+        Remarks(text).check(blank.spec())?;
         let expected = blank.to_csv();
         let (ends, actions) = (2 * blank.spec().inputs.len(), blank.spec().actions());
         let mut lines = table_lines(text).zip(table_lines(&expected));
@@ -125,6 +123,53 @@ impl Behaviour {
     }
 }
 
+/// The remarks of a CSV table: its lines that begin with `#`.
+pub(crate) struct Remarks<'a>(pub(crate) &'a str);
+
+impl<'a> Remarks<'a> {
+    /// What the remarks that begin with `what` go on with.
+    fn about(&self, what: &str) -> impl Iterator<Item = &'a str> {
+        let remarks = self.0.lines().filter_map(|line| line.strip_prefix("# "));
+        remarks.filter_map(move |remark| remark.strip_prefix(what).map(str::trim_end))
+    }
+
+    /// What the only remark that begins with `what` goes on with.
+    pub(crate) fn only(&self, what: &str) -> Result<&'a str, BehaviourError> {
+        let mut about = self.about(what);
+        match (about.next(), about.next()) {
+            (Some(said), None) => Ok(said),
+            (Some(_), Some(_)) => Err(bad(format!("`# {what}...` is said twice"))),
+            (None, _) => Err(bad(format!("there is no remark `# {what}...`"))),
+        }
+    }
+
+    /// The goal intervals in words.
+    pub(crate) fn goals(&self) -> impl Iterator<Item = &'a str> {
+        self.about("at the goal ")
+            .filter(|said| said.contains(" is from "))
+    }
+
+    /// Fails if the remarks state other conventions, or another goal than that of `spec`. What they leave out is as it is here.
+    fn check(&self, spec: &BehaviourSpec) -> Result<(), BehaviourError> {
+        if let Some(said) = self.about("frame ").next() {
+            let conventions = Conventions::of_line(said);
+            conventions
+                .ok_or_else(|| bad(format!("its frame is {said:?}")))?
+                .check()?;
+        }
+        let mut goals = self.goals().peekable();
+        if goals.peek().is_some() && !goals.eq(spec.goal.iter().map(goal_line)) {
+            return Err(bad("its goal is not that of the behaviour"));
+        }
+        Ok(())
+    }
+}
+
+/// A goal interval in words.
+fn goal_line(GoalInterval { input, low, high }: &GoalInterval) -> String {
+    format!("{input:?} is from {low} to {high}, both ends included")
+}
+
 /// The lines of a CSV table that are no remarks, with their numbers in the text, from 1.
 fn table_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = text
@@ -142,6 +187,11 @@ pub(crate) fn rounded(degrees: f64) -> f64 {
 /// Plain data with text keys and finite numbers: there is nothing that could not be written.
 pub(crate) fn text_of(document: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(document).unwrap_or_default()
+}
+
+/// The same in one line.
+pub(crate) fn plain_text_of(document: &impl serde::Serialize) -> String {
+    serde_json::to_string(document).unwrap_or_default()
 }
 
 pub(crate) fn bad(what: impl Into<String>) -> BehaviourError {
@@ -223,6 +273,17 @@ impl Conventions {
             self.theta3_zero_degrees
         );
         std::iter::once(numbers).chain(self.words.clone())
+    }
+
+    /// The numbers of the first of [`Conventions::lines`], behind the word `frame`.
+    fn of_line(line: &str) -> Option<Self> {
+        let (frame, zero) = line.split_once("; theta3_zero_degrees ")?;
+        let (width, height) = frame.split_once(" x ")?;
+        Some(Self {
+            frame: [width.parse().ok()?, height.parse().ok()?],
+            theta3_zero_degrees: zero.parse().ok()?,
+            words: Vec::new(),
+        })
     }
 
     /// Numbers with other conventions than these mean something else.

@@ -10,11 +10,45 @@
 //!   [`paper_literal`](BehaviourPair::paper_literal), [`paper_mended`](BehaviourPair::paper_mended), [`fine`](BehaviourPair::fine).
 //! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which [`qtable`] learns it.
 //! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked what to do.
-//! * An [`Agent`] runs a [`Controller`] on an [`Eye`] ([`CameraEye`]: camera, and an object described by [`ObjectFeatures`]) and a
-//!   [`Manipulator`](puma_val2::Manipulator), and tells every [`Event`] as it happens; an [`EventLog`] keeps them and replays the run.
+//! * An [`Agent`] links the modules of section 2.2, each of which can be replaced or used alone, and runs them on an [`Eye`] ([`CameraEye`]: camera,
+//!   and an object described by [`ObjectFeatures`]) and a [`Manipulator`](puma_val2::Manipulator). It tells every [`Event`] as it happens; an
+//!   [`EventLog`] keeps them, and a `SavedRun` what else it takes to make the run again.
 //! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those that the paper names as alternatives,
 //!   [`PositionBased`], [`ImageBased`], [`Fuzzy`] and [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins
 //!   with such a model and learns what is wrong with it.
+//!
+//! # The state machine
+//!
+//! | module of section 2.2 | here | says | moves the arm itself |
+//! |---|---|---|---|
+//! | rotation, reaching | [`Controller`] ([`Learned`]: two [`Behaviour`]s) | the next joint move, from what is seen | no |
+//! | target search | [`Search`] ([`PoseSearch`]) | the next pose to look from | no |
+//! | recovery of a lost target | [`Recovery`] ([`RecoveryMoves`]) | the next pose to look from | no |
+//! | gripper activation | [`GripperActivation`] | whether the jaws hold the ball | through a [`Hand`] |
+//! | constant control of the approach | [`Supervision`] ([`Guard`]) | whether what came of a move may go on | no |
+//!
+//! They know nothing of each other. An [`Agent`] is in one [`Phase`] at a time, and every transition is an [`Event`], named at the arrows:
+//!
+//! ```text
+//!              Reaching             AtGoal, Cornered            Grasped
+//!   +--------+ --------> +-------+ -----------------> +------+ ---------> +-----+
+//!   | Search |           | Reach |                    | Grip |            | End |
+//!   +--------+           +-------+ <----------------- +------+            +-----+
+//!     ^    ^              |     ^      Reaching        |    |
+//!     |    |         Lost |     | Reaching             |    |
+//!     |    |              v     |                      |    |
+//!     |    | Searching  +---------+     Lost, Missed   |    |
+//!     |    +----------- | Recover | <------------------+    |
+//!     |                 +---------+                         |
+//!     +-----------------------------------------------------+
+//!                           Searching
+//!
+//!   It begins with Started and Searching. Every phase can lead to End: GaveUp, or Failed.
+//! ```
+//!
+//! Within a phase the events are the orders that were carried out ([`EventKind::AtSearchPose`], [`EventKind::Moved`], ...), what was looked at
+//! ([`EventKind::Seen`], [`EventKind::NotSeen`], [`EventKind::SameFrame`]) and what supervision did ([`EventKind::TooNear`], [`EventKind::TooFast`],
+//! [`EventKind::TakenBack`]).
 //!
 //! The crate knows no simulator, no renderer and no particular detector, arm or camera: they meet it through the traits of
 //! `hough-heuristic` and `puma-val2` and through plain closures.
@@ -74,16 +108,22 @@ mod export;
 #[cfg(feature = "serde")]
 mod export_policy;
 mod eye;
+mod gripper;
 mod hybrid;
 mod learned;
 mod log;
 mod object;
 mod percept;
 mod preset;
+mod recovery;
 mod reward;
 mod run;
+#[cfg(feature = "serde")]
+mod saved_run;
+mod search;
 mod servo;
 mod spec;
+mod supervision;
 mod task;
 mod taught_goal;
 mod watch;
@@ -100,17 +140,23 @@ pub use camera_model::CameraModel;
 pub use config::{AgentConfig, ApproachLimit};
 pub use controller::{Consequence, Controller, JointLimits, Situation, StepLimits};
 pub use error::{AgentError, BehaviourError};
-pub use event::{Event, EventKind, GaveUp};
+pub use event::{Event, EventKind, GaveUp, Order, Phase};
 pub use eye::{CameraEye, Eye, Look, Sighting};
+pub use gripper::{GripEnd, GripperActivation, Hand, Went};
 pub use hybrid::{Belief, Hybrid, HybridSettings, Prior};
 pub use learned::{Learned, OnlineLearning};
 pub use log::{EventLog, LoggedEvent};
 pub use object::{BallFeatures, EggFeatures, EggLimits, ObjectFeatures};
 pub use percept::{Input, Percept, theta3};
 pub use preset::{BehaviourPair, YGoal};
+pub use recovery::{Recovery, RecoveryMoves};
 pub use reward::{Reward, RewardTerm};
+#[cfg(feature = "serde")]
+pub use saved_run::{Replayed, SavedController, SavedRun};
+pub use search::{LastLook, PoseSearch, Search, Viewpoint};
 pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSettings};
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
+pub use supervision::{Arrival, Guard, Supervision, Verdict};
 pub use task::BehaviourTask;
 pub use taught_goal::{Retargeted, TaughtGoal};
 

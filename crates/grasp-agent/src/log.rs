@@ -6,7 +6,7 @@ use hough_heuristic::FrameError;
 use hough_heuristic::image::{GrayImage, Luma};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 
-use crate::{Agent, AgentError, Controller, Event, EventKind, Eye, Look, Outcome};
+use crate::{Agent, AgentError, Controller, Event, EventKind, Eye, Look, Order, Outcome};
 
 /// An [`Event`] without its frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,15 @@ impl EventLog {
     /// [`AgentError::Replay`] when the agent does something else than was done then; otherwise what the run ended with, if it ended
     /// with an error.
     pub fn replay<C: Controller + Clone>(&self, agent: &Agent<C>) -> Result<(Outcome, Self), AgentError> {
+        let Played { end, log, differs } = self.play(agent);
+        match (differs, end) {
+            (Some(event), _) => Err(AgentError::Replay { event }),
+            (None, end) => Ok((end?, log)),
+        }
+    }
+
+    /// Lets a copy of `agent` make the run again, whatever comes of it.
+    pub(crate) fn play<C: Controller + Clone>(&self, agent: &Agent<C>) -> Played {
         let tape = RefCell::new(Tape {
             events: &self.events,
             next: 0,
@@ -52,9 +61,9 @@ impl EventLog {
         });
         let mut log = Self::default();
         let end = agent.clone().having_seen(numbered(0)).run_and_learn(
-            &mut Played(&tape),
-            &mut Played(&tape),
-            &mut Played(&tape),
+            &mut Player(&tape),
+            &mut Player(&tape),
+            &mut Player(&tape),
             &mut |event| {
                 log.note(event);
             },
@@ -66,11 +75,16 @@ impl EventLog {
             .position(|(now, then)| !same(now, then));
         let differs = differs
             .or((log.events.len() != self.events.len()).then(|| log.events.len().min(self.events.len())));
-        match (differs, end) {
-            (Some(event), _) => Err(AgentError::Replay { event }),
-            (None, end) => Ok((end?, log)),
-        }
+        Played { end, log, differs }
     }
+}
+
+/// A run, made again.
+pub(crate) struct Played {
+    pub(crate) end: Result<Outcome, AgentError>,
+    pub(crate) log: EventLog,
+    /// The first event that was another one then.
+    pub(crate) differs: Option<usize>,
 }
 
 /// Whether two events are the same. A failure of camera or arm comes back in the words of the replayed device, which quote those of then.
@@ -134,7 +148,7 @@ fn unmoved(reason: String) -> ArmError {
 }
 
 /// A frame that differs from that of every other number: what there was to see is not in the log, only whether it was the same.
-fn numbered(number: u32) -> GrayImage {
+pub(crate) fn numbered(number: u32) -> GrayImage {
     GrayImage::from_fn(4, 1, |x, _| Luma([number.to_le_bytes()[x as usize]]))
 }
 
@@ -176,10 +190,18 @@ impl Tape<'_> {
         next
     }
 
-    /// Fails if the next thing that happened was that the arm failed: of the orders that make no event when they succeed.
-    fn arm_holds(&self) -> Result<(), ArmError> {
+    /// Fails if the next thing that happened was that the sensors on the arm did: their answers make no event of their own.
+    fn sensors_hold(&self) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
             Some(EventKind::Failed(cause)) if Device::Arm.failed_in(cause) => Err(unmoved(self.silence())),
+            _ => Ok(()),
+        }
+    }
+
+    /// Fails if the next thing that happened was that this order was not answered: of the orders that make no event when they succeed.
+    fn answers(&self, order: Order) -> Result<(), ArmError> {
+        match self.events.get(self.next).map(|event| &event.kind) {
+            Some(EventKind::Unanswered(then)) if *then == order => Err(unmoved(self.silence())),
             _ => Ok(()),
         }
     }
@@ -190,24 +212,28 @@ fn is_answer(kind: &EventKind) -> bool {
     !matches!(
         kind,
         EventKind::Searching
+            | EventKind::Reaching
             | EventKind::SameFrame
             | EventKind::Lost
             | EventKind::TooFast
             | EventKind::AtGoal
+            | EventKind::Cornered
             | EventKind::Gripped
             | EventKind::Missed
+            | EventKind::Grasped
             | EventKind::GaveUp(_)
+            | EventKind::Unanswered(_)
             | EventKind::Failed(_)
     )
 }
 
 /// Arm, sensors and eye of then.
-struct Played<'a, 'b>(&'a RefCell<Tape<'b>>);
+struct Player<'a, 'b>(&'a RefCell<Tape<'b>>);
 
 /// What the devices of a replay are called in messages.
 const NAME: &str = "replayed event log";
 
-impl Played<'_, '_> {
+impl Player<'_, '_> {
     fn stand(&self) -> Result<Joints, ArmError> {
         let mut tape = self.0.borrow_mut();
         match tape.answer() {
@@ -217,7 +243,7 @@ impl Played<'_, '_> {
     }
 }
 
-impl Manipulator for Played<'_, '_> {
+impl Manipulator for Player<'_, '_> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
         // Asked before anything happens. An arm that failed after it had told where it stands has told it all the same.
         let tape = self.0.borrow();
@@ -239,28 +265,31 @@ impl Manipulator for Played<'_, '_> {
         self.stand()
     }
 
-    fn set_gripper(&mut self, _gripper: Gripper) -> Result<(), ArmError> {
+    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         let mut tape = self.0.borrow_mut();
-        tape.arm_holds()?;
+        tape.answers(Order::Jaws {
+            close: gripper == Gripper::Closed,
+        })?;
         // The opened gripper begins the run.
         tape.next_if(&EventKind::Started);
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {
-        Ok(())
+        self.0.borrow().answers(Order::Stop)
     }
 }
 
-impl ProximitySensor for Played<'_, '_> {
+impl ProximitySensor for Player<'_, '_> {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let mut tape = self.0.borrow_mut();
-        tape.arm_holds()?;
-        Ok(tape.next_if(&EventKind::TooNear))
+        tape.sensors_hold()?;
+        // What was too near made no event where the arm could not be stopped.
+        Ok(tape.next_if(&EventKind::TooNear) || tape.answers(Order::Stop).is_err())
     }
 }
 
-impl Eye for Played<'_, '_> {
+impl Eye for Player<'_, '_> {
     fn look(&mut self) -> Result<Look, FrameError> {
         let mut tape = self.0.borrow_mut();
         let ball = match tape.answer().map(|event| event.kind) {

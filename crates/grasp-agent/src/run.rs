@@ -1,62 +1,109 @@
-//! A run under way: the phases of the state machine and how one leads to the next.
+//! A run under way: the state machine, which links the modules and tells every transition.
 
 use hough_heuristic::image::GrayImage;
-use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
+use puma_val2::{Gripper, Joints, Manipulator, ProximitySensor};
 
+use crate::gripper::is_same_place;
 use crate::watch::Watch;
 use crate::{
-    AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, Look, Outcome, Percept,
-    Sighting, Situation,
+    AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, GripEnd,
+    GripperActivation, Hand, LastLook, Outcome, Percept, Phase, Recovery, Search, Sighting, Situation,
+    Supervision, Went,
 };
 
-mod gripping;
-
-use gripping::{Grips, is_same_place};
+mod acting;
 
 /// So many moves that were taken back are too many.
 const OFTEN: usize = 3;
 
-/// Where the state machine stands.
+/// The modules that a user can put others in the place of, beside the controller.
+#[derive(Clone, Debug)]
+pub(crate) struct Modules {
+    pub(crate) search: Box<dyn Search>,
+    pub(crate) recovery: Box<dyn Recovery>,
+    pub(crate) supervision: Box<dyn Supervision>,
+}
+
+/// What a run acts on.
+pub(crate) struct Devices<'a> {
+    pub(crate) eye: &'a mut dyn Eye,
+    pub(crate) arm: &'a mut dyn Manipulator,
+    pub(crate) proximity: &'a mut dyn ProximitySensor,
+}
+
+/// Where the state machine stands: a [`Phase`] and what it begins with.
 #[derive(Clone, Copy, Debug)]
-enum Phase {
-    /// Looking around from the search poses.
+enum State {
     Search,
     /// The ball is in view.
     Reach(Sighting),
-    /// The ball was in view from this pose and is not any more.
-    Recover(Joints),
+    /// The ball was in view like this and is not any more.
+    Recover {
+        seen: Situation,
+        why: Gone,
+    },
     /// The ball is where it should be, or as near to that as can be.
-    Grip { seen: Sighting, at_goal: bool },
+    Grip {
+        seen: Sighting,
+        at_goal: bool,
+    },
     /// Over, without a grip where there is a reason.
     End(Option<GaveUp>),
 }
 
-/// What an order to move came to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Went {
-    /// The arm stands where it should.
-    There,
-    /// Something was too near; the arm has gone back to where it came from.
-    Back,
+/// Why a ball has to be recovered.
+#[derive(Clone, Copy, Debug)]
+enum Gone {
+    Lost,
+    Missed,
+}
+
+impl State {
+    fn phase(&self) -> Phase {
+        match self {
+            Self::Search => Phase::Search,
+            Self::Reach(_) => Phase::Reach,
+            Self::Recover { .. } => Phase::Recover,
+            Self::Grip { .. } => Phase::Grip,
+            Self::End(_) => Phase::End,
+        }
+    }
+
+    /// The event of entering this state from another phase; [`EventKind::enters`] is its inverse.
+    fn entry(&self) -> EventKind {
+        match *self {
+            Self::Search => EventKind::Searching,
+            Self::Reach(_) => EventKind::Reaching,
+            Self::Recover { why: Gone::Lost, .. } => EventKind::Lost,
+            Self::Recover {
+                why: Gone::Missed, ..
+            } => EventKind::Missed,
+            Self::Grip { at_goal: true, .. } => EventKind::AtGoal,
+            Self::Grip { at_goal: false, .. } => EventKind::Cornered,
+            Self::End(None) => EventKind::Grasped,
+            Self::End(Some(reason)) => EventKind::GaveUp(reason),
+        }
+    }
 }
 
 pub(crate) struct Run<'a> {
     config: &'a AgentConfig,
     controller: &'a mut dyn Controller,
-    eye: &'a mut dyn Eye,
-    arm: &'a mut dyn Manipulator,
-    proximity: &'a mut dyn ProximitySensor,
+    modules: &'a mut Modules,
+    gripper: GripperActivation,
+    watch: &'a mut Watch,
+    devices: Devices<'a>,
     observe: &'a mut dyn FnMut(&Event<'_>),
     joints: Joints,
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
-    watch: &'a mut Watch,
+    /// Whether the jaws have closed: what is seen says whether they hold the ball.
+    closed: bool,
     /// Moves in a row that were taken back.
     taken_back: usize,
     /// All of them since the search.
     barred: usize,
-    grips: Grips,
     /// Whether what is seen has shown in more than one place of the image since the search began.
     wandered: bool,
 }
@@ -65,27 +112,26 @@ impl<'a> Run<'a> {
     pub(crate) fn new(
         config: &'a AgentConfig,
         controller: &'a mut dyn Controller,
+        modules: &'a mut Modules,
         watch: &'a mut Watch,
-        eye: &'a mut dyn Eye,
-        arm: &'a mut dyn Manipulator,
-        proximity: &'a mut dyn ProximitySensor,
+        devices: Devices<'a>,
         observe: &'a mut dyn FnMut(&Event<'_>),
     ) -> Self {
         Self {
             config,
             controller,
+            gripper: GripperActivation::new(config, *modules.supervision.limits()),
+            modules,
             watch,
-            eye,
-            arm,
-            proximity,
+            devices,
             observe,
             joints: Joints::default(),
             cycles: 0,
             losses: 0,
             last_seen: None,
+            closed: false,
             taken_back: 0,
             barred: 0,
-            grips: Grips::default(),
             wandered: false,
         }
     }
@@ -94,151 +140,215 @@ impl<'a> Run<'a> {
         let result = self.phases();
         if let Err(error) = &result {
             // The first error is the one to report; stopping is all that can still be done.
-            let _ = self.arm.stop();
+            let _ = self.devices.arm.stop();
             self.tell(EventKind::Failed(error.to_string()), None);
         }
         result
     }
 
     fn phases(&mut self) -> Result<Outcome, AgentError> {
-        let joints = self.arm.joints()?;
+        let joints = self.devices.arm.joints()?;
         self.stand_at(joints);
-        self.arm.set_gripper(Gripper::Open)?;
+        self.set_jaws(Gripper::Open)?;
         self.tell(EventKind::Started, None);
-        let mut phase = Phase::Search;
+        let mut state = State::Search;
+        self.tell(state.entry(), None);
         loop {
-            phase = match phase {
-                Phase::Search => self.search()?,
-                Phase::Reach(sighting) => self.reach(sighting)?,
-                Phase::Recover(last) => self.recover(last)?,
-                Phase::Grip { seen, at_goal } => self.grip(seen, at_goal)?,
-                Phase::End(gave_up) => {
-                    if let Some(reason) = gave_up {
-                        self.tell(EventKind::GaveUp(reason), None);
-                    }
-                    return Ok(Outcome {
-                        gave_up,
-                        cycles: self.cycles,
-                        losses: self.losses,
-                        last_seen: self.last_seen,
-                        joints: self.joints,
-                    });
-                }
+            let next = match state {
+                State::Search => self.search()?,
+                State::Reach(sighting) => self.reach(&sighting)?,
+                State::Recover { seen, .. } => self.recover(&seen)?,
+                State::Grip { seen, at_goal } => self.grip(&seen, at_goal)?,
+                State::End(gave_up) => return Ok(self.outcome(gave_up)),
             };
+            if next.phase() != state.phase() {
+                self.tell(next.entry(), None);
+            }
+            if let State::Recover { why, .. } = next {
+                match why {
+                    Gone::Lost => self.losses += 1,
+                    Gone::Missed => self.cycles += 1,
+                }
+            }
+            state = next;
         }
     }
 
-    /// Looks around from the search poses, the nearest pan angle first; then from beside them.
-    fn search(&mut self) -> Result<Phase, AgentError> {
-        let config = self.config;
-        self.tell(EventKind::Searching, None);
+    fn outcome(&self, gave_up: Option<GaveUp>) -> Outcome {
+        Outcome {
+            gave_up,
+            cycles: self.cycles,
+            losses: self.losses,
+            last_seen: self.last_seen,
+            joints: self.joints,
+        }
+    }
+
+    /// Looks around until the ball is in view, or there is nowhere left to look from.
+    fn search(&mut self) -> Result<State, AgentError> {
         (self.wandered, self.barred) = (false, 0);
-        let rounds = std::iter::once(JointDelta::default()).chain(config.search_again.iter().copied());
-        for (round, beside) in rounds.enumerate() {
-            for pose in nearest_first(&config.search_poses, &self.joints) {
-                let target = config.limits.nearest(&(config.search_poses[pose] + beside));
-                let number = round * config.search_poses.len() + pose;
-                if self.go_to(target, EventKind::AtSearchPose(number))? == Went::Back {
-                    continue;
-                }
-                if let Some(sighting) = self.look()? {
-                    return Ok(Phase::Reach(sighting));
-                }
+        let mut last = LastLook::None;
+        while let Some(view) = self.modules.search.next_view(&self.joints, last) {
+            match self.look_from(&view.pose, EventKind::AtSearchPose(view.number))? {
+                Ok(ball) => return Ok(State::Reach(ball)),
+                Err(came) => last = came,
             }
         }
-        Ok(Phase::End(Some(GaveUp::NotFound)))
+        Ok(State::End(Some(GaveUp::NotFound)))
+    }
+
+    /// The ball from the pose nearest to `pose`, or what came of the look.
+    fn look_from(
+        &mut self,
+        pose: &Joints,
+        there: EventKind,
+    ) -> Result<Result<Sighting, LastLook>, AgentError> {
+        let target = self.modules.supervision.limits().nearest(pose);
+        Ok(match self.go_to(target, there)? {
+            Went::Back => Err(LastLook::Barred),
+            Went::There => self.look()?.ok_or(LastLook::Nothing),
+        })
     }
 
     /// One control cycle: sighting, decision, one joint move, next sighting.
-    fn reach(&mut self, sighting: Sighting) -> Result<Phase, AgentError> {
-        let now = self.situation(&sighting);
+    fn reach(&mut self, sighting: &Sighting) -> Result<State, AgentError> {
+        let now = self.situation(sighting);
         let percept = Percept::new(sighting.features, &self.joints);
         if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
             // What is shown from two poses alike is not what is there: no reason to grip.
             if self.watch.same() > 0 {
                 return Err(self.frozen());
             }
-            self.tell(EventKind::AtGoal, None);
-            return Ok(Phase::Grip {
-                seen: sighting,
+            return Ok(State::Grip {
+                seen: *sighting,
                 at_goal: true,
             });
         }
         if self.cycles >= self.config.max_cycles {
-            return Ok(Phase::End(Some(GaveUp::OutOfCycles)));
+            return Ok(State::End(Some(GaveUp::OutOfCycles)));
         }
-        let (limits, from) = (&self.config.limits, self.joints);
+        let limits = self.modules.supervision.limits();
         let delta = match self.controller.decide(&now, limits) {
             // A controller may be anyone's: what leads out of the limits is not done.
-            Ok(delta) if limits.admit(&(from + delta)) => delta,
-            Ok(_) => return Ok(Phase::End(Some(GaveUp::NoMoveLeft))),
-            Err(reason) => return Ok(Phase::End(Some(reason))),
+            Ok(delta) if limits.admit(&(self.joints + delta)) => delta,
+            Ok(_) => return Ok(State::End(Some(GaveUp::NoMoveLeft))),
+            Err(reason) => return Ok(State::End(Some(reason))),
         };
 
         self.cycles += 1;
         if self.go_by(delta, EventKind::Moved(delta))? == Went::Back {
-            return self.after_taking_back(from);
+            return self.after_taking_back(now);
         }
         let Some(after) = self.look()? else {
             self.controller.judge(&Consequence::Lost);
-            return Ok(self.lose(from));
+            return Ok(lost(now));
         };
         if self
-            .config
-            .approach
-            .exceeded(sighting.features.r, after.features.r)
+            .modules
+            .supervision
+            .is_too_fast(&sighting.features, &after.features)
         {
             self.tell(EventKind::TooFast, None);
-            self.take_back(from)?;
-            return self.after_taking_back(from);
+            self.take_back(now.joints)?;
+            return self.after_taking_back(now);
         }
         self.taken_back = 0;
         let then = self.situation(&after);
         self.controller.judge(&Consequence::Seen(then));
-        Ok(Phase::Reach(after))
+        Ok(State::Reach(after))
     }
 
     /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself, and a
     /// controller that can aim at it from here does; where they do so in a row and it cannot, whatever is seen is not to be had, and the search
     /// begins anew.
-    fn after_taking_back(&mut self, from: Joints) -> Result<Phase, AgentError> {
+    fn after_taking_back(&mut self, before: Situation) -> Result<State, AgentError> {
         self.controller.judge(&Consequence::TakenBack);
         self.taken_back += 1;
         self.barred += 1;
         let Some(seen) = self.look()? else {
-            return Ok(self.lose(from));
+            return Ok(lost(before));
         };
         Ok(if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
-            Phase::Grip { seen, at_goal: false }
+            State::Grip { seen, at_goal: false }
         } else {
-            Phase::Reach(seen)
+            State::Reach(seen)
         })
     }
 
-    fn lose(&mut self, from: Joints) -> Phase {
-        self.losses += 1;
-        self.tell(EventKind::Lost, None);
-        Phase::Recover(from)
-    }
-
-    /// Back to where the ball was last seen, then the recovery moves around that pose, then a new search.
-    fn recover(&mut self, last: Joints) -> Result<Phase, AgentError> {
-        let config = self.config;
-        let around = config.recovery.iter().map(|delta| last + *delta);
-        for (attempt, pose) in std::iter::once(last).chain(around).enumerate() {
-            if self.cycles >= config.max_cycles {
-                return Ok(Phase::End(Some(GaveUp::OutOfCycles)));
+    /// Looks around where the ball was `seen` last, then leaves it to a new search.
+    fn recover(&mut self, seen: &Situation) -> Result<State, AgentError> {
+        let mut last = LastLook::None;
+        while let Some(view) = self.modules.recovery.next_view(seen, &self.joints, last) {
+            if self.cycles >= self.config.max_cycles {
+                return Ok(State::End(Some(GaveUp::OutOfCycles)));
             }
-            let pose = config.limits.nearest(&pose);
             self.cycles += 1;
-            let went = self.go_to(pose, EventKind::Recovering(attempt))?;
-            if went == Went::There
-                && let Some(sighting) = self.look()?
-            {
-                return Ok(Phase::Reach(sighting));
+            match self.look_from(&view.pose, EventKind::Recovering(view.number))? {
+                Ok(ball) => return Ok(State::Reach(ball)),
+                Err(came) => last = came,
             }
         }
-        Ok(Phase::Search)
+        Ok(State::Search)
+    }
+
+    /// Lets the gripper go for the ball, and goes on from what that came to.
+    fn grip(&mut self, seen: &Sighting, at_goal: bool) -> Result<State, AgentError> {
+        let from = self.joints;
+        let (mut gripper, wandered) = (self.gripper.clone(), self.wandered);
+        let end = gripper.activate(self, seen, at_goal, wandered);
+        self.gripper = gripper;
+        let end = end?;
+        if !matches!(end, GripEnd::Unseen | GripEnd::Elsewhere(_) | GripEnd::NoMove(_)) {
+            self.taken_back = 0;
+        }
+        Ok(match end {
+            GripEnd::Held(ball) => self.end_with(ball, None),
+            GripEnd::Unknown(ball, reason) => self.end_with(ball, Some(reason)),
+            GripEnd::Missed(ball) => {
+                // What was seen meanwhile was not the ball in its place.
+                self.last_seen = Some(ball);
+                self.controller.judge(&Consequence::Missed);
+                State::Recover {
+                    seen: Situation {
+                        features: ball.features,
+                        joints: from,
+                    },
+                    why: Gone::Missed,
+                }
+            }
+            GripEnd::Unseen => lost(self.situation(seen)),
+            GripEnd::Elsewhere(ball) => {
+                // Two looks that differ cost a cycle: both can be at the goal, and no move is made between them.
+                self.cycles += 1;
+                if self.cycles >= self.config.max_cycles {
+                    State::End(Some(GaveUp::OutOfCycles))
+                } else {
+                    State::Reach(ball)
+                }
+            }
+            GripEnd::NoMove(_) if at_goal => State::End(Some(GaveUp::NoMoveLeft)),
+            GripEnd::NoMove(ball) => {
+                let often = std::mem::take(&mut self.taken_back) >= OFTEN;
+                if often { State::Search } else { State::Reach(ball) }
+            }
+            GripEnd::Barred | GripEnd::BarredAgain => {
+                self.controller.judge(&Consequence::Missed);
+                self.cycles += 1;
+                if end == GripEnd::BarredAgain {
+                    return Ok(State::End(Some(GaveUp::Obstructed)));
+                }
+                match self.look()? {
+                    Some(ball) => State::Reach(ball),
+                    None => lost(self.situation(seen)),
+                }
+            }
+        })
+    }
+
+    /// The end, with the ball as it was before the jaws closed: what was seen meanwhile was not the ball in its place.
+    fn end_with(&mut self, ball: Sighting, gave_up: Option<GaveUp>) -> State {
+        self.last_seen = Some(ball);
+        State::End(gave_up)
     }
 
     fn situation(&self, sighting: &Sighting) -> Situation {
@@ -246,119 +356,6 @@ impl<'a> Run<'a> {
             features: sighting.features,
             joints: self.joints,
         }
-    }
-
-    /// Moves to `target` and tells `done`; goes back if something is too near there.
-    fn go_to(&mut self, target: Joints, done: EventKind) -> Result<Went, AgentError> {
-        let ordered = self.arm.move_to(target);
-        self.arrive(target, ordered, done)
-    }
-
-    /// The same for a relative move.
-    fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError> {
-        let target = self.joints + delta;
-        let ordered = self.arm.move_by(delta);
-        self.arrive(target, ordered, done)
-    }
-
-    fn arrive(
-        &mut self,
-        target: Joints,
-        ordered: Result<Joints, ArmError>,
-        done: EventKind,
-    ) -> Result<Went, AgentError> {
-        let from = self.joints;
-        let (reached, halted, fault) = match ordered {
-            Ok(joints) => (joints, false, None),
-            Err(ArmError::ProximityStop { joints, .. }) => (joints, true, None),
-            // An arm that something else has stopped stands somewhere on the way; its sensors may say what.
-            Err(error @ ArmError::NotReached { .. }) => (self.arm.joints()?, false, Some(error)),
-            Err(error) => return Err(error.into()),
-        };
-        self.stand_at(reached);
-        self.tell(done, None);
-        if self.too_near(halted)? {
-            self.take_back(from)?;
-            return Ok(Went::Back);
-        }
-        match fault {
-            Some(error) => Err(error.into()),
-            None => self.check_reached(&target).map(|()| Went::There),
-        }
-    }
-
-    /// Whether something is too near to the hand: the arm has been halted by its own guard, or is stopped now.
-    fn too_near(&mut self, halted: bool) -> Result<bool, AgentError> {
-        if !halted {
-            if !self.proximity.object_near()? {
-                return Ok(false);
-            }
-            self.arm.stop()?;
-        }
-        self.tell(EventKind::TooNear, None);
-        Ok(true)
-    }
-
-    /// Goes back the way the arm came. Where that is barred too, the arm stands where it is.
-    fn take_back(&mut self, from: Joints) -> Result<(), AgentError> {
-        let (reached, halted) = match self.arm.move_to(from) {
-            Ok(joints) => (joints, false),
-            Err(ArmError::ProximityStop { joints, .. }) => (joints, true),
-            Err(error) => return Err(error.into()),
-        };
-        self.stand_at(reached);
-        self.tell(EventKind::TakenBack, None);
-        if self.too_near(halted)? {
-            return Ok(());
-        }
-        self.check_reached(&from)
-    }
-
-    fn stand_at(&mut self, joints: Joints) {
-        self.joints = joints;
-        self.controller.arm_at(&joints);
-    }
-
-    /// Whether the arm is where it was sent; an arm that says it has moved and has not is stuck.
-    fn check_reached(&self, target: &Joints) -> Result<(), AgentError> {
-        let off = |joint: Joint| (self.joints[joint] - target[joint]).abs();
-        let stuck = Joint::ALL
-            .into_iter()
-            .find(|joint| off(*joint).is_nan() || off(*joint) > self.config.reach_tolerance);
-        match stuck {
-            None => Ok(()),
-            Some(joint) => Err(ArmError::NotReached {
-                port: "the arm".into(),
-                joint,
-                wanted_degrees: target[joint].to_degrees(),
-                reported_degrees: self.joints[joint].to_degrees(),
-            }
-            .into()),
-        }
-    }
-
-    /// Looks, a few times if need be, for the ball from where the arm stands.
-    fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
-        for _ in 0..self.config.looks {
-            let Look { frame, ball } = self.eye.look()?;
-            let ball = ball.filter(is_finite);
-            let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
-            self.tell(kind, frame.as_ref());
-            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
-                self.tell(EventKind::SameFrame, None);
-            }
-            if self.watch.same() >= self.config.same_frames {
-                return Err(self.frozen());
-            }
-            if let Some(sighting) = ball {
-                self.wandered |= self
-                    .last_seen
-                    .is_some_and(|last| !is_same_place(&last, &sighting));
-                self.last_seen = Some(sighting);
-                return Ok(Some(sighting));
-            }
-        }
-        Ok(None)
     }
 
     fn frozen(&self) -> AgentError {
@@ -375,34 +372,20 @@ impl<'a> Run<'a> {
             frame,
         });
     }
+
+    /// Takes note of a sighting.
+    fn saw(&mut self, sighting: Sighting) {
+        self.wandered |= self
+            .last_seen
+            .is_some_and(|last| !is_same_place(&last, &sighting));
+        self.last_seen = Some(sighting);
+    }
 }
 
-/// A detector may be anyone's: what is not a number is no ball.
-fn is_finite(sighting: &Sighting) -> bool {
-    let f = sighting.features;
-    f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0
-}
-
-/// Indices of `poses`, the one whose first joint is nearest to that of `joints` first.
-fn nearest_first(poses: &[Joints], joints: &Joints) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..poses.len()).collect();
-    order.sort_by(|&a, &b| {
-        let pan = |pose: usize| (poses[pose].0[0] - joints.0[0]).abs();
-        pan(a).total_cmp(&pan(b))
-    });
-    order
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn search_begins_at_the_nearest_pan_angle() {
-        let poses: Vec<Joints> = [-75.0, -50.0, -25.0, 0.0, 25.0, 50.0]
-            .map(|p| Joints::from_degrees([p, 0.0, 0.0, 0.0, 0.0, 0.0]))
-            .into();
-        let at = Joints::from_degrees([20.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(nearest_first(&poses, &at), [4, 3, 5, 2, 1, 0]);
+/// The ball was in view like this and is not any more.
+fn lost(seen: Situation) -> State {
+    State::Recover {
+        seen,
+        why: Gone::Lost,
     }
 }

@@ -11,14 +11,14 @@ use crate::Sighting;
 /// It goes on from run to run: a camera can freeze between two of them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Watch {
-    from: Joints,
-    shown: Option<Shown>,
-    same: usize,
+    pub(crate) from: Joints,
+    pub(crate) shown: Option<Shown>,
+    pub(crate) same: usize,
 }
 
 /// What a look is told by: the frame, or the ball where there is none.
 #[derive(Clone, Debug, PartialEq)]
-enum Shown {
+pub(crate) enum Shown {
     Frame(GrayImage),
     Ball(Features),
 }

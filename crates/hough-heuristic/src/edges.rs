@@ -13,7 +13,7 @@ mod rows;
 use image::GrayImage;
 
 pub use canny::{Canny, CannyConfig};
-pub(crate) use dispatch::{Vectorized, widest};
+pub use dispatch::{Vectorized, widest};
 pub use gradient::EdgeGradient;
 pub use imageproc_canny::ImageprocCanny;
 pub(crate) use maxima::Maxima;

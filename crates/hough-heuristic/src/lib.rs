@@ -85,6 +85,7 @@ pub use circle::{Circle, Features};
 pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
 pub use detect::{CircleDetector, Detection, StageTimes, Stages, detect_circles};
 pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny};
+pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
 pub use evidence::Acceptance;
 #[cfg(feature = "files")]

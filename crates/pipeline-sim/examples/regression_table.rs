@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let (_, training) = sample_moves(&cell, count, noise, &mut rng);
                 let (_, fresh) = sample_moves(&cell, count, noise, &mut rng);
                 let model = ReachModel::fit(&training, form, edges)?;
-                let quality = model.quality_on(&fresh);
+                let quality = model.quality_on(&fresh)?;
                 let (y, r) = (&quality[0], &quality[1]);
                 let open = model.open_loop_error(&cell, 5, RUNS, &mut rng);
                 rows.push([

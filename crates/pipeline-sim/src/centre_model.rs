@@ -2,8 +2,13 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Entry, Fit, Rows};
-use crate::{CentreSample, FitError, Quality, SightRule};
+use crate::least_squares::{Entry, Fit, Rows, ridge_strength};
+use crate::reach_noise::{Noise, Shares};
+use crate::stored::{Reader, Writer};
+use crate::{CentreSample, FitError, Quality, QuantityError, SightRule, StoredModelError};
+
+/// Terms 1, d1, r d1 of the longest move of the list at the goal's radius: what one unit of a ridge is measured in.
+const SCALES: [f64; 3] = [1.0, 5.0, 5.0 * 33.0];
 
 /// The change of x on 1, d1 and r d1, with d1 the move of `JT1` in degrees.
 ///
@@ -11,10 +16,15 @@ use crate::{CentreSample, FitError, Quality, SightRule};
 /// farther in the image.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "stored::CentreModelData"))]
+#[cfg_attr(
+    feature = "serde",
+    serde(into = "stored::CentreModelData", try_from = "stored::CentreModelData")
+)]
 pub struct CentreModel {
     with_radius: bool,
     fit: Fit,
+    /// How far observations of x lie from predictions.
+    noise: Noise,
     quality: Vec<Quality>,
 }
 
@@ -37,49 +47,60 @@ impl CentreModel {
 
     fn fit_terms(samples: &[CentreSample], with_radius: bool) -> Result<Self, FitError> {
         let needed = 2 + usize::from(with_radius);
-        let mut rows = Rows::default();
-        for (index, s) in samples.iter().enumerate() {
-            for (quantity, value) in [
-                ("x before", s.before.x),
-                ("r before", s.before.r),
-                ("d1", s.d1),
-                ("x after", s.after.x),
-            ] {
-                let usable = value.is_finite() && (quantity != "r before" || value > 0.0);
-                if !usable {
-                    return Err(FitError::NotFinite {
-                        index,
-                        quantity,
-                        value,
-                    });
-                }
-            }
-            rows.push(&terms(&s.before, s.d1)[..needed], &[s.after.x - s.before.x], 1.0)
-                .map_err(|(entry, value)| FitError::NotFinite {
-                    index,
-                    quantity: match entry {
-                        Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
-                        Entry::Target(_) => "the change of x",
-                    },
-                    value,
-                })?;
+        let rows = rows(samples, needed)?;
+        enough(samples, needed)?;
+        let fit = rows.solve(PLACE, samples.len())?;
+        Ok(Self::with(with_radius, fit, samples))
+    }
+
+    /// The model fitted anew to samples of another plant, held toward this one, as [`ReachModel::refit`](crate::ReachModel::refit) does it for
+    /// the approach: the coefficients c minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with c0 this model's
+    /// coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest move of the list at the goal). Without samples the model
+    /// stays as it is.
+    ///
+    /// # Errors
+    /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or above 1e100; otherwise as for
+    /// [`CentreModel::fit`] (with a ridge of 1e-12 or above neither too few samples nor a lack of rank is an error).
+    pub fn refit(&self, samples: &[CentreSample], ridge: f64) -> Result<Self, FitError> {
+        let strength = ridge_strength(ridge, samples.len())?;
+        let needed = self.fit.terms();
+        let mut rows = rows(samples, needed)?;
+        if samples.is_empty() {
+            return Ok(self.clone());
         }
-        let place = "centring".to_owned();
-        if samples.len() < needed {
-            return Err(FitError::TooFewSamples {
-                place,
-                got: samples.len(),
-                needed,
-            });
+        if ridge > 0.0 {
+            rows.pull(&self.fit, &SCALES[..needed], strength)?;
+        } else {
+            enough(samples, needed)?;
         }
-        let fit = rows.solve(&place, samples.len())?;
+        let fit = rows.solve(PLACE, samples.len())?;
+        Ok(Self::with(self.with_radius, fit, samples))
+    }
+
+    /// The model with these coefficients, judged on the samples they were fitted to.
+    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample]) -> Self {
         let mut model = Self {
             with_radius,
             fit,
+            noise: Noise::default(),
             quality: Vec::new(),
         };
-        model.quality = model.quality_on(samples);
-        Ok(model)
+        let n = model.fit.terms();
+        let taken: f64 = samples
+            .iter()
+            .map(|s| model.fit.leverage(&terms(&s.before, s.d1)[..n]))
+            .sum();
+        let residuals: Vec<(Shares, f64)> = samples
+            .iter()
+            .map(|s| {
+                let missed = s.after.x - s.before.x - model.change(&s.before, s.d1);
+                (shares(&s.before, s.d1), missed * missed)
+            })
+            .collect();
+        let count = samples.len() as f64;
+        model.noise = Noise::of(&residuals, (count - taken).max(1.0) / count);
+        model.quality = vec![model.judge(samples)];
+        model
     }
 
     /// What the image shows after `JT1` turned by `d1` degrees; y and r stay. `None` if the ball is lost
@@ -92,10 +113,12 @@ impl CentreModel {
         SightRule::default().sees_features(&after).then_some(after)
     }
 
-    /// The standard deviation of x, feature units, that the fit expects around what a new observation would show.
+    /// The standard deviation of x, feature units, that the fit expects around what a new observation would show: noise, what the terms
+    /// leave out (which grows with r d1), and the uncertainty of the coefficients.
     pub fn uncertainty(&self, before: &Features, d1: f64) -> f64 {
         let terms = terms(before, d1);
-        self.fit.residual[0] * (1.0 + self.fit.leverage(&terms[..self.fit.terms()])).sqrt()
+        let of_fit = self.fit.residual[0].powi(2) * self.fit.leverage(&terms[..self.fit.terms()]);
+        (self.noise.variance(shares(before, d1)) + of_fit).sqrt()
     }
 
     /// What the fit leaves of the changes of x on its samples: standard deviation in feature units, with the degrees of freedom that
@@ -110,12 +133,20 @@ impl CentreModel {
     }
 
     /// How well dx is reproduced on other samples.
-    pub fn quality_on(&self, samples: &[CentreSample]) -> Vec<Quality> {
+    ///
+    /// # Errors
+    /// [`QuantityError::NotPositive`] without samples.
+    pub fn quality_on(&self, samples: &[CentreSample]) -> Result<Vec<Quality>, QuantityError> {
+        Quality::some(samples.len())?;
+        Ok(vec![self.judge(samples)])
+    }
+
+    fn judge(&self, samples: &[CentreSample]) -> Quality {
         let pairs: Vec<(f64, Option<f64>)> = samples
             .iter()
             .map(|s| (s.after.x - s.before.x, Some(self.change(&s.before, s.d1))))
             .collect();
-        vec![Quality::of("dx", &pairs)]
+        Quality::of("dx", &pairs)
     }
 
     /// Condition number of the design matrix, columns scaled to unit length.
@@ -132,36 +163,144 @@ fn terms(before: &Features, d1: f64) -> [f64; 3] {
     [1.0, d1, before.r * d1]
 }
 
+/// By how much noise, and what the terms leave out, show in x: the latter is how far the ball is from the waist's axis, which says how far a
+/// turn carries it; it shows the more the nearer the ball and the longer the move.
+fn shares(before: &Features, d1: f64) -> Shares {
+    Shares {
+        observed: 1.0,
+        fitted: (before.r * d1 / SCALES[2]).powi(2),
+    }
+}
+
+/// What errors call the whole of the samples.
+const PLACE: &str = "centring";
+
+/// The rows of the first `needed` terms; refuses samples that cannot be fitted to.
+fn rows(samples: &[CentreSample], needed: usize) -> Result<Rows, FitError> {
+    let mut rows = Rows::default();
+    for (index, s) in samples.iter().enumerate() {
+        let not_finite = |quantity, value| FitError::NotFinite {
+            index,
+            quantity,
+            value,
+        };
+        for (quantity, value) in [
+            ("x before", s.before.x),
+            ("r before", s.before.r),
+            ("d1", s.d1),
+            ("x after", s.after.x),
+        ] {
+            let usable = value.is_finite() && (quantity != "r before" || value > 0.0);
+            if !usable {
+                return Err(not_finite(quantity, value));
+            }
+        }
+        rows.push(&terms(&s.before, s.d1)[..needed], &[s.after.x - s.before.x], 1.0)
+            .map_err(|(entry, value)| {
+                let quantity = match entry {
+                    Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
+                    Entry::Target(_) => "the change of x",
+                };
+                not_finite(quantity, value)
+            })?;
+    }
+    Ok(rows)
+}
+
+fn enough(samples: &[CentreSample], needed: usize) -> Result<(), FitError> {
+    if samples.len() < needed {
+        return Err(FitError::TooFewSamples {
+            place: PLACE.to_owned(),
+            got: samples.len(),
+            needed,
+        });
+    }
+    Ok(())
+}
+
+impl CentreModel {
+    const KIND: &str = "centre-model";
+
+    /// The model as text, which [`CentreModel::from_text`] turns into the same model again.
+    pub fn to_text(&self) -> String {
+        let mut out = Writer::new(Self::KIND);
+        out.line("with-radius", &[self.with_radius]);
+        out.quality(&self.quality);
+        out.fit(&self.fit);
+        out.noise(&self.noise);
+        out.finish()
+    }
+
+    /// The model that was stored as text.
+    ///
+    /// # Errors
+    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged one.
+    pub fn from_text(text: &str) -> Result<Self, StoredModelError> {
+        let mut stored = Reader::new(Self::KIND, text)?;
+        let with_radius: bool = stored.one("with-radius")?;
+        let model = Self {
+            with_radius,
+            quality: stored.quality(&["dx"])?,
+            fit: stored.fit(1, 2 + usize::from(with_radius))?,
+            noise: stored.noise()?,
+        };
+        stored.end()?;
+        model.sound()
+    }
+
+    /// Passes the model on if it could have come out of a fit.
+    fn sound(self) -> Result<Self, StoredModelError> {
+        if self.fit.fits(1, 2 + usize::from(self.with_radius)) && self.noise.is_sound() {
+            return Ok(self);
+        }
+        Err(StoredModelError::Contents {
+            what: "it has the wrong number of coefficients, or some of its numbers are none",
+        })
+    }
+}
+
 #[cfg(feature = "serde")]
 mod stored {
-    //! A stored model is believed only after its shape has been checked.
+    //! The model in serde's terms. What comes back is believed only after it has been checked.
 
-    use super::{CentreModel, Fit, Quality};
+    use super::{CentreModel, Fit, Noise, Quality, StoredModelError};
+    use crate::stored::{VERSION, known};
 
-    #[derive(serde::Deserialize)]
+    #[derive(serde::Serialize, serde::Deserialize)]
     pub(super) struct CentreModelData {
+        #[serde(default)]
+        version: u32,
         with_radius: bool,
         fit: Fit,
+        #[serde(default)]
+        noise: Noise,
         quality: Vec<Quality>,
     }
 
+    impl From<CentreModel> for CentreModelData {
+        fn from(model: CentreModel) -> Self {
+            Self {
+                version: VERSION,
+                with_radius: model.with_radius,
+                fit: model.fit,
+                noise: model.noise,
+                quality: model.quality,
+            }
+        }
+    }
+
     impl TryFrom<CentreModelData> for CentreModel {
-        type Error = &'static str;
+        type Error = StoredModelError;
 
         fn try_from(data: CentreModelData) -> Result<Self, Self::Error> {
-            let CentreModelData {
-                with_radius,
-                fit,
-                quality,
-            } = data;
-            if !fit.fits(1, 2 + usize::from(with_radius)) {
-                return Err("the stored model has the wrong number of coefficients, or some are not finite");
-            }
-            Ok(Self {
-                with_radius,
-                fit,
-                quality,
-            })
+            known(data.version)?;
+            let model = Self {
+                with_radius: data.with_radius,
+                fit: data.fit,
+                noise: data.noise,
+                quality: data.quality,
+            };
+            model.sound()
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::QuantityError;
+
 /// Why a regression has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -75,7 +77,6 @@ impl Fit {
     }
 
     /// Whether this is a fit of `targets` targets over `terms` terms, all numbers finite: a stored one may be anything.
-    #[cfg(feature = "serde")]
     pub(crate) fn fits(&self, targets: usize, terms: usize) -> bool {
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         self.coefficients.len() == targets
@@ -145,6 +146,25 @@ impl Rows {
             column.push(target * weight);
         }
         self.count += 1;
+        Ok(())
+    }
+
+    /// Rows that draw the coefficients toward those of `prior`, each over the `scales` of its term.
+    ///
+    /// # Errors
+    /// [`FitError::Prior`] if the prior is too strong to be reckoned with.
+    pub(crate) fn pull(&mut self, prior: &Fit, scales: &[f64], strength: f64) -> Result<(), FitError> {
+        let mut unit = vec![0.0; prior.terms()];
+        for k in 0..unit.len() {
+            let scale = scales.get(k).copied().unwrap_or(1.0);
+            unit[k] = scale;
+            let targets: Vec<f64> = prior.coefficients.iter().map(|c| c[k] * scale).collect();
+            self.push(&unit, &targets, strength)
+                .map_err(|(_, value)| FitError::Prior {
+                    what: format!("the prior is too strong to be reckoned with ({value})"),
+                })?;
+            unit[k] = 0.0;
+        }
         Ok(())
     }
 
@@ -218,6 +238,18 @@ impl Rows {
     }
 }
 
+/// What the rows of a prior are multiplied with, so that `ridge` counts against the mean over `count` samples.
+///
+/// # Errors
+/// [`FitError::Prior`] for a ridge that is not a number from 0 to 1e100.
+pub(crate) fn ridge_strength(ridge: f64, count: usize) -> Result<f64, FitError> {
+    if !(0.0..=1e100).contains(&ridge) {
+        let what = format!("a refit needs a ridge of 0..=1e100, not {ridge}");
+        return Err(FitError::Prior { what });
+    }
+    Ok((ridge * count as f64).sqrt())
+}
+
 /// How well a model reproduces one output.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -239,6 +271,17 @@ pub struct Quality {
 }
 
 impl Quality {
+    /// Refuses to judge a model on nothing.
+    pub(crate) fn some(samples: usize) -> Result<(), QuantityError> {
+        if samples == 0 {
+            return Err(QuantityError::NotPositive {
+                quantity: "the number of samples to judge a model on".to_owned(),
+                value: 0.0,
+            });
+        }
+        Ok(())
+    }
+
     /// From pairs of (observed, predicted) changes.
     pub(crate) fn of(output: &str, pairs: &[(f64, Option<f64>)]) -> Self {
         let n = pairs.len() as f64;

@@ -40,6 +40,7 @@ mod scene;
 mod scene_check;
 mod scene_kind;
 mod source;
+mod stored;
 mod workspace;
 mod y4m;
 
@@ -67,6 +68,7 @@ pub use samples::{
 pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
 pub use scene_kind::{SceneKind, Snapshot};
 pub use source::{CellCamera, FeatureCamera, SharedCell, SimulatedArm};
+pub use stored::StoredModelError;
 pub use workspace::{Coverage, Workspace};
 pub use y4m::Y4mWriter;
 

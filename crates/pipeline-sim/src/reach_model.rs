@@ -2,9 +2,10 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Entry, Fit, Rows};
+use crate::least_squares::{Entry, Fit, Rows, ridge_strength};
 use crate::reach_noise::Noise;
-use crate::{FitError, Quality, ReachForm, ReachSample, SightRule};
+use crate::stored::{Reader, Writer};
+use crate::{FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule, StoredModelError};
 
 /// A regression simulator of the approaching behaviour, fitted to samples of real or simulated moves.
 ///
@@ -21,7 +22,10 @@ use crate::{FitError, Quality, ReachForm, ReachSample, SightRule};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "stored::ReachModelData"))]
+#[cfg_attr(
+    feature = "serde",
+    serde(into = "stored::ReachModelData", try_from = "stored::ReachModelData")
+)]
 pub struct ReachModel {
     form: ReachForm,
     edges: Vec<f64>,
@@ -74,7 +78,7 @@ impl ReachModel {
             model.noise.push(Default::default());
             model.noise[i] = model.noise_of(i, group, |_| 1.0);
         }
-        model.quality = model.quality_on(samples);
+        model.quality = model.judge(samples);
         Ok(model)
     }
 
@@ -91,10 +95,9 @@ impl ReachModel {
     /// and for a power that is not finite; otherwise as for [`ReachModel::fit`] (with a ridge of 1e-12 or above neither too few samples nor
     /// a lack of rank is an error).
     pub fn refit(&self, samples: &[ReachSample], ridge: f64, radius_power: f64) -> Result<Self, FitError> {
-        if !((0.0..=1e100).contains(&ridge) && radius_power.is_finite()) {
-            let what = format!(
-                "a refit needs a ridge of 0..=1e100 and a finite power, not {ridge} and {radius_power}"
-            );
+        ridge_strength(ridge, 0)?;
+        if !radius_power.is_finite() {
+            let what = format!("a refit needs a finite power, not {radius_power}");
             return Err(FitError::Prior { what });
         }
         let mut model = self.clone();
@@ -122,30 +125,15 @@ impl ReachModel {
                 push(self.form, &mut rows, *index, sample, weigh(sample).sqrt())?;
             }
             if ridge > 0.0 {
-                self.pull(i, (ridge * count as f64).sqrt(), &mut rows)?;
+                rows.pull(&self.pieces[i], &[], ridge_strength(ridge, count)?)?;
             }
             model.pieces[i] = rows.solve(&self.place(i), count)?;
             model.noise[i] = model.noise_of(i, group, weigh);
         }
         if !samples.is_empty() {
-            model.quality = model.quality_on(samples);
+            model.quality = model.judge(samples);
         }
         Ok(model)
-    }
-
-    /// Rows that draw the coefficients of piece `i` toward what they are.
-    fn pull(&self, i: usize, strength: f64, rows: &mut Rows) -> Result<(), FitError> {
-        let [first, second] = [&self.pieces[i].coefficients[0], &self.pieces[i].coefficients[1]];
-        let mut unit = vec![0.0; self.form.terms()];
-        for k in 0..unit.len() {
-            unit[k] = 1.0;
-            rows.push(&unit, &[first[k], second[k]], strength)
-                .map_err(|(_, value)| FitError::Prior {
-                    what: format!("the prior is too strong to be reckoned with ({value})"),
-                })?;
-            unit[k] = 0.0;
-        }
-        Ok(())
     }
 
     /// The samples by elbow interval, each with its position.
@@ -263,7 +251,15 @@ impl ReachModel {
 
     /// How well the changes of y and r are reproduced on other samples. A sample for which the model has no prediction counts as one
     /// for which it predicts no change, and in [`Quality::unpredicted`].
-    pub fn quality_on(&self, samples: &[ReachSample]) -> Vec<Quality> {
+    ///
+    /// # Errors
+    /// [`QuantityError::NotPositive`] without samples.
+    pub fn quality_on(&self, samples: &[ReachSample]) -> Result<Vec<Quality>, QuantityError> {
+        Quality::some(samples.len())?;
+        Ok(self.judge(samples))
+    }
+
+    fn judge(&self, samples: &[ReachSample]) -> Vec<Quality> {
         let predicted = samples.iter().map(|s| {
             let after = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3);
             (s, after)
@@ -355,14 +351,89 @@ fn check(index: usize, sample: &ReachSample) -> Result<(), FitError> {
     Ok(())
 }
 
+impl ReachModel {
+    const KIND: &str = "reach-model";
+
+    /// The model as text, which [`ReachModel::from_text`] turns into the same model again.
+    ///
+    /// ```
+    /// # use pipeline_sim::{Ball, Cell, ReachForm, ReachModel, sample_moves};
+    /// # use rand::SeedableRng;
+    /// # let mut rng = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1);
+    /// # let (_, samples) = sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 100, 0.125, &mut rng);
+    /// # let path = std::env::temp_dir().join(format!("pipeline-sim-{}.txt", std::process::id()));
+    /// let model = ReachModel::fit(&samples, ReachForm::Rigid8, &[])?;
+    /// std::fs::write(&path, model.to_text())?;
+    /// assert_eq!(ReachModel::from_text(&std::fs::read_to_string(&path)?)?, model);
+    /// # std::fs::remove_file(&path)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn to_text(&self) -> String {
+        let mut out = Writer::new(Self::KIND);
+        out.line("form", &[self.form]);
+        out.line("elbow-edges", &self.edges);
+        out.quality(&self.quality);
+        for (fit, noise) in self.pieces.iter().zip(&self.noise) {
+            out.fit(fit);
+            noise.iter().for_each(|noise| out.noise(noise));
+        }
+        out.finish()
+    }
+
+    /// The model that was stored as text.
+    ///
+    /// # Errors
+    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged one.
+    pub fn from_text(text: &str) -> Result<Self, StoredModelError> {
+        let mut stored = Reader::new(Self::KIND, text)?;
+        let form = stored.form()?;
+        let edges: Vec<f64> = stored.line("elbow-edges", None)?;
+        let quality = stored.quality(&["dy", "dr"])?;
+        let (mut pieces, mut noise) = (Vec::new(), Vec::new());
+        for _ in 0..=edges.len() {
+            pieces.push(stored.fit(2, form.terms())?);
+            noise.push([stored.noise()?, stored.noise()?]);
+        }
+        stored.end()?;
+        let model = Self {
+            form,
+            edges,
+            pieces,
+            noise,
+            quality,
+        };
+        model.sound()
+    }
+
+    /// Passes the model on if it could have come out of a fit.
+    fn sound(self) -> Result<Self, StoredModelError> {
+        let damaged = |what| Err(StoredModelError::Contents { what });
+        let edges = &self.edges;
+        if !(edges.iter().all(|e| e.is_finite()) && edges.windows(2).all(|w| w[0] < w[1])) {
+            return damaged("the elbow edges do not ascend");
+        }
+        let terms = self.form.terms();
+        if self.pieces.len() != edges.len() + 1 || !self.pieces.iter().all(|p| p.fits(2, terms)) {
+            return damaged("it has the wrong number of coefficients, or some are not finite");
+        }
+        if self.noise.len() != self.pieces.len() || !self.noise.iter().flatten().all(Noise::is_sound) {
+            return damaged("its noise is not a finite number of zero or above for each piece");
+        }
+        Ok(self)
+    }
+}
+
 #[cfg(feature = "serde")]
 mod stored {
-    //! A stored model is believed only after its shape has been checked.
+    //! The model in serde's terms. What comes back is believed only after it has been checked.
 
-    use super::{Fit, Noise, Quality, ReachForm, ReachModel};
+    use super::{Fit, Noise, Quality, ReachForm, ReachModel, StoredModelError};
+    use crate::stored::{VERSION, known};
 
-    #[derive(serde::Deserialize)]
+    #[derive(serde::Serialize, serde::Deserialize)]
     pub(super) struct ReachModelData {
+        #[serde(default)]
+        version: u32,
         form: ReachForm,
         edges: Vec<f64>,
         pieces: Vec<Fit>,
@@ -370,36 +441,32 @@ mod stored {
         quality: Vec<Quality>,
     }
 
+    impl From<ReachModel> for ReachModelData {
+        fn from(model: ReachModel) -> Self {
+            Self {
+                version: VERSION,
+                form: model.form,
+                edges: model.edges,
+                pieces: model.pieces,
+                noise: model.noise,
+                quality: model.quality,
+            }
+        }
+    }
+
     impl TryFrom<ReachModelData> for ReachModel {
-        type Error = &'static str;
+        type Error = StoredModelError;
 
         fn try_from(data: ReachModelData) -> Result<Self, Self::Error> {
-            let ReachModelData {
-                form,
-                edges,
-                pieces,
-                noise,
-                quality,
-            } = data;
-            let ascending = edges.iter().all(|e| e.is_finite()) && edges.windows(2).all(|w| w[0] < w[1]);
-            if !ascending {
-                return Err("the elbow edges of the stored model do not ascend");
-            }
-            if pieces.len() != edges.len() + 1 || !pieces.iter().all(|p| p.fits(2, form.terms())) {
-                return Err("the stored model has the wrong number of coefficients, or some are not finite");
-            }
-            if noise.len() != pieces.len() || !noise.iter().flatten().all(Noise::is_sound) {
-                return Err(
-                    "the noise of the stored model is not a finite number of zero or above for each piece",
-                );
-            }
-            Ok(Self {
-                form,
-                edges,
-                pieces,
-                noise,
-                quality,
-            })
+            known(data.version)?;
+            let model = Self {
+                form: data.form,
+                edges: data.edges,
+                pieces: data.pieces,
+                noise: data.noise,
+                quality: data.quality,
+            };
+            model.sound()
         }
     }
 }

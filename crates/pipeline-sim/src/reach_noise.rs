@@ -8,9 +8,9 @@ use crate::ReachForm;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shares {
     /// Variance of the feature for noise of variance 1 on every observed feature.
-    observed: f64,
+    pub(crate) observed: f64,
     /// Variance of the feature for what the form leaves out, on a scale of its own.
-    fitted: f64,
+    pub(crate) fitted: f64,
 }
 
 impl ReachForm {
@@ -54,9 +54,9 @@ pub(crate) struct Noise {
     /// Standard deviation of all residuals, feature units.
     pub(crate) residual: f64,
     /// Variance of the noise of observed features, units².
-    observed: f64,
+    pub(crate) observed: f64,
     /// Strength of what the form cannot express, on the scale of its share.
-    fitted: f64,
+    pub(crate) fitted: f64,
 }
 
 impl Noise {
@@ -102,7 +102,6 @@ impl Noise {
     }
 
     /// Whether all of it is finite and not below zero.
-    #[cfg(feature = "serde")]
     pub(crate) fn is_sound(&self) -> bool {
         [self.residual, self.observed, self.fitted]
             .iter()

@@ -22,7 +22,7 @@ fn every_form_explains_what_it_is_known_to_explain() {
         (ReachForm::RigidBody, &[][..], (0.995, 1.0), (0.995, 1.0)),
     ] {
         let model = ReachModel::fit(&training, form, edges).expect("enough samples");
-        let q = model.quality_on(&fresh);
+        let q = model.quality_on(&fresh).expect("samples");
         println!(
             "{form:?}: training {:?} fresh {q:?} condition {:?}",
             model.quality(),
@@ -308,11 +308,14 @@ fn samples_without_a_prediction_count_as_errors() {
         .take(100)
         .collect();
     assert_eq!(lost.len(), 100);
-    let q = model.quality_on(&lost);
+    let q = model.quality_on(&lost).expect("samples");
     assert_eq!((q[0].samples, q[0].unpredicted), (100, 100));
     assert!((q[0].rmse - 10.0).abs() < 1e-9, "{q:?}");
     let mixed: Vec<ReachSample> = training[..900].iter().chain(&lost).copied().collect();
-    let (with, without) = (model.quality_on(&mixed), model.quality_on(&training[..900]));
+    let (with, without) = (
+        model.quality_on(&mixed).expect("samples"),
+        model.quality_on(&training[..900]).expect("samples"),
+    );
     assert_eq!((with[1].samples, with[1].unpredicted), (1000, 100));
     assert_eq!(without[0].unpredicted, 0);
     assert!(
@@ -364,7 +367,10 @@ fn a_refit_learns_a_wrong_arm_from_few_moves() {
     let (_, few) = sample_moves(&wrong, 200, 0.5, &mut rng);
     let (_, fresh) = sample_moves(&wrong, 1000, 0.0, &mut rng);
     let refitted = model.refit(&few, 0.001, 2.0).expect("a prior helps out");
-    let (before, after) = (model.quality_on(&fresh), refitted.quality_on(&fresh));
+    let (before, after) = (
+        model.quality_on(&fresh).expect("samples"),
+        refitted.quality_on(&fresh).expect("samples"),
+    );
     println!("{before:?} {after:?}");
     assert!(after[0].rmse < 0.5 * before[0].rmse && after[1].rmse < before[1].rmse);
     // So strong a prior that nothing moves, and none at all with too few samples.

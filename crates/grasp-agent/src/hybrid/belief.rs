@@ -132,6 +132,10 @@ impl Belief {
     /// The same after a time in which camera, ball and gears may have changed by `share` of what `prior` allows for: as much is believed,
     /// and less firmly.
     pub(crate) fn loosened(self, prior: &Prior, share: f64) -> Self {
+        if share.abs() < f64::MIN_POSITIVE {
+            // Exactly the same, without the rounding of two inversions.
+            return self;
+        }
         let change = (prior.deviations() * share).map(|s| s * s);
         let information = self.information_matrix().try_inverse();
         let information = information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::nalgebra::Point3;
-use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
+use grasp_agent::puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, CameraModel, Controller, EventLog, Eye, Look, Outcome, Sighting,
 };
@@ -28,6 +28,10 @@ pub(crate) enum Fault {
     LineDead(usize),
     /// After so many orders to the gripper.
     GripperDead(usize),
+    /// Something is near at this move, and the line is dead when the arm is told to stop.
+    StopDead(usize),
+    /// The arm stops halfway in this move, for a reason of its own.
+    StoppedShort(usize),
     /// After so many moves.
     SensorDead(usize),
     Near(usize),
@@ -64,6 +68,8 @@ pub(crate) struct Cell {
     pub(crate) joints: Joints,
     pub(crate) closed: bool,
     pub(crate) held: bool,
+    /// Whether the jaws hold nothing, beside what else goes wrong.
+    pub(crate) slippery: bool,
     pub(crate) stops: usize,
     pub(crate) looks: usize,
     looked_first: Option<Joints>,
@@ -77,6 +83,11 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
+    /// From now on the gripper does not answer.
+    pub(crate) fn cut_gripper(&mut self) {
+        self.fault = Fault::GripperDead(0);
+    }
+
     fn dead_line(&self, doing: &str) -> ArmError {
         ArmError::Line {
             port: "ttyUSB0".into(),
@@ -98,6 +109,7 @@ impl Shared {
             joints: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
             closed: false,
             held: false,
+            slippery: false,
             stops: 0,
             looks: 0,
             looked_first: None,
@@ -253,6 +265,15 @@ impl Manipulator for Shared {
             Fault::LineDead(after) if moves > after => {
                 return Err(cell.dead_line("DRIVE"));
             }
+            Fault::StoppedShort(at) if moves == at => {
+                cell.joints = from + JointDelta(std::array::from_fn(|i| 0.5 * (target.0[i] - from.0[i])));
+                return Err(ArmError::NotReached {
+                    port: "ttyUSB0".into(),
+                    joint: Joint::J1,
+                    wanted_degrees: target.degrees()[0],
+                    reported_degrees: cell.joints.degrees()[0],
+                });
+            }
             Fault::Halted(at) => moves == at,
             Fault::HaltedTwice(at) => moves == at || moves == at + 1,
             Fault::HaltedNear(r) => {
@@ -292,7 +313,7 @@ impl Manipulator for Shared {
         }
         cell.closed = gripper == Gripper::Closed;
         let miss = (cell.truth.tool_point(&cell.joints) - cell.ball).norm();
-        cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery;
+        cell.held = cell.closed && miss < 0.010 && cell.fault != Fault::Slippery && !cell.slippery;
         if cell.fault == Fault::SqueezedOut && cell.held && cell.halts == 0 {
             (cell.held, cell.halts) = (false, 1);
             cell.ball.y += 0.02;
@@ -302,8 +323,12 @@ impl Manipulator for Shared {
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {
-        self.0.borrow_mut().stops += 1;
-        Ok(())
+        let mut cell = self.0.borrow_mut();
+        cell.stops += 1;
+        match cell.fault {
+            Fault::StopDead(_) => Err(cell.dead_line("ABORT")),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -312,7 +337,7 @@ impl ProximitySensor for Shared {
         let cell = self.0.borrow();
         match cell.fault {
             Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
-            Fault::Near(at) => Ok(cell.moves == at),
+            Fault::Near(at) | Fault::StopDead(at) => Ok(cell.moves == at),
             _ => Ok(false),
         }
     }

@@ -32,6 +32,7 @@ fn without_a_fault_the_ball_is_gripped() {
         "lifted",
         "not-seen",
         "not-seen",
+        "grasped",
     ];
     assert!(words.ends_with(&end), "{words:?}");
     assert!(
@@ -358,5 +359,31 @@ fn settings_that_cannot_work_are_refused() {
         change(&mut config);
         let refused = Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap_err();
         assert!(refused.to_string().contains(name), "{name}: {refused}");
+    }
+}
+
+#[test]
+fn a_camera_that_freezes_at_any_look_brings_about_no_success() {
+    for slippery in [false, true] {
+        let (_, _, cell) = end_of(Fault::FrozenPicture(usize::MAX));
+        let looks = cell.0.borrow().looks;
+        // The lift is followed by two looks, and the picture before it cannot be an old one.
+        for after in 0..looks - 1 {
+            let cell = Shared::new(
+                CameraModel::paper(),
+                [0.6, 0.1, -0.1],
+                Fault::FrozenPicture(after),
+            );
+            cell.0.borrow_mut().slippery = slippery;
+            let servo = PositionBased::new(ServoSettings::paper());
+            let mut agent = Agent::with_controller(config(), servo).unwrap();
+            let mut log = EventLog::default();
+            let end = cell.run(&mut agent, &mut log);
+            assert!(
+                matches!(end, Err(AgentError::FrozenCamera { .. })),
+                "slippery {slippery}, after {after} of {looks}: {end:?} {:?}",
+                words_from(&log, "at-goal")
+            );
+        }
     }
 }

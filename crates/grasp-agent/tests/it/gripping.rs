@@ -19,6 +19,7 @@ fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
         "too-near",
         "taken-back",
         "seen",
+        "reaching",
         "at-goal",
         "seen",
         "gripping",
@@ -90,8 +91,8 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
 
 #[test]
 fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
-    let at_once: &[_] = &["lifted", "seen", "seen"];
-    let then: &[_] = &["lifted", "seen", "seen", "lifted", "seen"];
+    let at_once: &[_] = &["lifted", "seen", "seen", "grasped"];
+    let then: &[_] = &["lifted", "seen", "seen", "lifted", "seen", "grasped"];
     for (from, expected) in [(0, at_once), (2, then)] {
         let (end, log, cell) = end_of(Fault::ShowsInTheJaws(from));
         assert_eq!(end.unwrap().gave_up, None);

@@ -86,6 +86,8 @@ fn logs_of_runs_that_failed_replay_to_the_same_failure() {
         Fault::GripperDead(1),
         Fault::SensorDead(0),
         Fault::SensorDead(3),
+        Fault::StopDead(3),
+        Fault::StoppedShort(3),
     ] {
         replays(PositionBased::new(servo), fault);
     }
@@ -143,4 +145,169 @@ fn another_controller_is_told_apart() {
         events: log.events[..log.events.len() / 2].to_vec(),
     };
     assert!(matches!(cut.replay(&agent), Err(AgentError::Replay { .. })));
+}
+
+#[cfg(feature = "serde")]
+mod saved {
+    use grasp_agent::qtable::{Action, QTable, State};
+    use grasp_agent::{
+        Agent, AgentError, Behaviour, BehaviourPair, CameraModel, Controller, EventLog, Hybrid,
+        HybridSettings, Learned, OnlineLearning, Replayed, SavedController, SavedRun,
+    };
+
+    use super::FAULTS;
+    use crate::cell::{Fault, Shared, config};
+
+    fn blank(spec: grasp_agent::BehaviourSpec) -> Behaviour {
+        let table = QTable::new(spec.states(), spec.actions()).unwrap();
+        Behaviour::new(spec, table).unwrap()
+    }
+
+    fn learned() -> Learned {
+        let pair = BehaviourPair::paper_mended();
+        Learned::new(blank(pair.centering), blank(pair.approaching)).with_kappa(3.0, 4.0)
+    }
+
+    /// Makes a run, saves it, and reads it again: all that the replay gets is the text.
+    fn saved<C: Controller + Clone>(
+        agent: &mut Agent<C>,
+        controller: SavedController,
+        cell: &Shared,
+    ) -> String {
+        let mut saved = SavedRun::before(agent, controller);
+        let end = agent.run_and_learn(
+            &mut cell.clone(),
+            &mut cell.clone(),
+            &mut cell.clone(),
+            &mut |event| {
+                saved.note(event);
+            },
+        );
+        let text = saved.to_json();
+        let read = SavedRun::from_json(&text).unwrap();
+        assert_eq!(read.log(), saved.log());
+        assert_eq!(read.to_json(), text);
+        match (end, read.replay().unwrap()) {
+            (Ok(then), Replayed::Same(Ok(now))) => assert_eq!(then, now),
+            (Err(_), Replayed::Same(Err(_))) => {}
+            (then, now) => panic!("{then:?} and {now:?}"),
+        }
+        text
+    }
+
+    #[test]
+    fn saved_runs_replay_from_their_text_alone() {
+        let more = [
+            Fault::NoFrame(3),
+            Fault::FrozenPicture(2),
+            Fault::LineDead(4),
+            Fault::StopDead(3),
+        ];
+        for fault in FAULTS.into_iter().chain(more) {
+            let cell = || Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
+            let mut agent = Agent::with_controller(config(), learned()).unwrap();
+            saved(&mut agent, SavedController::of_learned(&learned(), None), &cell());
+
+            // Learning, in the third run: what was learned in the first two is part of it.
+            let mut agent = Agent::with_controller(config(), learned()).unwrap();
+            for run in 0..3 {
+                let learning = OnlineLearning::careful(run);
+                let now = agent.controller().clone().learning(learning);
+                *agent.controller_mut() = now;
+                let before = SavedController::of_learned(agent.controller(), Some(learning));
+                saved(&mut agent, before, &cell());
+            }
+
+            let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+            for _ in 0..3 {
+                let before = SavedController::of_hybrid(agent.controller());
+                saved(&mut agent, before, &cell());
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_that_froze_before_the_run_is_part_of_it() {
+        let cell = Shared::new(
+            CameraModel::paper(),
+            [0.6, 0.1, -0.1],
+            Fault::FrozenPicture(usize::MAX),
+        );
+        let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+        cell.run(&mut agent, &mut EventLog::default()).unwrap();
+        let looks = cell.0.borrow().looks;
+        cell.0.borrow_mut().fault = Fault::FrozenPicture(looks);
+        let before = SavedController::of_hybrid(agent.controller());
+        assert!(saved(&mut agent, before, &cell).contains("frozen"));
+    }
+
+    #[test]
+    fn another_course_is_told_with_the_event() {
+        let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+        let mut agent = Agent::with_controller(config(), learned()).unwrap();
+        let text = saved(&mut agent, SavedController::of_learned(&learned(), None), &cell);
+        let differs = |text: &str| match SavedRun::from_json(text).unwrap().replay().unwrap() {
+            Replayed::Differs { event, then, now } => (event, then, now),
+            same => panic!("{same:?}"),
+        };
+        // Other settings: of the bound on moves.
+        let shorter = text.replace("\"max_cycles\":60", "\"max_cycles\":3");
+        let (event, then, now) = differs(&shorter);
+        let now = now.unwrap().kind;
+        assert_eq!(
+            (now.word(), event > 5),
+            ("gave-up", true),
+            "{event}: {now:?} for {then:?}"
+        );
+        // Other knowledge.
+        let mut table = QTable::new(42, 9).unwrap();
+        table.set(State(0), Action(0), 1.0).unwrap();
+        (0..42).for_each(|state| table.set(State(state), Action(8), 2.0).unwrap());
+        let pair = BehaviourPair::paper_mended();
+        let other = Learned::new(
+            Behaviour::new(pair.centering, table).unwrap(),
+            blank(pair.approaching),
+        );
+        let mut saved = SavedRun::before(&agent, SavedController::of_learned(&other, None));
+        let mut log = EventLog::default();
+        cell.run(
+            &mut Agent::with_controller(config(), learned()).unwrap(),
+            &mut log,
+        )
+        .unwrap();
+        for event in &log.events {
+            saved.note(&grasp_agent::Event {
+                cycle: event.cycle,
+                kind: event.kind.clone(),
+                joints: event.joints,
+                frame: None,
+            });
+        }
+        assert!(matches!(saved.replay().unwrap(), Replayed::Differs { .. }));
+    }
+
+    #[test]
+    fn text_that_is_no_saved_run_is_refused_with_the_reason() {
+        let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+        let mut agent = Agent::with_controller(config(), learned()).unwrap();
+        let text = saved(&mut agent, SavedController::of_learned(&learned(), None), &cell);
+        let cases = [
+            ("grasp-agent run 1", "grasp-agent run 9", "run 9"),
+            ("\"looks\":2", "\"looks\":0", "looks is 0"),
+            ("\"lost_weight\":50", "\"lost_weight\":5", "lost_weight is 5"),
+            ("\"camera\"", "\"kamera\"", "camera"),
+            ("\"events\"", "\"evens\"", "events"),
+        ];
+        for (old, new, said) in cases {
+            let changed = text.replace(old, new);
+            assert_ne!(changed, text, "{old}");
+            let refused = SavedRun::from_json(&changed).unwrap_err();
+            assert!(
+                refused.to_string().contains(said),
+                "{refused} does not say {said}"
+            );
+        }
+        let half = SavedRun::from_json(&text[..text.len() / 2]);
+        assert!(matches!(half, Err(AgentError::SavedRun(_))));
+    }
 }

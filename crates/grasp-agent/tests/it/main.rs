@@ -7,5 +7,7 @@ mod gripping;
 mod hybrid;
 mod learned;
 mod log;
+mod modules;
 mod object;
+mod phases;
 mod rivals;

@@ -6,8 +6,9 @@
 
 use super::rows::{self, Candidate, Passes, Rows};
 
-/// Work that is worth compiling for wider vectors: whatever [`run`](Vectorized::run) and the functions inlined into it do.
-pub(crate) trait Vectorized {
+/// Work that is worth compiling for wider vectors: whatever [`run`](Vectorized::run) and the functions inlined into it do
+/// (`#[inline(always)]` on both). [`widest`] does it.
+pub trait Vectorized {
     /// What it gives.
     type Output;
 
@@ -15,8 +16,28 @@ pub(crate) trait Vectorized {
     fn run(self) -> Self::Output;
 }
 
-/// Does `work` by the fastest code for this machine. There are no fused multiplications, so the result is always the same.
-pub(crate) fn widest<W: Vectorized>(work: W) -> W::Output {
+/// Does `work` by the fastest code for this machine: with AVX2 where the processor has it. There are no fused multiplications, so the result
+/// is always the same.
+///
+/// ```
+/// use hough_heuristic::{Vectorized, widest};
+///
+/// struct Halve<'a>(&'a mut [f32]);
+///
+/// impl Vectorized for Halve<'_> {
+///     type Output = ();
+///
+///     #[inline(always)]
+///     fn run(self) {
+///         self.0.iter_mut().for_each(|value| *value *= 0.5);
+///     }
+/// }
+///
+/// let mut values = [3.0; 100];
+/// widest(Halve(&mut values));
+/// assert_eq!(values, [1.5; 100]);
+/// ```
+pub fn widest<W: Vectorized>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the function needs nothing but AVX2, which has just been detected.

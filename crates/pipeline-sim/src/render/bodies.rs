@@ -1,5 +1,6 @@
 //! The shaded bodies: balls, cylinders, boxes, and what lies flat.
 
+use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::render::canvas::Canvas;
@@ -20,56 +21,59 @@ pub(super) struct Studio<'a> {
     pub(super) bounce: f64,
 }
 
-/// Pixels between two places where a plane's coordinates are worked out exactly.
-const STRIDE: usize = 16;
-
 /// Writes a row of a textured plane of reflectance 1: `plane` takes pixels to homogeneous plane coordinates in metres.
 pub(super) fn plane_row(
     plane: &Matrix3<f64>,
     texture: &Texture,
     strength: f32,
-    (y, x0): (usize, usize),
+    start: (usize, usize),
     row: &mut [f32],
 ) {
-    let base = plane * Vector3::new(x0 as f64, y as f64, 1.0);
-    let step = plane.column(0);
-    let place = |k: usize| {
-        let k = k as f64;
-        let w = 1.0 / (base.z + k * step.z);
-        ((base.x + k * step.x) * w, (base.y + k * step.y) * w)
-    };
-    let middle = row.len() / 2;
-    let (a, b) = (place(middle), place(middle + 1));
-    let down = {
-        let p = plane * Vector3::new((x0 + middle) as f64, y as f64 + 1.0, 1.0);
-        (p.x / p.z, p.y / p.z)
-    };
-    let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
-    let level = texture.level(footprint);
-    // A plane that does not recede along the row (the camera's x axis lies in it, as it does while the hand is not rolled) is walked in one
-    // go; otherwise places are exact at multiples of the stride, so that what lies between is the same in all rows.
-    let length = row.len();
-    let even = (step.z * length as f64).abs() < 1e-7 * base.z.abs();
-    if even {
-        let (from, to) = (place(0), place(length));
-        let share = 1.0 / length as f64;
-        texture.walk(
-            level,
-            from,
-            ((to.0 - from.0) * share, (to.1 - from.1) * share),
+    widest(PlaneRow {
+        plane,
+        texture,
+        strength,
+        start,
+        row,
+    });
+}
+
+/// The work of [`plane_row`].
+struct PlaneRow<'a> {
+    plane: &'a Matrix3<f64>,
+    texture: &'a Texture,
+    strength: f32,
+    start: (usize, usize),
+    row: &'a mut [f32],
+}
+
+impl Vectorized for PlaneRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            plane,
+            texture,
             strength,
+            start: (y, x0),
             row,
-        );
-    }
-    let mut k = 0;
-    let mut from = place(0);
-    while !even && k < length {
-        let end = ((x0 + k + STRIDE) / STRIDE * STRIDE - x0).min(length);
-        let to = place(end);
-        let share = 1.0 / (end - k) as f64;
-        let step = ((to.0 - from.0) * share, (to.1 - from.1) * share);
-        texture.walk(level, from, step, strength, &mut row[k..end]);
-        (from, k) = (to, end);
+        } = self;
+        let base = plane * Vector3::new(0.0, y as f64, 1.0);
+        let step = plane.column(0);
+        let place = |x: usize| {
+            let x = x as f64;
+            let w = 1.0 / (base.z + x * step.z);
+            ((base.x + x * step.x) * w, (base.y + x * step.y) * w)
+        };
+        let middle = x0 + row.len() / 2;
+        let (a, b) = (place(middle), place(middle + 1));
+        let down = {
+            let p = plane * Vector3::new(middle as f64, y as f64 + 1.0, 1.0);
+            (p.x / p.z, p.y / p.z)
+        };
+        let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
+        texture.walk(texture.level(footprint), place, strength, x0, row);
     }
 }
 

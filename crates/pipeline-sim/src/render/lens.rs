@@ -1,5 +1,6 @@
 //! What the lens does to the light: distortion and defocus.
 
+use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Point2, Vector2};
 
 use crate::Camera;
@@ -213,7 +214,7 @@ pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
 }
 
 /// Pixels that are blurred at a time, so that their sums stay in registers.
-const BLOCK: usize = 16;
+const BLOCK: usize = 32;
 
 /// Blurs the whole canvas by a Gaussian of standard deviation `sigma` pixels.
 pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
@@ -256,6 +257,26 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
 
 /// The sum of pairs of rows, each with its weight.
 fn weigh<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
+    widest(Weighing { pairs, out });
+}
+
+/// The work of [`weigh`].
+struct Weighing<'a, P> {
+    pairs: &'a P,
+    out: &'a mut [f32],
+}
+
+impl<'a, P: Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone> Vectorized for Weighing<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        weigh_blocks(self.pairs, self.out);
+    }
+}
+
+#[inline(always)]
+fn weigh_blocks<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
     let mut at = 0;
     let mut blocks = out.chunks_exact_mut(BLOCK);
     for block in &mut blocks {

@@ -1,5 +1,6 @@
 //! Slowly varying light on the table, worked out at few pixels and interpolated between them.
 
+use hough_heuristic::{Vectorized, widest};
 use nalgebra::Matrix3;
 
 use crate::render::view::View;
@@ -63,6 +64,15 @@ impl LightGrid {
 
     /// Multiplies the pixels x0.. of row y by the light on them.
     pub(super) fn shine(&self, y: usize, x0: usize, row: &mut [f32]) {
+        widest(Shining {
+            light: self,
+            start: (y, x0),
+            row,
+        });
+    }
+
+    #[inline(always)]
+    fn shine_on(&self, (y, x0): (usize, usize), row: &mut [f32]) {
         let (j, fy) = (y / STEP, (y % STEP) as f32 / STEP as f32);
         let line = |j: usize| self.values.get(j * self.columns..(j + 1) * self.columns);
         let (Some(upper), Some(lower)) = (line(j), line(j + 1)) else {
@@ -94,6 +104,22 @@ impl LightGrid {
             }
             from = to;
         }
+    }
+}
+
+/// The work of [`LightGrid::shine`].
+struct Shining<'a> {
+    light: &'a LightGrid,
+    start: (usize, usize),
+    row: &'a mut [f32],
+}
+
+impl Vectorized for Shining<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.light.shine_on(self.start, self.row);
     }
 }
 

@@ -1,5 +1,6 @@
 //! From light to grey levels: blur, vignetting, noise, gamma, eight bits.
 
+use hough_heuristic::{Vectorized, widest};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -45,11 +46,22 @@ impl Exposure {
 
     /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and with it the noise.
     pub(super) fn expose(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, frame: u64, out: &mut [u8]) {
+        widest(Exposing {
+            exposure: self,
+            canvas,
+            camera,
+            seed: seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15),
+            out,
+        });
+    }
+
+    #[inline(always)]
+    fn expose_rows(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, out: &mut [u8]) {
         let (width, height) = (canvas.width, canvas.height);
         if width == 0 || height == 0 {
             return;
         }
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let s = self.sensor;
         let (principal, focal) = (camera.principal_point(), camera.focal_px());
         let (side, middle) = three_taps(if self.blurred { 0.0 } else { s.blur });
@@ -102,5 +114,24 @@ impl Exposure {
                 *grey = curve[value.to_bits() as usize & (LEVELS - 1)];
             }
         }
+    }
+}
+
+/// The work of [`Exposure::expose`].
+struct Exposing<'a> {
+    exposure: &'a mut Exposure,
+    canvas: &'a Canvas,
+    camera: &'a Camera,
+    seed: u64,
+    out: &'a mut [u8],
+}
+
+impl Vectorized for Exposing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.exposure
+            .expose_rows(self.canvas, self.camera, self.seed, self.out);
     }
 }

@@ -1,5 +1,6 @@
 //! A layer in motion: drawn once, in the middle of the exposure, and averaged along the way that every pixel's content takes.
 
+use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
 use crate::render::canvas::{Area, Canvas};
@@ -7,7 +8,7 @@ use crate::render::canvas::{Area, Canvas};
 /// Side of the squares of pixels that are taken to move alike.
 const SQUARE: usize = 16;
 /// Numbers that are worked on at once.
-const LANES: usize = 4;
+const LANES: usize = 8;
 /// Motion of less than this is none, pixels.
 const STILL: f64 = 0.01;
 
@@ -65,6 +66,18 @@ impl Smear {
         area: Area,
         out: &mut Canvas,
     ) {
+        widest(Laying {
+            smear: self,
+            layer,
+            sweeps,
+            margin,
+            area,
+            out,
+        });
+    }
+
+    #[inline(always)]
+    fn lay_squares(&mut self, layer: &Canvas, sweeps: &[Sweep], margin: usize, area: Area, out: &mut Canvas) {
         for top in (area.top..area.bottom).step_by(SQUARE) {
             for left in (area.left..area.right).step_by(SQUARE) {
                 let square = Area {
@@ -136,6 +149,7 @@ impl Smear {
     }
 
     /// Writes columns left..right of a row.
+    #[inline(always)]
     fn row(&self, layer: &Canvas, margin: usize, y: usize, (left, right): (usize, usize), out: &mut Canvas) {
         let base = ((y + margin) * layer.width + left + margin) as isize;
         let n = right - left;
@@ -155,6 +169,7 @@ impl Smear {
     }
 
     /// The weighted sums of a square's row of pixels; what lies outside of the layer counts as 0.
+    #[inline(always)]
     fn gather(&self, from: &[f32], base: isize) -> [f32; SQUARE] {
         let mut sums = [[0.0_f32; LANES]; SQUARE / LANES];
         for (offset, share) in &self.taps {
@@ -174,6 +189,26 @@ impl Smear {
             }
         }
         std::array::from_fn(|i| sums[i / LANES][i % LANES])
+    }
+}
+
+/// The work of [`Smear::lay`].
+struct Laying<'a> {
+    smear: &'a mut Smear,
+    layer: &'a Canvas,
+    sweeps: &'a [Sweep],
+    margin: usize,
+    area: Area,
+    out: &'a mut Canvas,
+}
+
+impl Vectorized for Laying<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.smear
+            .lay_squares(self.layer, self.sweeps, self.margin, self.area, self.out);
     }
 }
 

@@ -16,8 +16,23 @@ pub(super) struct Texture {
 struct Level {
     /// Logarithm of the side in half texels.
     bits: u32,
-    /// Row after row, at every half texel: interpolated beforehand, so that to sample is to take the nearest.
+    /// At every half texel: interpolated beforehand, so that to sample is to take the nearest. In tiles of 8 by 8, each a line of the
+    /// processor's cache, and these in blocks of 8 by 8, each a page of memory: a walk in any direction meets few of either.
     values: Vec<u8>,
+}
+
+/// Bits of a coordinate behind the point.
+const FRACTION: u32 = 16;
+/// Least logarithm of a level's side in half texels: that of a block.
+const BLOCK_BITS: u32 = 6;
+
+/// Where a level of 2^`bits` half texels has the one at (u, v), modulo its side.
+#[inline(always)]
+fn place(u: u32, v: u32, bits: u32) -> u32 {
+    let blocks = (1 << (bits - BLOCK_BITS)) - 1;
+    let spread = |c: u32| c & 7 | (c >> 3 & 7) << 6;
+    let block = |c: u32| c >> BLOCK_BITS & blocks;
+    spread(u) | spread(v) << 3 | block(u) << 12 | block(v) << (BLOCK_BITS + bits)
 }
 
 const FINEST_BITS: u32 = 10;
@@ -67,7 +82,7 @@ impl Texture {
 
     fn from_values(mut values: Vec<f32>, per_metre: f64) -> Self {
         let mut levels = Vec::new();
-        for bits in (3..=FINEST_BITS).rev() {
+        for bits in (BLOCK_BITS - 1..=FINEST_BITS).rev() {
             let n = 1_usize << bits;
             levels.push(Level {
                 bits: bits + 1,
@@ -99,65 +114,101 @@ impl Texture {
         }
     }
 
-    /// Samples from `from` on in steps of `step` (metres per entry), one for each entry of `row`, scaled so that the mean is 1 and one
-    /// standard deviation about `strength` / 3.2.
+    /// Samples along an image row from column `x0` on, one for each entry of `row`, scaled so that the mean is 1 and one standard deviation
+    /// about `strength` / 3.2. `place` tells where on the surface a column lies (metres); it is asked at multiples of [`STRIDE`], with
+    /// straight lines between, so that what lies between is the same in all rows.
     ///
-    /// A sample is the nearest of the level's values, at most a quarter of a texel away along either axis. Every second entry is the mean of
+    /// A sample is the nearest of the level's values, at most a quarter of a texel away along either axis. Every odd column is the mean of
     /// its neighbours: with the level chosen for the pixels' size nothing visible is lost.
+    #[inline(always)]
     pub(super) fn walk(
         &self,
         index: usize,
-        from: (f64, f64),
-        step: (f64, f64),
+        place_of: impl Fn(usize) -> (f64, f64),
         strength: f32,
+        x0: usize,
         row: &mut [f32],
     ) {
-        let level = &self.levels[index];
-        let scale = 2.0 * self.per_metre / (1_u64 << index) as f64 * 65536.0;
-        // 16.16 fixed point; the texture repeats, so the wrap of the integers does no harm.
-        let fixed = |metres: f64| (metres * scale) as i64 as u32;
-        let half = 1 << 15;
-        let (mut u, mut v) = (fixed(from.0).wrapping_add(half), fixed(from.1).wrapping_add(half));
-        let (du, dv) = (fixed(2.0 * step.0), fixed(2.0 * step.1));
-        let bits = level.bits;
-        let (columns, rows) = ((1_u32 << bits) - 1, ((1_u32 << bits) - 1) << bits);
+        let Level { bits, values } = &self.levels[index];
+        let scale = 2.0 * self.per_metre / (1_u64 << index) as f64 * f64::from(1 << FRACTION);
+        // Whole numbers have their place at the low end of a number that is this large. The texture repeats, so the wrap does no harm.
+        const LARGE: f64 = 6_755_399_441_055_744.0;
+        let fixed = |metres: f64| (metres * scale + LARGE).to_bits() as u32;
         let (gain, base) = (strength / 128.0, 1.0 - strength);
-        let values = level.values.as_slice();
-        let mut sample = || {
-            let at = (v >> (16 - bits) & rows) | (u >> 16 & columns);
-            let value = values.get(at as usize).copied().unwrap_or(128);
-            u = u.wrapping_add(du);
-            v = v.wrapping_add(dv);
-            base + gain * f32::from(value)
-        };
-        let mut here = sample();
-        let mut pairs = row.chunks_exact_mut(2);
-        for pair in &mut pairs {
-            let next = sample();
-            pair[0] = here;
-            pair[1] = 0.5 * (here + next);
-            here = next;
-        }
-        if let [last] = pairs.into_remainder() {
-            *last = here;
+        let value = |byte: u8| base + gain * f32::from(byte);
+        // Places of a stretch first, then its values, then their means: each can be done to several at once, or, the values, be waited for
+        // several at once.
+        let mut places = [0_u32; STRETCH / 2 + 1];
+        let mut found = [0_u8; STRETCH / 2 + 1];
+        let end = x0 + row.len();
+        let mut rest = row;
+        for left in (x0 / STRETCH * STRETCH..end).step_by(STRETCH) {
+            let (from, to) = (x0.max(left) - left, end.min(left + STRETCH) - left);
+            let node = |k: usize| {
+                let (u, v) = place_of(left + k * STRIDE);
+                (fixed(u), fixed(v))
+            };
+            let (first, last) = (from / STRIDE, to.div_ceil(STRIDE));
+            let mut here = node(first);
+            let strides = places.as_chunks_mut::<{ STRIDE / 2 }>().0;
+            for (k, stride) in strides[first..last].iter_mut().enumerate() {
+                let next = node(first + k + 1);
+                let at = |here: u32, next: u32, k: u32| {
+                    let way = next.wrapping_sub(here) as i32;
+                    here.wrapping_add((way / (STRIDE / 2) as i32).wrapping_mul(k as i32) as u32)
+                };
+                for (place_at, k) in stride.iter_mut().zip(0_u32..) {
+                    let (u, v) = (at(here.0, next.0, k), at(here.1, next.1, k));
+                    *place_at = place(u >> FRACTION, v >> FRACTION, *bits);
+                }
+                here = next;
+            }
+            places[last * STRIDE / 2] = place(here.0 >> FRACTION, here.1 >> FRACTION, *bits);
+            let needed = from / 2..to / 2 + 1;
+            for (found, at) in found[needed.clone()].iter_mut().zip(&places[needed.clone()]) {
+                *found = values.get(*at as usize).copied().unwrap_or(128);
+            }
+            let (part, further) = std::mem::take(&mut rest).split_at_mut(to - from);
+            rest = further;
+            let mean = |k: usize| 0.5 * (value(found[k]) + value(found[k + 1]));
+            let (head, part) = part.split_at_mut(from % 2);
+            if let [head] = head {
+                *head = mean(needed.start);
+            }
+            let (pairs, tail) = part.as_chunks_mut::<2>();
+            for (pair, two) in pairs.iter_mut().zip(found[from.div_ceil(2)..].windows(2)) {
+                let (here, next) = (value(two[0]), value(two[1]));
+                *pair = [here, 0.5 * (here + next)];
+            }
+            if let [tail] = tail {
+                *tail = value(found[to / 2]);
+            }
         }
     }
 }
 
-/// A repeating square of `n` by `n` values, interpolated at its texels and half way between them.
+/// Columns between two at which the place on a surface is worked out exactly.
+const STRIDE: usize = 16;
+/// Columns that are worked on at a time.
+const STRETCH: usize = 8 * STRIDE;
+
+/// A repeating square of `n` by `n` values, interpolated at its texels and half way between them, in the order of [`place`].
 fn at_half_texels(values: &[f32], n: usize) -> Vec<u8> {
-    let mut finer = Vec::with_capacity(4 * n * n);
+    let bits = (2 * n).ilog2();
+    let mut finer = vec![0; 4 * n * n];
     for v in 0..n {
         let (here, below) = (&values[v * n..][..n], &values[(v + 1) % n * n..][..n]);
-        let mut line = |at: &dyn Fn(usize) -> f32| {
-            finer.extend((0..n).flat_map(|u| {
+        let mut line = |row: usize, at: &dyn Fn(usize) -> f32| {
+            for u in 0..n {
                 let (left, right) = (at(u), at((u + 1) % n));
                 // The sums are positive: adding a half and cutting off rounds.
-                [(left + 0.5) as u8, (0.5 * (left + right) + 0.5) as u8]
-            }));
+                for (column, value) in [(2 * u, left), (2 * u + 1, 0.5 * (left + right))] {
+                    finer[place(column as u32, row as u32, bits) as usize] = (value + 0.5) as u8;
+                }
+            }
         };
-        line(&|u| here[u]);
-        line(&|u| 0.5 * (here[u] + below[u]));
+        line(2 * v, &|u| here[u]);
+        line(2 * v + 1, &|u| 0.5 * (here[u] + below[u]));
     }
     finer
 }
@@ -288,7 +339,19 @@ mod tests {
             ((-5.0, -9.0), (0.25, 0.25)),
         ] {
             // Not quite there: what is met is the nearest.
-            texture.walk(0, (start.0 - 0.2, start.1 + 0.2), step, 1.0, &mut row);
+            let place = |x: usize| {
+                (
+                    start.0 - 0.2 + step.0 * x as f64,
+                    start.1 + 0.2 + step.1 * x as f64,
+                )
+            };
+            texture.walk(0, place, 1.0, 0, &mut row);
+            // A walk that begins elsewhere meets the same.
+            for x0 in [1, 7, 16, 130, 3990] {
+                let mut later = vec![0.0_f32; 4001 - x0];
+                texture.walk(0, place, 1.0, x0, &mut later);
+                assert_eq!(later, row[x0..], "{x0}");
+            }
             for k in (0..4001_i64).step_by(2) {
                 let (u, v) = (start.0 + step.0 * k as f64, start.1 + step.1 * k as f64);
                 let (i, j) = (u.floor(), v.floor());

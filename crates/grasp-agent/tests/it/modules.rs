@@ -1,0 +1,151 @@
+//! Other modules in the place of the paper's search, recovery and supervision.
+
+use grasp_agent::hough_heuristic::Features;
+use grasp_agent::puma_val2::Joints;
+use grasp_agent::{
+    Agent, Arrival, CameraModel, EventKind, EventLog, GaveUp, Guard, JointLimits, LastLook, PositionBased,
+    Recovery, Search, ServoSettings, Situation, Supervision, Verdict, Viewpoint,
+};
+
+use crate::cell::{Fault, Shared, config};
+use crate::faults::words_from;
+
+/// Looks from one pose, and from there only.
+#[derive(Clone, Debug)]
+struct FromThere(Joints);
+
+impl Search for FromThere {
+    fn next_view(&mut self, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
+        (last == LastLook::None).then_some(Viewpoint {
+            number: 7,
+            pose: self.0,
+        })
+    }
+
+    fn boxed(&self) -> Box<dyn Search> {
+        Box::new(self.clone())
+    }
+}
+
+/// Looks for the ball where it was, and nowhere else; counts how often it was asked.
+#[derive(Clone, Debug, Default)]
+struct WhereItWas;
+
+impl Recovery for WhereItWas {
+    fn next_view(&mut self, seen: &Situation, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
+        (last == LastLook::None).then_some(Viewpoint {
+            number: 0,
+            pose: seen.joints,
+        })
+    }
+
+    fn boxed(&self) -> Box<dyn Recovery> {
+        Box::new(self.clone())
+    }
+}
+
+/// Finds the moves with these numbers too near.
+#[derive(Clone, Debug)]
+struct Nervous {
+    guard: Guard,
+    moves: usize,
+    near: fn(usize) -> bool,
+}
+
+impl Supervision for Nervous {
+    fn limits(&self) -> &JointLimits {
+        self.guard.limits()
+    }
+
+    fn judge_move(&mut self, arrival: &Arrival) -> Verdict {
+        self.moves += 1;
+        if (self.near)(self.moves) {
+            return Verdict::TooNear;
+        }
+        self.guard.judge_move(arrival)
+    }
+
+    fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
+        self.guard.is_too_fast(before, after)
+    }
+
+    fn boxed(&self) -> Box<dyn Supervision> {
+        Box::new(self.clone())
+    }
+}
+
+fn agent() -> Agent<PositionBased> {
+    Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap()
+}
+
+#[test]
+fn a_search_of_ones_own_is_what_is_searched_by() {
+    let pose = Joints::from_degrees([8.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
+    let agent = agent().searching_by(FromThere(pose));
+    for (y, found) in [(0.1, true), (-0.5, false)] {
+        let cell = Shared::new(CameraModel::paper(), [0.6, y, -0.1], Fault::None);
+        let mut log = EventLog::default();
+        let outcome = cell.run(&mut agent.clone(), &mut log).unwrap();
+        assert_eq!(outcome.gave_up, (!found).then_some(GaveUp::NotFound));
+        let searched = log
+            .events
+            .iter()
+            .filter(|event| matches!(event.kind, EventKind::AtSearchPose(_)));
+        let searched: Vec<_> = searched.map(|event| (&event.kind, event.joints)).collect();
+        assert_eq!(searched, [(&EventKind::AtSearchPose(7), pose)]);
+        // It belongs to what is replayed.
+        assert_eq!(log.replay(&agent).unwrap().1, log);
+    }
+}
+
+#[test]
+fn a_viewpoint_out_of_the_limits_is_cut_to_them() {
+    let agent = agent().searching_by(FromThere(Joints::from_degrees([400.0; 6])));
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut log = EventLog::default();
+    cell.run(&mut agent.clone(), &mut log).unwrap();
+    assert!(
+        log.events[2..]
+            .iter()
+            .all(|event| config().limits.admit(&event.joints))
+    );
+}
+
+#[test]
+fn a_recovery_of_ones_own_is_what_is_recovered_by() {
+    let mut agent = agent().recovering_by(WhereItWas);
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::PhantomOnce);
+    let mut log = EventLog::default();
+    cell.run(&mut agent, &mut log).unwrap();
+    let words = words_from(&log, "lost");
+    assert_eq!(
+        words[..5],
+        ["lost", "recover", "not-seen", "not-seen", "searching"],
+        "{words:?}"
+    );
+}
+
+#[test]
+fn a_supervision_of_ones_own_is_what_takes_moves_back() {
+    let log_of = |near| {
+        let guard = Guard::of(&config());
+        let moves = 0;
+        let mut agent = agent().supervised_by(Nervous { guard, moves, near });
+        let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+        let mut log = EventLog::default();
+        cell.run(&mut agent, &mut log).unwrap();
+        assert!(cell.0.borrow().stops > 0);
+        log
+    };
+    let log = log_of(|number| number == 3);
+    let near = words_from(&log, "too-near");
+    assert_eq!(near[..3], ["too-near", "taken-back", "seen"], "{near:?}");
+    // Every move after the ball was found: three in a row, and a servo controller cannot aim; nor can it be searched for again.
+    let log = log_of(|number| number > 1);
+    let cornered = words_from(&log, "cornered");
+    assert_eq!(cornered[..3], ["cornered", "seen", "searching"], "{cornered:?}");
+    assert_eq!(
+        log.events.last().unwrap().kind,
+        EventKind::GaveUp(GaveUp::NotFound)
+    );
+}

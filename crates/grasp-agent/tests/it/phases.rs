@@ -1,0 +1,186 @@
+//! The state machine: every transition and every order is in the log.
+
+use std::collections::BTreeSet;
+
+use grasp_agent::{
+    Agent, CameraModel, EventKind, EventLog, Hybrid, HybridSettings, Order, Phase, PositionBased,
+    ServoSettings,
+};
+
+use crate::cell::{Fault, Shared, config};
+use crate::faults::{end_of, words_from};
+
+/// The transitions in the diagram on the crate's front page.
+const DIAGRAM: [(Phase, Phase); 13] = [
+    (Phase::Search, Phase::Reach),
+    (Phase::Search, Phase::End),
+    (Phase::Reach, Phase::Recover),
+    (Phase::Reach, Phase::Grip),
+    (Phase::Reach, Phase::End),
+    (Phase::Recover, Phase::Reach),
+    (Phase::Recover, Phase::Search),
+    (Phase::Recover, Phase::End),
+    (Phase::Grip, Phase::Reach),
+    (Phase::Grip, Phase::Recover),
+    (Phase::Grip, Phase::Search),
+    (Phase::Grip, Phase::End),
+    // Of the fault before the first search.
+    (Phase::End, Phase::End),
+];
+
+const FAULTS: [Fault; 27] = [
+    Fault::None,
+    Fault::NoFrame(0),
+    Fault::NoFrame(5),
+    Fault::FrozenFrame(3),
+    Fault::FrozenPicture(2),
+    Fault::Garbage,
+    Fault::FalseCircle,
+    Fault::Phantoms,
+    Fault::ArmStuck(3),
+    Fault::LineDead(0),
+    Fault::LineDead(4),
+    Fault::GripperDead(0),
+    Fault::GripperDead(1),
+    Fault::SensorDead(3),
+    Fault::StopDead(3),
+    Fault::StoppedShort(3),
+    Fault::Near(4),
+    Fault::HaltedTwice(3),
+    Fault::HaltedNear(20.0),
+    Fault::HaltedGrips(1),
+    Fault::HaltedGrips(100),
+    Fault::HaltedClosed(1),
+    Fault::HaltedClosed(2),
+    Fault::Slippery,
+    Fault::SqueezedOut,
+    Fault::PhantomOnce,
+    Fault::PhantomFromThere,
+];
+
+/// The phases of a log, one after the other.
+fn phases(log: &EventLog) -> Vec<Phase> {
+    log.events
+        .iter()
+        .filter_map(|event| event.kind.enters())
+        .collect()
+}
+
+/// The phases in which an event can happen.
+fn belongs_to(kind: &EventKind) -> &'static [Phase] {
+    match kind {
+        EventKind::AtSearchPose(_) => &[Phase::Search],
+        EventKind::Recovering(_) => &[Phase::Recover],
+        EventKind::Moved(_) | EventKind::TooFast => &[Phase::Reach],
+        EventKind::Gripping(_) | EventKind::Gripped | EventKind::Withdrawn | EventKind::Lifted => {
+            &[Phase::Grip]
+        }
+        _ => &[Phase::Search, Phase::Reach, Phase::Recover, Phase::Grip],
+    }
+}
+
+#[test]
+fn every_transition_is_one_of_the_diagram_and_in_the_log() {
+    let mut seen = BTreeSet::new();
+    for fault in FAULTS {
+        let (_, log, _) = end_of(fault);
+        let phases = phases(&log);
+        for pair in phases.windows(2) {
+            assert!(DIAGRAM.contains(&(pair[0], pair[1])), "{fault:?}: {phases:?}");
+            seen.insert((pair[0], pair[1]));
+        }
+        assert_eq!(phases.last(), Some(&Phase::End), "{fault:?}");
+        assert_eq!(
+            phases.iter().filter(|phase| **phase == Phase::End).count(),
+            1,
+            "{fault:?}"
+        );
+        // What is not in the log as a transition has not happened: every event is one of the phase that the log is in.
+        let mut phase = None;
+        for event in &log.events {
+            phase = event.kind.enters().or(phase);
+            let here =
+                phase.is_none_or(|phase| phase == Phase::End || belongs_to(&event.kind).contains(&phase));
+            assert!(here, "{fault:?}: {:?} in {phase:?}", event.kind);
+        }
+    }
+    assert!(seen.len() >= 9, "{seen:?}");
+}
+
+#[test]
+fn going_for_the_ball_away_from_the_goal_and_coming_back_are_told() {
+    // Three moves have been taken back, not in a row: a servo controller cannot aim, and reaches on.
+    let (_, log, _) = end_of(Fault::HaltedNear(20.0));
+    let words = words_from(&log, "cornered");
+    assert_eq!(words[..3], ["cornered", "seen", "reaching"], "{words:?}");
+    // The hybrid can aim.
+    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.0, -0.1], Fault::HaltedNear(20.0));
+    let mut log = EventLog::default();
+    cell.run(&mut agent, &mut log).unwrap();
+    assert!(
+        phases(&log)
+            .windows(2)
+            .any(|pair| pair == [Phase::Reach, Phase::Grip])
+    );
+}
+
+#[test]
+fn an_order_that_is_not_answered_is_in_the_log() {
+    let of = |fault| {
+        let (end, log, _) = end_of(fault);
+        assert!(end.is_err(), "{fault:?}");
+        let [.., event, failed] = &log.events[..] else {
+            panic!("{fault:?}: {log:?}");
+        };
+        assert!(matches!(failed.kind, EventKind::Failed(_)), "{fault:?}");
+        event.kind.clone()
+    };
+    for after in 0..5 {
+        let kind = of(Fault::LineDead(after));
+        let order = matches!(kind, EventKind::Unanswered(Order::MoveTo(_) | Order::MoveBy(_)));
+        assert!(order, "{after}: {kind:?}");
+    }
+    assert_eq!(
+        of(Fault::GripperDead(0)),
+        EventKind::Unanswered(Order::Jaws { close: false })
+    );
+    assert_eq!(
+        of(Fault::GripperDead(1)),
+        EventKind::Unanswered(Order::Jaws { close: true })
+    );
+    assert_eq!(of(Fault::StopDead(3)), EventKind::Unanswered(Order::Stop));
+    // An arm that says where it stands has answered.
+    assert!(matches!(
+        of(Fault::StoppedShort(3)),
+        EventKind::AtSearchPose(_) | EventKind::Moved(_)
+    ));
+}
+
+#[test]
+fn a_gripper_that_does_not_open_again_is_in_the_log() {
+    let servo = PositionBased::new(ServoSettings::paper());
+    let mut agent = Agent::with_controller(config(), servo).unwrap();
+    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
+    let mut log = EventLog::default();
+    // Once the jaws have closed on nothing the line is cut.
+    let end = agent.run_and_learn(
+        &mut cell.clone(),
+        &mut cell.clone(),
+        &mut cell.clone(),
+        &mut |event| {
+            if event.kind == EventKind::Gripped {
+                cell.0.borrow_mut().cut_gripper();
+            }
+            log.note(event);
+        },
+    );
+    assert!(end.is_err());
+    let [.., unanswered, _] = &log.events[..] else {
+        panic!("{log:?}")
+    };
+    assert_eq!(
+        unanswered.kind,
+        EventKind::Unanswered(Order::Jaws { close: false })
+    );
+}

@@ -1,0 +1,90 @@
+//! Makes saved runs again, and says whether they come out the same.
+//!
+//! ```text
+//! cargo run --release --example replay -- out/grasp/failures/run003.json
+//! ```
+
+#![allow(clippy::print_stderr, reason = "a program for a terminal")]
+
+use std::error::Error;
+use std::io::{Write as _, stdout};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use grasp_agent::{LoggedEvent, Replayed, SavedRun};
+
+use program::ended;
+
+mod program;
+
+/// Make runs again that `grasp` (failures/, with --save-runs saved/) or `track` has kept, and say whether they come out the same.
+///
+/// A file holds the settings, the controller before the run, and every event. Arm, sensors and camera answer as they did then; what the controller
+/// and the state machine decide is decided anew.
+#[derive(Parser, Debug)]
+struct Options {
+    /// Saved runs
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+
+    /// Print every event too
+    #[arg(long)]
+    events: bool,
+}
+
+fn main() -> ExitCode {
+    ended(run(&Options::parse()))
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let mut others = 0;
+    for file in &options.files {
+        let saved = read(file)?;
+        let events = &saved.log().events;
+        if options.events {
+            for (number, event) in events.iter().enumerate() {
+                say(&format!("{number:5} {}", told(event)));
+            }
+        }
+        let name = file.display();
+        match saved.replay().map_err(|error| format!("{name}: {error}"))? {
+            Replayed::Same(end) => {
+                let end = match end {
+                    Ok(outcome) => outcome.gave_up.map_or_else(
+                        || "the jaws hold the ball, as far as can be told".into(),
+                        |reason| reason.to_string(),
+                    ),
+                    Err(cause) => cause,
+                };
+                say(&format!("{name}: the same {} events; {end}", events.len()));
+            }
+            Replayed::Differs { event, then, now } => {
+                others += 1;
+                let told = |event: Option<LoggedEvent>| event.as_ref().map_or("the end".into(), told);
+                say(&format!("{name}: another course from event {event} on"));
+                say(&format!("  then: {}\n  now:  {}", told(then), told(now)));
+            }
+        }
+    }
+    match others {
+        0 => Ok(()),
+        _ => Err(format!("{others} of {} runs took another course", options.files.len()).into()),
+    }
+}
+
+fn read(file: &Path) -> Result<SavedRun, String> {
+    let named = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
+    let text = std::fs::read_to_string(file).map_err(|error| named(&error))?;
+    SavedRun::from_json(&text).map_err(|error| named(&error))
+}
+
+/// Prints; a reader who has gone away is no reason to stop.
+fn say(words: &str) {
+    let _ = writeln!(stdout(), "{words}");
+}
+
+/// An event in a line: the move it happened in, what it was, and where the arm stood.
+fn told(event: &LoggedEvent) -> String {
+    format!("{:4} {:?} at {}", event.cycle, event.kind, event.joints)
+}
