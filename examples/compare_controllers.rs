@@ -202,7 +202,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     write_whole(&options.out.join("comparison.csv"), table::csv(&rows).as_bytes())?;
     write_whole(
         &options.out.join("comparison.svg"),
-        table::plot(&rows)?.as_bytes(),
+        table::plot(&rows, if options.grip { "grasped" } else { "at the goal" })?.as_bytes(),
     )?;
     println!("results: {}", options.out.display());
     Ok(())

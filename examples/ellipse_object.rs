@@ -15,14 +15,14 @@
 
 use std::cell::Cell;
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, BehaviourPair, CameraEye, Consequence, Controller, EggFeatures, EggLimits, EventKind,
-    GaveUp, JointLimits, Learned, ObjectFeatures, Percept, Sighting, Situation,
+    EventLog, GaveUp, JointLimits, Learned, ObjectFeatures, Percept, Sighting, Situation,
 };
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse};
@@ -35,7 +35,7 @@ use rand::{RngExt, SeedableRng};
 
 use detour::Detour;
 use egg::{Egg, EggCamera};
-use files::{writable_folder, write_png};
+use files::{writable_folder, write_png, write_whole};
 use overlay::Overlay;
 use program::ended;
 
@@ -53,6 +53,9 @@ mod program;
 ///
 /// The behaviours are learned for a ball that is as thick as the egg; in the place of its radius the controller is told the shorter half-axis
 /// of the egg's outline. For the grip the hand is turned so that the jaws close across the egg.
+///
+/// What the camera shows is an egg; what the hand can touch and hold in the simulated cell is the ball of 40 mm inside it. That the jaws close across
+/// the egg is therefore asked for beside that they hold the ball. The events of a run that fails are kept in the folder.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for a picture of each egg as it was seen last
@@ -125,25 +128,36 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
         let params = cell.get().params;
-        let outcome = agent.run(
+        let mut log = EventLog::default();
+        let end = agent.run(
             &mut eye,
             &mut Detour { arm, params },
             &mut *sensor,
-            &mut |event| match (&event.kind, event.frame, outline.get()) {
-                (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
-                    last = Some((frame.clone(), ellipse));
+            &mut |event| {
+                log.note(event);
+                match (&event.kind, event.frame, outline.get()) {
+                    (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
+                        last = Some((frame.clone(), ellipse));
+                    }
+                    (EventKind::Gripping(_), ..) => {
+                        let miss = cell.with(|cell| cell.grip_miss(&event.joints));
+                        closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
+                    }
+                    (EventKind::Missed, ..) => closed = None,
+                    _ => {}
                 }
-                (EventKind::Gripping(_), ..) => {
-                    let miss = cell.with(|cell| cell.grip_miss(&event.joints));
-                    closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
-                }
-                (EventKind::Missed, ..) => closed = None,
-                _ => {}
             },
-        )?;
+        );
         // The camera holds the rig until here.
         drop(eye);
         drop(camera);
+        let outcome = match end {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                let kept = keep_log(&options.out, run, &log)?;
+                return Err(format!("run {run} was broken off: {error}; {kept}").into());
+            }
+        };
         let round = options.length < 44.0;
         let across = closed.is_some_and(|(_, off)| round || off <= ACROSS_TOLERANCE);
         let held = outcome.gave_up.is_none() && rig.holds_ball() && across;
@@ -165,6 +179,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             "{run:4}  {:5}  {:4}  {seen:<32} {miss:>9}  {off:>16}  {result}",
             outcome.cycles, outcome.losses
         );
+        if !held {
+            println!("      {}", keep_log(&options.out, run, &log)?);
+        }
         if let Some((frame, ellipse)) = last {
             let mut overlay = Overlay::new(&frame);
             overlay.closed(|angle| {
@@ -186,6 +203,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         options.out.display()
     );
     Ok(())
+}
+
+/// Writes the events of a run that failed, and says where.
+fn keep_log(out: &Path, run: usize, log: &EventLog) -> Result<String, Box<dyn Error>> {
+    let path = out.join(format!("egg{run:03}.json"));
+    write_whole(&path, &serde_json::to_vec_pretty(log)?)?;
+    Ok(format!("its events: {}", path.display()))
 }
 
 /// Ellipses among the edges of the frame.

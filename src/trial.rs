@@ -156,7 +156,11 @@ impl TrialCell {
         seed: u64,
     ) -> Result<Option<Features>, ArmError> {
         const LOOKS: usize = 20;
-        let shared = SharedCell::new(self.cell);
+        // The jaws that the ball is shown between, also where the hand has no bodies otherwise.
+        let shared = SharedCell::new(Cell {
+            hand: Hand::paper(),
+            ..self.cell
+        });
         let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
         arm.move_to(from + *grip)?;
         let gripping = arm.pose()();

@@ -39,42 +39,44 @@ impl Tally {
         }
     }
 
-    /// Mean share of successes over the cells and half the width of its 95 % interval, percent.
-    fn success(&self) -> (f64, f64) {
-        let shares: Vec<f64> = self
-            .draws
-            .iter()
-            .filter(|(_, runs)| *runs > 0)
-            .map(|(successes, runs)| 100.0 * *successes as f64 / *runs as f64)
-            .collect();
-        let n = shares.len() as f64;
-        let mean = shares.iter().sum::<f64>() / n;
-        let variance = shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (
-            mean,
-            if n > 1.0 {
-                (student(shares.len() - 1) * (variance / n).sqrt()).min(100.0)
-            } else {
-                f64::NAN
-            },
-        )
+    /// Mean share of successes over the cells, percent.
+    fn success(&self) -> f64 {
+        let shares = self.shares();
+        100.0 * shares.iter().sum::<f64>() / shares.len() as f64
     }
-}
 
-/// The 97.5 % point of Student's distribution.
-fn student(freedom: usize) -> f64 {
-    const TABLE: [f64; 16] = [
-        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
-        2.131, 2.120,
-    ];
-    TABLE.get(freedom.saturating_sub(1)).copied().unwrap_or(2.05)
+    /// Its 95 % interval, percent: Wilson's, with each cell counting as one. It holds however much the runs in one cell are alike, and says
+    /// something where all runs succeed, or none; for cells whose runs are not alike it is wider than it need be. Not a number without cells.
+    fn interval(&self) -> [f64; 2] {
+        const Z: f64 = 1.96;
+        let (n, share) = (self.shares().len() as f64, 0.01 * self.success());
+        let middle = share + 0.5 * Z * Z / n;
+        let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
+        let scale = 100.0 / (1.0 + Z * Z / n);
+        [middle - half, middle + half].map(|end| (scale * end).clamp(0.0, 100.0).abs())
+    }
+
+    /// In how many cells all runs succeeded.
+    fn whole_cells(&self) -> usize {
+        self.shares().iter().filter(|share| **share >= 1.0).count()
+    }
+
+    fn shares(&self) -> Vec<f64> {
+        let counted = self.draws.iter().filter(|(_, runs)| *runs > 0);
+        counted
+            .map(|(successes, runs)| *successes as f64 / *runs as f64)
+            .collect()
+    }
 }
 
 /// A row of the table.
 pub(crate) struct Row {
     level: ErrorLevel,
     name: String,
-    success: (f64, f64),
+    success: f64,
+    interval: [f64; 2],
+    whole_cells: usize,
+    cells: usize,
     cycles: f64,
     losses: f64,
     collisions: Option<usize>,
@@ -82,8 +84,7 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(crate) const HEADER: &str =
-        "level     controller                         success %     cycles  losses/run  collisions  runs";
+    pub(crate) const HEADER: &str = "level     controller                       success %  95 % interval  cells without failure  cycles  losses/run  collisions  runs";
 
     pub(crate) fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
         let count = |part: fn(&(usize, usize)) -> usize| tally.draws.iter().map(part).sum::<usize>();
@@ -92,6 +93,9 @@ impl Row {
             level,
             name: name.into(),
             success: tally.success(),
+            interval: tally.interval(),
+            whole_cells: tally.whole_cells(),
+            cells: tally.shares().len(),
             cycles: tally.cycles as f64 / successes as f64,
             losses: tally.losses as f64 / runs as f64,
             collisions: tally.collisions,
@@ -105,19 +109,23 @@ impl fmt::Display for Row {
         let Self {
             level,
             name,
-            success: (mean, half),
+            success,
+            interval: [low, high],
+            whole_cells,
+            cells,
             cycles,
             losses,
             collisions,
             runs,
         } = self;
-        // One cell has no interval, and no success no moves.
-        let interval = number(*half, |half| format!("+-{half:5.1}"));
+        let interval = number(*low, |low| format!("{low:.1}..{high:.1}"));
+        let whole = format!("{whole_cells} of {cells}");
+        // No success, no moves.
         let cycles = number(*cycles, |cycles| format!("{cycles:.1}"));
         let collisions = collisions.map_or("-".into(), |count| count.to_string());
         write!(
             f,
-            "{:9} {name:32} {mean:6.1} {interval:7} {cycles:>9} {losses:11.2} {collisions:>11} {runs:5}",
+            "{:9} {name:32} {success:9.1} {interval:>14} {whole:>22} {cycles:>7} {losses:11.2} {collisions:>11} {runs:5}",
             level.to_string()
         )
     }
@@ -134,12 +142,15 @@ fn number(value: f64, words: impl FnOnce(f64) -> String) -> String {
 
 pub(crate) fn csv(rows: &[Row]) -> String {
     let mut csv = String::from(
-        "level,controller,success_percent,half_interval,cycles,losses_per_run,collisions,runs\n",
+        "level,controller,success_percent,low,high,cells_without_failure,cells,cycles,losses_per_run,collisions,runs\n",
     );
     for Row {
         level,
         name,
-        success: (mean, half),
+        success,
+        interval,
+        whole_cells,
+        cells,
         cycles,
         losses,
         collisions,
@@ -147,15 +158,18 @@ pub(crate) fn csv(rows: &[Row]) -> String {
     } in rows
     {
         let collisions = collisions.map_or(String::new(), |count| count.to_string());
-        let [half, cycles] = [*half, *cycles].map(|value| number(value, |value| format!("{value:.3}")));
-        csv += &format!("{level},\"{name}\",{mean:.3},{half},{cycles},{losses:.4},{collisions},{runs}\n");
+        let [success, low, high, cycles] = [*success, interval[0], interval[1], *cycles]
+            .map(|value| number(value, |value| format!("{value:.3}")));
+        csv += &format!(
+            "{level},\"{name}\",{success},{low},{high},{whole_cells},{cells},{cycles},{losses:.4},{collisions},{runs}\n"
+        );
     }
     csv
 }
 
-/// A bar for each controller and level: how long it is says how often the goal was reached, a line across its end how sure that is, and
-/// words how many moves it took.
-pub(crate) fn plot(rows: &[Row]) -> Result<String, Box<dyn Error>> {
+/// A bar for each controller and level: how long it is says how often it succeeded, in what `success` names, a line across its end how sure that is,
+/// and words how many moves it took.
+pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>> {
     const NAMES: i32 = 210;
     const COLUMN: i32 = 190;
     const BAR: i32 = 100;
@@ -181,7 +195,7 @@ pub(crate) fn plot(rows: &[Row]) -> Result<String, Box<dyn Error>> {
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         let words = |size: i32| ("sans-serif", size).into_font().color(&ink);
-        root.draw(&Text::new("% at the goal / moves", (10, 14), words(13)))?;
+        root.draw(&Text::new(format!("% {success} / moves"), (10, 14), words(13)))?;
         for (level, left) in levels.iter().zip((NAMES..).step_by(COLUMN as usize)) {
             root.draw(&Text::new(format!("errors: {level}"), (left, 14), words(14)))?;
         }
@@ -198,14 +212,14 @@ pub(crate) fn plot(rows: &[Row]) -> Result<String, Box<dyn Error>> {
             } else {
                 RGBColor(90, 120, 185)
             };
-            let (mean, half) = row.success;
+            let (mean, [low, high]) = (row.success, row.interval);
             let at = |percent: f64| left + (0.01 * f64::from(BAR) * percent.clamp(0.0, 100.0)) as i32;
             let bar = |to: i32, style: ShapeStyle| Rectangle::new([(left, top), (to, top + LINE - 7)], style);
             root.draw(&bar(left + BAR, RGBColor(236, 236, 241).filled()))?;
             root.draw(&bar(at(mean), colour.filled()))?;
-            if half > 0.0 {
+            if low < high {
                 let middle = top + (LINE - 7) / 2;
-                let ends = vec![(at(mean - half), middle), (at(mean + half), middle)];
+                let ends = vec![(at(low), middle), (at(high), middle)];
                 root.draw(&PathElement::new(ends, ink.stroke_width(1)))?;
             }
             let moves = if row.cycles.is_finite() {
@@ -218,4 +232,41 @@ pub(crate) fn plot(rows: &[Row]) -> Result<String, Box<dyn Error>> {
         root.present()?;
     }
     Ok(svg)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tally(draws: &[(usize, usize)]) -> Tally {
+        Tally {
+            draws: draws.into(),
+            ..Tally::default()
+        }
+    }
+
+    #[test]
+    fn an_interval_never_says_that_nothing_is_left_to_chance() {
+        let all = tally(&[(30, 30); 16]);
+        let [low, high] = all.interval();
+        assert!((low - 80.6).abs() < 0.1 && high > 99.999, "{low}..{high}");
+        assert!(all.success() > 99.999 && all.whole_cells() == 16);
+        let [low, high] = tally(&[(0, 30); 16]).interval();
+        assert!(low < 1e-9 && (high - 19.4).abs() < 0.1, "{low}..{high}");
+        // More runs in as many cells say no more; a cell without runs says nothing.
+        assert!((tally(&[(300, 300); 16]).interval()[0] - all.interval()[0]).abs() < 1e-9);
+        assert!((tally(&[(3, 6), (0, 0), (6, 6)]).success() - 75.0).abs() < 1e-9);
+        assert!(tally(&[]).interval()[0].is_nan());
+    }
+
+    #[test]
+    fn rows_and_file_say_the_interval_and_the_plot_what_success_is() {
+        let row = Row::new(ErrorLevel::Heavy, "hybrid", &tally(&[(30, 30); 16]));
+        assert!(row.to_string().contains("80.6..100.0"), "{row}");
+        assert!(row.to_string().contains("16 of 16"), "{row}");
+        let file = csv(std::slice::from_ref(&row));
+        assert!(file.contains("100.000,80.639,100.000,16,16"), "{file}");
+        let plot = plot(&[row], "grasped").expect("draws");
+        assert!(plot.contains("% grasped / moves"));
+    }
 }

@@ -1,0 +1,81 @@
+//! A goal that is shown on the arm, in cells whose camera is not what it is taken to be.
+
+use grasp_agent::{
+    Agent, AgentConfig, Controller, Hybrid, HybridSettings, PositionBased, ServoSettings, TaughtGoal,
+};
+use pipeline_sim::ErrorLevel;
+use puma_grasp::TrialCell;
+
+/// How many of six balls the jaws hold in the end.
+fn held<C: Controller + Clone>(cell: &TrialCell, config: &AgentConfig, controller: &C) -> usize {
+    let agent = Agent::with_controller(config.clone(), controller.clone()).expect("sound settings");
+    let run = |ball| {
+        let result = cell.run(&mut agent.clone(), ball, &mut |_, _| (), &mut |_| ());
+        result.expect("no fault").is_some_and(|result| result.held)
+    };
+    (0..6).filter(|ball| run(*ball)).count()
+}
+
+/// A cell with drawn errors and the goal that is shown in it.
+fn taught(level: ErrorLevel, seed: u64) -> Option<(TrialCell, TaughtGoal)> {
+    let cell = TrialCell::draw(level, seed).expect("a camera");
+    let goal = cell.teach_goal(seed).expect("no fault")?;
+    Some((cell, goal))
+}
+
+#[test]
+fn a_cell_without_errors_shows_the_papers_goal() {
+    let (_, goal) = taught(ErrorLevel::None, 1).expect("in view");
+    let f = goal.features();
+    assert!((99.0..=108.0).contains(&f.x), "{f:?}");
+    assert!(
+        (74.0..=82.0).contains(&f.y) && (32.0..=34.0).contains(&f.r),
+        "{f:?}"
+    );
+}
+
+#[test]
+fn servoing_grasps_with_a_wrong_camera_once_it_was_shown_the_goal() {
+    let (mut with, mut without) = (0, 0);
+    for seed in 0..4 {
+        let (cell, goal) = taught(ErrorLevel::Moderate, seed).expect("in view");
+        let (config, paper) = (cell.agent_config(), ServoSettings::paper());
+        let shown = ServoSettings {
+            goal: goal.features(),
+            ..paper
+        };
+        without += held(&cell, &config, &PositionBased::new(paper));
+        with += held(&cell, &goal.applied_to(config), &PositionBased::new(shown));
+    }
+    assert!(with >= 23 && without <= 6, "{with} with, {without} without of 24");
+}
+
+#[test]
+fn what_was_shown_tells_the_hybrid_of_the_camera() {
+    let hybrid = Hybrid::new(HybridSettings::paper());
+    let shown: Vec<_> = (0..16)
+        .filter_map(|seed| taught(ErrorLevel::Heavy, seed))
+        .collect();
+    assert!(shown.len() >= 8, "{}", shown.len());
+    let (mut with, mut without) = (0, 0);
+    for (cell, goal) in &shown {
+        let hybrid_shown = hybrid.clone().shown(goal);
+        with += held(cell, &goal.applied_to(cell.agent_config()), &hybrid_shown);
+        without += held(cell, &cell.agent_config(), &hybrid);
+        // What it believes now explains what it was shown.
+        let nominal = HybridSettings::paper().nominal;
+        let between = nominal.tool_point(&(goal.seen_from() + goal.grip()));
+        let model = hybrid_shown.belief().corrected(&nominal);
+        let (f, expected) = (
+            goal.features(),
+            model.view(&goal.seen_from(), &between).expect("in front"),
+        );
+        let off = [f.x - expected.x, f.y - expected.y, f.r - expected.r];
+        assert!(off.iter().all(|off| off.abs() < 2.0), "{off:?}");
+    }
+    let balls = 6 * shown.len();
+    assert!(
+        10 * with >= 9 * balls && 2 * without <= with,
+        "{with} and {without} of {balls}"
+    );
+}
