@@ -135,3 +135,24 @@ impl Vectorized for Exposing<'_> {
             .expose_rows(self.canvas, self.camera, self.seed, self.out);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wide_vectors_give_the_same_grey_levels() {
+        let camera = Camera::paper().resized(203, 31).expect("a size");
+        let mut canvas = Canvas::new(203, 31);
+        for (k, light) in canvas.light.iter_mut().enumerate() {
+            *light = 1.3 * (0.5 + 0.5 * (k as f32 * 0.37).sin());
+        }
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut exposure = Exposure::new(Sensor::default(), &mut rng);
+        let (mut wide, mut plain) = (vec![0; 203 * 31], vec![0; 203 * 31]);
+        exposure.expose(&canvas, &camera, 5, 0, &mut wide);
+        exposure.expose_rows(&canvas, &camera, 5, &mut plain);
+        assert_eq!(wide, plain);
+        assert!(wide.iter().max() > wide.iter().min());
+    }
+}
