@@ -4,7 +4,7 @@
 //! cargo run --release --example cell_pictures -- --out out/pictures
 //! ```
 //!
-//! writes `overview.svg`, `search.png`, `goal.png`, `run.png` (animated) and `run.y4m`.
+//! writes and lists `overview.svg`, `search.png`, `goal.png`, `run.png` (animated) and `run.y4m`.
 
 #![allow(
     clippy::print_stdout,
@@ -12,13 +12,23 @@
     reason = "a program for the terminal"
 )]
 
+#[allow(
+    dead_code,
+    reason = "shared with the examples that write pictures of another kind"
+)]
+mod files;
+mod program;
+
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Parser;
+use files::{writable_folder, write_whole};
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageFormat};
 use pipeline_sim::{Cell, Renderer, Scene, Sensor, Workspace, Y4mWriter};
+use program::ended;
 use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -37,9 +47,18 @@ struct Options {
     frames: u32,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
-    std::fs::create_dir_all(&options.out)?;
+fn main() -> ExitCode {
+    ended(draw(&Options::parse()))
+}
+
+fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
+    writable_folder(&options.out)?;
+    let save = |name: &str, bytes: &[u8]| {
+        let path = options.out.join(name);
+        write_whole(&path, bytes)?;
+        println!("{}", path.display());
+        Ok::<(), Box<dyn Error>>(())
+    };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let workspace = Workspace::paper();
     let nominal = Cell::paper(pipeline_sim::Ball::at(0.6, 0.0, -0.1));
@@ -53,20 +72,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = reach(&cell, &start, &goal, options.frames.max(4));
 
     let overview = cell.overview_svg(&workspace, &path[..=path.len() * 3 / 4]);
-    save(&options.out.join("overview.svg"), overview.as_bytes())?;
+    save("overview.svg", overview.as_bytes())?;
     let mut renderer = Renderer::new(&Scene::laboratory(), options.seed);
     for (name, pose) in [("search.png", &start), ("goal.png", &goal)] {
         let mut bytes = std::io::Cursor::new(Vec::new());
         renderer
             .render(&cell, pose)
             .write_to(&mut bytes, ImageFormat::Png)?;
-        save(&options.out.join(name), bytes.get_ref())?;
+        save(name, bytes.get_ref())?;
     }
     let mut video = Y4mWriter::new(Vec::new(), 12, 1)?;
     for pose in &path {
         video.write(renderer.render(&cell, pose))?;
     }
-    save(&options.out.join("run.y4m"), &video.finish()?)?;
+    save("run.y4m", &video.finish()?)?;
     // Noise cannot be compressed; the animated picture goes without.
     let quiet = Sensor {
         read_noise: 0.0,
@@ -84,7 +103,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .iter()
         .map(|pose| resize(renderer.render(&cell, pose), 384, 288, FilterType::Triangle))
         .collect();
-    save(&options.out.join("run.png"), &animated(&frames)?)?;
+    save("run.png", &animated(&frames)?)?;
     Ok(())
 }
 
@@ -123,11 +142,4 @@ fn animated(frames: &[GrayImage]) -> Result<Vec<u8>, Box<dyn Error>> {
     }
     writer.finish()?;
     Ok(bytes)
-}
-
-/// Writes a file as a whole or not at all.
-fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let unfinished = path.with_extension("part");
-    std::fs::write(&unfinished, bytes)?;
-    std::fs::rename(unfinished, path)
 }

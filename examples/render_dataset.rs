@@ -14,22 +14,35 @@
 //! Kinds are those of `SceneKind` (the arm at work, as hard as it gets there), and those of `BenchmarkKind` (one difficulty at a time), with
 //! `cell` and `benchmark` for all of either. A kind's frames depend on the seed and on nothing else, whatever other kinds are drawn.
 
-#![allow(clippy::print_stdout)] // What it measured is what it prints.
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a program for the terminal"
+)]
+
+#[allow(
+    dead_code,
+    reason = "shared with the examples that write pictures of another kind"
+)]
+mod files;
+#[path = "render_dataset/kinds.rs"]
+mod kinds;
+mod program;
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::io::Write as _;
-use std::os::unix::fs::PermissionsExt as _;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
+use files::{writable_folder, write_whole};
 use image::ImageFormat;
 use indicatif::{ProgressBar, ProgressStyle};
-use pipeline_sim::{BenchmarkKind, Camera, Renderer, Round, Scene, SceneKind, Sighting, Snapshot};
-use rand::rngs::Xoshiro256PlusPlus;
-use rand::{RngExt, SeedableRng};
+use kinds::{Kind, Kinds, repeated, share, size};
+use pipeline_sim::{Camera, Renderer, Round, Scene, Sighting, Snapshot};
+use program::ended;
+use rand::RngExt;
 use rustix::time::{ClockId, clock_gettime};
 
 /// Renders labelled frames of the simulated cell.
@@ -59,59 +72,11 @@ struct Options {
     visible: f64,
 }
 
-/// A kind of frame.
-#[derive(Clone, Copy)]
-enum Kind {
-    Cell(SceneKind),
-    Benchmark(BenchmarkKind),
+fn main() -> ExitCode {
+    ended(render(&Options::parse()))
 }
 
-/// One or several kinds, as given on the command line.
-#[derive(Clone)]
-struct Kinds(Vec<Kind>);
-
-impl FromStr for Kinds {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, Self::Err> {
-        let all_of_cell = SceneKind::ALL.map(Kind::Cell);
-        let all_of_benchmark = BenchmarkKind::ALL.map(Kind::Benchmark);
-        Ok(Self(match (name, name.parse(), name.parse()) {
-            ("cell", ..) => all_of_cell.to_vec(),
-            ("benchmark", ..) => all_of_benchmark.to_vec(),
-            (_, Ok(kind), _) => vec![Kind::Cell(kind)],
-            (_, _, Ok(kind)) => vec![Kind::Benchmark(kind)],
-            (_, Err(of_cell), Err(of_benchmark)) => {
-                return Err(format!(
-                    "unknown kind; known are cell: {}; benchmark: {}",
-                    of_cell.known, of_benchmark.known
-                ));
-            }
-        }))
-    }
-}
-
-impl Kind {
-    fn name(self) -> String {
-        match self {
-            Self::Cell(kind) => kind.to_string(),
-            Self::Benchmark(kind) => kind.to_string(),
-        }
-    }
-
-    /// A generator that no other kind and no other seed shares.
-    fn generator(self, seed: u64) -> Xoshiro256PlusPlus {
-        // FNV-1a over the name and the seed.
-        let bytes = self.name().into_bytes().into_iter().chain(seed.to_le_bytes());
-        let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-        Xoshiro256PlusPlus::seed_from_u64(hash)
-    }
-}
-
-fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
+fn render(options: &Options) -> Result<(), Box<dyn Error>> {
     let kinds: Vec<Kind> = options.kinds.iter().flat_map(|k| k.0.clone()).collect();
     if let Some(name) = repeated(&kinds) {
         let message = format!(
@@ -121,7 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             .error(ErrorKind::ValueValidation, message)
             .exit();
     }
-    std::fs::create_dir_all(&options.out)?;
+    writable_folder(&options.out)?;
     let mut truth = String::from("file,cx,cy,r,what,visible\n");
     let mut frames = String::from("file,scene\n");
     let bar = ProgressBar::new(kinds.len() as u64 * options.frames)
@@ -151,7 +116,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             milliseconds.push(1000.0 * (cpu_seconds() - before));
             let mut png = std::io::Cursor::new(Vec::new());
             frame.write_to(&mut png, ImageFormat::Png)?;
-            save(&options.out.join(&file), png.get_ref())?;
+            write_whole(&options.out.join(&file), png.get_ref())?;
             writeln!(frames, "{file},{name}")?;
             let sightings = snapshot.truth(&renderer);
             let scale = snapshot.cell.camera.focal_px() / Camera::paper().focal_px();
@@ -176,8 +141,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             bar.suspend(|| println!("{name:20} CPU {least:.1} ms a frame at best, {median:.1} ms median"));
         }
     }
-    save(&options.out.join("truth.csv"), truth.as_bytes())?;
-    save(&options.out.join("frames.csv"), frames.as_bytes())?;
+    write_whole(&options.out.join("truth.csv"), truth.as_bytes())?;
+    write_whole(&options.out.join("frames.csv"), frames.as_bytes())?;
     bar.finish_with_message(format!("in {}", options.out.display()));
     Ok(())
 }
@@ -189,64 +154,8 @@ fn counts(sighting: &Sighting, visible: f64, least_radius: f64) -> bool {
     round && sighting.visible >= visible && ellipse.circle().radius >= least_radius
 }
 
-/// The first kind that is named twice: its files would be written over.
-fn repeated(kinds: &[Kind]) -> Option<String> {
-    let names: Vec<String> = kinds.iter().map(|kind| kind.name()).collect();
-    let again = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
-    again.map(|i| names[i].clone())
-}
-
-/// A share of a whole.
-fn share(text: &str) -> Result<f64, String> {
-    let number: Option<f64> = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
-    number.ok_or_else(|| format!("{text} is not a share from 0 to 1"))
-}
-
-/// Width and height, as in `768x576`.
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let number = |part: &str| part.parse().ok().filter(|n| (16..=8192).contains(n));
-    text.split_once('x')
-        .and_then(|(width, height)| Some((number(width)?, number(height)?)))
-        .ok_or_else(|| format!("{text} is not a size such as 768x576, from 16 to 8192 pixels each"))
-}
-
-/// Writes a file as a whole or not at all.
-fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = path.parent().unwrap_or_else(|| Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // As any new file: the process's mask is applied to it.
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
-    let mut unfinished = builder.tempfile_in(folder)?;
-    unfinished.write_all(bytes)?;
-    unfinished.persist(path)?;
-    Ok(())
-}
-
 /// CPU time of this process.
 fn cpu_seconds() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kinds(list: &str) -> Vec<Kind> {
-        let kinds = list.split(',').map(|name| name.parse::<Kinds>().expect("known"));
-        kinds.flat_map(|k| k.0).collect()
-    }
-
-    #[test]
-    fn shares_and_kinds_that_make_no_sense_are_refused() {
-        for text in ["-0.1", "1.01", "nan", "inf", "much"] {
-            let refused = share(text).expect_err("no share");
-            assert!(refused.contains(text), "{refused}");
-        }
-        assert_eq!(share("0"), Ok(0.0));
-        assert_eq!(share("1"), Ok(1.0));
-        assert_eq!(repeated(&kinds("cell,benchmark")), None);
-        assert_eq!(repeated(&kinds("cell,plain")).as_deref(), Some("plain"));
-        assert_eq!(repeated(&kinds("clean,many,clean")).as_deref(), Some("clean"));
-    }
 }

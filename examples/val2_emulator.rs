@@ -23,8 +23,11 @@ use clap::Parser;
 use puma_val2::PtyServer;
 use puma_val2::{Emulator, Profile, PumaParams, ServeConfig, TcpServer, char_time};
 
+use files::write_whole;
 use program::ended;
 
+#[allow(dead_code, reason = "shared with the examples that write pictures")]
+mod files;
 mod program;
 
 /// An emulated VAL II controller with a PUMA 560.
@@ -191,9 +194,7 @@ impl Floppy {
                 .paths
                 .entry(name.clone())
                 .or_insert_with(|| self.folder.join(format!("{name}.v2")));
-            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
-            file.write_all(text.as_bytes())?;
-            file.persist(path)?;
+            write_whole(path, text.as_bytes())?;
         }
         for name in self.kept.keys().filter(|name| !now.contains_key(*name)) {
             if let Some(path) = self.paths.remove(name) {

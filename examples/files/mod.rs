@@ -15,15 +15,21 @@ pub(crate) fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
         .map_err(|error| format!("{}: cannot be written to: {error}", folder.display()).into())
 }
 
-/// Writes a file: first beside its place, then renamed into it.
+/// Writes a file: first beside its place, then renamed into it. What is there and is no regular file (a device, a pipe) is written to as it
+/// is, never replaced; a link stays a link.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-    let mut beside = path.as_os_str().to_owned();
+    let failed = |error| format!("{}: cannot be written: {error}", path.display());
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(&target).is_ok_and(|there| !there.is_file()) {
+        return Ok(fs::write(&target, bytes).map_err(failed)?);
+    }
+    let mut beside = target.as_os_str().to_owned();
     beside.push(".part");
-    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
-    written.map_err(|error| {
+    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &target));
+    Ok(written.map_err(|error| {
         let _ = fs::remove_file(&beside);
-        format!("{}: cannot be written: {error}", path.display()).into()
-    })
+        failed(error)
+    })?)
 }
 
 /// Writes a picture as PNG.

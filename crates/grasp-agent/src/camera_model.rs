@@ -2,6 +2,8 @@
 
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+#[cfg(feature = "serde")]
+use nalgebra::{Quaternion, Vector4};
 use puma_val2::{Joint, JointDelta, Joints, PumaParams};
 
 use crate::percept::THETA3_ZERO;
@@ -12,6 +14,11 @@ use crate::{JointLimits, Percept};
 /// It answers the two questions of visual servoing: what would be seen ([`CameraModel::view`]), and where is what is seen
 /// ([`CameraModel::locate`]). Lengths in metres, in VAL's world frame (origin at the shoulder, z up).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(into = "Written", try_from = "Written")
+)]
 pub struct CameraModel {
     /// The arm.
     pub arm: PumaParams,
@@ -138,9 +145,83 @@ impl CameraModel {
     }
 }
 
+/// A [`CameraModel`] as it is written: the mount by the place of its origin, metres, and its turn, a unit quaternion (i, j, k, w).
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Written {
+    arm: PumaParams,
+    focal: f64,
+    centre: [f64; 2],
+    mount_at: [f64; 3],
+    mount_turn: [f64; 4],
+    ball_radius: f64,
+    tool: f64,
+}
+
+#[cfg(feature = "serde")]
+impl From<CameraModel> for Written {
+    fn from(model: CameraModel) -> Self {
+        Self {
+            arm: model.arm,
+            focal: model.focal,
+            centre: model.centre,
+            mount_at: model.mount.translation.vector.into(),
+            mount_turn: model.mount.rotation.coords.into(),
+            ball_radius: model.ball_radius,
+            tool: model.tool,
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Written> for CameraModel {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        let turn = Quaternion::from(Vector4::from(written.mount_turn));
+        let off = (turn.norm() - 1.0).abs();
+        if off.is_nan() || off > 1e-9 {
+            return Err(format!(
+                "mount_turn is {:?}; it must be a unit quaternion",
+                written.mount_turn
+            ));
+        }
+        Ok(Self {
+            arm: written.arm,
+            focal: written.focal,
+            centre: written.centre,
+            // To the last digit what was written.
+            mount: Isometry3::from_parts(
+                Translation3::from(written.mount_at),
+                UnitQuaternion::new_unchecked(turn),
+            ),
+            ball_radius: written.ball_radius,
+            tool: written.tool,
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn a_model_is_read_as_it_was_written_and_a_turn_that_is_none_is_refused() {
+        let model = CameraModel {
+            mount: Isometry3::from_parts(
+                Translation3::new(0.1, -0.2, 0.3),
+                UnitQuaternion::from_euler_angles(0.1, 0.7, -2.0),
+            ),
+            ..CameraModel::paper()
+        };
+        let text = serde_json::to_string(&model).unwrap();
+        assert_eq!(serde_json::from_str::<CameraModel>(&text).unwrap(), model);
+        let mut other: serde_json::Value = serde_json::from_str(&text).unwrap();
+        other["mount_turn"][0] = 2.0.into();
+        let refused = serde_json::from_value::<CameraModel>(other).unwrap_err();
+        assert!(refused.to_string().contains("unit quaternion"), "{refused}");
+    }
 
     #[test]
     fn what_is_located_shows_as_it_was_seen() {

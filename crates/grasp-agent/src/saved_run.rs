@@ -66,8 +66,10 @@ pub enum SavedController {
         /// How learning went on in the run, from this seed on; `None` for behaviours that were frozen.
         learning: Option<OnlineLearning>,
     },
-    /// The hybrid with [`HybridSettings::paper`].
+    /// The hybrid.
     Hybrid {
+        /// Its settings.
+        settings: Box<HybridSettings>,
         /// What it believed.
         belief: Belief,
     },
@@ -82,9 +84,10 @@ impl SavedController {
         }
     }
 
-    /// A hybrid with [`HybridSettings::paper`]. Within a run it goes by what it believed before, whether it learns from that or not.
+    /// A hybrid. Within a run it goes by what it believed before, whether it learns from that or not.
     pub fn of_hybrid(hybrid: &Hybrid) -> Self {
         Self::Hybrid {
+            settings: Box::new(*hybrid.settings()),
             belief: hybrid.belief().clone(),
         }
     }
@@ -165,10 +168,11 @@ impl SavedRun {
                     None => learned,
                 })
             }
-            SavedController::Hybrid { belief } => {
+            SavedController::Hybrid { settings, belief } => {
+                // What was believed then is believed as firmly now.
                 let settings = HybridSettings {
                     drift: 0.0,
-                    ..HybridSettings::paper()
+                    ..**settings
                 };
                 self.replay_by(Hybrid::with_belief(settings, belief.clone()).frozen())
             }
@@ -200,7 +204,8 @@ impl SavedRun {
                 policy: Box::new(Policy::of(learned, &self.config.limits)),
                 learning: *learning,
             },
-            SavedController::Hybrid { belief } => ControllerText::Hybrid {
+            SavedController::Hybrid { settings, belief } => ControllerText::Hybrid {
+                settings: settings.clone(),
                 belief: belief.clone(),
             },
         };
@@ -232,7 +237,7 @@ impl SavedRun {
                 learned: Box::new(policy.into_learned().map_err(refused)?.0),
                 learning,
             },
-            ControllerText::Hybrid { belief } => SavedController::Hybrid { belief },
+            ControllerText::Hybrid { settings, belief } => SavedController::Hybrid { settings, belief },
         };
         Ok(Self {
             config: document.config,
@@ -262,6 +267,7 @@ enum ControllerText {
         learning: Option<OnlineLearning>,
     },
     Hybrid {
+        settings: Box<HybridSettings>,
         belief: Belief,
     },
 }

@@ -30,7 +30,8 @@ pub enum Verdict {
 /// The paper's constant control of the approach (section 2.2: collisions with unexpected objects, "or a rapid approach that could damage the
 /// camera"): judges every move by what came back.
 ///
-/// It moves nothing itself. [`Agent::supervised_by`](crate::Agent::supervised_by) puts another one in the place of [`Guard`]. What a camera
+/// It moves nothing itself, and what it remembers it remembers from run to run.
+/// [`Agent::supervised_by`](crate::Agent::supervised_by) puts another one in the place of [`Guard`]. What a camera
 /// shows is supervised too, by the agent itself: see [`AgentConfig::same_frames`](crate::AgentConfig::same_frames).
 ///
 /// ```

@@ -97,7 +97,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 fn save_png(path: &Path, frame: &GrayImage) -> Result<(), Box<dyn Error>> {
     let mut png = Cursor::new(Vec::new());
     frame.write_to(&mut png, ImageFormat::Png)?;
-    Ok(save(path, png.get_ref())?)
+    save(path, png.get_ref())
 }
 
 /// Width and height, as in `768x576`.
@@ -115,9 +115,13 @@ fn kind(name: &str) -> Result<Kind, String> {
     })
 }
 
-/// Writes a file as a whole or not at all.
-fn save(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+/// Writes a file as a whole or not at all; what is there and is no regular file is written to as it is.
+fn save(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+    let failed = |error| format!("{}: cannot be written: {error}", path.display());
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+        return Ok(std::fs::write(path, bytes).map_err(failed)?);
+    }
     let unfinished = path.with_extension("part");
-    std::fs::write(&unfinished, bytes)?;
-    std::fs::rename(unfinished, path)
+    let written = std::fs::write(&unfinished, bytes).and_then(|()| std::fs::rename(&unfinished, path));
+    Ok(written.map_err(failed)?)
 }

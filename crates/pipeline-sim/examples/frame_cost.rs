@@ -75,9 +75,6 @@ fn report(
     for list in [&mut times, &mut quiet] {
         list.sort_by(f64::total_cmp);
     }
-    if std::env::var("LIST").is_ok() {
-        println!("{quiet:.2?}");
-    }
     let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
     println!(
         "{name:20} {:7.2} {:7.2} {:7.2}",

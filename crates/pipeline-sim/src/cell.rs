@@ -4,7 +4,7 @@ use hough_heuristic::{Circle, Features};
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joint, Joints, PumaParams};
 
-use crate::{Ball, Camera, Capsule, Ellipse, Hand, Holder, Mount, SightError};
+use crate::{Ball, Camera, Capsule, Ellipse, Hand, Holder, Mount, ReachError, SightError};
 
 /// When a ball counts as seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,37 +44,42 @@ impl SightRule {
         let circle = outline.circle();
         let Features { r, .. } = Features::from_circle(&circle, size.0);
         let (width, height) = (f64::from(size.0), f64::from(size.1));
-        if !(self.min_radius..=self.max_radius).contains(&r) {
-            let (w, h) = outline.half_extent();
-            if 2.0 * w > width || 2.0 * h > height {
-                return Err(SightError::LargerThanView {
+        let (w, h) = outline.half_extent();
+        // Whatever else is wrong with a ball that cannot fit into the frame follows from that.
+        let why = |error| {
+            if (2.0 * w > width || 2.0 * h > height) && r >= self.min_radius {
+                SightError::LargerThanView {
                     width_px: 2.0 * w,
                     height_px: 2.0 * h,
                     frame_width: size.0,
                     frame_height: size.1,
-                });
+                }
+            } else {
+                error
             }
-            return Err(SightError::Radius {
+        };
+        if !(self.min_radius..=self.max_radius).contains(&r) {
+            return Err(why(SightError::Radius {
                 r,
                 least: self.min_radius,
                 greatest: self.max_radius,
-            });
+            }));
         }
         let inside = (-0.5..=width - 0.5).contains(&circle.x) && (-0.5..=height - 0.5).contains(&circle.y);
         if !inside {
-            return Err(SightError::CentreOutside {
+            return Err(why(SightError::CentreOutside {
                 x: circle.x,
                 y: circle.y,
-            });
+            }));
         }
         let share = outline.share_inside(size.0, size.1);
         if share >= self.min_share {
             Ok(())
         } else {
-            Err(SightError::CutOff {
+            Err(why(SightError::CutOff {
                 share,
                 least: self.min_share,
-            })
+            }))
         }
     }
 
@@ -114,7 +119,15 @@ impl WorkingLimits {
 
     /// Whether all six angles are inside.
     pub fn contain(&self, joints: &Joints) -> bool {
-        (0..6).all(|i| joints.0[i] >= self.min[i] - 1e-9 && joints.0[i] <= self.max[i] + 1e-9)
+        self.violated(joints).is_none()
+    }
+
+    /// The first joint whose angle is outside.
+    pub fn violated(&self, joints: &Joints) -> Option<Joint> {
+        Joint::ALL.into_iter().find(|joint| {
+            let (i, angle) = (joint.index(), joints[*joint]);
+            !(angle >= self.min[i] - 1e-9 && angle <= self.max[i] + 1e-9)
+        })
     }
 }
 
@@ -265,11 +278,32 @@ impl Cell {
     }
 
     /// The pose, with the hand at `jt5_degrees` and `JT4` = `JT6` = 0, in which the ball shows the middle of the goal in y and
-    /// r and lies in the middle between the jaws; elbow up. `None` if the ball is out of reach or the pose out of the working limits.
+    /// r and lies in the middle between the jaws; elbow up. `None` if the ball is out of reach or the pose out of the working limits
+    /// ([`Cell::try_goal_pose`] says which).
     pub fn goal_pose(&self, jt5_degrees: f64) -> Option<Joints> {
+        self.try_goal_pose(jt5_degrees).ok()
+    }
+
+    /// As [`Cell::goal_pose`], with the reason why there is none.
+    ///
+    /// # Errors
+    /// [`ReachError`]: a ball or an angle that is not finite; a camera that cannot show the ball as the goal has it; a ball out of the arm's
+    /// reach; a pose out of the working limits.
+    pub fn try_goal_pose(&self, jt5_degrees: f64) -> Result<Joints, ReachError> {
+        let ball = self.ball.centre;
+        for (quantity, value) in [
+            ("JT5 (degrees)", jt5_degrees),
+            ("the x coordinate of the ball (m)", ball.x),
+            ("the y coordinate of the ball (m)", ball.y),
+            ("the z coordinate of the ball (m)", ball.z),
+        ] {
+            if !value.is_finite() {
+                return Err(ReachError::NotFinite { quantity, value });
+            }
+        }
         // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a two-link arm in the plane.
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
-        let goal = self.ball_showing(&hand, &Self::GOAL)?;
+        let goal = self.ball_showing(&hand, &Self::GOAL).ok_or(ReachError::NoView)?;
         let wrist = self.params.wrist(&hand);
         let mut in_hand = wrist.inverse_transform_point(&goal);
         in_hand.y = 0.0;
@@ -277,11 +311,13 @@ impl Cell {
         let link = wrist * in_hand - elbow;
         let (length, angle) = (link.x.hypot(link.z), link.z.atan2(link.x));
 
-        let ball = self.ball.centre;
         let rho2 = ball.x * ball.x + ball.y * ball.y;
         let forward2 = rho2 - self.params.d2 * self.params.d2;
         if forward2.is_nan() || forward2 <= 0.0 {
-            return None;
+            return Err(ReachError::BesideWaist {
+                distance: rho2.sqrt(),
+                offset: self.params.d2.abs(),
+            });
         }
         let forward = forward2.sqrt();
         let jt1 = ball.y.atan2(ball.x) - self.params.d2.atan2(forward);
@@ -290,7 +326,11 @@ impl Cell {
         let a2 = self.params.a2;
         let cos_bend = (distance2 - a2 * a2 - length * length) / (2.0 * a2 * length);
         if cos_bend.is_nan() || cos_bend.abs() > 1.0 {
-            return None;
+            return Err(ReachError::OutOfReach {
+                distance: distance2.sqrt(),
+                least: (a2 - length).abs(),
+                greatest: a2 + length,
+            });
         }
         let bend = cos_bend.acos();
         let shoulder = ball.z.atan2(forward) + (length * bend.sin()).atan2(a2 + length * cos_bend);
@@ -305,7 +345,15 @@ impl Cell {
             hand.0[4],
             0.0,
         ]);
-        self.within_limits(&pose).then_some(pose)
+        match self.limits.violated(&pose) {
+            None => Ok(pose),
+            Some(joint) => Err(ReachError::OutOfLimits {
+                joint,
+                angle: pose[joint],
+                low: self.limits.min[joint.index()],
+                high: self.limits.max[joint.index()],
+            }),
+        }
     }
 
     /// Whether the goal can be reached with the hand as it stands while reaching ([`Cell::REACHING_JT5_DEGREES`]).

@@ -94,7 +94,7 @@ impl CentreModel {
             .iter()
             .map(|s| {
                 let missed = s.after.x - s.before.x - model.change(&s.before, s.d1);
-                (shares(&s.before, s.d1), missed * missed)
+                (shares(&s.before, s.d1, with_radius), missed * missed)
             })
             .collect();
         let count = samples.len() as f64;
@@ -114,11 +114,11 @@ impl CentreModel {
     }
 
     /// The standard deviation of x, feature units, that the fit expects around what a new observation would show: noise, what the terms
-    /// leave out (which grows with r d1), and the uncertainty of the coefficients.
+    /// leave out (which grows with the move), and the uncertainty of the coefficients.
     pub fn uncertainty(&self, before: &Features, d1: f64) -> f64 {
         let terms = terms(before, d1);
         let of_fit = self.fit.residual[0].powi(2) * self.fit.leverage(&terms[..self.fit.terms()]);
-        (self.noise.variance(shares(before, d1)) + of_fit).sqrt()
+        (self.noise.variance(shares(before, d1, self.with_radius)) + of_fit).sqrt()
     }
 
     /// What the fit leaves of the changes of x on its samples: standard deviation in feature units, with the degrees of freedom that
@@ -163,12 +163,18 @@ fn terms(before: &Features, d1: f64) -> [f64; 3] {
     [1.0, d1, before.r * d1]
 }
 
-/// By how much noise, and what the terms leave out, show in x: the latter is how far the ball is from the waist's axis, which says how far a
-/// turn carries it; it shows the more the nearer the ball and the longer the move.
-fn shares(before: &Features, d1: f64) -> Shares {
+/// By how much noise, and what the terms leave out, show in x. Without r d1 they leave out how near the ball is; with it, how far it is from
+/// the waist's axis, which says how far a turn carries it.
+fn shares(before: &Features, d1: f64, with_radius: bool) -> Shares {
+    let [_, turned, near] = terms(before, d1);
+    let left_out = if with_radius {
+        near / SCALES[2]
+    } else {
+        turned / SCALES[1]
+    };
     Shares {
         observed: 1.0,
-        fitted: (before.r * d1 / SCALES[2]).powi(2),
+        fitted: left_out * left_out,
     }
 }
 

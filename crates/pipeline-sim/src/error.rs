@@ -137,6 +137,58 @@ pub enum SightError {
     },
 }
 
+/// Why there is no pose from which the ball can be gripped.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReachError {
+    /// An angle, or a coordinate of the ball, is NaN or infinite.
+    #[error("{quantity} must be a finite number, but is {value}")]
+    NotFinite {
+        /// Which quantity.
+        quantity: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// No place before this camera shows a ball of this size as the goal has it.
+    #[error("the camera shows the ball nowhere as the goal has it")]
+    NoView,
+    /// The ball is nearer to the waist's axis than the plane in which the arm moves.
+    #[error(
+        "the ball is {distance:.3} m from the waist's axis; the arm moves in a plane {offset:.3} m beside it"
+    )]
+    BesideWaist {
+        /// Distance from the axis, metres.
+        distance: f64,
+        /// Distance of the arm's plane from the axis, metres.
+        offset: f64,
+    },
+    /// The ball is too near to the shoulder, or too far from it.
+    #[error(
+        "the ball is {distance:.3} m from the shoulder, in the arm's plane; it reaches {least:.3}..{greatest:.3} m"
+    )]
+    OutOfReach {
+        /// Distance from the shoulder, metres.
+        distance: f64,
+        /// Least distance that the arm reaches with the hand as it is.
+        least: f64,
+        /// Greatest distance.
+        greatest: f64,
+    },
+    /// The pose is beyond what the task keeps to.
+    #[error("the pose has {joint} at {:.1} degrees, out of the working limits {:.1}..{:.1}",
+        angle.to_degrees(), low.to_degrees(), high.to_degrees())]
+    OutOfLimits {
+        /// The first such joint.
+        joint: Joint,
+        /// Its angle, radians.
+        angle: f64,
+        /// Its lower limit, radians.
+        low: f64,
+        /// Its upper limit, radians.
+        high: f64,
+    },
+}
+
 /// A quantity of the cell that cannot be worked with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

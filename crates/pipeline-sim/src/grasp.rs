@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Point3, Vector3};
-use puma_val2::{Gripper, Joints};
+use puma_val2::{Gripper, Joints, PumaParams};
 
 use crate::{Cell, Holder};
 
@@ -149,14 +149,21 @@ impl Cell {
         if self.held.is_some() {
             return self.follow(to);
         }
-        // Too far away to meet: the hand reaches 0.25 m from the wrist, and no point of the wrist's way is farther from its ends than the
-        // way is long.
+        // Too far away to meet: no point of the wrist's way is farther from the nearer of its ends than half the way is long, and no part of
+        // the hand farther from the wrist than it reaches.
         let wrist_at = |joints: &Joints| self.params.wrist(joints).translation.vector;
         let (start, end) = (wrist_at(from), wrist_at(to));
+        let bodies = self.hand_bodies(from);
+        let hand = bodies
+            .iter()
+            .map(|b| (b.from.coords - start).norm().max((b.to.coords - start).norm()) + b.radius)
+            .fold(0.0, f64::max);
+        let PumaParams { a2, a3, d2, d4, .. } = self.params;
+        let arm = a2.abs() + d2.abs() + a3.hypot(d4);
         let turned = (0..6).map(|i| (to.0[i] - from.0[i]).abs()).fold(0.0, f64::max);
         let way: f64 = (0..3).map(|i| (to.0[i] - from.0[i]).abs()).sum();
         let ball = self.ball.centre.coords;
-        if (ball - start).norm().min((ball - end).norm()) > 0.25 + 0.5 * way {
+        if (ball - start).norm().min((ball - end).norm()) > hand + self.ball.radius + 0.5 * arm * way {
             return Contact::Free;
         }
         let steps = (turned / STEP).ceil().clamp(1.0, 1000.0) as usize;

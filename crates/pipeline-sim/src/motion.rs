@@ -1,10 +1,12 @@
-//! Balls that do not stay where they are.
+//! Balls and arms that do not stay where they are.
 
 use nalgebra::{Point3, Rotation3, Vector3};
+use puma_val2::{Joint, Joints};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::Workspace;
+use crate::error::finite;
+use crate::{Cell, QuantityError, Workspace};
 
 /// A path of the ball's centre over time.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +52,71 @@ impl BallPath {
                 reached.or(places.first()).map(|(_, place)| *place)
             }
         }
+    }
+}
+
+/// How fast arm and ball move while a frame is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Motion {
+    /// Speeds of the joints, `JT1` first, radians per second.
+    pub joints: [f64; 6],
+    /// Velocity of the ball, metres per second, and of its holder if it stands on it. A ball in the jaws goes with the hand instead.
+    pub ball: Vector3<f64>,
+}
+
+impl Motion {
+    /// Nothing moves.
+    pub fn still() -> Self {
+        Self {
+            joints: [0.0; 6],
+            ball: Vector3::zeros(),
+        }
+    }
+
+    /// The even motion that leads from one moment to another, `seconds` later.
+    pub fn between(before: (&Cell, &Joints), after: (&Cell, &Joints), seconds: f64) -> Self {
+        Self {
+            joints: std::array::from_fn(|i| (after.1.0[i] - before.1.0[i]) / seconds),
+            ball: (after.0.ball.centre - before.0.ball.centre) / seconds,
+        }
+    }
+
+    /// Cell and joints `seconds` after (or, below zero, before) they are `cell` and `joints`.
+    pub fn moved(&self, cell: &Cell, joints: &Joints, seconds: f64) -> (Cell, Joints) {
+        let then = Joints(std::array::from_fn(|i| joints.0[i] + self.joints[i] * seconds));
+        let mut moved = *cell;
+        if let Some(place) = cell.held {
+            moved.ball.centre = cell.params.wrist(&then) * place;
+            return (moved, then);
+        }
+        let by = self.ball * seconds;
+        moved.ball.centre += by;
+        if let Some(holder) = moved.holder.as_mut().filter(|h| h.carries(&cell.ball)) {
+            holder.foot += by.xy();
+            holder.top += by.z;
+        }
+        (moved, then)
+    }
+
+    /// Whether all speeds are finite.
+    ///
+    /// # Errors
+    /// [`QuantityError::NotFinite`] names the first that is not.
+    pub fn check(&self) -> Result<(), QuantityError> {
+        for (joint, speed) in Joint::ALL.iter().zip(self.joints) {
+            finite(format!("the speed of {joint} (rad/s)"), speed)?;
+        }
+        for (axis, speed) in ["x", "y", "z"].iter().zip(self.ball.iter()) {
+            finite(format!("the speed of the ball along {axis} (m/s)"), *speed)?;
+        }
+        Ok(())
+    }
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self::still()
     }
 }
 

@@ -3,7 +3,7 @@
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta, Joints};
 
-use crate::error::ascending;
+use crate::error::{ascending, finite};
 use crate::{Cell, MoveLists, QuantityError};
 
 /// Intervals of the image features in which the goal is reached, both ends included, feature units.
@@ -83,7 +83,7 @@ impl Cell {
             .collect();
         // The ball must be in sight before the waist is turned, too.
         if start.non_finite().is_none() && self.features(start).is_none() {
-            return Ok(None);
+            return Grid::new(self, start, &deltas).map(|_| None);
         }
         self.breadth_first(&turned, &deltas, |f, _| goal.approached(f), most)
     }
@@ -113,7 +113,7 @@ impl Cell {
     /// `None` if the ball is out of sight at `start` or the arm out of its limits, no way leads to the goal, or it takes more than `most` moves.
     ///
     /// # Errors
-    /// [`QuantityError`]: angles of `start`, of a move, or of the working limits that are not finite; limits the wrong way round or more than
+    /// [`QuantityError`]: a ball's place, angles of `start`, of a move, or of the working limits that are not finite; limits the wrong way round or more than
     /// three turns apart; moves that turn more than two joints.
     pub fn fewest_moves(
         &self,
@@ -204,6 +204,10 @@ impl Grid {
             quantity: format!("the {what} of JT{} (rad)", joint + 1),
             value,
         };
+        let ball = cell.ball.centre;
+        for (axis, value) in [("x", ball.x), ("y", ball.y), ("z", ball.z)] {
+            finite(format!("the {axis} coordinate of the ball (m)"), value)?;
+        }
         let mut moving = Vec::new();
         for joint in 0..6 {
             if !start.0[joint].is_finite() {

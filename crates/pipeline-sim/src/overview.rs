@@ -11,6 +11,21 @@ use crate::{Cell, Workspace};
 const SCALE: f64 = 340.0;
 /// Width of each of the two views, and their height, pixels.
 const VIEW: (f64, f64) = (560.0, 470.0);
+/// Height of the legend below both views, pixels.
+const LEGEND: f64 = 34.0;
+/// Length of the scale bars, metres.
+const BAR: f64 = 0.2;
+/// What is drawn: class, whether as an area, and its name.
+const PARTS: [(&str, bool, &str); 8] = [
+    ("arm", false, "arm"),
+    ("hand", false, "hand"),
+    ("camera", true, "camera"),
+    ("cone", true, "field of view"),
+    ("space", true, "workspace"),
+    ("ball", true, "ball"),
+    ("path", false, "way of the tool point"),
+    ("table", false, "table"),
+];
 
 /// World to page.
 type Placement = Box<dyn Fn(&Point3<f64>) -> (f64, f64)>;
@@ -23,14 +38,13 @@ struct Page<'a> {
 
 impl Page<'_> {
     fn line(&mut self, points: &[Point3<f64>], class: &str) {
-        let place = &self.place;
-        let points: Vec<String> = points
-            .iter()
-            .map(|p| {
-                let (x, y) = place(p);
-                format!("{x:.1},{y:.1}")
-            })
-            .collect();
+        let points: Vec<(f64, f64)> = points.iter().map(|p| (self.place)(p)).collect();
+        self.stroke(&points, class);
+    }
+
+    /// A line through places of the page.
+    fn stroke(&mut self, points: &[(f64, f64)], class: &str) {
+        let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
         let _ = writeln!(
             self.text,
             r#"<polyline class="{class}" points="{}"/>"#,
@@ -52,20 +66,49 @@ impl Page<'_> {
     }
 }
 
+/// Names what is drawn, below both views.
+fn legend(text: &mut String) {
+    let y = VIEW.1 + 0.5 * LEGEND;
+    let mut x = 16.0;
+    let drawn = PARTS.map(|(class, ..)| text.contains(&format!("class=\"{class}\"")));
+    for ((class, is_area, name), _) in PARTS.into_iter().zip(drawn).filter(|(_, drawn)| *drawn) {
+        let _ = if is_area {
+            writeln!(
+                text,
+                r#"<circle class="{class}" cx="{:.0}" cy="{y:.0}" r="6"/>"#,
+                x + 12.0
+            )
+        } else {
+            writeln!(
+                text,
+                r#"<polyline class="{class}" points="{x:.0},{y:.0} {:.0},{y:.0}"/>"#,
+                x + 24.0
+            )
+        };
+        let _ = writeln!(
+            text,
+            r#"<text x="{:.0}" y="{:.0}">{name}</text>"#,
+            x + 31.0,
+            y + 4.0
+        );
+        x += 56.0 + 7.0 * name.len() as f64;
+    }
+}
+
 impl Cell {
     /// Draws the cell as SVG: the arm from the side (in its own vertical plane) and from above, the camera's field of view, the workspace, the
-    /// ball, and the way of the tool point through `path`, whose last pose is the one drawn.
+    /// ball, and the way of the tool point through `path`, whose last pose is the one drawn; with scale bars and a legend.
     ///
     /// An empty path, or one with angles that are not finite, gives a drawing without the arm.
     pub fn overview_svg(&self, workspace: &Workspace, path: &[Joints]) -> String {
-        let (width, height) = (2.0 * VIEW.0, VIEW.1);
+        let (width, height) = (2.0 * VIEW.0, VIEW.1 + LEGEND);
         let mut text = format!(
             r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}">
 <style>
 rect{{fill:#fff}} text{{font:13px sans-serif;fill:#333}} polyline{{fill:none;stroke-linejoin:round;stroke-linecap:round}}
 .arm{{stroke:#3b5b7a;stroke-width:9}} .hand{{stroke:#7a8ea3;stroke-width:5}} .bracket{{stroke:#222;stroke-width:2}} .joint{{fill:#20364a}} .space{{fill:#e8f1e4;stroke:#8fb27c;stroke-width:1}}
 .cone{{fill:#f4c430;fill-opacity:.25;stroke:#c99a00;stroke-width:1}} .ball{{fill:#d8453b}} .holder{{stroke:#777;stroke-width:4}}
-.table{{stroke:#8a6f4d;stroke-width:3}} .path{{stroke:#d8453b;stroke-width:1.5;stroke-dasharray:4 3}} .camera{{fill:#222}}
+.table{{stroke:#8a6f4d;stroke-width:3}} .path{{stroke:#d8453b;stroke-width:1.5;stroke-dasharray:4 3}} .camera{{fill:#222}} .bar{{stroke:#333;stroke-width:1.5}}
 </style>
 <rect width="{width}" height="{height}"/>
 "##
@@ -89,8 +132,19 @@ rect{{fill:#fff}} text{{font:13px sans-serif;fill:#333}} polyline{{fill:none;str
                 place,
             };
             self.draw_view(&mut page, k == 0, pan, workspace, path, pose);
-            page.label(VIEW.0 * k as f64 + 16.0, VIEW.1 - 14.0, name);
+            let left = VIEW.0 * k as f64;
+            page.label(left + 16.0, VIEW.1 - 14.0, name);
+            let (end, y) = (left + VIEW.0 - 24.0, VIEW.1 - 18.0);
+            let bar = [
+                (end - BAR * SCALE, y - 4.0),
+                (end - BAR * SCALE, y),
+                (end, y),
+                (end, y - 4.0),
+            ];
+            page.stroke(&bar, "bar");
+            page.label(end - 0.5 * BAR * SCALE - 16.0, y - 5.0, &format!("{BAR} m"));
         }
+        legend(&mut text);
         text.push_str("</svg>\n");
         text
     }

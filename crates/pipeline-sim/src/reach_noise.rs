@@ -19,12 +19,13 @@ impl ReachForm {
         // What a form leaves out is, of the terms that turn (Z, V), those of the next higher order in the move.
         let moved = (d2 / 20.0).powi(2) + (d3 / 16.0).powi(2);
         let left_out = match self {
+            // All that its coefficients stand for grows with r, that of r with its square.
             Self::Linear => {
-                let even = Shares {
+                let near = (before.r / 33.0).powi(2);
+                return [near, near * near].map(|near| Shares {
                     observed: 1.0,
-                    fitted: 0.0,
-                };
-                return [even, even];
+                    fitted: moved * near,
+                });
             }
             Self::Rigid8 => moved.powi(2),
             Self::Rigid22 => moved.powi(3),
@@ -47,6 +48,9 @@ impl ReachForm {
     }
 }
 
+/// Rounds of weighing in [`Noise::of`].
+const ROUNDS: usize = 6;
+
 /// The noise of one feature.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -66,29 +70,38 @@ impl Noise {
         if residuals.is_empty() {
             return Self::default();
         }
-        // Squared residuals on both shares, relative to the first, by least squares, neither below zero.
-        let (mut sq, mut q, mut eq, mut e, mut total) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (shares, squared) in residuals {
-            let (ratio, relative) = (shares.fitted / shares.observed, squared / shares.observed);
-            sq += ratio * ratio / n;
-            q += ratio / n;
-            eq += ratio * relative / n;
-            e += relative / n;
-            total += squared / n;
+        // Squared residuals on both shares, relative to the first, by least squares, neither below zero; then again and again with each weighed
+        // as a squared residual of the variance found deserves, or the greatest would decide alone.
+        let relative: Vec<(f64, f64)> = residuals
+            .iter()
+            .map(|(shares, squared)| (shares.fitted / shares.observed, squared / shares.observed))
+            .collect();
+        let total = residuals.iter().map(|(_, squared)| squared / n).sum::<f64>();
+        let least = 1e-3 * relative.iter().map(|(_, squared)| squared / n).sum::<f64>();
+        let (mut observed, mut fitted) = (1.0, 0.0);
+        for _ in 0..ROUNDS {
+            let (mut w, mut sq, mut q, mut eq, mut e) = (0.0, 0.0, 0.0, 0.0, 0.0);
+            for (ratio, squared) in &relative {
+                let weight = (observed + fitted * ratio).max(least).powi(-2);
+                w += weight;
+                sq += weight * ratio * ratio;
+                q += weight * ratio;
+                eq += weight * ratio * squared;
+                e += weight * squared;
+            }
+            let determinant = w * sq - q * q;
+            let even = (e / w, 0.0);
+            (observed, fitted) = if determinant > 1e-12 * w * sq {
+                ((e * sq - eq * q) / determinant, (w * eq - e * q) / determinant)
+            } else {
+                even
+            };
+            if fitted < 0.0 || !observed.is_finite() || !fitted.is_finite() {
+                (observed, fitted) = even;
+            } else if observed < 0.0 {
+                (observed, fitted) = (0.0, eq / sq);
+            }
         }
-        let determinant = sq - q * q;
-        let (observed, fitted) = if determinant > 1e-12 * sq {
-            ((e * sq - eq * q) / determinant, (eq - e * q) / determinant)
-        } else {
-            (e, 0.0)
-        };
-        let (observed, fitted) = if fitted < 0.0 {
-            (e, 0.0)
-        } else if observed < 0.0 {
-            (0.0, eq / sq)
-        } else {
-            (observed, fitted)
-        };
         Self {
             residual: (total / left).sqrt(),
             observed: observed / left,

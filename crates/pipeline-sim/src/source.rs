@@ -12,7 +12,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use crate::error::amount;
 use crate::errors::Drive;
 use crate::samples::NOISE;
-use crate::{Cell, Contact, Errors, Grasp, QuantityError, Renderer, with_noise};
+use crate::{Cell, Contact, Errors, Grasp, Motion, QuantityError, Renderer, Shot, with_noise};
 
 /// A cell that camera, arm and whoever pushes the ball have in common.
 ///
@@ -53,31 +53,89 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// The camera on the hand as a [`FrameSource`]: every grab renders the cell as it is, with the joints where they are.
 ///
 /// The joints come from a closure, so that any arm will do: [`SimulatedArm::pose`], or an emulated controller asked where it stands.
+/// Frames are taken in an instant unless [`CellCamera::exposed`] says how long they take, and how things move meanwhile.
 pub struct CellCamera<P> {
     cell: SharedCell,
     renderer: Renderer,
     pose: P,
+    shot: Shot,
+    motion: Option<Speeds>,
 }
+
+/// Tells how fast arm and ball move.
+type Speeds = Box<dyn FnMut() -> Motion + Send>;
 
 impl<P: FnMut() -> Joints> CellCamera<P> {
     /// A camera in `cell` that looks from wherever `pose` says the joints are.
     pub fn new(cell: SharedCell, renderer: Renderer, pose: P) -> Self {
-        Self { cell, renderer, pose }
+        Self {
+            cell,
+            renderer,
+            pose,
+            shot: Shot::still(),
+            motion: None,
+        }
+    }
+
+    /// The camera with exposures that take time ([`Shot`]), of one field or two: `motion` is asked at every grab how fast arm and ball
+    /// move. An arm that moves at once and a cell have no speeds of their own; whoever moves them knows, or takes what has moved since
+    /// the last frame for it ([`Motion::between`]).
+    ///
+    /// Cell and joints are as they are in the middle of the exposure, so that its truth, and [`Cell::features`], hold for the frame.
+    ///
+    /// ```
+    /// use hough_heuristic::FrameSource;
+    /// use pipeline_sim::{Ball, Cell, CellCamera, Motion, Renderer, Scene, SharedCell, Shot, Workspace};
+    ///
+    /// let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.15, -0.1)));
+    /// let pose = Workspace::paper().search_poses()[3];
+    /// // PAL, each field exposed for 10 ms, while the waist turns by 20 degrees a second.
+    /// let turning = || Motion {
+    ///     joints: [20.0_f64.to_radians(), 0.0, 0.0, 0.0, 0.0, 0.0],
+    ///     ..Motion::still()
+    /// };
+    /// let mut camera = CellCamera::new(cell, Renderer::new(&Scene::laboratory(), 1), move || pose)
+    ///     .exposed(Shot::pal(0.010, 8), turning)?;
+    /// assert_eq!(camera.grab()?.dimensions(), (768, 576));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`QuantityError`] names what makes no sense in `shot`.
+    pub fn exposed(
+        mut self,
+        shot: Shot,
+        motion: impl FnMut() -> Motion + Send + 'static,
+    ) -> Result<Self, QuantityError> {
+        shot.check()?;
+        self.shot = shot;
+        self.motion = Some(Box::new(motion));
+        Ok(self)
     }
 
     /// Renders the next frame into the renderer's own buffer, without a copy.
     ///
     /// # Errors
-    /// [`FrameError::Failed`] if the joints are not finite.
+    /// [`FrameError::Failed`] if the joints, or the speeds of an exposure, are not finite.
     pub fn look(&mut self) -> Result<&GrayImage, FrameError> {
+        let failed = |reason: String| FrameError::Failed {
+            origin: "simulated camera".to_owned(),
+            reason,
+        };
         let joints = (self.pose)();
         if let Some(joint) = joints.non_finite() {
-            return Err(FrameError::Failed {
-                origin: "simulated camera".to_owned(),
-                reason: format!("the angle of {joint} is not a finite number"),
-            });
+            return Err(failed(format!("the angle of {joint} is not a finite number")));
         }
-        Ok(self.renderer.render(&self.cell.get(), &joints))
+        let cell = self.cell.get();
+        let Some(motion) = &mut self.motion else {
+            return Ok(self.renderer.render(&cell, &joints));
+        };
+        let motion = motion();
+        motion.check().map_err(|error| failed(error.to_string()))?;
+        let middle = 0.5 * (self.shot.exposure + self.shot.interlace.unwrap_or(0.0));
+        Ok(self
+            .renderer
+            .take(&self.shot, |t| motion.moved(&cell, &joints, t - middle)))
     }
 }
 
@@ -91,6 +149,7 @@ impl<P> std::fmt::Debug for CellCamera<P> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("CellCamera")
             .field("cell", &self.cell)
+            .field("shot", &self.shot)
             .finish_non_exhaustive()
     }
 }

@@ -19,6 +19,7 @@ use hough_heuristic::image::GrayImage;
 pub struct Y4mWriter<W: Write> {
     out: W,
     rate: (u32, u32),
+    interlaced: bool,
     size: Option<(u32, u32)>,
 }
 
@@ -35,8 +36,17 @@ impl<W: Write> Y4mWriter<W> {
         Ok(Self {
             out,
             rate: (frames, seconds),
+            interlaced: false,
             size: None,
         })
+    }
+
+    /// Says in the header that every frame consists of two fields, the even rows (the top field) taken first, as [`crate::Shot::pal`] takes
+    /// them. Without it the stream says progressive.
+    #[must_use]
+    pub fn interlaced(mut self) -> Self {
+        self.interlaced = true;
+        self
     }
 
     /// Appends a frame. The first one decides the size.
@@ -48,9 +58,10 @@ impl<W: Write> Y4mWriter<W> {
         match self.size {
             None if size.0 > 0 && size.1 > 0 => {
                 let (frames, seconds) = self.rate;
+                let fields = if self.interlaced { 't' } else { 'p' };
                 writeln!(
                     self.out,
-                    "YUV4MPEG2 W{} H{} F{frames}:{seconds} Ip A1:1 Cmono",
+                    "YUV4MPEG2 W{} H{} F{frames}:{seconds} I{fields} A1:1 Cmono",
                     size.0, size.1
                 )?;
                 self.size = Some(size);

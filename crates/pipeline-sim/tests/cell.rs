@@ -1,7 +1,7 @@
 //! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
 
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, Contact, Grasp, ProjectionError, SightError, Workspace};
+use pipeline_sim::{Ball, Cell, Contact, Grasp, ProjectionError, ReachError, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -220,6 +220,25 @@ fn what_keeps_a_ball_from_being_seen_is_named() {
         SightError::CentreOutside { .. }
     ));
     assert!(matches!(shown(1.0, 72.0, 30.0), SightError::CutOff { .. }));
+    // Whatever the rule asks for, what is larger than the view is called that; a rule that is content with part of it sees it.
+    let mut rule = cell;
+    rule.sight.max_radius = 300.0;
+    rule.ball.centre = cell
+        .ball_showing(
+            &goal,
+            &Features {
+                x: 96.0,
+                y: 72.0,
+                r: 90.0,
+            },
+        )
+        .expect("some place shows it");
+    assert!(matches!(
+        rule.try_features(&goal),
+        Err(SightError::LargerThanView { .. })
+    ));
+    rule.sight.min_share = 0.1;
+    assert!(rule.features(&goal).is_some());
     // Inside the camera, behind it, nowhere.
     let camera = cell.camera_pose(&goal);
     let at = |x, y, z| {
@@ -264,4 +283,38 @@ fn each_finger_feels_for_itself() {
         assert_eq!(near.proximity_pair(&grip), expected, "{side}");
         assert!(near.proximity(&grip));
     }
+}
+
+#[test]
+fn why_there_is_no_goal_pose_is_told() {
+    let refused = |change: &dyn Fn(&mut Cell)| {
+        let mut cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+        change(&mut cell);
+        assert_eq!(cell.goal_pose(45.0), None);
+        cell.try_goal_pose(45.0).expect_err("no pose")
+    };
+    let at = |x: f64, y: f64, z: f64| refused(&|cell| cell.ball.centre = nalgebra::Point3::new(x, y, z));
+    assert!(
+        matches!(at(3.0, 0.0, 0.0), ReachError::OutOfReach { distance, greatest, .. } if distance > greatest)
+    );
+    assert!(matches!(at(0.1, 0.0, 0.0), ReachError::BesideWaist { .. }));
+    let back = at(-0.6, 0.0, -0.1);
+    assert!(
+        matches!(back, ReachError::OutOfLimits { joint: Joint::J1, .. }),
+        "{back}"
+    );
+    assert!(
+        back.to_string().contains("JT1") && back.to_string().contains("160"),
+        "{back}"
+    );
+    assert!(at(0.6, f64::NAN, 0.0).to_string().contains("y coordinate"));
+    assert_eq!(refused(&|cell| cell.ball.radius = -1.0), ReachError::NoView);
+    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+    assert!(
+        cell.try_goal_pose(f64::INFINITY)
+            .expect_err("no angle")
+            .to_string()
+            .contains("JT5")
+    );
+    assert_eq!(cell.try_goal_pose(45.0).ok(), cell.goal_pose(45.0));
 }

@@ -1,7 +1,12 @@
 //! The cell behind the doors of camera and arm.
 
+use hough_heuristic::image::GrayImage;
 use hough_heuristic::{FrameError, FrameSource};
-use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell, SimulatedArm, Workspace};
+use nalgebra::Vector3;
+use pipeline_sim::{
+    Ball, Cell, CellCamera, Motion, Renderer, Scene, Sensor, SharedCell, Shot, SimulatedArm, Workspace,
+    Y4mWriter,
+};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 
 fn cell() -> SharedCell {
@@ -62,4 +67,151 @@ fn camera_and_arm_can_be_sent_to_another_thread() {
     let camera = CellCamera::new(cell, Renderer::new(&Scene::plain(), 1), arm.pose());
     sent(&camera);
     sent(&arm);
+}
+
+/// A frame, without noise, of a camera that is exposed while the waist turns at `speed` degrees a second.
+fn exposed(shot: Shot, speed: f64) -> GrayImage {
+    let mut scene = Scene::laboratory();
+    scene.sensor = Sensor {
+        read_noise: 0.0,
+        shot_noise: 0.0,
+        ..scene.sensor
+    };
+    let pose = Workspace::paper().search_poses()[3];
+    let motion = move || Motion {
+        joints: [speed.to_radians(), 0.0, 0.0, 0.0, 0.0, 0.0],
+        ..Motion::still()
+    };
+    let mut camera = CellCamera::new(cell(), Renderer::new(&scene, 5), move || pose)
+        .exposed(shot, motion)
+        .expect("a sound shot");
+    camera.grab().expect("a frame")
+}
+
+/// Mean difference of neighbours along rows and along columns: what motion along x takes from the first, and fields add to the second.
+fn detail(frame: &GrayImage) -> (f64, f64) {
+    let (w, h) = frame.dimensions();
+    let at = |x: u32, y: u32| f64::from(frame.get_pixel(x, y).0[0]);
+    let (mut across, mut down) = (0.0, 0.0);
+    for (x, y) in (0..h - 1).flat_map(|y| (0..w - 1).map(move |x| (x, y))) {
+        across += (at(x + 1, y) - at(x, y)).abs();
+        down += (at(x, y + 1) - at(x, y)).abs();
+    }
+    let n = f64::from(w * h);
+    (across / n, down / n)
+}
+
+#[test]
+fn exposures_blur_what_moves_and_fields_comb_it() {
+    let exposure = |seconds: f64| Shot {
+        exposure: seconds,
+        moments: 8,
+        interlace: None,
+    };
+    let (sharp, resting) = (exposed(Shot::still(), 0.0), exposed(exposure(0.02), 0.0));
+    let apart = |a: &GrayImage, b: &GrayImage| {
+        a.iter()
+            .zip(b.iter())
+            .map(|(p, q)| f64::from(p.abs_diff(*q)))
+            .sum::<f64>()
+            / a.len() as f64
+    };
+    // Nothing moves: an exposure changes next to nothing. A turning waist does, and along the rows.
+    assert!(apart(&sharp, &resting) < 0.5, "{}", apart(&sharp, &resting));
+    let (still, blurred) = (detail(&sharp), detail(&exposed(exposure(0.02), 30.0)));
+    assert!(blurred.0 < 0.8 * still.0, "{still:?} {blurred:?}");
+    let combed = detail(&exposed(Shot::pal(0.002, 4), 60.0));
+    assert!(combed.1 > 1.2 * still.1, "{still:?} {combed:?}");
+}
+
+#[test]
+fn the_ball_of_an_exposure_is_where_the_cell_has_it() {
+    // A bright ball that rolls by: its blurred picture lies around the sharp one.
+    let mut scene = Scene::plain();
+    scene.ball.albedo = 0.95;
+    let middle = |exposed: bool| {
+        let shared = cell();
+        let pose = shared.get().goal_pose(45.0).expect("within reach");
+        let rolling = || Motion {
+            ball: Vector3::new(0.0, 0.5, 0.0),
+            ..Motion::still()
+        };
+        let shot = Shot {
+            exposure: 0.02,
+            moments: 16,
+            interlace: None,
+        };
+        let mut camera = CellCamera::new(shared, Renderer::new(&scene, 5), move || pose);
+        if exposed {
+            camera = camera.exposed(shot, rolling).expect("a sound shot");
+        }
+        let frame = camera.grab().expect("a frame");
+        let bright = |p: &u8| f64::from(p.saturating_sub(150));
+        let sum: f64 = frame.iter().map(bright).sum();
+        let rows = frame
+            .enumerate_pixels()
+            .map(|(x, _, p)| f64::from(x) * bright(&p.0[0]));
+        (rows.sum::<f64>() / sum, detail(&frame).0)
+    };
+    let (sharp, blurred) = (middle(false), middle(true));
+    // The ball moves by 10 mm, 65 pixels; from one end of the exposure to its middle would be half of that.
+    assert!(
+        (sharp.0 - blurred.0).abs() < 6.0 && blurred.1 < sharp.1,
+        "{sharp:?} {blurred:?}"
+    );
+}
+
+#[test]
+fn exposures_that_make_no_sense_are_refused() {
+    let pose = Workspace::paper().search_poses()[3];
+    let camera = || CellCamera::new(cell(), Renderer::new(&Scene::plain(), 5), move || pose);
+    let shot = Shot {
+        exposure: -1.0,
+        ..Shot::still()
+    };
+    let refused = camera().exposed(shot, Motion::still).expect_err("no exposure");
+    assert!(refused.to_string().contains("exposure time"), "{refused}");
+    let nowhere = || Motion {
+        joints: [0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0],
+        ..Motion::still()
+    };
+    let mut camera = camera()
+        .exposed(Shot::pal(0.01, 4), nowhere)
+        .expect("a sound shot");
+    let Err(FrameError::Failed { reason, .. }) = camera.grab() else {
+        panic!("no such speed");
+    };
+    assert!(reason.contains("speed of JT2"), "{reason}");
+}
+
+#[test]
+fn speeds_are_those_between_two_moments_and_a_held_ball_goes_with_the_hand() {
+    let mut before = cell().get();
+    let joints = before.goal_pose(45.0).expect("within reach");
+    let mut later = before;
+    later.place_ball(before.ball.centre + Vector3::new(0.01, -0.02, 0.0));
+    let turned = joints + JointDelta::from_degrees([1.0, 0.0, -2.0, 0.0, 0.0, 0.0]);
+    let motion = Motion::between((&before, &joints), (&later, &turned), 0.04);
+    let (then, there) = motion.moved(&before, &joints, 0.04);
+    assert!((then.ball.centre - later.ball.centre).norm() < 1e-12);
+    assert!((then.holder.expect("a holder").foot - later.holder.expect("a holder").foot).norm() < 1e-12);
+    assert!((0..6).all(|i| (there.0[i] - turned.0[i]).abs() < 1e-12));
+    let mut grip = joints;
+    grip.0[4] = before.grip_angle(&joints);
+    before.close_gripper(&grip);
+    assert!(before.held.is_some());
+    let (then, there) = motion.moved(&before, &grip, 0.04);
+    assert!(then.grip_miss(&there) < before.grip_miss(&grip) + 1e-9);
+}
+
+#[test]
+fn video_says_how_its_frames_were_taken() {
+    let header = |video: Y4mWriter<Vec<u8>>| {
+        let mut video = video;
+        video.write(&GrayImage::new(4, 2)).expect("in memory");
+        String::from_utf8_lossy(&video.finish().expect("in memory")).into_owned()
+    };
+    let video = || Y4mWriter::new(Vec::new(), 25, 1).expect("PAL");
+    assert!(header(video()).contains(" Ip "));
+    assert!(header(video().interlaced()).starts_with("YUV4MPEG2 W4 H2 F25:1 It A1:1 Cmono\n"));
 }

@@ -344,4 +344,7 @@ fn the_overview_shows_arm_ball_and_workspace() {
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"));
     let without = cell.overview_svg(&Workspace::paper(), &[Joints([f64::NAN; 6])]);
     assert!(!without.contains("class=\"cone\"") && !without.contains("NaN"));
+    // A bar for each view, and the name of what is drawn.
+    assert_eq!(svg.matches(">0.2 m</text>").count(), 2);
+    assert!(svg.contains(">field of view</text>") && !without.contains(">field of view</text>"));
 }

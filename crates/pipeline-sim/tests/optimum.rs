@@ -95,3 +95,20 @@ fn a_search_without_bounds_is_refused_by_name() {
     let leap = [JointDelta::from_degrees([0.0, 1e30, 0.0, 0.0, 0.0, 0.0])];
     assert_eq!(cell.fewest_moves(&there, &leap, |_, _| false, 5), Ok(None));
 }
+
+#[test]
+fn a_ball_that_is_nowhere_is_named() {
+    let mut cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
+    let there = cell.goal_pose(45.0).expect("within reach");
+    cell.ball.centre.y = f64::NAN;
+    let moves = MoveLists::paper();
+    let goal = GoalBox::paper();
+    for result in [
+        cell.fewest_moves(&there, &[], |_, _| true, 5),
+        cell.fewest_reaching_moves(&there, &moves, &goal, 5),
+        cell.fewest_centring_moves(&there, &moves, &goal, 5),
+    ] {
+        let refused = result.expect_err("nowhere").to_string();
+        assert!(refused.contains("y coordinate of the ball"), "{refused}");
+    }
+}

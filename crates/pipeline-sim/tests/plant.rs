@@ -457,3 +457,23 @@ fn noise_that_is_no_number_is_refused_and_leads_to_no_features() {
         5
     );
 }
+
+#[test]
+fn a_hand_of_any_length_meets_the_ball_on_its_way() {
+    // Fingers half a metre long: they reach the ball where the wrist stays far from it.
+    let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
+    let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES).expect("within reach");
+    cell.hand.tool = 0.5;
+    let wrist = cell.params.wrist(&goal);
+    let turned = |degrees: f64| goal + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    cell.ball.centre = wrist * Point3::new(0.0, 0.0, cell.params.d6 + 0.45);
+    cell.holder = None;
+    cell.table = -1.0;
+    let ball = cell.ball.centre;
+    let contact = cell.sweep(&turned(-12.0), &turned(12.0));
+    assert!(
+        matches!(contact, Contact::Pushed { .. }),
+        "{contact:?} {:?}",
+        cell.ball.centre - ball
+    );
+}

@@ -147,6 +147,7 @@ fn it_is_so_near_and_far_whatever_the_form() {
         let (_, fresh) = samples(6, 3000, noise);
         let edges = ReachModel::PAPER_ELBOW_EDGES;
         for (form, edges, least, most) in [
+            (ReachForm::Linear, &edges[..], 0.3, 3.0),
             // What this form cannot express is not noise; its size is told, its pattern only roughly.
             (ReachForm::Rigid8, &edges[..], 0.15, 2.5),
             (ReachForm::Rigid22, &edges[..], 0.5, 2.0),
@@ -391,29 +392,95 @@ fn a_refit_learns_a_wrong_arm_from_few_moves() {
     ));
 }
 
-#[cfg(feature = "serde")]
 #[test]
-fn models_are_stored_and_only_sound_ones_come_back() {
-    let (centring, reaching) = samples(11, 300, 0.125);
-    let model = ReachModel::fit(&reaching, ReachForm::Rigid8, &[185.0]).expect("enough samples");
-    let text = serde_json::to_string(&model).expect("plain data");
-    assert_eq!(
-        serde_json::from_str::<ReachModel>(&text).expect("its own text"),
-        model
-    );
+fn no_model_is_judged_on_nothing() {
+    let (centring, reaching) = samples(4, 60, 0.0);
+    let reach = ReachModel::fit(&reaching, ReachForm::Linear, &[]).expect("enough samples");
     let centre = CentreModel::fit(&centring).expect("enough samples");
-    let centre_text = serde_json::to_string(&centre).expect("plain data");
-    assert_eq!(
-        serde_json::from_str::<CentreModel>(&centre_text).expect("its own text"),
-        centre
-    );
-    // Too few pieces, another form, edges that do not ascend.
-    for broken in [
-        text.replace("\"edges\":[185.0]", "\"edges\":[]"),
-        text.replace("Rigid8", "Rigid22"),
-        text.replace("\"edges\":[185.0]", "\"edges\":[190.0,185.0]"),
-    ] {
-        assert_ne!(broken, text);
-        assert!(serde_json::from_str::<ReachModel>(&broken).is_err());
+    for refused in [reach.quality_on(&[]), centre.quality_on(&[])] {
+        let refused = refused.expect_err("nothing").to_string();
+        assert!(refused.contains("number of samples"), "{refused}");
     }
+}
+
+#[test]
+fn a_refit_of_centring_learns_a_wrong_arm_from_few_moves() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let (nominal, _) = samples(9, 1500, 0.125);
+    let model = CentreModel::fit(&nominal).expect("enough samples");
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(10);
+    let mut errors = pipeline_sim::Errors::none();
+    errors.radius_factor = 1.5;
+    let wrong = errors.apply(&cell).expect("sound errors");
+    let (few, _) = sample_moves(&wrong, 30, 0.5, &mut rng);
+    let (fresh, _) = sample_moves(&wrong, 1000, 0.0, &mut rng);
+    let rmse = |model: &CentreModel| model.quality_on(&fresh).expect("samples")[0].rmse;
+    let (before, after) = (
+        rmse(&model),
+        rmse(&model.refit(&few, 0.01).expect("a prior helps out")),
+    );
+    println!("{before} {after}");
+    assert!(after < 0.8 * before, "{before} {after}");
+    // A single move leaves most as it was, where a fit of its own has no answer; so strong a prior leaves all.
+    assert!(model.refit(&few[..1], 0.0).is_err() && CentreModel::fit(&few[..1]).is_err());
+    let one = rmse(&model.refit(&few[..1], 0.5).expect("a prior helps out"));
+    assert!(one < 1.5 * before, "{before} {one}");
+    let held = rmse(&model.refit(&few, 1e12).expect("a prior helps out"));
+    assert!((held - before).abs() < 1e-3, "{before} {held}");
+    // Without a prior to speak of it is a fit.
+    let (loose, fitted) = (model.refit(&few, 0.0), CentreModel::fit(&few));
+    assert!((rmse(&loose.expect("enough")) - rmse(&fitted.expect("enough"))).abs() < 1e-9);
+    assert_eq!(model.refit(&[], 0.01).expect("nothing to learn from"), model);
+    for ridge in [f64::NAN, -1.0, f64::INFINITY, 1e200] {
+        assert!(
+            matches!(model.refit(&few, ridge), Err(FitError::Prior { .. })),
+            "{ridge}"
+        );
+    }
+    let mut broken = few;
+    broken[3].after.x = f64::NAN;
+    assert!(matches!(
+        model.refit(&broken, 0.01),
+        Err(FitError::NotFinite { index: 3, .. })
+    ));
+}
+
+#[test]
+fn the_expected_error_of_centring_is_the_one_that_occurs_near_and_far() {
+    let mut wrong = Vec::new();
+    for noise in [0.125, 0.5] {
+        let (training, _) = samples(5, 3000, noise);
+        let (mut fresh, _) = samples(6, 3000, noise);
+        for (name, model) in [
+            ("1, d1", CentreModel::fit_without_radius(&training)),
+            ("1, d1, r d1", CentreModel::fit(&training)),
+        ] {
+            let model = model.expect("enough samples");
+            let mut by = |key: &dyn Fn(&pipeline_sim::CentreSample) -> f64| -> Vec<f64> {
+                fresh.sort_by(|a, b| key(a).total_cmp(&key(b)));
+                let squared = |s: &pipeline_sim::CentreSample| {
+                    let change = s.after.x - s.before.x;
+                    let predicted = model.quality_on(std::slice::from_ref(s)).expect("a sample")[0].rmse;
+                    assert!(predicted.is_finite() && change.is_finite());
+                    (predicted / model.uncertainty(&s.before, s.d1)).powi(2)
+                };
+                let thirds = fresh.chunks_exact(fresh.len() / 3).take(3);
+                thirds
+                    .map(|part| part.iter().map(squared).sum::<f64>() / part.len() as f64)
+                    .collect()
+            };
+            let (near, far) = (by(&|s| s.before.r), by(&|s| s.d1.abs()));
+            println!("{name} {noise}: by r {near:.2?} by d1 {far:.2?}");
+            for ratio in near.into_iter().chain(far) {
+                // What the form without r cannot express is not noise, and least where r is near its mean.
+                let (least, most) = if name.contains('r') {
+                    (0.5, 2.0)
+                } else {
+                    (0.1, 4.0)
+                };
+                wrong.extend((!(least..most).contains(&ratio)).then_some((name, noise, ratio)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
 }

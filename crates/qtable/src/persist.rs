@@ -276,11 +276,15 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, Problem> {
     Ok(bytes)
 }
 
-/// Writes a file beside its target and renames it. The permissions are those of the file replaced, or of a file
+/// Writes a file beside its target and renames it; a target that is there and is no regular file (a device, a pipe) is written to as it is,
+/// not replaced. The permissions are those of the file replaced, or of a file
 /// created in the ordinary way.
 pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A link stays a link: what it points to is replaced.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(&target).is_ok_and(|there| !there.is_file()) {
+        return fs::write(&target, bytes);
+    }
     let folder = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),

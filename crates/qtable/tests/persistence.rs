@@ -49,6 +49,21 @@ fn what_is_saved_is_loaded() {
     );
 }
 
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_not_replaced() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("socket");
+    let _listening = std::os::unix::net::UnixListener::bind(&path).unwrap();
+    // A socket is not to be written to like this; a device is.
+    assert!(matches!(
+        save(&path, "number/1", &1).unwrap_err().problem,
+        Problem::Io(_)
+    ));
+    assert!(std::fs::metadata(&path).unwrap().file_type().is_socket());
+}
+
 #[test]
 fn errors_name_the_path_and_the_trouble() {
     let folder = tempfile::tempdir().unwrap();

@@ -11,6 +11,7 @@ use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation
 
 /// What a [`Hybrid`] is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HybridSettings {
     /// The camera and the arm as they should be.
     pub nominal: CameraModel,
@@ -159,6 +160,11 @@ impl Hybrid {
     pub fn frozen(mut self) -> Self {
         self.learning = false;
         self
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &HybridSettings {
+        &self.settings
     }
 
     /// What is believed of the camera, the ball and the gears.

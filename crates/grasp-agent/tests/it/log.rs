@@ -218,7 +218,16 @@ mod saved {
                 saved(&mut agent, before, &cell());
             }
 
-            let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+            // Not the paper's settings, which belong to it too.
+            let bold = HybridSettings {
+                caution: 1.0,
+                nominal: CameraModel {
+                    focal: 1.1 * CameraModel::paper().focal,
+                    ..CameraModel::paper()
+                },
+                ..HybridSettings::paper()
+            };
+            let mut agent = Agent::with_controller(config(), Hybrid::new(bold)).unwrap();
             for _ in 0..3 {
                 let before = SavedController::of_hybrid(agent.controller());
                 saved(&mut agent, before, &cell());

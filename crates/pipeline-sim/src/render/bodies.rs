@@ -1,4 +1,4 @@
-//! The shaded bodies: balls, cylinders, boxes, and what lies flat.
+//! The shaded bodies: cylinders, boxes, and what lies flat; balls are drawn in `sphere`.
 
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -87,107 +87,6 @@ impl Studio<'_> {
             .map(|(toward, intensity)| intensity * toward.dot(normal).max(0.0))
             .sum();
         self.scene.ambient.max(0.0) * up + self.bounce * (1.0 - up) + lamps
-    }
-
-    /// Draws a sphere.
-    pub(super) fn sphere(&self, canvas: &mut Canvas, centre: &Point3<f64>, radius: f64, look: &Look) {
-        // In units of the radius, camera frame.
-        let c = self.view.seen(centre).coords / radius;
-        if c.z <= 1.05 || c.norm_squared() <= 1.0 {
-            return;
-        }
-        let Some((rows, columns)) = self.sphere_bounds(canvas, &c) else {
-            return;
-        };
-        let k = c.norm_squared() - 1.0;
-        let (cx, cy, cz, k) = (c.x as f32, c.y as f32, c.z as f32, k as f32);
-        let step = (1.0 / self.view.focal) as f32;
-        let up = self.view.turned(&Vector3::z()).cast::<f32>();
-        let (sky, ground) = (
-            (0.5 * self.scene.ambient.max(0.0)) as f32,
-            (0.5 * self.bounce) as f32,
-        );
-        let albedo = look.albedo as f32;
-        let gloss = look.gloss as f32;
-        let lamps: Vec<(Vector3<f32>, Vector3<f32>, f32)> = self
-            .lamps
-            .iter()
-            .map(|(toward, intensity)| {
-                let axis = self.view.turned(toward);
-                let half = (axis - c.normalize()).try_normalize(1e-9).unwrap_or(axis);
-                (axis.cast(), half.cast(), *intensity as f32)
-            })
-            .collect();
-        let origin = columns.start;
-        let width = columns.len();
-        let mut shade = vec![0.0_f32; width];
-        let mut normals = vec![[0.0_f32; 3]; width];
-        for y in rows {
-            let yn = ((y as f64 - self.view.principal.y) / self.view.focal) as f32;
-            let first = ((origin as f64 - self.view.principal.x) / self.view.focal) as f32;
-            let row = &mut canvas.light[y * canvas.width + origin..y * canvas.width + origin + width];
-            for (i, (value, n)) in shade.iter_mut().zip(&mut normals).enumerate() {
-                let xn = first + i as f32 * step;
-                let dd = 1.0 + xn * xn + yn * yn;
-                let b = xn * cx + yn * cy + cz;
-                let disc = b * b - dd * k;
-                let t = (b - disc.max(0.0).sqrt()) / dd;
-                *n = [t * xn - cx, t * yn - cy, t - cz];
-                *value = ground + sky + (sky - ground) * (n[0] * up.x + n[1] * up.y + n[2] * up.z);
-            }
-            for (axis, half, intensity) in &lamps {
-                for (value, n) in shade.iter_mut().zip(&normals) {
-                    let lit = (n[0] * axis.x + n[1] * axis.y + n[2] * axis.z).max(0.0);
-                    *value += intensity * lit;
-                }
-                if gloss > 0.0 {
-                    for (value, n) in shade.iter_mut().zip(&normals) {
-                        let h = (n[0] * half.x + n[1] * half.y + n[2] * half.z).max(0.0);
-                        let (h2, h4) = (h * h, h * h * h * h);
-                        let h16 = h4 * h4 * h4 * h4;
-                        let h64 = h16 * h16 * h16 * h16;
-                        // Added on top of the reflectance, hence divided by it here.
-                        *value += intensity * gloss / albedo.max(0.05) * (1.6 * h64 + 0.12 * h4 * h2);
-                    }
-                }
-            }
-            for (i, (light, value)) in row.iter_mut().zip(&mut shade).enumerate() {
-                let xn = first + i as f32 * step;
-                let dd = 1.0 + xn * xn + yn * yn;
-                let b = xn * cx + yn * cy + cz;
-                let disc = b * b - dd * k;
-                // Distance to the outline in pixels: the discriminant over its gradient.
-                let (gx, gy) = (2.0 * (b * cx - xn * k) * step, 2.0 * (b * cy - yn * k) * step);
-                let share = (0.5 + disc / (gx * gx + gy * gy).max(1e-20).sqrt()).clamp(0.0, 1.0);
-                *light += (albedo * *value - *light) * share;
-                *value = share;
-            }
-            canvas.note(y, origin, shade.iter().copied());
-        }
-    }
-
-    /// Rows and columns that a sphere of radius 1 may touch.
-    fn sphere_bounds(
-        &self,
-        canvas: &Canvas,
-        c: &Vector3<f64>,
-    ) -> Option<(std::ops::Range<usize>, std::ops::Range<usize>)> {
-        let k = c.z * c.z - 1.0;
-        let range = |across: f64, principal: f64, limit: usize| {
-            let half = (across * across + k).max(0.0).sqrt() / k;
-            let middle = across * c.z / k;
-            let (least, most) = (
-                principal + (middle - half) * self.view.focal - 1.0,
-                principal + (middle + half) * self.view.focal + 2.0,
-            );
-            (most > 0.0 && least < limit as f64)
-                .then(|| least.max(0.0) as usize..(most.min(limit as f64).max(0.0)) as usize)
-                .filter(|r| !r.is_empty())
-        };
-        Some((
-            range(c.y, self.view.principal.y, canvas.height)?,
-            range(c.x, self.view.principal.x, canvas.width)?,
-        ))
     }
 
     /// Draws an upright rod or cylinder from `low` to `high`, hollow-looking tops left out.

@@ -14,8 +14,10 @@ pub(super) struct Canvas {
     touched: Area,
     coverage: Vec<f32>,
     shade: Vec<f32>,
-    /// Edges of the present polygon, but for level ones.
+    /// Edges of the present polygon that begin below the present row, the next one last; level ones are left out.
     edges: Vec<Edge>,
+    /// Those that the present row may touch.
+    active: Vec<Edge>,
 }
 
 /// An edge of a polygon, from its upper end down.
@@ -86,6 +88,7 @@ impl Canvas {
             coverage: vec![0.0; width + 2],
             shade: vec![0.0; width + 2],
             edges: Vec::with_capacity(8),
+            active: Vec::with_capacity(8),
         }
     }
 
@@ -222,18 +225,21 @@ impl Canvas {
             }
             p = q;
         }
+        self.edges.sort_unstable_by(|a, b| b.top.total_cmp(&a.top));
+        self.active.clear();
         Some(first as usize..last as usize + 1)
     }
 
-    /// Coverage of one row: the touched pixels start..end, and whether all of them are covered wholly.
+    /// Coverage of one row, after those above it: the touched pixels start..end, and whether all of them are covered wholly.
     fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
         let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
         let lines: [f64; SUBROWS] = std::array::from_fn(|i| above + (i as f64 + 0.5) / SUBROWS as f64);
         let (mut lefts, mut rights) = ([f64::INFINITY; SUBROWS], [f64::NEG_INFINITY; SUBROWS]);
-        for edge in &self.edges {
-            if edge.bottom < above || edge.top > below {
-                continue;
-            }
+        while let Some(edge) = self.edges.pop_if(|edge| edge.top <= below) {
+            self.active.push(edge);
+        }
+        self.active.retain(|edge| edge.bottom >= above);
+        for edge in &self.active {
             for i in 0..SUBROWS {
                 let x = edge.x + (lines[i] - edge.top) * edge.slope;
                 let crosses = edge.top <= lines[i] && lines[i] < edge.bottom;

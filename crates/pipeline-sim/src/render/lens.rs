@@ -96,31 +96,61 @@ impl Warp {
 
     /// Takes every pixel of `out` from `ideal`.
     pub(super) fn apply(&self, ideal: &Canvas, out: &mut Canvas) {
-        let w = ideal.width;
-        let rows = out.light.chunks_exact_mut(out.width.max(1));
+        widest(Applying {
+            warp: self,
+            ideal,
+            out,
+        });
+    }
+
+    #[inline(always)]
+    fn apply_rows(&self, ideal: &Canvas, out: &mut Canvas) {
+        let (w, width) = (ideal.width, out.width);
+        // Whole pixels and their 65536ths; no frame is so large that these do not fit.
+        let fixed = |v: f32| (v * 65536.0) as i32;
+        let part = |v: i32| (v & 0xffff) as f32 / 65536.0;
+        let (mut x, mut y) = (vec![0_i32; width], vec![0_i32; width]);
+        let mut corners = vec![[0.0_f32; 4]; width];
+        let rows = out.light.chunks_exact_mut(width.max(1));
         for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
-            for ((k, run), ends) in row.chunks_mut(self.run).enumerate().zip(sources.windows(2)) {
+            let runs = x.chunks_mut(self.run).zip(y.chunks_mut(self.run));
+            for ((k, (x, y)), ends) in runs.enumerate().zip(sources.windows(2)) {
                 // The last place of a row is that of its last pixel.
-                let length = self.run.min((out.width - 1 - k * self.run).max(1));
+                let length = self.run.min((width - 1 - k * self.run).max(1));
                 let share = 1.0 / length as f32;
-                // Whole pixels and their 65536ths.
-                let fixed = |v: f32| (v * 65536.0) as i64;
-                let (mut x, mut y) = (fixed(ends[0][0]), fixed(ends[0][1]));
-                let dx = fixed((ends[1][0] - ends[0][0]) * share);
-                let dy = fixed((ends[1][1] - ends[0][1]) * share);
-                for light in run {
-                    let at = (y >> 16) as usize * w + (x >> 16) as usize;
-                    let part = |v: i64| (v & 0xffff) as i32 as f32 / 65536.0;
-                    let Some(four) = ideal.light.get(at..at + w + 2) else {
-                        continue;
-                    };
-                    let upper = four[0] + (four[1] - four[0]) * part(x);
-                    let lower = four[w] + (four[w + 1] - four[w]) * part(x);
-                    *light = upper + (lower - upper) * part(y);
-                    (x, y) = (x + dx, y + dy);
+                let (x0, dx) = (fixed(ends[0][0]), fixed((ends[1][0] - ends[0][0]) * share));
+                let (y0, dy) = (fixed(ends[0][1]), fixed((ends[1][1] - ends[0][1]) * share));
+                for ((x, y), i) in x.iter_mut().zip(y).zip(0..) {
+                    (*x, *y) = (x0 + i * dx, y0 + i * dy);
                 }
             }
+            for ((corners, x), y) in corners.iter_mut().zip(&x).zip(&y) {
+                let at = (y >> 16) as usize * w + (x >> 16) as usize;
+                if let Some(four) = ideal.light.get(at..at + w + 2) {
+                    *corners = [four[0], four[1], four[w], four[w + 1]];
+                }
+            }
+            for (((light, [a, b, c, d]), x), y) in row.iter_mut().zip(&corners).zip(&x).zip(&y) {
+                let (upper, lower) = (a + (b - a) * part(*x), c + (d - c) * part(*x));
+                *light = upper + (lower - upper) * part(*y);
+            }
         }
+    }
+}
+
+/// The work of [`Warp::apply`].
+struct Applying<'a> {
+    warp: &'a Warp,
+    ideal: &'a Canvas,
+    out: &'a mut Canvas,
+}
+
+impl Vectorized for Applying<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.warp.apply_rows(self.ideal, self.out);
     }
 }
 
@@ -174,32 +204,58 @@ pub(super) fn soften(canvas: &mut Canvas, area: Area, sigma: f64, spare: &mut Ve
     if area.is_empty() || side <= 0.0 {
         return;
     }
-    let width = canvas.width;
-    let (w, h) = (area.right - area.left, area.bottom - area.top);
-    // The area as it was, and a row with a pixel more at either end.
-    let needed = w * h + w + 2;
+    // Two rows as they were, and a row with a pixel more at either end.
+    let needed = 3 * (area.right - area.left) + 2;
     if spare.len() < needed {
         spare.resize(needed, 0.0);
     }
-    let (before, mixed) = spare[..needed].split_at_mut(w * h);
     for values in [&mut canvas.light, &mut canvas.cover] {
-        if values.is_empty() {
-            continue;
+        if !values.is_empty() {
+            widest(Softening {
+                values,
+                width: canvas.width,
+                area,
+                taps: (side, middle),
+                spare,
+            });
         }
-        let place = |y: usize| (area.top + y) * width + area.left;
-        for (y, copy) in before.chunks_exact_mut(w).enumerate() {
-            copy.copy_from_slice(&values[place(y)..][..w]);
-        }
-        for y in 0..h {
-            let line = |k: usize| &before[k * w..][..w];
-            let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(h - 1)));
-            for (((m, a), c), b) in mixed[1..=w].iter_mut().zip(above).zip(here).zip(below) {
+    }
+}
+
+/// The work of [`soften`].
+struct Softening<'a> {
+    values: &'a mut [f32],
+    width: usize,
+    area: Area,
+    taps: (f32, f32),
+    spare: &'a mut [f32],
+}
+
+impl Vectorized for Softening<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { values, area, .. } = self;
+        let (side, middle) = self.taps;
+        let w = area.right - area.left;
+        let (mut above, rest) = self.spare.split_at_mut(w);
+        let (mut here, mixed) = rest.split_at_mut(w);
+        let mixed = &mut mixed[..w + 2];
+        let start = |y: usize| y * self.width + area.left;
+        here.copy_from_slice(&values[start(area.top)..][..w]);
+        above.copy_from_slice(here);
+        for y in area.top..area.bottom {
+            let below = &values[start((y + 1).min(area.bottom - 1))..][..w];
+            for (((m, a), c), b) in mixed[1..=w].iter_mut().zip(&*above).zip(&*here).zip(below) {
                 *m = middle * c + side * (a + b);
             }
+            std::mem::swap(&mut above, &mut here);
+            here.copy_from_slice(below);
             mixed[0] = mixed[1];
             mixed[w + 1] = mixed[w];
             let sides = mixed.iter().zip(&mixed[2..]);
-            let out = &mut values[place(y)..][..w];
+            let out = &mut values[start(y)..][..w];
             for ((o, c), (l, r)) in out.iter_mut().zip(&mixed[1..]).zip(sides) {
                 *o = middle * c + side * (l + r);
             }

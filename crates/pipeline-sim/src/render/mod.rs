@@ -10,6 +10,7 @@ mod sensor;
 mod shadow;
 mod shot;
 mod smear;
+mod sphere;
 mod texture;
 mod truth;
 mod view;

@@ -344,8 +344,8 @@ impl BallShadow {
     fn ball_share(&self, lamp: &Lamp, point: &Point3<f64>) -> f64 {
         let to = self.ball.centre - point;
         let along = to.dot(&lamp.axis);
-        let across = (to.norm_squared() - along * along).max(0.0).sqrt();
-        overlap(self.ball.radius, along * lamp.reach, across)
+        let across2 = (to.norm_squared() - along * along).max(0.0);
+        overlap(self.ball.radius, along * lamp.reach, across2)
     }
 
     fn holder_share(&self, lamp: &Lamp, point: &Point3<f64>) -> f64 {
@@ -363,14 +363,18 @@ impl BallShadow {
         } else {
             0.0
         };
-        let across = ((px + z * dx).powi(2) + (py + z * dy).powi(2)).sqrt();
-        overlap(h.radius, z * lamp.reach, across)
+        let across2 = (px + z * dx).powi(2) + (py + z * dy).powi(2);
+        overlap(h.radius, z * lamp.reach, across2)
     }
 }
 
-/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body` at distance `across` between their middles.
-fn overlap(body: f64, lamp: f64, across: f64) -> f64 {
+/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body`, `across2` being the squared distance between their middles.
+fn overlap(body: f64, lamp: f64, across2: f64) -> f64 {
     let lamp = lamp.max(1e-4);
+    if across2 >= (body + lamp) * (body + lamp) {
+        return 0.0;
+    }
+    let across = across2.sqrt();
     let t = ((body + lamp - across) / (2.0 * lamp.min(body))).clamp(0.0, 1.0);
     let depth = (body / lamp).min(1.0);
     t * t * (3.0 - 2.0 * t) * depth * depth.sqrt()

@@ -131,8 +131,9 @@ impl Texture {
     ) {
         let Level { bits, values } = &self.levels[index];
         let scale = 2.0 * self.per_metre / (1_u64 << index) as f64 * f64::from(1 << FRACTION);
-        // Whole numbers have their place at the low end of a number that is this large. The texture repeats, so the wrap does no harm.
-        const LARGE: f64 = 6_755_399_441_055_744.0;
+        // Whole numbers have their place at the low end of a number that is this large; and half a step more, to round. The texture repeats,
+        // so the wrap does no harm.
+        const LARGE: f64 = 6_755_399_441_055_744.0 + (1 << (FRACTION - 1)) as f64;
         let fixed = |metres: f64| (metres * scale + LARGE).to_bits() as u32;
         let (gain, base) = (strength / 128.0, 1.0 - strength);
         let value = |byte: u8| base + gain * f32::from(byte);

@@ -5,11 +5,15 @@
 //! ```
 //!
 //! R² and root mean square errors (feature units) are those of as many other samples; the open-loop error is the mean error of y after 1, 3 and 5
-//! moves that the model does not see. For features noisy by 0, 0.125 and 0.5 units.
+//! moves that the model does not see. For features noisy by 0, 0.125 and 0.5 units. Then two forms linear in y and r that the library does
+//! not offer, and the fits to balls in the arm's plane only, or in the task's workspace only, with the standard deviations of the changes.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
+
+mod otherwise;
 
 use std::error::Error;
 
+use otherwise::{Balls, Form, Terms, centring_with_square, sample, to_second_order, with_products};
 use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
 use pipeline_sim::{Ball, Cell, CentreModel, ReachForm, ReachModel, sample_moves};
@@ -81,6 +85,82 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         println!("\n| centring: R² of dx on 1, d1 | error | on 1, d1, r d1 | error |\n|---|---|---|---|");
         println!("| {} |", spread(&rows).join(" | "));
+    }
+    other_forms(&cell, count, seeds)?;
+    other_samples(&cell, count, seeds)
+}
+
+/// Forms linear in y and r, which the library does not offer, for noise of 0.125 units.
+fn other_forms(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Error>> {
+    println!("\nOther forms, noise of 0.125 units, per elbow interval\n");
+    println!("| form | R² of dy | R² of dr | error of y | error of r | y after 1 | 3 | 5 moves |");
+    println!("|---|---|---|---|---|---|---|---|");
+    let forms: [(&str, Terms); 2] = [
+        ("dy, dr with products, 9 terms", with_products),
+        ("dy, dr to second order, 22 terms", to_second_order),
+    ];
+    for (name, terms) in forms {
+        let mut rows = Vec::new();
+        for seed in 0..seeds {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let (_, training) = sample_moves(cell, count, 0.125, &mut rng);
+            let (_, fresh) = sample_moves(cell, count, 0.125, &mut rng);
+            let form = Form::fit(&training, terms, &ReachModel::PAPER_ELBOW_EDGES).ok_or("no fit")?;
+            let [a, b, c, d] = form.quality(&fresh);
+            let [e, f, g] = form.open_loop(cell, RUNS, &mut rng);
+            rows.push([a, b, c, d, e, f, g]);
+        }
+        println!("| {name} | {} |", spread(&rows).join(" | "));
+    }
+    let mut rows = Vec::new();
+    for seed in 0..seeds {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let (training, _) = sample_moves(cell, count, 0.125, &mut rng);
+        rows.push(centring_with_square(&training).ok_or("no fit")?);
+    }
+    println!(
+        "\ncentring on 1, d1, r d1, r² d1: R², error: {}",
+        spread(&rows).join(", ")
+    );
+    Ok(())
+}
+
+/// The library's forms, fitted to and judged on other balls.
+fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Error>> {
+    for (balls, noise) in [
+        (Balls::InPlane, 0.125),
+        (Balls::InPlane, 0.5),
+        (Balls::InWorkspace, 0.125),
+    ] {
+        println!("\nBalls {balls:?}, noise of {noise} units\n");
+        println!("| form | R² of dy | R² of dr | error of y | error of r | spread of dy | of dr |");
+        println!("|---|---|---|---|---|---|---|");
+        for form in [ReachForm::Linear, ReachForm::Rigid8, ReachForm::Rigid22] {
+            let mut rows = Vec::new();
+            for seed in 0..seeds {
+                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+                let (_, training) = sample(cell, balls, count, noise, &mut rng);
+                let (_, fresh) = sample(cell, balls, count, noise, &mut rng);
+                let model = ReachModel::fit(&training, form, &ReachModel::PAPER_ELBOW_EDGES)?;
+                let quality = model.quality_on(&fresh)?;
+                let (y, r) = (&quality[0], &quality[1]);
+                let of = |rmse: f64, r2: f64| rmse / (1.0 - r2).sqrt();
+                rows.push([y.r2, r.r2, y.rmse, r.rmse, of(y.rmse, y.r2), of(r.rmse, r.r2)]);
+            }
+            println!("| `{form:?}` | {} |", spread(&rows).join(" | "));
+        }
+        let mut rows = Vec::new();
+        for seed in 0..seeds {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let (training, _) = sample(cell, balls, count, noise, &mut rng);
+            let plain = CentreModel::fit_without_radius(&training)?.quality();
+            let full = CentreModel::fit(&training)?.quality();
+            rows.push([plain[0].r2, plain[0].rmse, full[0].r2, full[0].rmse]);
+        }
+        println!(
+            "\ncentring on 1, d1 and on 1, d1, r d1: {}",
+            spread(&rows).join(", ")
+        );
     }
     Ok(())
 }

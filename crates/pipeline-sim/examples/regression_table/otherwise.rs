@@ -1,0 +1,240 @@
+//! Forms that the library does not offer, and samples drawn in other ways, for comparison.
+
+use hough_heuristic::Features;
+use pipeline_sim::nalgebra::{DMatrix, DVector};
+use pipeline_sim::rand::{Rng, RngExt};
+use pipeline_sim::{Cell, CentreSample, MoveLists, ReachSample, Workspace, exploring_start, with_noise};
+use puma_val2::{JointDelta, Joints};
+
+/// Where balls are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Balls {
+    /// In the arm's plane, as if the arm had been turned toward them.
+    InPlane,
+    /// In the workspace of the task only.
+    InWorkspace,
+}
+
+/// As `exploring_start`, with the ball in the arm's plane, or in the workspace only.
+fn start<R: Rng>(cell: &Cell, balls: Balls, rng: &mut R) -> Option<(Cell, Joints)> {
+    (0..100_000).find_map(|_| match balls {
+        Balls::InWorkspace => {
+            exploring_start(cell, rng).filter(|(start, _)| Workspace::paper().contains(&start.ball.centre))
+        }
+        Balls::InPlane => {
+            let (y, r) = (
+                rng.random_range(4.0..140.0),
+                rng.random_range(6.0_f64.ln()..60.0_f64.ln()).exp(),
+            );
+            // The camera sits 4.5 mm beside that plane, and the ball's radius of 20 mm shows as r.
+            let x = 96.0 + r * 4.5 / 20.0;
+            let jt3 = 170.0 + rng.random_range(-20.0..44.0);
+            let jt2 = rng.random_range(-125.0..-30.0);
+            let joints = Joints::from_degrees([0.0, jt2, jt3, 0.0, Cell::REACHING_JT5_DEGREES, 0.0]);
+            let mut start = *cell;
+            start.place_ball(cell.ball_showing(&joints, &Features { x, y, r })?);
+            let kept = start.ball.centre.z > start.table + start.ball.radius
+                && start.circle(&joints).is_some()
+                && start.reachable();
+            kept.then_some((start, joints))
+        }
+    })
+}
+
+/// As `sample_moves`, from other starts.
+pub(crate) fn sample<R: Rng>(
+    cell: &Cell,
+    balls: Balls,
+    count: usize,
+    noise: f64,
+    rng: &mut R,
+) -> (Vec<CentreSample>, Vec<ReachSample>) {
+    let moves = MoveLists::paper();
+    let (mut centring, mut reaching) = (Vec::new(), Vec::new());
+    while centring.len() < count || reaching.len() < count {
+        let Some((start, joints)) = start(cell, balls, rng) else {
+            break;
+        };
+        let mut draw = |list: &[f64; 9]| list[rng.random_range(0..9)];
+        let (d1, d2, d3) = (draw(&moves.jt1), draw(&moves.jt2), draw(&moves.jt3));
+        let mut seen = |delta: [f64; 6]| {
+            let after = joints + JointDelta::from_degrees(delta);
+            let before = start.features(&joints)?;
+            let after = start
+                .within_limits(&after)
+                .then(|| start.features(&after))
+                .flatten()?;
+            Some((with_noise(before, noise, rng), with_noise(after, noise, rng)))
+        };
+        if let Some((before, after)) = seen([d1, 0.0, 0.0, 0.0, 0.0, 0.0]).filter(|_| centring.len() < count)
+        {
+            centring.push(CentreSample { before, d1, after });
+        }
+        if let Some((before, after)) = seen([0.0, d2, d3, 0.0, 0.0, 0.0]).filter(|_| reaching.len() < count) {
+            let jt3_degrees = joints.degrees()[2];
+            reaching.push(ReachSample {
+                before,
+                jt3_degrees,
+                d2,
+                d3,
+                after,
+            });
+        }
+    }
+    (centring, reaching)
+}
+
+/// The terms of a form.
+pub(crate) type Terms = fn(&Features, f64, f64, f64) -> Vec<f64>;
+
+/// 1, the moves, and their products with r, the elbow angle and y: changes of y and r in units.
+pub(crate) fn with_products(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
+    let place = [
+        1.0,
+        before.r / 33.0,
+        (before.y - 72.0) / 33.0,
+        (jt3 - 140.0) / 40.0,
+    ];
+    let moved = [d2 / 20.0, d3 / 16.0];
+    let products = moved.iter().flat_map(|m| place.map(|p| m * p));
+    std::iter::once(1.0).chain(products).collect()
+}
+
+/// The same with the moves to the second order, 22 terms as `Rigid22` has them.
+pub(crate) fn to_second_order(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
+    let (a, b) = (d2 / 20.0, d3 / 16.0);
+    let e = (jt3 - 140.0) / 40.0;
+    let place = [1.0, before.r / 33.0, (before.y - 72.0) / 33.0, e];
+    let products = [a, b, a * a, a * b, b * b]
+        .into_iter()
+        .flat_map(|m| place.map(|p| m * p));
+    std::iter::once(1.0).chain(products).chain([e * e * a]).collect()
+}
+
+/// A linear form of the changes of y and r, a fit for each interval of the elbow.
+pub(crate) struct Form {
+    terms: Terms,
+    edges: Vec<f64>,
+    /// For each interval the coefficients of dy and of dr.
+    pieces: Vec<[DVector<f64>; 2]>,
+}
+
+impl Form {
+    pub(crate) fn fit(samples: &[ReachSample], terms: Terms, edges: &[f64]) -> Option<Self> {
+        let mut form = Self {
+            terms,
+            edges: edges.to_vec(),
+            pieces: Vec::new(),
+        };
+        for piece in 0..=edges.len() {
+            let group: Vec<&ReachSample> = samples
+                .iter()
+                .filter(|s| form.piece(s.jt3_degrees) == piece)
+                .collect();
+            let rows: Vec<Vec<f64>> = group
+                .iter()
+                .map(|s| terms(&s.before, s.jt3_degrees, s.d2, s.d3))
+                .collect();
+            let dy = group.iter().map(|s| s.after.y - s.before.y).collect();
+            let dr = group.iter().map(|s| s.after.r - s.before.r).collect();
+            form.pieces
+                .push([least_squares(&rows, dy)?, least_squares(&rows, dr)?]);
+        }
+        Some(form)
+    }
+
+    fn piece(&self, jt3: f64) -> usize {
+        self.edges.iter().filter(|edge| jt3 >= **edge).count()
+    }
+
+    pub(crate) fn predict(&self, before: &Features, jt3: f64, d2: f64, d3: f64) -> Features {
+        let terms = DVector::from_vec((self.terms)(before, jt3, d2, d3));
+        let [y, r] = self.pieces[self.piece(jt3)].each_ref().map(|c| c.dot(&terms));
+        Features {
+            y: before.y + y,
+            // A believed ball does not vanish.
+            r: (before.r + r).max(1.0),
+            ..*before
+        }
+    }
+
+    /// R² of dy and dr, and their errors.
+    pub(crate) fn quality(&self, samples: &[ReachSample]) -> [f64; 4] {
+        let predicted: Vec<Features> = samples
+            .iter()
+            .map(|s| self.predict(&s.before, s.jt3_degrees, s.d2, s.d3))
+            .collect();
+        let judge = |change: fn(&Features, &Features) -> f64| {
+            let pairs = samples.iter().zip(&predicted);
+            judged(pairs.map(|(s, p)| (change(&s.before, &s.after), change(&s.before, p))))
+        };
+        let (y, r) = (judge(|a, b| b.y - a.y), judge(|a, b| b.r - a.r));
+        [y.0, r.0, y.1, r.1]
+    }
+
+    /// Mean error of y after 1, 3 and 5 moves that the form does not see.
+    pub(crate) fn open_loop<R: Rng>(&self, cell: &Cell, runs: usize, rng: &mut R) -> [f64; 3] {
+        let lists = MoveLists::paper();
+        let mut errors = vec![Vec::new(); 5];
+        for _ in 0..runs {
+            let Some((start, mut joints)) = exploring_start(cell, rng) else {
+                break;
+            };
+            let Some(mut believed) = start.features(&joints) else {
+                continue;
+            };
+            for error in &mut errors {
+                let next = (0..100).find_map(|_| {
+                    let mut draw = |list: &[f64; 9]| list[rng.random_range(0..9)];
+                    let (d2, d3) = (draw(&lists.jt2), draw(&lists.jt3));
+                    let there = joints + JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]);
+                    let seen = start
+                        .within_limits(&there)
+                        .then(|| start.features(&there))
+                        .flatten()?;
+                    Some((d2, d3, there, seen))
+                });
+                let Some((d2, d3, there, seen)) = next else { break };
+                believed = self.predict(&believed, joints.degrees()[2], d2, d3);
+                joints = there;
+                error.push((believed.y - seen.y).abs());
+            }
+        }
+        [0, 2, 4].map(|k| errors[k].iter().sum::<f64>() / errors[k].len() as f64)
+    }
+}
+
+/// R² and error of dx on 1, d1, r d1, r² d1, on the samples it is fitted to.
+pub(crate) fn centring_with_square(samples: &[CentreSample]) -> Option<[f64; 2]> {
+    let terms = |s: &CentreSample| {
+        let r = s.before.r / 33.0;
+        vec![1.0, s.d1, r * s.d1, r * r * s.d1]
+    };
+    let rows: Vec<Vec<f64>> = samples.iter().map(terms).collect();
+    let dx: Vec<f64> = samples.iter().map(|s| s.after.x - s.before.x).collect();
+    let coefficients = least_squares(&rows, dx.clone())?;
+    let predicted = rows
+        .into_iter()
+        .map(|row| DVector::from_vec(row).dot(&coefficients));
+    let (r2, error) = judged(dx.into_iter().zip(predicted));
+    Some([r2, error])
+}
+
+fn least_squares(rows: &[Vec<f64>], targets: Vec<f64>) -> Option<DVector<f64>> {
+    let width = rows.first()?.len();
+    let design = DMatrix::from_row_iterator(rows.len(), width, rows.iter().flatten().copied());
+    design
+        .svd(true, true)
+        .solve(&DVector::from_vec(targets), 1e-10)
+        .ok()
+}
+
+/// R² and root mean square error of (observed, predicted).
+fn judged(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let pairs: Vec<(f64, f64)> = pairs.collect();
+    let n = pairs.len() as f64;
+    let mean = pairs.iter().map(|p| p.0).sum::<f64>() / n;
+    let spread: f64 = pairs.iter().map(|p| (p.0 - mean).powi(2)).sum();
+    let error: f64 = pairs.iter().map(|p| (p.0 - p.1).powi(2)).sum();
+    (1.0 - error / spread, (error / n).sqrt())
+}
