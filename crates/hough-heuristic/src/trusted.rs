@@ -1,5 +1,6 @@
 //! The detector whose score can be trusted.
 
+mod arcs;
 mod budget;
 mod candidate;
 mod config;
@@ -21,7 +22,7 @@ use image::GrayImage;
 
 pub use config::TrustedConfig;
 
-use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
+use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
 use budget::{Budget, MEASURING, Stage};
 use candidate::Collected;
@@ -180,7 +181,13 @@ impl Trusted {
             let slack = 1.0 + 0.05 * radii.0;
             (radii.0 - slack, radii.1 + slack)
         };
-        let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
+        // Large frames have enough pixels in half of those rows.
+        let rows = if frame.len() < 200_000 {
+            ROW_STEP
+        } else {
+            2 * ROW_STEP
+        };
+        let noise = noise_deviation(frame.as_raw(), frame.width() as usize, rows);
         self.shrink(frame, radii.1);
         self.prove(frame, radii, noise);
         self.report(frame, radii, noise);
@@ -241,7 +248,12 @@ impl Trusted {
                     .explain(&self.circle, level, &ring, &mut self.budget.looks);
             }
             let least = if depth == finest { 3.2 } else { 8.0 };
-            let most = if depth == smallest { f32::MAX } else { 20.0 };
+            // Smaller sizes have the larger circles; but short arcs of them are exact in the larger ones only.
+            let (most, most_of_arcs) = if depth == smallest {
+                (f32::MAX, f32::MAX)
+            } else {
+                (20.0, 60.0)
+            };
             widest(Searching {
                 search: Search {
                     circle: &self.circle,
@@ -250,6 +262,7 @@ impl Trusted {
                         (radii.0 as f32 / scale).max(least),
                         (radii.1 as f32 / scale).min(most),
                     ),
+                    most_radius: (radii.1 as f32 / scale).min(most_of_arcs),
                     scale,
                     seed: self.config.seed,
                     mirror_slack: if noise > 12.0 { 0.35 } else { 0.28 },
@@ -454,6 +467,8 @@ impl Vectorized for Searching<'_, '_> {
     fn run(self) {
         self.search
             .run(self.level, self.collected, self.prover, self.budget);
+        self.search
+            .follow_arcs(self.level, self.collected, self.prover, self.budget);
     }
 }
 
