@@ -17,7 +17,7 @@ pub use dispatch::{Vectorized, widest};
 pub use gradient::EdgeGradient;
 pub use imageproc_canny::ImageprocCanny;
 pub(crate) use maxima::Maxima;
-pub(crate) use noise::noise_deviation;
+pub(crate) use noise::{ROW_STEP, noise_deviation};
 pub(crate) use rows::Candidate;
 
 /// The coordinates of one edge pixel: a record of the paper's structure `D`.

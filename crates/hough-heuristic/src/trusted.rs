@@ -1,5 +1,6 @@
 //! The detector whose score can be trusted.
 
+mod arcs;
 mod budget;
 mod candidate;
 mod config;
@@ -21,7 +22,7 @@ use image::GrayImage;
 
 pub use config::TrustedConfig;
 
-use crate::edges::{Maxima, Vectorized, noise_deviation, widest};
+use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::{Circle, CircleDetector, ConfigError, Detection};
 use budget::{Budget, MEASURING, Stage};
 use candidate::Collected;
@@ -37,15 +38,16 @@ use search::{Outline, Search};
 ///
 /// It keeps the paper's idea: draw edge points, solve for the circle, look at the image itself; no accumulator. What is drawn
 /// are *pairs* on one row or column whose gradients mirror one another, at a half, a quarter and further halves of the frame, the
-/// smallest first. A circle whose outline runs along edges is fitted and becomes a candidate.
+/// smallest first; where no circle explains an edge, it is followed for a few pixels, and the *arc* has a circle too. A circle whose
+/// outline runs along edges is fitted and becomes a candidate.
 ///
 /// **Proof.** A candidate is looked at where its radius is 12 to 24 px (smaller ones at the full size; in noise from 4.5 px on), at
 /// twice that size if the frame has it (in noise also at four times) and, in doubt, at half of it; what says most counts. On 64 rays across its outline the strongest edge that runs along it
 /// is sought within a third of the radius (3 to 8 px) on either side. If there were no circle, that edge would lie anywhere: within a
 /// tolerance of a quarter or half a pixel (in noise up to 1.2 px) by a known chance, be the picture as textured as it may. The number
 /// of false alarms is the number of circles that differ noticeably in the frame, times the probability that chance alone puts so many
-/// of the edges on the outline (Hoeffding's bound of the binomial tail, over samples that do not overlap); a hundred times as much if
-/// more than a quarter of the circle lies outside of the frame. The score is `c / (c + 1)` with `c` minus its decimal logarithm, 0
+/// of the edges on the outline (Hoeffding's bound of the binomial tail, over samples that do not overlap; a ray without any
+/// edge counts as a quarter of a sample), and a thousand times as much if more than a tenth of the circle lies outside of the frame. The score is `c / (c + 1)` with `c` minus its decimal logarithm, 0
 /// where that is negative: 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in 100, 0.8 for one in
 /// 10000. The bound is far from tight: of 500 rendered frames without a circle, half of them noisy, 3 gave one with a score of 0.5 or
 /// more. Chance is not all there is: wheels, holes, fingertips and letters are round, and score high. Lamps do not: an edge whose
@@ -180,7 +182,13 @@ impl Trusted {
             let slack = 1.0 + 0.05 * radii.0;
             (radii.0 - slack, radii.1 + slack)
         };
-        let noise = noise_deviation(frame.as_raw(), frame.width() as usize);
+        // Large frames have enough pixels in half of those rows.
+        let rows = if frame.len() < 200_000 {
+            ROW_STEP
+        } else {
+            2 * ROW_STEP
+        };
+        let noise = noise_deviation(frame.as_raw(), frame.width() as usize, rows);
         self.shrink(frame, radii.1);
         self.prove(frame, radii, noise);
         self.report(frame, radii, noise);
@@ -241,7 +249,12 @@ impl Trusted {
                     .explain(&self.circle, level, &ring, &mut self.budget.looks);
             }
             let least = if depth == finest { 3.2 } else { 8.0 };
-            let most = if depth == smallest { f32::MAX } else { 20.0 };
+            // Smaller sizes have the larger circles; but short arcs of them are exact in the larger ones only.
+            let (most, most_of_arcs) = if depth == smallest {
+                (f32::MAX, f32::MAX)
+            } else {
+                (20.0, 60.0)
+            };
             widest(Searching {
                 search: Search {
                     circle: &self.circle,
@@ -250,6 +263,7 @@ impl Trusted {
                         (radii.0 as f32 / scale).max(least),
                         (radii.1 as f32 / scale).min(most),
                     ),
+                    most_radius: (radii.1 as f32 / scale).min(most_of_arcs),
                     scale,
                     seed: self.config.seed,
                     mirror_slack: if noise > 12.0 { 0.35 } else { 0.28 },
@@ -454,6 +468,8 @@ impl Vectorized for Searching<'_, '_> {
     fn run(self) {
         self.search
             .run(self.level, self.collected, self.prover, self.budget);
+        self.search
+            .follow_arcs(self.level, self.collected, self.prover, self.budget);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use image::GrayImage;
 
-use super::noise::noise_deviation;
+use super::noise::{ROW_STEP, noise_deviation};
 use super::rows::{Candidate, MAX_REACH, Passes, Rows, STRONG, UNITS, WEAK, WEIGHT_SUM};
 use super::{EdgeDetector, EdgeMap, dispatch};
 use crate::ConfigError;
@@ -150,7 +150,7 @@ impl EdgeDetector for Canny {
         let grey = frame.as_raw();
         let columns = width as usize;
         let noise = if self.config.noise_factor > 0.0 {
-            noise_deviation(grey, columns)
+            noise_deviation(grey, columns, ROW_STEP)
         } else {
             0.0
         };
@@ -453,7 +453,7 @@ mod tests {
             let frame = GrayImage::from_fn(400, 300, |_, _| {
                 image::Luma([(128.0 + deviation * noise()).round() as u8])
             });
-            let estimate = noise_deviation(frame.as_raw(), 400);
+            let estimate = noise_deviation(frame.as_raw(), 400, ROW_STEP);
             assert!(
                 (estimate / deviation - 1.0).abs() < 0.1,
                 "{deviation}: {estimate}"

@@ -115,6 +115,12 @@ impl Level {
         (self.rows.x[id], self.rows.y[id])
     }
 
+    /// The point that a mark stands for.
+    #[inline(always)]
+    pub(super) fn id_at(&self, pixel: usize) -> usize {
+        self.nearest[pixel] as usize
+    }
+
     /// How steep the edge is at the point that a mark stands for.
     #[inline(always)]
     pub(super) fn strength_at(&self, pixel: usize) -> f32 {

@@ -21,9 +21,11 @@ const OVERLAP: f32 = 0.85;
 /// From here on slopes are averaged along the outline, and the edges of a circle may lie farther off it, grey levels.
 const NOISE: f32 = 3.0;
 /// Of a circle less than this part of which lies in the frame
-const WHOLE: f32 = 0.75;
-/// the number of false alarms counts a hundredfold: its decimal logarithm.
-const CUT: f32 = 2.0;
+const WHOLE: f32 = 0.9;
+/// the number of false alarms counts a thousandfold: its decimal logarithm.
+const CUT: f32 = 3.0;
+/// What a ray without any edge counts among the samples. It says little of where the outline is: balls darken towards one side.
+const NO_EDGE: f32 = 0.25;
 
 /// Fewer rays than these do not make a circle.
 const LEAST_NEAR: usize = 20;
@@ -185,7 +187,9 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
         0.0
     };
     let apart = (OVERLAP * averaged).max(SPACING);
-    let independent = (arc / apart).min(1.0) * visible;
+    let edges_found = edges.slope.iter().filter(|&&slope| slope > 0.0).count() as f32;
+    let rays = edges_found + NO_EDGE * (visible - edges_found);
+    let independent = (arc / apart).min(1.0) * rays;
     let mut best = Proof {
         ring,
         certainty: f32::NEG_INFINITY,
@@ -206,11 +210,10 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
             .filter(|&edge| on(edge))
             .count();
         let p = (2.0 * slack + 0.2) / (2 * window.reach + 1) as f32;
-        let share = hits as f32 / visible.max(1.0);
-        let certainty = independent * divergence(share, p) - tests;
+        let certainty = independent * divergence(hits as f32 / rays.max(1.0), p) - tests;
         if certainty > best.certainty {
             best.certainty = certainty;
-            best.covered = share;
+            best.covered = hits as f32 / visible.max(1.0);
             best.visible = visible / RAYS as f32;
         }
     }

@@ -18,6 +18,8 @@ const NOISY: f32 = 8.0;
 
 /// The least radius at which a circle is looked at a second time at half the size, pixels there.
 const LEAST_SECOND: f32 = 8.0;
+/// From this certainty on no larger size is asked, but in noise.
+const SURE: f32 = 12.0;
 /// What a second look takes from the certainty.
 const SECOND_LOOK: f32 = 1.0;
 
@@ -82,6 +84,9 @@ impl Prover<'_> {
             let proof = self.prove_at(depth, &candidate.ring(), looks);
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
+            }
+            if self.noise <= NOISY && best.is_some_and(|proof| proof.certainty >= SURE) {
+                break;
             }
         }
         // In doubt, a smaller size is asked too: it forgives a smeared outline.

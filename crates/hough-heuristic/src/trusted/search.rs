@@ -16,8 +16,11 @@ pub(super) const DIRECTION_SLACK: u8 = 7;
 const LEAST_ALONG: f32 = 0.58;
 /// Of the outline so much is to lie on edges, once it is fitted, for a circle to be worth a proof.
 const LEAST_SHARE: f32 = 0.4;
-/// The share of the outline that must lie on edges at the first look: of a ball hidden by two fifths little more is to be seen.
-const FIRST_SHARE: f32 = 0.44;
+/// Of a ball hidden by two fifths little more is to be seen.
+const START: Start = Start {
+    share: 0.44,
+    reach: [3.0, 2.0],
+};
 /// How many mirrored partners of a point are tried.
 const PARTNERS: usize = 6;
 
@@ -197,12 +200,22 @@ fn runs_along(mark: u8, lowest: u8) -> bool {
     mark & EDGE != 0 && mark.wrapping_sub(lowest) % CODES <= 2 * DIRECTION_SLACK
 }
 
+/// How a circle is looked at for the first time.
+pub(super) struct Start {
+    /// The share of the outline that must lie on edges.
+    pub(super) share: f32,
+    /// How far off the circle the points lie that it is fitted to, pixels: in the first two rounds, and then.
+    pub(super) reach: [f32; 2],
+}
+
 /// Everything the search of a level needs.
 pub(super) struct Search<'a> {
     pub(super) circle: &'a UnitCircle,
     pub(super) outline: &'a Outline,
-    /// Radii sought at this level, pixels of the level.
+    /// Radii that pairs are drawn for at this level, pixels of the level.
     pub(super) radii: (f32, f32),
+    /// The largest radius of arcs, and of what pairs are fitted to, pixels of the level.
+    pub(super) most_radius: f32,
     /// Pixels of the frame per pixel of the level.
     pub(super) scale: f32,
     pub(super) seed: u64,
@@ -275,7 +288,7 @@ impl Search<'_> {
             } else {
                 *ring
             };
-            if self.consider(level, ring, found, prover, budget) {
+            if self.consider(level, ring, &START, found, prover, budget) {
                 return;
             }
         }
@@ -283,16 +296,17 @@ impl Search<'_> {
 
     /// Looks at the circle and keeps it if it is worth it; true if it explains its points.
     #[inline(always)]
-    fn consider(
+    pub(super) fn consider(
         &self,
         level: &mut Level,
         ring: Ring,
+        start: &Start,
         found: &mut Collected,
         prover: &mut Prover<'_>,
         budget: &mut Budget,
     ) -> bool {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, FIRST_SHARE, &mut budget.looks) else {
+        let Some(_) = self.outline.support(level, &ring, start.share, &mut budget.looks) else {
             return false;
         };
         // The same circle is met again and again; a few fits from different pairs are enough.
@@ -302,11 +316,11 @@ impl Search<'_> {
         // Fit until it rests.
         let (mut ring, mut support) = (ring, Support::default());
         for round in 0..6 {
-            let reach = if round < 2 { 3.0 } else { 2.0 };
+            let reach = start.reach[usize::from(round >= 2)];
             let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
                 break;
             };
-            let outside = fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.radii.1;
+            let outside = fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.most_radius;
             if outside || now.hits + 2 < support.hits {
                 break;
             }
@@ -316,7 +330,7 @@ impl Search<'_> {
                 break;
             }
         }
-        if support.share() < LEAST_SHARE || support.visible < LOOKS as u32 / 3 {
+        if support.share() < LEAST_SHARE.min(start.share) || support.visible < LOOKS as u32 / 3 {
             return false;
         }
         let candidate = Candidate::new(&ring, self.scale, support);

@@ -46,6 +46,7 @@ proptest! {
                     circle: &circle,
                     outline: &outline,
                     radii: (4.0, 60.0),
+                    most_radius: 60.0,
                     scale: 1.0,
                     seed,
                     mirror_slack: 0.35,

@@ -144,6 +144,26 @@ fn balls_that_are_hidden_in_part_or_moved_are_found() {
     }
 }
 
+/// No row and no column meets such a disc at two opposite sides.
+#[test]
+fn discs_are_found_of_which_more_than_half_is_hidden_aslant() {
+    for (dx, dy) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+        let frame = GrayImage::from_fn(320, 240, |x, y| {
+            let (x, y) = (f64::from(x) - 160.3, f64::from(y) - 118.7);
+            let hidden = (x * dx + y * dy) * std::f64::consts::FRAC_1_SQRT_2 > -0.2 * 40.0;
+            Luma([if x.hypot(y) < 40.0 && !hidden { 40 } else { 200 }])
+        });
+        let found = plain().detect(&frame);
+        assert_eq!(found.len(), 1, "{dx} {dy}: {found:?}");
+        let disc = Circle {
+            x: 160.3,
+            y: 118.7,
+            radius: 40.0,
+        };
+        assert!(same(&found[0].circle, &disc, 1.0), "{dx} {dy}: {found:?}");
+    }
+}
+
 #[test]
 fn frames_of_any_size_pass() {
     let mut detector = with(|config| config.min_radius = 4.0);
