@@ -31,7 +31,7 @@ pub(super) struct Level {
     pub(super) height: usize,
     pub(super) rows: Lines,
     pub(super) columns: Lines,
-    /// Which points no circle explains so far.
+    /// Which points no circle explains so far, and no arc in which they lie was looked at.
     pub(super) free: Vec<bool>,
     /// How steep the edge is at each point.
     strength: Vec<f32>,
