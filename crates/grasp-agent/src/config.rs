@@ -22,10 +22,10 @@ pub struct AgentConfig {
     /// \[four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
     /// +12\]; tried in order, after that pose itself.
     pub recovery: Vec<JointDelta>,
-    /// The range that each joint is kept in [[`JointLimits::paper`]].
+    /// The range that each joint is kept in, finite [[`JointLimits::paper`]].
     pub limits: JointLimits,
     /// Moves after the first sighting before the run is given up \[60\]; two looks at the goal that show the ball at different places
-    /// count as one.
+    /// count as one, and so does a ball there that the second look does not show. At least 1.
     pub max_cycles: usize,
     /// Frames to look at from one pose before the ball counts as not in view \[2\]. Sampling can miss a circle once.
     pub looks: usize,
@@ -61,7 +61,7 @@ pub struct AgentConfig {
 pub struct ApproachLimit {
     /// Radius up to which any approach is slow enough, feature units \[62\].
     pub radius: f64,
-    /// Greatest growth of the radius in one move beyond that \[1.5\].
+    /// Greatest growth of the radius in one move beyond that \[1.5\]; finite, as an infinite number cannot be saved.
     pub growth: f64,
 }
 
@@ -113,6 +113,7 @@ impl AgentConfig {
                 "there is no search pose; give at least one".into(),
             ));
         }
+        self.check_numbers().map_err(AgentError::Config)?;
         if let Some(pose) = self.search_poses.iter().find(|pose| !self.limits.admit(pose)) {
             return Err(AgentError::Config(format!(
                 "the search pose {pose} lies outside the working limits"
@@ -122,12 +123,6 @@ impl AgentConfig {
             return Err(AgentError::Config(
                 "there is no goal; give at least one interval".into(),
             ));
-        }
-        if self.reach_tolerance.is_nan() || self.reach_tolerance <= 0.0 {
-            return Err(AgentError::Config(format!(
-                "reach_tolerance is {}; it must be above 0",
-                self.reach_tolerance
-            )));
         }
         let (limits, zero) = (&self.limits.0, JointDelta::default());
         let beyond = |joint: &Joint| {
@@ -166,6 +161,38 @@ impl AgentConfig {
             return Err(AgentError::Config(
                 "looks is 0; the agent must look at least once".into(),
             ));
+        }
+        Ok(())
+    }
+
+    /// What must be a number, and of which size.
+    fn check_numbers(&self) -> Result<(), String> {
+        for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.limits.0) {
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(format!("the limits of {joint} are {low} to {high} radians"));
+            }
+        }
+        self.goal.iter().try_for_each(GoalInterval::check)?;
+        for (name, moves) in [("search_again", &self.search_again), ("recovery", &self.recovery)] {
+            if moves
+                .iter()
+                .flat_map(|delta| delta.0)
+                .any(|turn| !turn.is_finite())
+            {
+                return Err(format!("{name} has a displacement that is not finite"));
+            }
+        }
+        for (name, value) in [
+            ("reach_tolerance", self.reach_tolerance),
+            ("approach.radius", self.approach.radius),
+            ("approach.growth", self.approach.growth),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(format!("{name} is {value}; it must be finite and above 0"));
+            }
+        }
+        if self.max_cycles == 0 {
+            return Err("max_cycles is 0; no move could be made, give at least 1".into());
         }
         Ok(())
     }

@@ -132,12 +132,16 @@ impl JointLimits {
             .all(|(&(low, high), angle)| (low - SLACK..=high + SLACK).contains(&angle))
     }
 
-    /// The pose nearest to `joints` in which every joint is in its range.
+    /// The pose nearest to `joints` in which every joint is in its range; NaN stays NaN.
     pub fn nearest(&self, joints: &Joints) -> Joints {
         Joints(std::array::from_fn(|i| {
             let (low, high) = self.0[i];
-            // Not `clamp`, which panics on a range that is none.
-            joints.0[i].min(high).max(low)
+            // Not `clamp`, which panics on a range that is none, nor `min` and `max`, which make a number of NaN.
+            match joints.0[i] {
+                angle if angle < low => low,
+                angle if angle > high => high,
+                angle => angle,
+            }
         }))
     }
 }
@@ -190,6 +194,7 @@ mod tests {
             delta.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),
             "{delta:?}"
         );
+        assert!(JointLimits::paper().nearest(&Joints([f64::NAN; 6])).0[0].is_nan());
         let none = StepLimits::paper().apply([f64::NAN; 3], &at, &JointLimits::paper());
         assert_eq!(none, JointDelta::default());
     }

@@ -1,7 +1,7 @@
 //! What can go wrong.
 
 use hough_heuristic::FrameError;
-use puma_val2::ArmError;
+use puma_val2::{ArmError, Joint};
 
 /// Why a behaviour could not be made, saved or loaded.
 #[derive(Debug, thiserror::Error)]
@@ -75,6 +75,14 @@ pub enum AgentError {
     Replay {
         /// The first event that differs.
         event: usize,
+    },
+    /// A search or a recovery named a viewpoint that is no pose.
+    #[error("viewpoint {number} is no pose to look from: its {joint} is not finite")]
+    Viewpoint {
+        /// Its number.
+        number: usize,
+        /// The first joint that has no finite angle.
+        joint: Joint,
     },
     /// Text that is no saved run.
     #[error("this text is no saved run: {0}")]

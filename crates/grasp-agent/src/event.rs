@@ -65,7 +65,7 @@ pub enum EventKind {
     Searching,
     /// The ball has come into view, and the controller begins to reach for it.
     Reaching,
-    /// The arm stands at the search pose with this index, and is about to look. Indices go on counting when the poses are tried again
+    /// The arm stands at the search pose with this index and is about to look, or is on its way there if [`EventKind::TooNear`] follows. Indices go on counting when the poses are tried again
     /// with a displacement.
     AtSearchPose(usize),
     /// The ball is in the frame.
@@ -78,7 +78,8 @@ pub enum EventKind {
     Moved(JointDelta),
     /// The ball has left the frame, and its recovery begins.
     Lost,
-    /// The arm has gone back to the pose from which the ball was last seen (0), or made the recovery move with this number.
+    /// The arm has gone back to the pose from which the ball was last seen (0), or made the recovery move with this number; or it is on its way
+    /// there if [`EventKind::TooNear`] follows.
     Recovering(usize),
     /// Something is too near to the hand; the arm has been stopped, on its way to the pose of the event before or there.
     TooNear,
@@ -165,7 +166,8 @@ pub enum GaveUp {
     OutOfCycles,
     /// Every move that the controller could make leads out of the working limits, or the grip at the goal does, or the lift after it.
     NoMoveLeft,
-    /// Something was too near to the hand on its last way to the ball, again and again, or when what it had gripped was lifted.
+    /// Something was too near to the hand on its last way to the ball, again and again, or when what it had gripped was lifted; or on the way to every
+    /// viewpoint of a search, so that there was no look at all.
     Obstructed,
 }
 
@@ -175,7 +177,7 @@ impl std::fmt::Display for GaveUp {
             Self::NotFound => "the ball is in view from no search pose",
             Self::OutOfCycles => "the goal was not reached within the allowed number of moves",
             Self::NoMoveLeft => "every move leads out of the working limits",
-            Self::Obstructed => "something was too near to the hand as it went for the ball or lifted it",
+            Self::Obstructed => "something was too near to the hand: on its way to every search pose, or as it went for the ball or lifted it",
         })
     }
 }

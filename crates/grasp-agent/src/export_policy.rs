@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use puma_val2::Joint;
+use puma_val2::{Joint, PumaParams};
 
 use crate::behaviour::LOST_WEIGHT;
 use crate::export::{Document, Remarks, bad, check_format, rounded, text_of};
@@ -79,6 +79,14 @@ fn assembled(
         if !(low.is_finite() && high.is_finite() && low <= high) {
             return Err(bad(format!("the limits of {joint} are {low} to {high} degrees")));
         }
+        // The ranges of both presets of the arm.
+        let range = PumaParams::unimation().ranges[joint.index()];
+        let (min, max) = (rounded(range.min.to_degrees()), rounded(range.max.to_degrees()));
+        if low < min || high > max {
+            return Err(bad(format!(
+                "the limits of {joint} are {low} to {high} degrees; its range is {min} to {max}"
+            )));
+        }
     }
     for kappa in [breaker.centering, breaker.approaching] {
         if !(kappa.is_finite() && kappa >= 0.0) {
@@ -116,7 +124,7 @@ impl Learned {
     ///
     /// # Errors
     /// [`BehaviourError::Text`] for what [`Behaviour::from_json`] refuses, two behaviours that move the same joint, limits that are no
-    /// ranges, and loop breakers below zero or other than this one.
+    /// ranges or wider than the arm's own ([`PumaParams::unimation`]), and loop breakers below zero or other than this one.
     pub fn from_json(text: &str) -> Result<(Self, JointLimits), BehaviourError> {
         let policy: Policy = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
         policy.into_learned()
@@ -303,9 +311,13 @@ mod tests {
     #[test]
     fn a_policy_that_cannot_be_run_is_refused_with_the_reason() {
         type Change = fn(&mut serde_json::Value);
-        let cases: [(Change, &str); 7] = [
+        let cases: [(Change, &str); 8] = [
             (|d| d["format"] = "grasp-agent policy 2".into(), "policy 2"),
             (|d| d["limits_degrees"][2][0] = 300.0.into(), "limits of JT3"),
+            (
+                |d| d["limits_degrees"][1] = serde_json::json!([-1e9, 1e9]),
+                "its range is -225 to 45",
+            ),
             (|d| d["loop_breaker"]["centering"] = (-1.0).into(), "loop breaker"),
             (
                 |d| d["loop_breaker"]["lost_weight"] = 3.into(),

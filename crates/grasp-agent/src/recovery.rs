@@ -34,7 +34,7 @@ use crate::{LastLook, Situation, Viewpoint};
 pub trait Recovery: std::fmt::Debug + Send + Sync {
     /// Where to look from next for a ball that was last `seen` so, with the arm at `at`, after what came of the last viewpoint;
     /// [`LastLook::None`] begins a new recovery. `None` to leave it to the search. Each viewpoint costs a cycle of
-    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles).
+    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles); it is not asked when none is left.
     fn next_view(&mut self, seen: &Situation, at: &Joints, last: LastLook) -> Option<Viewpoint>;
 
     /// A copy, for the copies of an agent: `Box::new(self.clone())`.

@@ -8,7 +8,7 @@ use crate::watch::Watch;
 use crate::{
     AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, GripEnd,
     GripperActivation, Hand, LastLook, Outcome, Percept, Phase, Recovery, Search, Sighting, Situation,
-    Supervision, Went,
+    Supervision, Viewpoint, Went,
 };
 
 mod acting;
@@ -104,7 +104,9 @@ pub(crate) struct Run<'a> {
     taken_back: usize,
     /// All of them since the search.
     barred: usize,
-    /// Whether what is seen has shown in more than one place of the image since the search began.
+    /// What was seen first since the search began.
+    first_seen: Option<Sighting>,
+    /// Whether what is seen has shown in more than one place of the image since then.
     wandered: bool,
 }
 
@@ -132,6 +134,7 @@ impl<'a> Run<'a> {
             closed: false,
             taken_back: 0,
             barred: 0,
+            first_seen: None,
             wandered: false,
         }
     }
@@ -186,24 +189,37 @@ impl<'a> Run<'a> {
 
     /// Looks around until the ball is in view, or there is nowhere left to look from.
     fn search(&mut self) -> Result<State, AgentError> {
-        (self.wandered, self.barred) = (false, 0);
+        (self.first_seen, self.wandered, self.barred) = (None, false, 0);
+        let (mut barred, mut looked) = (false, false);
         let mut last = LastLook::None;
         while let Some(view) = self.modules.search.next_view(&self.joints, last) {
-            match self.look_from(&view.pose, EventKind::AtSearchPose(view.number))? {
+            match self.look_from(&view, EventKind::AtSearchPose(view.number))? {
                 Ok(ball) => return Ok(State::Reach(ball)),
                 Err(came) => last = came,
             }
+            barred |= last == LastLook::Barred;
+            looked |= last == LastLook::Nothing;
         }
-        Ok(State::End(Some(GaveUp::NotFound)))
+        let reason = if barred && !looked {
+            GaveUp::Obstructed
+        } else {
+            GaveUp::NotFound
+        };
+        Ok(State::End(Some(reason)))
     }
 
-    /// The ball from the pose nearest to `pose`, or what came of the look.
+    /// The ball from the pose nearest to that of `view`, or what came of the look.
     fn look_from(
         &mut self,
-        pose: &Joints,
+        view: &Viewpoint,
         there: EventKind,
     ) -> Result<Result<Sighting, LastLook>, AgentError> {
-        let target = self.modules.supervision.limits().nearest(pose);
+        // A module may be anyone's.
+        if let Some(joint) = view.pose.non_finite() {
+            let number = view.number;
+            return Err(AgentError::Viewpoint { number, joint });
+        }
+        let target = self.modules.supervision.limits().nearest(&view.pose);
         Ok(match self.go_to(target, there)? {
             Went::Back => Err(LastLook::Barred),
             Went::There => self.look()?.ok_or(LastLook::Nothing),
@@ -277,13 +293,17 @@ impl<'a> Run<'a> {
 
     /// Looks around where the ball was `seen` last, then leaves it to a new search.
     fn recover(&mut self, seen: &Situation) -> Result<State, AgentError> {
+        // A recovery that offers nothing costs no cycle, and what led to it may not have been a move.
+        if self.cycles >= self.config.max_cycles {
+            return Ok(State::End(Some(GaveUp::OutOfCycles)));
+        }
         let mut last = LastLook::None;
         while let Some(view) = self.modules.recovery.next_view(seen, &self.joints, last) {
             if self.cycles >= self.config.max_cycles {
                 return Ok(State::End(Some(GaveUp::OutOfCycles)));
             }
             self.cycles += 1;
-            match self.look_from(&view.pose, EventKind::Recovering(view.number))? {
+            match self.look_from(&view, EventKind::Recovering(view.number))? {
                 Ok(ball) => return Ok(State::Reach(ball)),
                 Err(came) => last = came,
             }
@@ -316,7 +336,11 @@ impl<'a> Run<'a> {
                     why: Gone::Missed,
                 }
             }
-            GripEnd::Unseen => lost(self.situation(seen)),
+            GripEnd::Unseen => {
+                // As for two looks that differ.
+                self.cycles += 1;
+                lost(self.situation(seen))
+            }
             GripEnd::Elsewhere(ball) => {
                 // Two looks that differ cost a cycle: both can be at the goal, and no move is made between them.
                 self.cycles += 1;
@@ -360,7 +384,7 @@ impl<'a> Run<'a> {
 
     fn frozen(&self) -> AgentError {
         AgentError::FrozenCamera {
-            looks: self.watch.same() + 1,
+            looks: self.watch.same().saturating_add(1),
         }
     }
 
@@ -375,9 +399,8 @@ impl<'a> Run<'a> {
 
     /// Takes note of a sighting.
     fn saw(&mut self, sighting: Sighting) {
-        self.wandered |= self
-            .last_seen
-            .is_some_and(|last| !is_same_place(&last, &sighting));
+        let first = self.first_seen.get_or_insert(sighting);
+        self.wandered |= !is_same_place(first, &sighting);
         self.last_seen = Some(sighting);
     }
 }

@@ -7,7 +7,8 @@ use puma_val2::{JointDelta, Joints};
 pub struct Viewpoint {
     /// Its number, for the event log.
     pub number: usize,
-    /// The pose. What lies outside the working limits is replaced by the nearest pose that does not.
+    /// The pose. What lies outside the working limits is replaced by the nearest pose that does not; what is not finite ends the run with
+    /// [`AgentError::Viewpoint`](crate::AgentError::Viewpoint).
     pub pose: Joints,
 }
 
@@ -61,7 +62,8 @@ pub enum LastLook {
 /// ```
 pub trait Search: std::fmt::Debug + Send + Sync {
     /// Where to look from next, with the arm at `at`, after what came of the last viewpoint; [`LastLook::None`] begins a new search. `None` when
-    /// there is nowhere left to look from: the run ends with [`GaveUp::NotFound`](crate::GaveUp::NotFound). A search that never says so never ends.
+    /// there is nowhere left to look from: the run ends with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
+    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) where every viewpoint was barred. A search that never says so never ends.
     fn next_view(&mut self, at: &Joints, last: LastLook) -> Option<Viewpoint>;
 
     /// A copy, for the copies of an agent: `Box::new(self.clone())`.

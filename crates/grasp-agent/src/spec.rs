@@ -53,6 +53,15 @@ impl GoalInterval {
     pub fn holds(&self, percept: &Percept) -> bool {
         (self.low..=self.high).contains(&self.input.of(percept))
     }
+
+    /// Whether anything can lie in it; if not, why.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self { input, low, high } = self;
+        if low.is_finite() && high.is_finite() && low <= high {
+            return Ok(());
+        }
+        Err(format!("the goal of {input:?} is from {low} to {high}"))
+    }
 }
 
 /// Edges of the radius, common to both behaviours; the goal is \[32, 34\].
@@ -255,13 +264,7 @@ impl BehaviourSpec {
         if self.goal.is_empty() {
             return Err("it has no goal".into());
         }
-        let none = |interval: &&GoalInterval| {
-            let GoalInterval { low, high, .. } = interval;
-            !(low.is_finite() && high.is_finite() && low <= high)
-        };
-        if let Some(GoalInterval { input, low, high }) = self.goal.iter().find(none) {
-            return Err(format!("the goal of {input:?} is from {low} to {high}"));
-        }
+        self.goal.iter().try_for_each(GoalInterval::check)?;
         self.reward.check()
     }
 

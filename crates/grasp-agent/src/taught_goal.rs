@@ -11,7 +11,11 @@ use crate::{AgentConfig, Consequence, Controller, GaveUp, GoalInterval, Input, J
 /// Another camera, or the same one mounted otherwise, shows something else. To teach the goal, the ball is put between the open jaws, the
 /// gripper's turn is taken back, and the arm looks. Nothing need be known of the camera for that.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Read")
+)]
 pub struct TaughtGoal {
     untaught: Features,
     taught: Features,
@@ -19,9 +23,43 @@ pub struct TaughtGoal {
     grip: JointDelta,
 }
 
+/// A goal as it is read, before it is known to be one.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Read {
+    untaught: Features,
+    taught: Features,
+    from: Joints,
+    grip: JointDelta,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Read> for TaughtGoal {
+    type Error = &'static str;
+
+    fn try_from(
+        Read {
+            untaught,
+            taught,
+            from,
+            grip,
+        }: Read,
+    ) -> Result<Self, Self::Error> {
+        let goal = Self {
+            untaught,
+            taught,
+            from,
+            grip,
+        };
+        goal.checked()
+            .ok_or("a taught goal with a radius that is none, or an angle or place that is not finite")
+    }
+}
+
 impl TaughtGoal {
     /// The goal that shows as `seen` with the arm at `from`, from where `grip` brings the jaws around the ball, in the place of the one that
     /// `intervals` have in their middle. `None` where they do not say what x, y and r should be, and for a radius that is none.
+    /// Nor is there one of a pose or a grip that is not finite.
     pub fn new(intervals: &[GoalInterval], seen: Features, from: Joints, grip: JointDelta) -> Option<Self> {
         let middle = |input: Input| {
             let interval = intervals.iter().find(|interval| interval.input == input)?;
@@ -32,16 +70,25 @@ impl TaughtGoal {
             y: middle(Input::Y)?,
             r: middle(Input::R)?,
         };
-        let finite = [seen.x, seen.y, untaught.x, untaught.y]
-            .iter()
-            .all(|v| v.is_finite());
-        let radius = |r: f64| r.is_finite() && r > 0.0;
-        (finite && radius(seen.r) && radius(untaught.r)).then_some(Self {
+        Self {
             untaught,
             taught: seen,
             from,
             grip,
-        })
+        }
+        .checked()
+    }
+
+    fn checked(self) -> Option<Self> {
+        let Self {
+            untaught,
+            taught,
+            from,
+            grip,
+        } = self;
+        let shows = |f: Features| f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0;
+        let finite = from.0.iter().chain(&grip.0).all(|angle| angle.is_finite());
+        (finite && shows(untaught) && shows(taught)).then_some(self)
     }
 
     /// The features of the ball at the goal.
@@ -204,5 +251,28 @@ mod tests {
         }
         assert!(new(&intervals[..2], seen).is_none());
         assert!(new(&intervals, Features { r: 0.0, ..seen }).is_none());
+        let of = |from, grip| TaughtGoal::new(&intervals, seen, from, grip);
+        assert!(of(Joints([f64::NAN; 6]), grip).is_none());
+        assert!(of(Joints::default(), JointDelta([f64::INFINITY; 6])).is_none());
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn what_could_not_be_made_cannot_be_read() {
+        let paper = AgentConfig::paper([Joints::default()]);
+        let seen = Features {
+            x: 90.0,
+            y: 95.0,
+            r: 36.0,
+        };
+        let goal = TaughtGoal::new(&paper.goal, seen, Joints::default(), paper.grip).unwrap();
+        let text = serde_json::to_string(&goal).unwrap();
+        assert_eq!(serde_json::from_str::<TaughtGoal>(&text).unwrap(), goal);
+        for radius in ["0.0", "-36.0"] {
+            let changed = text.replace("36.0", radius);
+            assert_ne!(changed, text);
+            let refused = serde_json::from_str::<TaughtGoal>(&changed).unwrap_err();
+            assert!(refused.to_string().contains("radius"), "{refused}");
+        }
     }
 }

@@ -43,7 +43,7 @@ impl Watch {
         let moved = (0..3).any(|i| (joints.0[i] - self.from.0[i]).abs() > A_MOVE);
         let same = moved && shown.is_some() && shown == self.shown;
         if moved {
-            self.same = if same { self.same + 1 } else { 0 };
+            self.same = if same { self.same.saturating_add(1) } else { 0 };
         }
         self.from = *joints;
         self.shown = shown;
@@ -98,6 +98,17 @@ mod tests {
         assert_eq!(watch.same(), 2);
         watch.looked(&at(40.0), frame(2), None);
         assert_eq!(watch.same(), 0);
+    }
+
+    #[test]
+    fn the_count_of_the_same_frame_ends_at_the_largest_number() {
+        let mut watch = Watch {
+            from: at(10.0),
+            shown: frame(1).map(Shown::Frame),
+            same: usize::MAX,
+        };
+        assert!(watch.looked(&at(20.0), frame(1), None));
+        assert_eq!(watch.same(), usize::MAX);
     }
 
     #[test]

@@ -343,7 +343,7 @@ fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
 #[test]
 fn settings_that_cannot_work_are_refused() {
     type Change = fn(&mut AgentConfig);
-    let changes: [(&str, Change); 9] = [
+    let changes: [(&str, Change); 22] = [
         ("same_frames", |c| c.same_frames = 0),
         ("lift", |c| c.lift = Some(JointDelta::default())),
         ("lift", |c| c.lift = Some(JointDelta([f64::NAN; 6]))),
@@ -353,6 +353,23 @@ fn settings_that_cannot_work_are_refused() {
         ("grip", |c| c.grip.0[4] = 4.0),
         ("grip", |c| c.grip.0[0] = f64::NAN),
         ("looks", |c| c.looks = 0),
+        ("max_cycles", |c| c.max_cycles = 0),
+        ("goal of X", |c| {
+            (c.goal[0].low, c.goal[0].high) = (108.0, 99.0);
+        }),
+        ("goal of Y", |c| c.goal[1].low = f64::NAN),
+        ("goal of R", |c| c.goal[2].high = f64::INFINITY),
+        ("approach.growth", |c| c.approach.growth = f64::NAN),
+        ("approach.growth", |c| c.approach.growth = f64::INFINITY),
+        ("approach.radius", |c| c.approach.radius = f64::NAN),
+        ("reach_tolerance", |c| c.reach_tolerance = f64::INFINITY),
+        ("reach_tolerance", |c| c.reach_tolerance = f64::NAN),
+        ("reach_tolerance", |c| c.reach_tolerance = -0.1),
+        ("limits of JT6", |c| {
+            c.limits.0[5] = (f64::NEG_INFINITY, f64::INFINITY);
+        }),
+        ("search_again", |c| c.search_again[0].0[0] = f64::NAN),
+        ("recovery", |c| c.recovery[0].0[1] = f64::INFINITY),
     ];
     for (name, change) in changes {
         let mut config = config();

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod cell;
+mod endings;
 mod faults;
 mod gripping;
 mod hybrid;

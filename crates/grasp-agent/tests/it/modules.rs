@@ -146,6 +146,6 @@ fn a_supervision_of_ones_own_is_what_takes_moves_back() {
     assert_eq!(cornered[..3], ["cornered", "seen", "searching"], "{cornered:?}");
     assert_eq!(
         log.events.last().unwrap().kind,
-        EventKind::GaveUp(GaveUp::NotFound)
+        EventKind::GaveUp(GaveUp::Obstructed)
     );
 }

@@ -1,0 +1,199 @@
+//! Runs that have to end, and with the right word: by eyes, sensors and modules that are of no use.
+
+use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
+use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
+use grasp_agent::puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
+use grasp_agent::{
+    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, LastLook, Look, Outcome, PositionBased,
+    Recovery, Search, ServoSettings, Sighting, Situation, Viewpoint,
+};
+
+const AT_GOAL: Features = Features {
+    x: 103.0,
+    y: 78.0,
+    r: 33.0,
+};
+const ASIDE: Features = Features {
+    x: 60.0,
+    y: 60.0,
+    r: 20.0,
+};
+
+/// An arm that goes where it is sent.
+struct Arm(Joints);
+
+impl Manipulator for Arm {
+    fn joints(&mut self) -> Result<Joints, ArmError> {
+        Ok(self.0)
+    }
+
+    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        self.move_to(self.0 + delta)
+    }
+
+    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
+        assert!(target.non_finite().is_none(), "{target}");
+        self.0 = target;
+        Ok(target)
+    }
+
+    fn set_gripper(&mut self, _: Gripper) -> Result<(), ArmError> {
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), ArmError> {
+        Ok(())
+    }
+}
+
+/// A sensor that always says this.
+struct Sensor(bool);
+
+impl ProximitySensor for Sensor {
+    fn object_near(&mut self) -> Result<bool, ArmError> {
+        Ok(self.0)
+    }
+}
+
+/// What look number n, from 0, finds; no two frames are the same. More looks than anyone needs are a panic.
+struct Scene {
+    looks: u32,
+    finds: fn(u32) -> Option<Features>,
+}
+
+impl Eye for Scene {
+    fn look(&mut self) -> Result<Look, FrameError> {
+        let bytes = self.looks.to_le_bytes();
+        let frame = GrayImage::from_fn(4, 1, |x, _| Luma([bytes[x as usize]]));
+        let ball = (self.finds)(self.looks).map(|features| Sighting {
+            features,
+            detection: Detection {
+                circle: features.to_circle(768),
+                score: 1.0,
+            },
+        });
+        self.looks += 1;
+        assert!(self.looks < 5000, "the run does not end");
+        Ok(Look {
+            frame: Some(frame),
+            ball,
+        })
+    }
+}
+
+fn pose() -> Joints {
+    Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0])
+}
+
+fn agent(poses: usize) -> Agent<PositionBased> {
+    let config = AgentConfig::paper(vec![pose(); poses]);
+    Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap()
+}
+
+fn run(
+    mut agent: Agent<PositionBased>,
+    near: bool,
+    finds: fn(u32) -> Option<Features>,
+) -> (Result<Outcome, AgentError>, EventLog) {
+    let mut log = EventLog::default();
+    let (mut arm, mut sensor) = (Arm(pose()), Sensor(near));
+    let mut eye = Scene { looks: 0, finds };
+    let end = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| log.note(event));
+    (end, log)
+}
+
+/// Names this viewpoint once, or none.
+#[derive(Clone, Debug)]
+struct Once(Option<Joints>);
+
+impl Search for Once {
+    fn next_view(&mut self, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
+        let pose = self.0.filter(|_| last == LastLook::None)?;
+        Some(Viewpoint { number: 3, pose })
+    }
+
+    fn boxed(&self) -> Box<dyn Search> {
+        Box::new(self.clone())
+    }
+}
+
+impl Recovery for Once {
+    fn next_view(&mut self, _seen: &Situation, at: &Joints, last: LastLook) -> Option<Viewpoint> {
+        Search::next_view(self, at, last)
+    }
+
+    fn boxed(&self) -> Box<dyn Recovery> {
+        Box::new(self.clone())
+    }
+}
+
+#[test]
+fn a_circle_that_keeps_its_place_in_the_image_is_no_grasp_whatever_was_seen_before_the_search() {
+    let never_before = |n: u32| (n > 12).then_some(AT_GOAL);
+    let once_before = |n: u32| match n {
+        0 => Some(ASIDE),
+        1..=12 => None,
+        _ => Some(AT_GOAL),
+    };
+    for (name, finds) in [
+        ("never", never_before as fn(u32) -> Option<Features>),
+        ("once", once_before),
+    ] {
+        let (end, log) = run(agent(12), false, finds);
+        assert_eq!(end.unwrap().gave_up, Some(GaveUp::OutOfCycles), "{name}");
+        let searches = log.events.iter().filter(|e| e.kind == EventKind::Searching);
+        assert_eq!(searches.count() > 1, name == "once", "{name}");
+    }
+}
+
+#[test]
+fn a_recovery_that_offers_nothing_ends_with_the_cycles() {
+    // At the goal in the first look, and not in the next ones.
+    let (end, _) = run(agent(1).recovering_by(Once(None)), false, |n| {
+        n.is_multiple_of(3).then_some(AT_GOAL)
+    });
+    let outcome = end.unwrap();
+    assert_eq!((outcome.gave_up, outcome.cycles), (Some(GaveUp::OutOfCycles), 60));
+    // At the goal, gripped, and missed each time.
+    let (end, log) = run(agent(1).recovering_by(Once(None)), false, |_| Some(AT_GOAL));
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::OutOfCycles));
+    assert!(log.events.iter().any(|e| e.kind == EventKind::Missed));
+}
+
+#[test]
+fn a_viewpoint_that_is_not_finite_is_an_error_and_no_pose() {
+    for number in [f64::NAN, f64::INFINITY] {
+        let mut nowhere = pose();
+        nowhere.0[1] = number;
+        let searching = agent(1).searching_by(Once(Some(nowhere)));
+        let recovering = agent(1).recovering_by(Once(Some(nowhere)));
+        for agent in [searching, recovering] {
+            let (end, log) = run(agent, false, |n| (n == 0).then_some(ASIDE));
+            let error = end.unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    AgentError::Viewpoint {
+                        number: 3,
+                        joint: Joint::J2
+                    }
+                ),
+                "{error}"
+            );
+            assert_eq!(
+                log.events.last().unwrap().kind,
+                EventKind::Failed(error.to_string())
+            );
+        }
+    }
+}
+
+#[test]
+fn a_search_that_never_got_to_look_was_obstructed() {
+    let (end, _) = run(agent(3), true, |_| Some(ASIDE));
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
+    let (end, _) = run(agent(3), false, |_| None);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
+    let (end, _) = run(agent(3).searching_by(Once(None)), true, |_| None);
+    assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
+}
