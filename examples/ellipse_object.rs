@@ -55,7 +55,8 @@ mod program;
 /// of the egg's outline. For the grip the hand is turned so that the jaws close across the egg.
 ///
 /// What the camera shows is an egg; what the hand can touch and hold in the simulated cell is the ball of 40 mm inside it. That the jaws close across
-/// the egg is therefore asked for beside that they hold the ball. The events of a run that fails are kept in the folder.
+/// the egg is therefore asked for beside that they hold the ball. The events of a run that fails are kept in the folder, without the
+/// settings and the controller: to read, and no saved run for `replay`.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for a picture of each egg as it was seen last

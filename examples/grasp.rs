@@ -78,9 +78,6 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             _ => Path::new("."),
         })?;
     }
-    let frames = Frames::new(&options.out.join("frames"))?;
-    let failures = emptied(&options.out.join("failures"))?;
-    let saved_runs = emptied(&options.out.join("saved"))?;
     let mut detector = options.detector.build(options.seed)?;
     let pair = behaviours(options)?;
     let loaded = options
@@ -93,6 +90,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         options,
         &format!("connected to the VAL II controller on {}", rig.name()),
     );
+
+    // Only now, when nothing but the work itself can fail, does what an earlier run has left go.
+    let frames = Frames::new(&options.out.join("frames"))?;
+    let failures = emptied(&options.out.join("failures"))?;
+    let saved_runs = emptied(&options.out.join("saved"))?;
 
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let begin = Instant::now();
@@ -394,14 +396,33 @@ fn reach_for(
     written.map(|()| outcome)
 }
 
-/// Makes a folder anew: files of an earlier run must not mix with those of this one.
+/// Makes a folder, or takes out of it what this program wrote there before: files of an earlier run must not mix with those of this one.
 fn emptied(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
-    if folder.exists() {
-        std::fs::remove_dir_all(folder)
-            .map_err(|error| format!("{}: cannot be replaced: {error}", folder.display()))?;
-    }
     writable_folder(folder)?;
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().and_then(|name| name.to_str());
+        if name.is_some_and(is_ours) {
+            std::fs::remove_file(&path)
+                .map_err(|error| format!("{}: cannot be replaced: {error}", path.display()))?;
+        }
+    }
     Ok(folder.to_owned())
+}
+
+/// Whether a file is named as a saved run or a frame is: `run001.json`, `run001-frame002.png`.
+fn is_ours(name: &str) -> bool {
+    let number = |text: &str| text.len() >= 3 && text.bytes().all(|byte| byte.is_ascii_digit());
+    let Some((stem, kind)) = name.strip_prefix("run").and_then(|rest| rest.rsplit_once('.')) else {
+        return false;
+    };
+    match kind {
+        "json" => number(stem),
+        "png" => stem
+            .split_once("-frame")
+            .is_some_and(|(run, frame)| number(run) && number(frame)),
+        _ => false,
+    }
 }
 
 /// The folder of the frames: a picture is written when it is made.
@@ -414,7 +435,7 @@ impl Frames {
 
     fn write(&self, picture: &Picture) -> Result<(), Box<dyn Error>> {
         let name = format!("run{:03}-frame{:03}.png", picture.run, picture.number);
-        write_png(&self.0.join(name), &picture.image)
+        write_png(&self.0.join(name), &picture.captioned())
     }
 }
 

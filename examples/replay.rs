@@ -38,9 +38,17 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    let mut others = 0;
+    let (mut others, mut unread) = (0, 0);
     for file in &options.files {
-        let saved = read(file)?;
+        // The rest can be made again all the same.
+        let (saved, replayed) = match read(file) {
+            Ok(read) => read,
+            Err(error) => {
+                unread += 1;
+                eprintln!("{error}");
+                continue;
+            }
+        };
         let events = &saved.log().events;
         if options.events {
             for (number, event) in events.iter().enumerate() {
@@ -48,7 +56,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
         }
         let name = file.display();
-        match saved.replay().map_err(|error| format!("{name}: {error}"))? {
+        match replayed {
             Replayed::Same(end) => {
                 let end = match end {
                     Ok(outcome) => outcome.gave_up.map_or_else(
@@ -67,16 +75,24 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    match others {
-        0 => Ok(()),
-        _ => Err(format!("{others} of {} runs took another course", options.files.len()).into()),
+    let files = options.files.len();
+    match (others, unread) {
+        (0, 0) => Ok(()),
+        (_, 0) => Err(format!("{others} of {files} runs took another course").into()),
+        (0, _) => Err(format!("{unread} of {files} runs cannot be made again").into()),
+        _ => {
+            Err(format!("{others} of {files} runs took another course, {unread} cannot be made again").into())
+        }
     }
 }
 
-fn read(file: &Path) -> Result<SavedRun, String> {
+/// A run, and what comes of making it again.
+fn read(file: &Path) -> Result<(SavedRun, Replayed), String> {
     let named = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
     let text = std::fs::read_to_string(file).map_err(|error| named(&error))?;
-    SavedRun::from_json(&text).map_err(|error| named(&error))
+    let saved = SavedRun::from_json(&text).map_err(|error| named(&error))?;
+    let replayed = saved.replay().map_err(|error| named(&error))?;
+    Ok((saved, replayed))
 }
 
 /// Prints; a reader who has gone away is no reason to stop.

@@ -56,6 +56,20 @@ fn grasp_names_a_port_that_does_not_exist() {
 }
 
 #[test]
+fn grasp_keeps_what_an_earlier_run_left_when_it_cannot_begin() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let kept = folder.path().join("out/failures/run001.json");
+    std::fs::create_dir_all(folder.path().join("out/failures")).expect("a folder");
+    std::fs::write(&kept, "a run").expect("a file");
+    for wrong in [["--policy", "no-such-policy"], ["--port", "/dev/no-such-port"]] {
+        if grasp_fails(folder.path(), &wrong).is_none() {
+            return;
+        }
+        assert!(kept.exists(), "{wrong:?}");
+    }
+}
+
+#[test]
 fn grasp_names_a_socket_that_is_silent_or_talks_nonsense() {
     for nonsense in [&b""[..], b"\x00\xff220 mail ready\r\n"] {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a socket");
@@ -293,8 +307,12 @@ fn replays(file: &Path, text: &str) {
     assert!(errors.starts_with("error: 1 of 1 runs"), "{errors}");
 
     std::fs::write(&other, &text[..text.len() / 2]).expect("a file");
-    let (code, _, errors) = replayed(&other, &[]).expect("it was there");
-    assert_eq!(code, Some(1), "{errors}");
+    let whole = file.to_str().expect("plain text");
+    let (again, errors) = output(example("replay").expect("it was there").arg(&other).arg(whole));
+    assert_eq!(again.status.code(), Some(1), "{errors}");
+    let said = String::from_utf8_lossy(&again.stdout);
+    assert!(said.contains(whole) && said.contains("the same"), "{said}");
+    assert!(errors.contains("error: 1 of 2 runs"), "{errors}");
     assert!(
         errors.contains("other.json") && errors.contains("no saved run"),
         "{errors}"

@@ -48,6 +48,16 @@ pub(crate) struct Picture {
     /// Whether the ball was found.
     pub(crate) seen: bool,
     pub(crate) image: RgbImage,
+    words: String,
+}
+
+impl Picture {
+    /// The picture below a caption, which covers nothing of it.
+    pub(crate) fn captioned(&self) -> RgbImage {
+        Overlay::from(self.image.clone())
+            .captioned(&self.words)
+            .into_image()
+    }
 }
 
 impl RunRecord {
@@ -95,19 +105,17 @@ impl RunRecord {
         }
         let full = overlay.into_image();
         let half = resize(&full, full.width() / 2, full.height() / 2, FilterType::Triangle);
-        // The words go on after the frame has shrunk, so that they can be read.
-        let mut overlay = Overlay::from(half);
         let found = features.map_or("no ball".into(), |f| {
             format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r)
         });
-        overlay.caption(&format!("run {run} step {}  {found}", event.cycle));
         let (step, seen) = (event.cycle, features.is_some());
         Some(Picture {
             run,
             number: self.frames,
             step,
             seen,
-            image: overlay.into_image(),
+            image: half,
+            words: format!("run {run} step {step}  {found}"),
         })
     }
 

@@ -6,7 +6,7 @@ use image::imageops::{FilterType, replace, resize};
 use image::{Rgb, RgbImage};
 use serde::Serialize;
 
-use crate::overlay::Overlay;
+use crate::overlay::{CAPTION, Overlay};
 use crate::record::{Picture, RunRecord};
 
 /// What `summary.json` holds.
@@ -183,8 +183,10 @@ struct Tile {
     image: RgbImage,
 }
 
-/// Size of a tile with its border, pixels.
-const TILE: (u32, u32) = (160, 120);
+/// Size of a frame in a tile, pixels.
+const SMALL: (u32, u32) = (156, 117);
+/// Size of a tile with its caption and its border.
+const TILE: (u32, u32) = (SMALL.0 + 4, SMALL.1 + CAPTION + 4);
 /// Runs that are shown, the first ones.
 const RUNS_SHOWN: usize = 20;
 
@@ -193,9 +195,8 @@ impl ContactSheet {
         if !picture.seen || picture.run > RUNS_SHOWN {
             return;
         }
-        let small = resize(&picture.image, TILE.0 - 4, TILE.1 - 4, FilterType::Triangle);
-        let mut tile = Overlay::from(small);
-        tile.caption(&format!("run {} step {}", picture.run, picture.step));
+        let small = resize(&picture.image, SMALL.0, SMALL.1, FilterType::Triangle);
+        let tile = Overlay::from(small).captioned(&format!("run {} step {}", picture.run, picture.step));
         self.0.push(Tile {
             run: picture.run,
             image: tile.into_image(),

@@ -9,6 +9,10 @@ use embedded_graphics::text::{Baseline, Text};
 use hough_heuristic::Circle;
 use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 
+/// Height of a caption, pixels.
+#[allow(dead_code, reason = "not every example that draws lays pictures out")]
+pub(crate) const CAPTION: u32 = 24;
+
 /// A frame to draw on.
 pub(crate) struct Overlay(RgbImage);
 
@@ -80,12 +84,22 @@ impl Overlay {
 
     /// Words on a dark bar at the top.
     pub(crate) fn caption(&mut self, words: &str) {
-        let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), 24));
+        let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), CAPTION));
         let Ok(()) = bar
             .into_styled(PrimitiveStyle::with_fill(Rgb888::new(20, 20, 40)))
             .draw(self);
         let style = MonoTextStyle::new(&FONT_10X20, Rgb888::YELLOW);
         let Ok(_) = Text::with_baseline(words, Point::new(6, 2), style, Baseline::Top).draw(self);
+    }
+
+    /// Words in a dark strip above the picture, which becomes higher by as much.
+    #[allow(dead_code, reason = "not every example that draws needs the whole picture")]
+    pub(crate) fn captioned(self, words: &str) -> Self {
+        let mut higher = RgbImage::new(self.0.width(), self.0.height() + CAPTION);
+        image::imageops::replace(&mut higher, &self.0, 0, i64::from(CAPTION));
+        let mut captioned = Self(higher);
+        captioned.caption(words);
+        captioned
     }
 
     pub(crate) fn into_image(self) -> RgbImage {

@@ -6,10 +6,32 @@ use crate::{BehaviourError, BehaviourSpec};
 
 /// A behaviour with what it has learned: the Q-table over its states and actions.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Unchecked")
+)]
 pub struct Behaviour {
     spec: BehaviourSpec,
     table: QTable,
+}
+
+/// The same as it comes from a file.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    spec: BehaviourSpec,
+    table: QTable,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for Behaviour {
+    type Error = BehaviourError;
+
+    fn try_from(Unchecked { spec, table }: Unchecked) -> Result<Self, BehaviourError> {
+        spec.check().map_err(|what| BehaviourError::Text { what })?;
+        Self::new(spec, table)
+    }
 }
 
 impl Behaviour {
@@ -137,7 +159,6 @@ impl Behaviour {
     /// A file that cannot be read, is damaged or is none of ours; a behaviour with other states, actions, goal or reward.
     pub fn load(path: &std::path::Path, expected: &BehaviourSpec) -> Result<Self, BehaviourError> {
         let behaviour: Self = qtable::load(path, FILE_KIND)?;
-        behaviour.check_shape()?;
         if behaviour.spec != *expected {
             return Err(BehaviourError::Foreign {
                 path: path.to_owned(),
@@ -240,6 +261,24 @@ mod tests {
                 ..
             })
         ));
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn what_is_read_is_checked_as_what_is_made() {
+        let sound = serde_json::to_value(behaviour()).unwrap();
+        assert_eq!(
+            serde_json::from_value::<Behaviour>(sound.clone()).unwrap(),
+            behaviour()
+        );
+        let refused = |change: &dyn Fn(&mut serde_json::Value)| {
+            let mut text = sound.clone();
+            change(&mut text);
+            serde_json::from_value::<Behaviour>(text).unwrap_err().to_string()
+        };
+        let larger = serde_json::to_value(BehaviourSpec::approaching()).unwrap();
+        assert!(refused(&|text| text["spec"] = larger.clone()).contains("42x9"));
+        assert!(refused(&|text| text["spec"]["goal"] = serde_json::json!([])).contains("no goal"));
     }
 
     #[cfg(feature = "serde")]

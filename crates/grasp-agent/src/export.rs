@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use hough_heuristic::Features;
 use qtable::{Action, QTable, State};
 
+use crate::numbers::Whole;
 use crate::percept::THETA3_ZERO;
 use crate::{Behaviour, BehaviourError, BehaviourSpec, GoalInterval};
 
@@ -184,14 +185,14 @@ pub(crate) fn rounded(degrees: f64) -> f64 {
     (degrees * 1e7).round() / 1e7
 }
 
-/// Plain data with text keys and finite numbers: there is nothing that could not be written.
+/// Plain data with text keys: there is nothing that could not be written.
 pub(crate) fn text_of(document: &impl serde::Serialize) -> String {
-    serde_json::to_string_pretty(document).unwrap_or_default()
+    serde_json::to_string_pretty(&Whole(document)).unwrap_or_default()
 }
 
 /// The same in one line.
 pub(crate) fn plain_text_of(document: &impl serde::Serialize) -> String {
-    serde_json::to_string(document).unwrap_or_default()
+    serde_json::to_string(&Whole(document)).unwrap_or_default()
 }
 
 pub(crate) fn bad(what: impl Into<String>) -> BehaviourError {

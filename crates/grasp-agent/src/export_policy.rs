@@ -36,7 +36,8 @@ const WORDS: [&str; 5] = [
     "in every cycle each behaviour chooses an action by its own inputs, and all joints make their steps together, until both are at their goals",
     "limits_degrees: lowest and highest angle of each joint, JT1 first; an action that leads out of them is not chosen",
     "loop_breaker: in each run every action of every state has a weight, at first 0; from its value is taken the behaviour's number times the weight",
-    "when an action is chosen its weight w becomes 2 w + 1; when the ball is lost after it, lost_weight is added",
+    "when an action is chosen its weight w becomes 2 w + 1; when the ball is lost after it, or the hand comes too near to something or to \
+     the ball too fast and the move is taken back, lost_weight is added",
     "a behaviour that is at its goal makes no step and chooses nothing",
 ];
 

@@ -112,6 +112,8 @@ mod gripper;
 mod hybrid;
 mod learned;
 mod log;
+#[cfg(feature = "serde")]
+mod numbers;
 mod object;
 mod percept;
 mod preset;

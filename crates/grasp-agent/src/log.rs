@@ -15,8 +15,10 @@ pub struct LoggedEvent {
     /// How many moves had been made since the ball was first seen.
     pub cycle: usize,
     /// What happened.
+    #[cfg_attr(feature = "serde", serde(with = "crate::numbers"))]
     pub kind: EventKind,
     /// Where the arm stood, as it reported.
+    #[cfg_attr(feature = "serde", serde(with = "crate::numbers"))]
     pub joints: Joints,
 }
 
@@ -91,10 +93,15 @@ pub(crate) struct Played {
 fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
     match (&now.kind, &then.kind) {
         (EventKind::Failed(cause), EventKind::Failed(cause_then)) => {
-            now.cycle == then.cycle && now.joints == then.joints && same_cause(cause, cause_then)
+            now.cycle == then.cycle && alike(&now.joints, &then.joints) && same_cause(cause, cause_then)
         }
-        _ => now == then,
+        _ => alike(now, then),
     }
+}
+
+/// Whether two values are equal, NaN being equal to NaN. In debug format every other number has a text of its own.
+fn alike<T: PartialEq + std::fmt::Debug>(now: &T, then: &T) -> bool {
+    now == then || format!("{now:?}") == format!("{then:?}")
 }
 
 /// Whether `now` is what ended the run `then`: the same words, or the same device failing again.

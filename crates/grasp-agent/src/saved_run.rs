@@ -7,7 +7,7 @@ use crate::export_policy::Policy;
 use crate::log::{Played, numbered};
 use crate::watch::{Shown, Watch};
 use crate::{
-    Agent, AgentConfig, AgentError, BehaviourError, Belief, Controller, Event, EventLog, Hybrid,
+    Agent, AgentConfig, AgentError, BehaviourError, Belief, Controller, Event, EventKind, EventLog, Hybrid,
     HybridSettings, Learned, LoggedEvent, OnlineLearning, Outcome,
 };
 
@@ -188,7 +188,14 @@ impl SavedRun {
         let agent = Agent::with_controller(self.config.clone(), controller)?.watching(watch);
         let Played { end, log, differs } = self.log.play(&agent);
         Ok(match differs {
-            None => Replayed::Same(end.map_err(|error| error.to_string())),
+            // The replayed devices fail in words of their own.
+            None => Replayed::Same(end.map_err(|error| match self.log.events.last() {
+                Some(LoggedEvent {
+                    kind: EventKind::Failed(cause),
+                    ..
+                }) => cause.clone(),
+                _ => error.to_string(),
+            })),
             Some(event) => Replayed::Differs {
                 event,
                 then: self.log.events.get(event).cloned(),
@@ -197,7 +204,8 @@ impl SavedRun {
         })
     }
 
-    /// The run as JSON: its format, settings, controller, what the camera had shown, and the events, one after the other.
+    /// The run as JSON: its format, settings, controller, what the camera had shown, and the events, one after the other. Numbers that are
+    /// not finite are written as the texts `"NaN"`, `"inf"` and `"-inf"`.
     pub fn to_json(&self) -> String {
         let controller = match &self.controller {
             SavedController::Learned { learned, learning } => ControllerText::Learned {
@@ -225,7 +233,7 @@ impl SavedRun {
     ///
     /// # Errors
     /// [`AgentError::SavedRun`], with the place where there is one: no JSON, another format, a missing part, a policy that
-    /// [`Learned::from_json`] refuses; [`AgentError::Config`] for settings that cannot work.
+    /// [`Learned::from_json`] refuses, a belief or settings of a hybrid that are not finite; [`AgentError::Config`] for settings that cannot work.
     pub fn from_json(text: &str) -> Result<Self, AgentError> {
         let refused = |error: BehaviourError| AgentError::SavedRun(error.to_string());
         let document: Document =
@@ -237,7 +245,10 @@ impl SavedRun {
                 learned: Box::new(policy.into_learned().map_err(refused)?.0),
                 learning,
             },
-            ControllerText::Hybrid { settings, belief } => SavedController::Hybrid { settings, belief },
+            ControllerText::Hybrid { settings, belief } => {
+                settings.check().map_err(AgentError::SavedRun)?;
+                SavedController::Hybrid { settings, belief }
+            }
         };
         Ok(Self {
             config: document.config,
@@ -254,8 +265,11 @@ const FORMAT: &str = "grasp-agent run 1";
 #[derive(Debug, Deserialize)]
 struct Document {
     format: String,
+    #[serde(deserialize_with = "crate::numbers::deserialize")]
     config: AgentConfig,
+    #[serde(deserialize_with = "crate::numbers::deserialize")]
     controller: ControllerText,
+    #[serde(deserialize_with = "crate::numbers::deserialize")]
     camera: Camera,
     log: EventLog,
 }

@@ -59,6 +59,12 @@ impl Prior {
         }
     }
 
+    /// Whether each of them is a number above zero.
+    #[cfg(feature = "serde")]
+    pub(crate) fn is_sound(&self) -> bool {
+        self.deviations().iter().all(|s| s.is_finite() && *s > 0.0)
+    }
+
     fn deviations(&self) -> Numbers {
         let Self {
             focal,
@@ -80,13 +86,56 @@ impl Prior {
 /// its x, y and z axes (radians) and shift along them (metres); logarithm of the ball's radius over the nominal one; play in `JT1`, `JT2`
 /// and `JT3` (whole width, radians).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Unchecked")
+)]
 pub struct Belief {
     mean: Vec<f64>,
     /// Inverse of the covariance, by columns.
     information: Vec<f64>,
     /// Standard deviation of what is seen about what is expected, feature units.
     noise: f64,
+}
+
+/// The same as it comes from a file.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    mean: Vec<f64>,
+    information: Vec<f64>,
+    noise: f64,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for Belief {
+    type Error = BehaviourError;
+
+    fn try_from(unchecked: Unchecked) -> Result<Self, BehaviourError> {
+        let Unchecked {
+            mean,
+            information,
+            noise,
+        } = unchecked;
+        let mut numbers = mean.iter().chain(&information);
+        let sound = mean.len() == LEARNED
+            && information.len() == LEARNED * LEARNED
+            && numbers.all(|v| v.is_finite())
+            && noise.is_finite()
+            && noise > 0.0;
+        if sound {
+            Ok(Self {
+                mean,
+                information,
+                noise,
+            })
+        } else {
+            Err(BehaviourError::Text {
+                what: "not thirteen finite numbers and what is known of them".into(),
+            })
+        }
+    }
 }
 
 /// Noise assumed before anything is known, feature units.
@@ -231,22 +280,7 @@ impl Belief {
     /// # Errors
     /// A file that cannot be read, is damaged or is none of ours; numbers that are too few, too many or not finite.
     pub fn load(path: &std::path::Path) -> Result<Self, BehaviourError> {
-        let belief: Self = qtable::load(path, Self::FILE_KIND)?;
-        let numbers = belief.mean.iter().chain(&belief.information);
-        let sound = belief.mean.len() == LEARNED
-            && belief.information.len() == LEARNED * LEARNED
-            && numbers.chain([&belief.noise]).all(|v| v.is_finite())
-            && belief.noise > 0.0;
-        if sound {
-            Ok(belief)
-        } else {
-            Err(BehaviourError::Text {
-                what: format!(
-                    "{}: not thirteen finite numbers and what is known of them",
-                    path.display()
-                ),
-            })
-        }
+        Ok(qtable::load(path, Self::FILE_KIND)?)
     }
 }
 

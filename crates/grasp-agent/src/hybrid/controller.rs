@@ -54,6 +54,46 @@ impl HybridSettings {
             grip_certainty: 0.008,
         }
     }
+
+    /// Whether they can be used; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self {
+            nominal, goal, steps, ..
+        } = self;
+        let arm = &nominal.arm;
+        let mount = nominal.mount.to_homogeneous();
+        let mut numbers = [
+            arm.a2,
+            arm.a3,
+            arm.d2,
+            arm.d4,
+            arm.d6,
+            nominal.tool,
+            goal.x,
+            goal.y,
+        ]
+        .into_iter()
+        .chain(nominal.centre)
+        .chain(mount.iter().copied())
+        .chain([self.grip_turn]);
+        let positive = [nominal.focal, nominal.ball_radius, goal.r]
+            .into_iter()
+            .chain(steps.0);
+        let not_negative = [self.drift, self.caution, self.grip_certainty];
+        let wrong = if !self.prior.is_sound() {
+            "a number of the prior is not finite and above zero"
+        } else if !numbers.all(f64::is_finite) {
+            "a length, angle or feature is not finite"
+        } else if !positive.into_iter().all(|v| v.is_finite() && v > 0.0) {
+            "focal length, radius or a step is not finite and above zero"
+        } else if !not_negative.iter().all(|v| v.is_finite() && *v >= 0.0) {
+            "drift, caution or grip_certainty is not finite, or negative"
+        } else {
+            return Ok(());
+        };
+        Err(format!("settings of the hybrid: {wrong}"))
+    }
 }
 
 /// Servoing by a model of the camera that is put right by what is seen.

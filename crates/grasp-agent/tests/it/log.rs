@@ -151,7 +151,7 @@ fn another_controller_is_told_apart() {
 mod saved {
     use grasp_agent::qtable::{Action, QTable, State};
     use grasp_agent::{
-        Agent, AgentError, Behaviour, BehaviourPair, CameraModel, Controller, EventLog, Hybrid,
+        Agent, AgentError, Behaviour, BehaviourPair, CameraModel, Controller, EventKind, EventLog, Hybrid,
         HybridSettings, Learned, OnlineLearning, Replayed, SavedController, SavedRun,
     };
 
@@ -189,7 +189,7 @@ mod saved {
         assert_eq!(read.to_json(), text);
         match (end, read.replay().unwrap()) {
             (Ok(then), Replayed::Same(Ok(now))) => assert_eq!(then, now),
-            (Err(_), Replayed::Same(Err(_))) => {}
+            (Err(then), Replayed::Same(Err(now))) => assert_eq!(then.to_string(), now),
             (then, now) => panic!("{then:?} and {now:?}"),
         }
         text
@@ -318,5 +318,59 @@ mod saved {
         }
         let half = SavedRun::from_json(&text[..text.len() / 2]);
         assert!(matches!(half, Err(AgentError::SavedRun(_))));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_kept() {
+        let hybrid = Hybrid::new(HybridSettings::paper()).frozen();
+        let agent = Agent::with_controller(config(), hybrid).unwrap();
+        let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+        let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
+        let mut log = EventLog::default();
+        cell.run(&mut agent.clone(), &mut log).unwrap();
+        let mut scores = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().cycle();
+        for event in &log.events {
+            let mut kind = event.kind.clone();
+            if let EventKind::Seen(sighting) = &mut kind {
+                sighting.detection.score = scores.next().unwrap();
+                sighting.detection.circle.radius = f64::NAN;
+            }
+            saved.note(&grasp_agent::Event {
+                cycle: event.cycle,
+                kind,
+                joints: event.joints,
+                frame: None,
+            });
+        }
+        let text = saved.to_json();
+        for word in ["\"NaN\"", "\"inf\"", "\"-inf\""] {
+            assert!(text.contains(word), "{word}");
+        }
+        let read = SavedRun::from_json(&text).unwrap();
+        assert_eq!(format!("{:?}", read.log()), format!("{:?}", saved.log()));
+        assert_eq!(read.to_json(), text);
+        for run in [saved, read] {
+            assert!(matches!(run.replay().unwrap(), Replayed::Same(Ok(_))));
+        }
+    }
+
+    #[test]
+    fn a_hybrid_that_cannot_work_is_refused() {
+        let hybrid = Hybrid::new(HybridSettings::paper()).frozen();
+        let agent = Agent::with_controller(config(), hybrid).unwrap();
+        let text = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller())).to_json();
+        let cases = [
+            ("\"mean\":[0.0,", "\"mean\":[", "thirteen"),
+            ("\"noise\":1.0", "\"noise\":0.0", "thirteen"),
+            ("\"turn\":0.17", "\"turn\":0.0", "prior"),
+            ("\"play\":0.015", "\"play\":\"NaN\"", "prior"),
+            ("\"caution\":2.0", "\"caution\":\"inf\"", "caution"),
+        ];
+        for (old, new, said) in cases {
+            let changed = text.replace(old, new);
+            assert_ne!(changed, text, "{old}");
+            let refused = SavedRun::from_json(&changed).unwrap_err().to_string();
+            assert!(refused.contains(said), "{refused} does not say {said}");
+        }
     }
 }
