@@ -354,7 +354,7 @@ fn what_is_nowhere_counts_as_near() {
     let (mut table, mut ball) = (cell, cell);
     table.table = f64::NAN;
     ball.ball.centre.x = f64::NAN;
-    let nowhere = puma_val2::Joints([f64::NAN; 6]);
+    let nowhere = Joints([f64::NAN; 6]);
     for (cell, joints) in [(cell, nowhere), (table, pose), (ball, pose)] {
         assert!(cell.proximity(&joints) && cell.collides(&joints));
         assert_eq!(cell.proximity_pair(&joints), [true; 2]);
