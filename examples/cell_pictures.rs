@@ -20,6 +20,7 @@ mod files;
 mod program;
 
 use std::error::Error;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -56,7 +57,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     let save = |name: &str, bytes: &[u8]| {
         let path = options.out.join(name);
         write_whole(&path, bytes)?;
-        println!("{}", path.display());
+        writeln!(std::io::stdout(), "{}", path.display())?;
         Ok::<(), Box<dyn Error>>(())
     };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);

@@ -31,6 +31,7 @@ mod program;
 
 use std::error::Error;
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -138,7 +139,12 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
         milliseconds.sort_by(f64::total_cmp);
         if let (Some(least), Some(median)) = (milliseconds.first(), milliseconds.get(milliseconds.len() / 2))
         {
-            bar.suspend(|| println!("{name:20} CPU {least:.1} ms a frame at best, {median:.1} ms median"));
+            bar.suspend(|| {
+                writeln!(
+                    std::io::stdout(),
+                    "{name:20} CPU {least:.1} ms a frame at best, {median:.1} ms median"
+                )
+            })?;
         }
     }
     write_whole(&options.out.join("truth.csv"), truth.as_bytes())?;

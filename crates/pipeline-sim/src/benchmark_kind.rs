@@ -253,8 +253,10 @@ impl Stage {
             ..Workspace::paper()
         };
         let joints = loop {
+            // The pose is drawn as for the paper's frame: one of another shape shows that and more.
             let over = Cell {
                 ball: above.sample_ball(rng),
+                camera: Camera::paper(),
                 ..cell
             };
             let aside = [0.0; 6].map(|_: f64| rng.random_range(-4.0_f64..4.0).to_radians());

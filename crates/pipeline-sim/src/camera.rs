@@ -1,143 +1,9 @@
-//! The camera: optics, lens distortion, and the exact outline of a sphere.
+//! The camera: optics, and the exact outline of a sphere.
 
 use hough_heuristic::Circle;
-use nalgebra::{Matrix2, Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 
-use crate::{CameraError, Ellipse, ProjectionError};
-
-/// Lens distortion after Brown and Conrady, in coordinates on the plane at unit depth.
-///
-/// A point (x, y) at squared distance s from the axis moves to
-/// x (1 + `k1` s + `k2` s² + `k3` s³) + 2 `p1` x y + `p2` (s + 2 x²), and likewise in y with `p1`, `p2` exchanged: the
-/// convention of OpenCV's five coefficients. All zero is the ideal pinhole.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Distortion {
-    /// Radial, of second order. Below zero: barrel.
-    pub k1: f64,
-    /// Radial, of fourth order.
-    pub k2: f64,
-    /// Radial, of sixth order.
-    pub k3: f64,
-    /// Tangential, along y.
-    pub p1: f64,
-    /// Tangential, along x.
-    pub p2: f64,
-}
-
-impl Distortion {
-    /// Whether this is the ideal pinhole.
-    pub fn is_none(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// Where the lens shows what a pinhole would show at `p`.
-    pub fn distort(&self, p: Point2<f64>) -> Point2<f64> {
-        let (x, y) = (p.x, p.y);
-        let s = x * x + y * y;
-        let radial = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
-        Point2::new(
-            x * radial + 2.0 * self.p1 * x * y + self.p2 * (s + 2.0 * x * x),
-            y * radial + 2.0 * self.p2 * x * y + self.p1 * (s + 2.0 * y * y),
-        )
-    }
-
-    /// The inverse of [`Distortion::distort`]: what a pinhole would show where the lens shows `p`, to about 1e-13 of its size.
-    ///
-    /// By Newton's method; where that hesitates, followed outward from the axis, so that of several answers it is the one
-    /// before the lens folds. `None` if there is none, or `p` is not finite.
-    pub fn undistort(&self, p: Point2<f64>) -> Option<Point2<f64>> {
-        if self.is_none() {
-            return Some(p);
-        }
-        self.newton(p, p, false).or_else(|| {
-            const STAGES: i32 = 32;
-            (1..=STAGES).try_fold(Point2::origin(), |from, stage| {
-                self.newton(p * (f64::from(stage) / f64::from(STAGES)), from, true)
-            })
-        })
-    }
-
-    /// As [`Distortion::undistort`], with the answer for a place nearby as a start.
-    pub(crate) fn undistort_near(
-        &self,
-        p: Point2<f64>,
-        (other, undone): (Point2<f64>, Point2<f64>),
-    ) -> Option<Point2<f64>> {
-        self.newton(p, undone + (p - other), false)
-            .or_else(|| self.undistort(p))
-    }
-
-    /// Newton's method from `start`. It must come nearer with every step; where it does not, the step is halved if `patient`, else that is
-    /// the end of it.
-    fn newton(&self, p: Point2<f64>, start: Point2<f64>, patient: bool) -> Option<Point2<f64>> {
-        let (mut q, mut error) = (start, self.distort(start) - p);
-        let enough = 1e-14 * (1.0 + p.coords.norm());
-        for _ in 0..60 {
-            if error.norm() <= enough {
-                break;
-            }
-            let slope = self.jacobian(q);
-            if slope.determinant() <= 0.0 {
-                return None;
-            }
-            let step = slope.try_inverse()? * error;
-            let halvings = if patient { 30 } else { 1 };
-            let nearer = (0..halvings).find_map(|k| {
-                let at = q - step * 0.5_f64.powi(k);
-                let left = self.distort(at) - p;
-                (left.norm() < error.norm()).then_some((at, left))
-            });
-            match nearer {
-                Some(nearer) => (q, error) = nearer,
-                // As near as numbers go.
-                None if error.norm() <= 10.0 * enough => break,
-                None => return None,
-            }
-        }
-        let sound = error.norm() <= 10.0 * enough && self.jacobian(q).determinant() > 0.0;
-        sound.then_some(q)
-    }
-
-    /// Whether the lens has not folded the image over on the way from the axis to `p`: only such directions are shown.
-    fn shows(&self, p: Point2<f64>) -> bool {
-        let s = p.coords.norm_squared();
-        // How fast the radial part grows with the distance from the axis: never slower than at either end or where this itself turns.
-        let growth = |s: f64| 1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3));
-        let last = growth(s);
-        if last.is_nan() || last <= 0.0 {
-            return false;
-        }
-        let (a, b, c) = (21.0 * self.k3, 10.0 * self.k2, 3.0 * self.k1);
-        let root = (b * b - 4.0 * a * c).sqrt();
-        let turns = [(-b + root) / (2.0 * a), (-b - root) / (2.0 * a), -c / b];
-        let turns = turns.into_iter().filter(|turn| (0.0..s).contains(turn));
-        let slowest = turns.map(growth).fold(last, f64::min);
-        // The tangential part changes that by no more than this.
-        let tangential = 6.0 * self.p1.hypot(self.p2) * s.sqrt();
-        if tangential == 0.0 || slowest > tangential {
-            return slowest > 0.0;
-        }
-        const STEPS: i32 = 128;
-        (1..=STEPS).all(|k| self.jacobian(p * (f64::from(k) / f64::from(STEPS))).determinant() > 0.0)
-    }
-
-    /// Derivatives of [`Distortion::distort`].
-    fn jacobian(&self, q: Point2<f64>) -> Matrix2<f64> {
-        let (x, y) = (q.x, q.y);
-        let s = x * x + y * y;
-        let radial = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
-        // Of the radial factor by s, twice.
-        let growth = 2.0 * (self.k1 + s * (2.0 * self.k2 + s * 3.0 * self.k3));
-        let across = x * y * growth + 2.0 * (self.p1 * x + self.p2 * y);
-        Matrix2::new(
-            radial + x * x * growth + 2.0 * self.p1 * y + 6.0 * self.p2 * x,
-            across,
-            across,
-            radial + y * y * growth + 2.0 * self.p2 * x + 6.0 * self.p1 * y,
-        )
-    }
-}
+use crate::{CameraError, Distortion, Ellipse, ProjectionError};
 
 /// A monochrome camera: a pinhole with square pixels, and the distortion of its lens.
 ///
@@ -153,6 +19,9 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// The greatest width and height of a frame, pixels.
+    pub const LARGEST_SIDE: u32 = 16_384;
+
     /// The paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3" CCD, whose image is
     /// 8.8 mm wide; principal point in the middle of the frame, no distortion.
     ///
@@ -175,7 +44,8 @@ impl Camera {
     /// `width` x `height` pixels, principal point in the middle of the frame.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] names the quantity that is not above zero.
+    /// [`CameraError::NotPositive`] names the quantity that is not above zero; [`CameraError::TooLarge`] for more than
+    /// [`Camera::LARGEST_SIDE`].
     pub fn pinhole(
         focal_length: f64,
         sensor_width: f64,
@@ -184,8 +54,7 @@ impl Camera {
     ) -> Result<Self, CameraError> {
         positive("focal length (m)", focal_length)?;
         positive("sensor width (m)", sensor_width)?;
-        positive("frame width (px)", f64::from(width))?;
-        positive("frame height (px)", f64::from(height))?;
+        frame_size(width, height)?;
         let focal_px = focal_length / sensor_width * f64::from(width);
         positive("focal length (px)", focal_px)?;
         Ok(Self {
@@ -233,10 +102,10 @@ impl Camera {
     /// a frame of another shape shows more on two sides.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::Folds`] if a distorted image would fold.
+    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::TooLarge`] for more than [`Camera::LARGEST_SIDE`];
+    /// [`CameraError::Folds`] if a distorted image would fold.
     pub fn resized(self, width: u32, height: u32) -> Result<Self, CameraError> {
-        positive("frame width (px)", f64::from(width))?;
-        positive("frame height (px)", f64::from(height))?;
+        frame_size(width, height)?;
         let scale =
             (f64::from(width) / f64::from(self.width)).min(f64::from(height) / f64::from(self.height));
         let middle = |w: u32, h: u32| Point2::new((f64::from(w) - 1.0) / 2.0, (f64::from(h) - 1.0) / 2.0);
@@ -354,7 +223,8 @@ impl Camera {
     /// [`Camera::project_sphere_to_circle`] for a camera without distortion, and close to it (the distortion at the circle's
     /// centre is undone) for others.
     ///
-    /// `None` if `circle` or `radius` is not finite or not above zero, or the lens shows nothing at the circle's centre.
+    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at the circle's centre, or numbers do not
+    /// suffice (a circle that fills all but the whole half-space).
     pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
         let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
             && [circle.radius, radius].iter().all(|v| v.is_finite() && *v > 0.0);
@@ -363,25 +233,17 @@ impl Camera {
         }
         let ray = self.try_ray(Point2::new(circle.x, circle.y)).ok()?;
         let (m, r) = (ray.xy().norm(), circle.radius / self.focal_px);
-        // Unknown: tan(eta) of the centre's direction, and sin²(alpha). From the formulas of `unit_outline`, with
-        // k = cos²(alpha) - sin²(eta): m = sin(eta) cos(eta) / k and r = (sin(alpha) cos(alpha) / k + sin(alpha) / sqrt(k)) / 2.
-        let (mut tan, mut sin) = (m, r / (1.0 + r * r).sqrt());
-        for _ in 0..60 {
-            let cos2_eta = 1.0 / (1.0 + tan * tan);
-            let k = (cos2_eta - sin * sin).max(1e-9);
-            let r_now = 0.5 * (sin * (1.0 - sin * sin).sqrt() / k + sin / k.sqrt());
-            let step = (r / r_now).clamp(0.5, 2.0);
-            let tan_now = m * k / cos2_eta;
-            let settled = (step - 1.0).abs() < 1e-15 && (tan_now - tan).abs() < 1e-15;
-            sin = (sin * step).min(0.999);
-            tan = tan_now;
-            if settled {
-                break;
-            }
-        }
-        let sideways = if m > 0.0 { ray.xy() * (tan / m) } else { ray.xy() };
-        let direction = Vector3::new(sideways.x, sideways.y, 1.0).normalize();
-        Some(Point3::from(direction * (radius / sin)))
+        // Unknown: tan(eta) of the centre's direction, sin²(alpha), and the minor semi-axis b. The formulas of `unit_outline` come to
+        // m = tan(eta) (1 + b²), sin²(alpha) = b² cos²(eta) / (1 + b²) and r = b (1 + sqrt(1 + m² / (1 + b²))) / 2.
+        let b = minor_axis(m, r);
+        let outer = 1.0 + b * b;
+        let tan = m / outer;
+        let sin = b / (outer * (1.0 + tan * tan)).sqrt();
+        let direction = Vector3::new(ray.x / outer, ray.y / outer, 1.0).normalize();
+        let centre = Point3::from(direction * (radius / sin));
+        let shown = unit_outline(&centre, radius).ok()?;
+        let off = (shown.centre - ray.xy()).coords.norm() + (0.5 * (shown.major + shown.minor) - r).abs();
+        (off <= 1e-6 * (m + r)).then_some(centre)
     }
 
     /// The pixel that shows the direction (p, 1); `None` beyond the fold of the lens.
@@ -406,25 +268,69 @@ impl Camera {
             .into_iter()
             .map(|(x, y)| (Point2::new(x, y) - self.principal).norm())
             .fold(0.0, f64::max);
-        // March outward until the image of the ray leaves the frame; the image must grow all the way, in every direction.
+        // March outward until the image of the ray leaves the frame; there and before, the lens must not have folded the image over.
         for direction in 0..32 {
             let (sin, cos) = (f64::from(direction) * std::f64::consts::TAU / 32.0).sin_cos();
+            let at = |u: f64| Point2::new(u * cos, u * sin);
+            let out = |u: f64| {
+                let image = self.distortion.distort(at(u));
+                (image.x * cos + image.y * sin) * self.focal_px
+            };
             let (mut last, mut u) = (0.0, 0.0);
             let step = reach / self.focal_px / 200.0;
-            while last < reach {
+            let mut folds = false;
+            while last < reach && !folds {
                 u += step;
-                let ideal = Point2::new(u * cos, u * sin);
-                let image = self.distortion.distort(ideal);
-                let out = (image.x * cos + image.y * sin) * self.focal_px;
-                let turned = self.distortion.jacobian(ideal).determinant() <= 0.0;
-                if out.is_nan() || out <= last || turned {
-                    return Err(CameraError::Folds { radius_px: last });
+                let now = out(u);
+                folds = now.is_nan() || now <= last || self.distortion.jacobian(at(u)).determinant() <= 0.0;
+                last = now;
+            }
+            // The steps may be wider than the fold.
+            if folds || !self.distortion.shows(at(u)) {
+                let (mut shown, mut beyond) = (0.0, u);
+                for _ in 0..60 {
+                    let middle = 0.5 * (shown + beyond);
+                    if self.distortion.shows(at(middle)) {
+                        shown = middle;
+                    } else {
+                        beyond = middle;
+                    }
                 }
-                last = out;
+                return Err(CameraError::Folds {
+                    radius_px: out(shown),
+                });
             }
         }
         Ok(self)
     }
+}
+
+/// The minor semi-axis b of a sphere's outline on the plane at unit depth, from the distance `m` of its centre from the axis and the mean
+/// `r` of both semi-axes: the root of b (1 + sqrt(1 + m² / (1 + b²))) = 2 r, whose left side rises with b. By Newton's method, and by
+/// bisection where that leads out of where the root must be.
+fn minor_axis(m: f64, r: f64) -> f64 {
+    let (mut low, mut high) = (2.0 * r / (1.0 + 1.0_f64.hypot(m)), r);
+    let mut b = low;
+    for _ in 0..100 {
+        let outer = 1.0 + b * b;
+        let root = (1.0 + m * m / outer).sqrt();
+        let excess = b * (1.0 + root) - 2.0 * r;
+        if excess <= 0.0 {
+            low = b;
+        } else {
+            high = b;
+        }
+        let slope = 1.0 + root - (m * b / outer).powi(2) / root;
+        let mut next = b - excess / slope;
+        if !(low..=high).contains(&next) {
+            next = 0.5 * (low + high);
+        }
+        if (next - b).abs() <= 1e-16 * b {
+            break;
+        }
+        b = next;
+    }
+    b
 }
 
 /// The outline of a sphere on the plane at unit depth.
@@ -464,6 +370,16 @@ pub(crate) fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse,
             0.0
         },
     })
+}
+
+/// Refuses a frame without pixels, or with more than a renderer can hold.
+fn frame_size(width: u32, height: u32) -> Result<(), CameraError> {
+    positive("frame width (px)", f64::from(width))?;
+    positive("frame height (px)", f64::from(height))?;
+    if width.max(height) > Camera::LARGEST_SIDE {
+        return Err(CameraError::TooLarge { width, height });
+    }
+    Ok(())
 }
 
 fn positive(quantity: &'static str, value: f64) -> Result<(), CameraError> {

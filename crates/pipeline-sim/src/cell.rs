@@ -39,8 +39,17 @@ impl SightRule {
     ///
     /// # Errors
     /// What keeps the ball from being seen: [`SightError::LargerThanView`], [`SightError::Radius`], [`SightError::CentreOutside`],
-    /// [`SightError::CutOff`].
+    /// [`SightError::CutOff`]. [`SightError::NotFinite`] for a rule that is NaN.
     pub fn check(&self, outline: &Ellipse, size: (u32, u32)) -> Result<(), SightError> {
+        for (quantity, value) in [
+            ("the smallest radius seen (units)", self.min_radius),
+            ("the greatest radius seen (units)", self.max_radius),
+            ("the least share of the outline inside the frame", self.min_share),
+        ] {
+            if value.is_nan() {
+                return Err(SightError::NotFinite { quantity, value });
+            }
+        }
         let circle = outline.circle();
         let Features { r, .. } = Features::from_circle(&circle, size.0);
         let (width, height) = (f64::from(size.0), f64::from(size.1));
@@ -227,11 +236,14 @@ impl Cell {
     /// As [`Cell::features`], with the reason why there are none.
     ///
     /// # Errors
-    /// [`SightError`]: joints that are not finite; a ball without an outline (behind the camera, around it, nowhere); an outline larger than the
+    /// [`SightError`]: joints, or a measure of arm or mount, that are not finite; a ball without an outline (behind the camera, around it, nowhere); an outline larger than the
     /// view; otherwise what [`Cell::sight`] asks for and does not get.
     pub fn try_features(&self, joints: &Joints) -> Result<Features, SightError> {
         if let Some(joint) = joints.non_finite() {
             return Err(SightError::JointNotFinite { joint });
+        }
+        if let Some((quantity, value)) = self.non_finite_measure() {
+            return Err(SightError::NotFinite { quantity, value });
         }
         let centre = self
             .camera_pose(joints)
@@ -239,6 +251,23 @@ impl Cell {
         let outline = self.camera.project_sphere(&centre, self.ball.radius)?;
         self.sight.check(&outline, self.camera.size())?;
         Ok(Features::from_circle(&outline.circle(), self.camera.size().0))
+    }
+
+    /// The first measure that the camera's pose rests on and that is not finite.
+    fn non_finite_measure(&self) -> Option<(&'static str, f64)> {
+        let (arm, mount) = (&self.params, &self.mount.0);
+        let [a, b, c] = mount.translation.vector.into();
+        let [i, j, k, w] = mount.rotation.coords.into();
+        let measures = [
+            ("the arm's length a2 (m)", arm.a2),
+            ("the arm's length a3 (m)", arm.a3),
+            ("the arm's length d2 (m)", arm.d2),
+            ("the arm's length d4 (m)", arm.d4),
+            ("the arm's length d6 (m)", arm.d6),
+            ("the place of the camera's mount (m)", a + b + c),
+            ("the rotation of the camera's mount", i + j + k + w),
+        ];
+        measures.into_iter().find(|(_, value)| !value.is_finite())
     }
 
     /// The point between the finger pads, world frame, metres.
@@ -287,7 +316,7 @@ impl Cell {
     /// As [`Cell::goal_pose`], with the reason why there is none.
     ///
     /// # Errors
-    /// [`ReachError`]: a ball or an angle that is not finite; a camera that cannot show the ball as the goal has it; a ball out of the arm's
+    /// [`ReachError`]: a ball, an angle, or a measure of arm or mount that is not finite; a ball without size; a camera that cannot show the ball as the goal has it; a ball out of the arm's
     /// reach; a pose out of the working limits.
     pub fn try_goal_pose(&self, jt5_degrees: f64) -> Result<Joints, ReachError> {
         let ball = self.ball.centre;
@@ -300,6 +329,13 @@ impl Cell {
             if !value.is_finite() {
                 return Err(ReachError::NotFinite { quantity, value });
             }
+        }
+        if let Some((quantity, value)) = self.non_finite_measure() {
+            return Err(ReachError::NotFinite { quantity, value });
+        }
+        let radius = self.ball.radius;
+        if !(radius.is_finite() && radius > 0.0) {
+            return Err(ReachError::BallRadius { radius });
         }
         // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a two-link arm in the plane.
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
@@ -365,6 +401,7 @@ impl Cell {
     ///
     /// The ball may be between the open fingers, that is what they are for: it counts when a finger, the palm or the camera comes
     /// nearer to its surface than the sensors' range, which does not happen in a correct reach and grip. A held ball does not count.
+    /// Joints, ball or table that are NaN count as near: nothing says that the way is free.
     pub fn proximity(&self, joints: &Joints) -> bool {
         let range = self.hand.sensor_range;
         self.hand_bodies(joints)
@@ -373,7 +410,7 @@ impl Cell {
     }
 
     /// Whether fingers, palm or camera overlap table, holder or ball (a held ball does not count): what no hand of metal can do, and what a
-    /// simulated one that got there has run into.
+    /// simulated one that got there has run into. Joints, ball or table that are NaN count as overlapping.
     pub fn collides(&self, joints: &Joints) -> bool {
         /// Bodies that [`Cell::follow`] has pushed apart touch, to rounding.
         const TOUCH: f64 = -1e-6;
@@ -389,16 +426,17 @@ impl Cell {
         [left, right].map(|finger| self.is_within(self.hand.sensor_range, &finger))
     }
 
-    /// Whether a part of the hand is nearer to something than `range`.
+    /// Whether a part of the hand is nearer to something than `range`, or cannot be told not to be (a place that is NaN).
     fn is_within(&self, range: f64, body: &Capsule) -> bool {
         let holder = self.holder.map(|h| Capsule {
             from: Point3::new(h.foot.x, h.foot.y, self.table),
             to: Point3::new(h.foot.x, h.foot.y, h.top - h.radius),
             radius: h.radius,
         });
-        body.gap_to_plane(self.table) < range
-            || (self.held.is_none() && body.gap_to_sphere(&self.ball.centre, self.ball.radius) < range)
-            || holder.is_some_and(|h| body.gap_to(&h) < range)
+        let near = |gap: f64| gap.is_nan() || gap < range;
+        near(body.gap_to_plane(self.table))
+            || (self.held.is_none() && near(body.gap_to_sphere(&self.ball.centre, self.ball.radius)))
+            || holder.is_some_and(|h| near(body.gap_to(&h)))
     }
 
     /// Fingers, palm and camera, in the world frame. Closed fingers stand as far apart as the ball is wide if they hold it.

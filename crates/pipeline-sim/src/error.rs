@@ -22,6 +22,14 @@ pub enum CameraError {
         /// What was given.
         value: f64,
     },
+    /// A frame that is larger than [`crate::Camera::LARGEST_SIDE`] on a side.
+    #[error("a frame of {width} x {height} px is too large: at most {largest} px on a side", largest = crate::Camera::LARGEST_SIDE)]
+    TooLarge {
+        /// Width asked for, pixels.
+        width: u32,
+        /// Height asked for, pixels.
+        height: u32,
+    },
     /// The distortion folds the image over within the frame: two directions would meet in one pixel.
     #[error(
         "the lens distortion folds the image over {radius_px:.0} px from the principal point, inside the frame"
@@ -90,6 +98,14 @@ pub enum SightError {
         /// The joint.
         joint: Joint,
     },
+    /// A measure of arm or hand, or of the rule itself, is NaN (or, where none can be, infinite).
+    #[error("{quantity} must be a finite number, but is {value}")]
+    NotFinite {
+        /// Which quantity.
+        quantity: &'static str,
+        /// What was given.
+        value: f64,
+    },
     /// The ball has no outline in the image.
     #[error(transparent)]
     Projection(#[from] ProjectionError),
@@ -141,13 +157,19 @@ pub enum SightError {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReachError {
-    /// An angle, or a coordinate of the ball, is NaN or infinite.
+    /// An angle, a coordinate of the ball, or a measure of arm or mount is NaN or infinite.
     #[error("{quantity} must be a finite number, but is {value}")]
     NotFinite {
         /// Which quantity.
         quantity: &'static str,
         /// What was given.
         value: f64,
+    },
+    /// The ball's radius is not above zero, or not a finite number.
+    #[error("the radius of the ball must be a finite number above zero, but is {radius} m")]
+    BallRadius {
+        /// Radius given, metres.
+        radius: f64,
     },
     /// No place before this camera shows a ball of this size as the goal has it.
     #[error("the camera shows the ball nowhere as the goal has it")]
@@ -227,6 +249,16 @@ pub enum QuantityError {
         /// What was given.
         value: f64,
     },
+    /// A quantity is greater than can be worked with.
+    #[error("{quantity} must be at most {greatest}, but is {value}")]
+    TooLarge {
+        /// Which quantity.
+        quantity: String,
+        /// What was given.
+        value: f64,
+        /// The greatest that can be worked with.
+        greatest: f64,
+    },
     /// A search over moves can follow one or two joints, not more.
     #[error("the moves turn {count} joints; a search can follow one or two")]
     Joints {
@@ -252,6 +284,18 @@ pub(crate) fn amount(quantity: impl Into<String>, value: f64) -> Result<(), Quan
         return Err(QuantityError::Negative { quantity, value });
     }
     finite(quantity, value)
+}
+
+/// Refuses what is above `greatest`.
+pub(crate) fn at_most(quantity: &str, value: f64, greatest: f64) -> Result<(), QuantityError> {
+    if value <= greatest {
+        return Ok(());
+    }
+    Err(QuantityError::TooLarge {
+        quantity: quantity.to_owned(),
+        value,
+        greatest,
+    })
 }
 
 /// Refuses a range that is not finite and ascending.

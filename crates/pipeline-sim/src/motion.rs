@@ -34,9 +34,10 @@ pub enum BallPath {
 }
 
 impl BallPath {
-    /// Where the ball is after `seconds`; `None` for jumps to nowhere (an empty list) and a circle without a period.
+    /// Where the ball is after `seconds`; `None` for jumps to nowhere (an empty list), a circle without a period, and a place that
+    /// is not finite.
     pub fn at(&self, seconds: f64) -> Option<Point3<f64>> {
-        match self {
+        let place = match self {
             Self::Drift { from, velocity } => Some(from + velocity * seconds),
             Self::Circle {
                 middle,
@@ -51,7 +52,8 @@ impl BallPath {
                 let reached = places.iter().take_while(|(time, _)| *time <= seconds).last();
                 reached.or(places.first()).map(|(_, place)| *place)
             }
-        }
+        };
+        place.filter(|place| place.iter().all(|v| v.is_finite()))
     }
 }
 
@@ -152,5 +154,29 @@ impl Workspace {
             from: *from,
             velocity,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_leads_to_no_place_that_is_no_number() {
+        let drift = |speed| BallPath::Drift {
+            from: Point3::origin(),
+            velocity: Vector3::new(speed, 0.0, 0.0),
+        };
+        assert!(drift(1.0).at(2.0).is_some());
+        assert_eq!(drift(f64::NAN).at(2.0), None);
+        assert_eq!(drift(1.0).at(f64::INFINITY), None);
+        let circle = BallPath::Circle {
+            middle: Point3::origin(),
+            radius: f64::NAN,
+            period: 1.0,
+        };
+        assert_eq!(circle.at(0.0), None);
+        let jump = BallPath::Jumps(vec![(0.0, Point3::new(f64::NAN, 0.0, 0.0))]);
+        assert_eq!(jump.at(1.0), None);
     }
 }

@@ -1,6 +1,6 @@
 //! Which quantity of a scene or a shot makes no sense.
 
-use crate::error::{amount, finite};
+use crate::error::{amount, at_most, finite};
 use crate::{Look, QuantityError, Scene, Sensor, Shape, Shot};
 
 impl Scene {
@@ -63,10 +63,25 @@ impl Shot {
     /// Whether a frame can be taken like this. [`crate::Renderer::take`] does not ask.
     ///
     /// # Errors
-    /// [`QuantityError`] names the time that is not finite or below zero.
+    /// [`QuantityError`] names the time that is not finite, below zero or above [`Shot::LONGEST`], or the number of moments that is
+    /// zero or above [`Shot::MOST_MOMENTS`].
     pub fn check(&self) -> Result<(), QuantityError> {
-        amount("exposure time (s)", self.exposure)?;
-        amount("time between the fields (s)", self.interlace.unwrap_or(0.0))
+        for (quantity, time) in [
+            ("exposure time (s)", self.exposure),
+            ("time between the fields (s)", self.interlace.unwrap_or(0.0)),
+        ] {
+            amount(quantity, time)?;
+            at_most(quantity, time, Self::LONGEST)?;
+        }
+        let (quantity, moments) = ("number of moments", self.moments as f64);
+        if self.moments == 0 {
+            let quantity = quantity.to_owned();
+            return Err(QuantityError::NotPositive {
+                quantity,
+                value: moments,
+            });
+        }
+        at_most(quantity, moments, Self::MOST_MOMENTS as f64)
     }
 }
 
@@ -170,6 +185,15 @@ mod tests {
             let refused = scene.check().expect_err("makes no sense").to_string();
             assert!(refused.starts_with(named), "{named}: {refused}");
         }
+        assert!(Shot::pal(0.02, Shot::MOST_MOMENTS).check().is_ok());
+        for moments in [0, Shot::MOST_MOMENTS + 1, usize::MAX] {
+            let error = Shot::pal(0.02, moments)
+                .check()
+                .expect_err("no number of moments");
+            assert!(error.to_string().contains("moments"), "{error}");
+        }
+        let error = Shot::pal(1e300, 3).check().expect_err("for ever").to_string();
+        assert!(error.contains("exposure time") && error.contains("60"), "{error}");
         let shot = Shot::pal(f64::NAN, 3).check().expect_err("no time").to_string();
         assert!(shot.starts_with("exposure time"), "{shot}");
     }

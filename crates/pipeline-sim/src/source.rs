@@ -164,7 +164,8 @@ pub struct FeatureCamera<P> {
 
 impl<P: FnMut() -> Joints> FeatureCamera<P> {
     /// A camera in `cell` that looks from wherever `pose` says the joints are; its features carry normal noise of standard deviation
-    /// `noise` units, drawn from `seed`. With noise that is no finite number it finds nothing ([`FeatureCamera::try_new`] refuses it).
+    /// `noise` units, drawn from `seed`. With noise that is no finite number, or below zero, it finds nothing
+    /// ([`FeatureCamera::try_new`] refuses it).
     pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Self {
         Self {
             cell,
@@ -183,9 +184,9 @@ impl<P: FnMut() -> Joints> FeatureCamera<P> {
         Ok(Self::new(cell, pose, noise, seed))
     }
 
-    /// What a detector would find; `None` if the ball counts as lost, or the noise is no finite number.
+    /// What a detector would find; `None` if the ball counts as lost, or the noise is no finite number of zero or above.
     pub fn look(&mut self) -> Option<Features> {
-        if !self.noise.is_finite() {
+        if amount(NOISE, self.noise).is_err() {
             return None;
         }
         let joints = (self.pose)();

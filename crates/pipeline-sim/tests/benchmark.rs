@@ -166,3 +166,13 @@ fn a_frame_without_pixels_is_refused() {
     // However small the frame, there is one.
     assert!(BenchmarkKind::Many.draw((1, 1), &mut rng).is_ok());
 }
+
+#[test]
+fn frames_of_any_shape_are_drawn_and_rendered() {
+    for kind in [BenchmarkKind::Clean, BenchmarkKind::Textured] {
+        for size in [(100, 576), (16, 2000), (2000, 16)] {
+            let (mut renderer, snapshot) = drawn(kind, size, 1);
+            assert_eq!(snapshot.take(&mut renderer).dimensions(), size);
+        }
+    }
+}

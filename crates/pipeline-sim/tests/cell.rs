@@ -308,7 +308,10 @@ fn why_there_is_no_goal_pose_is_told() {
         "{back}"
     );
     assert!(at(0.6, f64::NAN, 0.0).to_string().contains("y coordinate"));
-    assert_eq!(refused(&|cell| cell.ball.radius = -1.0), ReachError::NoView);
+    assert_eq!(
+        refused(&|cell| cell.ball.radius = -1.0),
+        ReachError::BallRadius { radius: -1.0 }
+    );
     let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
     assert!(
         cell.try_goal_pose(f64::INFINITY)
@@ -317,4 +320,43 @@ fn why_there_is_no_goal_pose_is_told() {
             .contains("JT5")
     );
     assert_eq!(cell.try_goal_pose(45.0).ok(), cell.goal_pose(45.0));
+}
+
+#[test]
+fn measures_that_are_no_numbers_are_named() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let pose = Workspace::paper().search_poses()[3];
+    let (mut mount, mut arm, mut rule) = (cell, cell, cell);
+    mount.mount.0.translation.vector.x = f64::NAN;
+    arm.params.a2 = f64::NAN;
+    rule.sight.min_share = f64::NAN;
+    for (wrong, named) in [(mount, "mount"), (arm, "a2"), (rule, "share")] {
+        let error = wrong.try_features(&pose).expect_err("no number").to_string();
+        assert!(error.contains(named), "{error}");
+    }
+    for (wrong, named) in [(mount, "mount"), (arm, "a2")] {
+        let error = wrong.try_goal_pose(45.0).expect_err("no number").to_string();
+        assert!(error.contains(named), "{error}");
+    }
+    for radius in [f64::NAN, -0.02, 0.0] {
+        let mut wrong = cell;
+        wrong.ball.radius = radius;
+        let error = wrong.try_goal_pose(45.0).expect_err("no ball");
+        assert!(matches!(error, ReachError::BallRadius { .. }), "{error}");
+    }
+}
+
+#[test]
+fn what_is_nowhere_counts_as_near() {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let pose = Workspace::paper().search_poses()[3];
+    assert!(!cell.proximity(&pose) && !cell.collides(&pose));
+    let (mut table, mut ball) = (cell, cell);
+    table.table = f64::NAN;
+    ball.ball.centre.x = f64::NAN;
+    let nowhere = Joints([f64::NAN; 6]);
+    for (cell, joints) in [(cell, nowhere), (table, pose), (ball, pose)] {
+        assert!(cell.proximity(&joints) && cell.collides(&joints));
+        assert_eq!(cell.proximity_pair(&joints), [true; 2]);
+    }
 }

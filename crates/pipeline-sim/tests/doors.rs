@@ -4,8 +4,8 @@ use hough_heuristic::image::GrayImage;
 use hough_heuristic::{FrameError, FrameSource};
 use nalgebra::Vector3;
 use pipeline_sim::{
-    Ball, Cell, CellCamera, Motion, Renderer, Scene, Sensor, SharedCell, Shot, SimulatedArm, Workspace,
-    Y4mWriter,
+    Ball, Cell, CellCamera, FeatureCamera, Motion, Renderer, Scene, Sensor, SharedCell, Shot, SimulatedArm,
+    Workspace, Y4mWriter,
 };
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 
@@ -214,4 +214,19 @@ fn video_says_how_its_frames_were_taken() {
     let video = || Y4mWriter::new(Vec::new(), 25, 1).expect("PAL");
     assert!(header(video()).contains(" Ip "));
     assert!(header(video().interlaced()).starts_with("YUV4MPEG2 W4 H2 F25:1 It A1:1 Cmono\n"));
+}
+
+#[test]
+fn a_camera_with_noise_that_makes_no_sense_finds_nothing() {
+    let pose = Workspace::paper().search_poses()[3];
+    let cell = || SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)));
+    let found = |noise| {
+        let mut camera = FeatureCamera::new(cell(), move || pose, noise, 1);
+        camera.look().is_some()
+    };
+    assert!(found(0.0) && found(0.5));
+    for noise in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(!found(noise), "{noise}");
+        assert!(FeatureCamera::try_new(cell(), move || pose, noise, 1).is_err());
+    }
 }

@@ -348,3 +348,35 @@ fn the_overview_shows_arm_ball_and_workspace() {
     assert_eq!(svg.matches(">0.2 m</text>").count(), 2);
     assert!(svg.contains(">field of view</text>") && !without.contains(">field of view</text>"));
 }
+
+#[test]
+fn things_far_off_the_table_throw_no_shadow() {
+    let (cell, joints) = (
+        Cell::paper(Ball::at(0.6, 0.0, -0.1)),
+        Workspace::paper().search_poses()[3],
+    );
+    let mut scene = Scene {
+        things: Vec::new(),
+        ..Scene::laboratory()
+    };
+    let bare = Renderer::new(&scene, 1).render(&cell, &joints).clone();
+    let template = Scene::laboratory().things[0];
+    for (x, y) in [
+        (0.0, 1.0),
+        (1.0, 0.0),
+        (0.0, -1.0),
+        (-1.0, 0.0),
+        (1.0, 1.0),
+        (-1.0, -1.0),
+    ] {
+        for far in [20.0, 1e6, 1e300] {
+            scene.things.push(pipeline_sim::Thing {
+                shape: Shape::Ball { radius: 0.02 },
+                x: far * x,
+                y: far * y,
+                ..template
+            });
+        }
+    }
+    assert!(*Renderer::new(&scene, 1).render(&cell, &joints) == bare);
+}

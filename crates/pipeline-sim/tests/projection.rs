@@ -307,3 +307,59 @@ fn directions_beyond_the_fold_are_not_shown() {
         assert!((back - pixel).norm() < 1e-6, "{pixel} {back}");
     }
 }
+
+#[test]
+fn a_circle_leads_back_to_its_sphere_whatever_the_lens() {
+    for millimetres in 2..=12 {
+        let camera = Camera::pinhole(f64::from(millimetres) * 1e-3, 0.0088, 768, 576).expect("a camera");
+        for k in 0..400 {
+            let circle = hough_heuristic::Circle {
+                x: f64::from(k % 20) * 40.0,
+                y: f64::from(k / 20) * 30.0,
+                radius: [2.0, 40.0, 132.0, 260.0][k as usize % 4],
+            };
+            let centre = camera.sphere_of_circle(&circle, 0.02).expect("there is one");
+            let back = camera
+                .project_sphere_to_circle(&centre, 0.02)
+                .expect("before the camera");
+            let off = (back.x - circle.x).hypot(back.y - circle.y) + (back.radius - circle.radius).abs();
+            assert!(off < 1e-6, "{millimetres} mm: {circle:?} comes back as {back:?}");
+        }
+    }
+}
+
+#[test]
+fn a_frame_too_large_to_hold_is_refused() {
+    let (largest, more) = (Camera::LARGEST_SIDE, Camera::LARGEST_SIDE + 1);
+    assert!(Camera::paper().resized(largest, largest).is_ok());
+    for (width, height) in [(u32::MAX, u32::MAX), (1, more), (more, 1)] {
+        let refused = [
+            Camera::paper().resized(width, height),
+            Camera::pinhole(0.01, 0.01, width, height),
+        ];
+        for refused in refused {
+            assert_eq!(refused, Err(CameraError::TooLarge { width, height }));
+        }
+    }
+}
+
+#[test]
+fn a_fold_narrower_than_the_frame_is_found() {
+    let lens = Distortion {
+        k1: -2.0,
+        k2: 1.0,
+        ..Distortion::default()
+    };
+    let wide = Camera::paper().with_focal_factor(0.002).expect("a camera");
+    // The radius u (1 - u²)² first turns back at u² = 1 / 5.
+    let expected = wide.focal_px() * 0.2_f64.sqrt() * 0.64;
+    for lens in [lens, Distortion { p1: 1e-6, ..lens }] {
+        let Err(CameraError::Folds { radius_px }) = wide.with_distortion(lens) else {
+            panic!("folds");
+        };
+        assert!(
+            (radius_px - expected).abs() < 1e-3 * expected,
+            "{radius_px} {expected}"
+        );
+    }
+}

@@ -48,7 +48,7 @@ pub(super) struct ThingShadows {
     bare: Vec<f32>,
     /// With them.
     map: CoarseMap,
-    /// Of each thing; `None` for what lies flat.
+    /// Of each thing; `None` for what lies flat, or off the map.
     casts: Vec<Option<Cast>>,
     /// Things that are not there at present.
     left_out: Vec<usize>,
@@ -121,7 +121,7 @@ impl ThingShadows {
     }
 }
 
-/// The shadow of a thing on a map.
+/// The shadow of a thing on a map; `None` if there is none.
 fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
     if thing.shape.is_flat() {
         return None;
@@ -143,6 +143,9 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
         .fold(0.0, f64::max);
     let reach = foot + (height * longest).max(0.05);
     let (columns, rows) = map.range(thing.x, thing.y, reach.min(map.size));
+    if columns.is_empty() || rows.is_empty() {
+        return None;
+    }
     // Each point of a lamp looks at another place of the map's cell, so that edges of shadows are as soft as the map can show them.
     let cell = map.size / (map.side - 1) as f64;
     let within = |k: usize, step: f64| cell * ((k as f64 * step).fract() - 0.5);

@@ -11,18 +11,24 @@ use crate::{Cell, Renderer};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Shot {
-    /// Time the shutter is open, seconds. 0 freezes all motion.
+    /// Time the shutter is open, seconds, up to [`Shot::LONGEST`]. 0 freezes all motion.
     pub exposure: f64,
     /// 1 freezes all motion. With more, the frame is drawn once, in the middle of its exposure, and each part of it is averaged along the way
     /// it takes, as long as arm, ball and holder move evenly and not far (48 pixels either way). Otherwise, and for two frozen fields, this
     /// many moments, spread evenly over the exposure of each field, are drawn and averaged at the cost of a frame each: one for every two
-    /// pixels of motion is enough.
+    /// pixels of motion is enough. 1 to [`Shot::MOST_MOMENTS`]; [`Renderer::take`] takes what is beyond for the nearer of both.
     pub moments: usize,
-    /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones.
+    /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones, at most [`Shot::LONGEST`].
     pub interlace: Option<f64>,
 }
 
 impl Shot {
+    /// The most moments of a field.
+    pub const MOST_MOMENTS: usize = 64;
+
+    /// The longest exposure, and the longest time between two fields, seconds.
+    pub const LONGEST: f64 = 60.0;
+
     /// All at once.
     pub fn still() -> Self {
         Self {
@@ -54,7 +60,7 @@ impl Renderer {
     ///
     /// The truth of such a frame is that of the middle of its exposure.
     pub fn take(&mut self, shot: &Shot, mut moment: impl FnMut(f64) -> (Cell, Joints)) -> &GrayImage {
-        let count = shot.moments.clamp(1, 64);
+        let count = shot.moments.clamp(1, Shot::MOST_MOMENTS);
         if count == 1 && shot.interlace.is_none() {
             let (cell, joints) = moment(0.5 * shot.exposure);
             return self.render(&cell, &joints);
