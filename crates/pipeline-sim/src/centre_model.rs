@@ -50,13 +50,13 @@ impl CentreModel {
         let rows = rows(samples, needed)?;
         enough(samples, needed)?;
         let fit = rows.solve(PLACE, samples.len())?;
-        Ok(Self::with(with_radius, fit, samples))
+        Ok(Self::with(with_radius, fit, samples, None))
     }
 
     /// The model fitted anew to samples of another plant, held toward this one, as [`ReachModel::refit`](crate::ReachModel::refit) does it for
     /// the approach: the coefficients c minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with c0 this model's
     /// coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest move of the list at the goal). Without samples the model
-    /// stays as it is.
+    /// stays as it is. For [`CentreModel::uncertainty`] the variances of this model count as ten further degrees of freedom.
     ///
     /// # Errors
     /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or above 1e100; otherwise as for
@@ -74,11 +74,11 @@ impl CentreModel {
             enough(samples, needed)?;
         }
         let fit = rows.solve(PLACE, samples.len())?;
-        Ok(Self::with(self.with_radius, fit, samples))
+        Ok(Self::with(self.with_radius, fit, samples, Some(self)))
     }
 
-    /// The model with these coefficients, judged on the samples they were fitted to.
-    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample]) -> Self {
+    /// The model with these coefficients, judged on the samples they were fitted to; of a refit, with the prior.
+    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample], prior: Option<&Self>) -> Self {
         let mut model = Self {
             with_radius,
             fit,
@@ -98,7 +98,12 @@ impl CentreModel {
             })
             .collect();
         let count = samples.len() as f64;
-        model.noise = Noise::of(&residuals, (count - taken).max(1.0) / count);
+        let freedom = count - taken;
+        model.noise = Noise::of(&residuals, freedom.max(1.0) / count);
+        if let Some(prior) = prior {
+            model.fit.pool(&prior.fit, freedom);
+            model.noise = model.noise.pooled(&prior.noise, freedom);
+        }
         model.quality = vec![model.judge(samples)];
         model
     }
@@ -114,15 +119,21 @@ impl CentreModel {
     }
 
     /// The standard deviation of x, feature units, that the fit expects around what a new observation would show: noise, what the terms
-    /// leave out (which grows with the move), and the uncertainty of the coefficients.
-    pub fn uncertainty(&self, before: &Features, d1: f64) -> f64 {
+    /// leave out (which grows with the move), and the uncertainty of the coefficients. `None` if an argument is not finite, or `before` shows a
+    /// radius that is not above zero.
+    pub fn uncertainty(&self, before: &Features, d1: f64) -> Option<f64> {
+        let finite = before.x.is_finite() && before.y.is_finite();
+        if !finite || before.r.is_nan() || before.r <= 0.0 {
+            return None;
+        }
         let terms = terms(before, d1);
         let of_fit = self.fit.residual[0].powi(2) * self.fit.leverage(&terms[..self.fit.terms()]);
-        (self.noise.variance(shares(before, d1, self.with_radius)) + of_fit).sqrt()
+        let sd = (self.noise.variance(shares(before, d1, self.with_radius)) + of_fit).sqrt();
+        sd.is_finite().then_some(sd)
     }
 
     /// What the fit leaves of the changes of x on its samples: standard deviation in feature units, with the degrees of freedom that
-    /// are left.
+    /// are left; of a refit, together with those of its prior.
     pub fn residual_noise(&self) -> f64 {
         self.fit.residual[0]
     }
@@ -135,9 +146,10 @@ impl CentreModel {
     /// How well dx is reproduced on other samples.
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] without samples.
+    /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not above zero.
     pub fn quality_on(&self, samples: &[CentreSample]) -> Result<Vec<Quality>, QuantityError> {
         Quality::some(samples.len())?;
+        rows(samples, self.fit.terms()).map_err(FitError::into_quantity)?;
         Ok(vec![self.judge(samples)])
     }
 
@@ -256,11 +268,12 @@ impl CentreModel {
 
     /// Passes the model on if it could have come out of a fit.
     fn sound(self) -> Result<Self, StoredModelError> {
-        if self.fit.fits(1, 2 + usize::from(self.with_radius)) && self.noise.is_sound() {
+        let fitted = self.fit.fits(1, 2 + usize::from(self.with_radius)) && self.noise.is_sound();
+        if fitted && Quality::are_sound(&self.quality, &["dx"]) {
             return Ok(self);
         }
         Err(StoredModelError::Contents {
-            what: "it has the wrong number of coefficients, or some of its numbers are none",
+            what: "it has the wrong number of coefficients, or a number is out of range",
         })
     }
 }

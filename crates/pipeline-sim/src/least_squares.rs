@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::QuantityError;
+use crate::reach_noise::pooled;
 
 /// Why a regression has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -54,6 +55,30 @@ pub enum FitError {
     },
 }
 
+impl FitError {
+    /// The error of a sample that a model cannot be judged on.
+    pub(crate) fn into_quantity(self) -> QuantityError {
+        match self {
+            Self::NotFinite {
+                index,
+                quantity,
+                value,
+            } => {
+                let quantity = format!("sample {index}: {quantity}");
+                if value.is_finite() && value <= 0.0 {
+                    QuantityError::NotPositive { quantity, value }
+                } else {
+                    QuantityError::NotFinite { quantity, value }
+                }
+            }
+            other => QuantityError::NotFinite {
+                quantity: other.to_string(),
+                value: f64::NAN,
+            },
+        }
+    }
+}
+
 /// Coefficients for several targets over the same terms.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -76,7 +101,7 @@ impl Fit {
         self.coefficients.first().map_or(0, Vec::len)
     }
 
-    /// Whether this is a fit of `targets` targets over `terms` terms, all numbers finite: a stored one may be anything.
+    /// Whether this is a fit of `targets` targets over `terms` terms, all numbers in their ranges: a stored one may be anything.
     pub(crate) fn fits(&self, targets: usize, terms: usize) -> bool {
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         self.coefficients.len() == targets
@@ -84,7 +109,28 @@ impl Fit {
             && self.inverse_gram.len() == terms * terms
             && self.coefficients.iter().all(|c| c.len() == terms && finite(c))
             && finite(&self.residual)
+            && self.residual.iter().all(|sd| *sd >= 0.0)
             && finite(&self.inverse_gram)
+            && self.gram_is_symmetric(terms)
+            && self.condition.is_finite()
+            && self.condition >= 1.0
+            && self.samples > 0
+    }
+
+    /// Whether the inverse Gram matrix is symmetric, but for rounding, with nothing below zero on its diagonal.
+    fn gram_is_symmetric(&self, terms: usize) -> bool {
+        let of = |i: usize, j: usize| self.inverse_gram[i * terms + j];
+        let length = |i: usize| of(i, i).sqrt();
+        (0..terms).all(|i| {
+            of(i, i) >= 0.0 && (0..i).all(|j| (of(i, j) - of(j, i)).abs() <= 1e-6 * length(i) * length(j))
+        })
+    }
+
+    /// Adds to the residual variances of a refit those of its prior; `freedom` is what the refit has left.
+    pub(crate) fn pool(&mut self, prior: &Self, freedom: f64) {
+        for (own, before) in self.residual.iter_mut().zip(&prior.residual) {
+            *own = pooled(own.powi(2), before.powi(2), freedom).sqrt();
+        }
     }
 
     /// The value of target `i` for these terms.
@@ -280,6 +326,15 @@ impl Quality {
             });
         }
         Ok(())
+    }
+
+    /// Whether these are judgements of `outputs`, in that order, with all numbers in their ranges: stored ones may be anything.
+    pub(crate) fn are_sound(all: &[Self], outputs: &[&str]) -> bool {
+        all.len() == outputs.len()
+            && all.iter().zip(outputs).all(|(q, output)| {
+                let numbers = q.r2.is_finite() && q.r2 <= 1.0 && q.rmse.is_finite() && q.rmse >= 0.0;
+                q.output == *output && numbers && q.samples > 0 && q.unpredicted <= q.samples
+            })
     }
 
     /// From pairs of (observed, predicted) changes.

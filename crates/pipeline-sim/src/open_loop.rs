@@ -25,12 +25,15 @@ pub struct OpenLoopError {
     pub r_median: f64,
 }
 
+/// Most moves in a row that errors are told for.
+const MOST_MOVES: usize = 10_000;
+
 impl ReachModel {
     /// Compares model and plant over runs of up to `moves` random moves from the paper's lists, starting from [`exploring_start`]s; entry
     /// k holds the errors after k + 1 moves.
     ///
     /// A run goes on while the plant keeps the ball in sight and the arm within its limits (moves that do not are not taken); the
-    /// model gets its own last prediction as its next input.
+    /// model gets its own last prediction as its next input. More than 10 000 moves count as 10 000.
     pub fn open_loop_error<R: Rng + ?Sized>(
         &self,
         cell: &Cell,
@@ -39,6 +42,7 @@ impl ReachModel {
         rng: &mut R,
     ) -> Vec<OpenLoopError> {
         let lists = MoveLists::paper();
+        let moves = moves.min(MOST_MOVES);
         let mut errors: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); moves];
         let mut lost = vec![0; moves];
         for _ in 0..runs {
@@ -63,7 +67,7 @@ impl ReachModel {
                 }) else {
                     break;
                 };
-                let Some(after) = self.predict_unbounded(&believed, joints[Joint::J3].to_degrees(), d2, d3)
+                let Some(after) = self.predict_onward(&believed, joints[Joint::J3].to_degrees(), d2, d3)
                 else {
                     lost[k..].iter_mut().for_each(|runs| *runs += 1);
                     break;

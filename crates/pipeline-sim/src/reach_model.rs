@@ -4,6 +4,7 @@ use hough_heuristic::Features;
 
 use crate::least_squares::{Entry, Fit, Rows, ridge_strength};
 use crate::reach_noise::Noise;
+use crate::samples;
 use crate::stored::{Reader, Writer};
 use crate::{FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule, StoredModelError};
 
@@ -76,7 +77,7 @@ impl ReachModel {
             }
             model.pieces.push(rows.solve(&place, group.len())?);
             model.noise.push(Default::default());
-            model.noise[i] = model.noise_of(i, group, |_| 1.0);
+            model.noise[i] = model.noise_of(i, group, |_| 1.0).0;
         }
         model.quality = model.judge(samples);
         Ok(model)
@@ -89,6 +90,9 @@ impl ReachModel {
     /// c0 this model's coefficients and w = r before to the power `radius_power`, normalised to mean 1 (the fitted quantities of the
     /// `Rigid` forms are the noisier the smaller the ball; 2 to 4 is right for them, 0 for `Linear`). An interval without samples stays as it
     /// is, and so does the whole model without any.
+    ///
+    /// For [`ReachModel::uncertainty`] the variances of this model count as ten further degrees of freedom. With few samples
+    /// the expected errors are rather too large than too small (the README has the figures).
     ///
     /// # Errors
     /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or is so large that nothing else counts (above 1e100),
@@ -128,7 +132,10 @@ impl ReachModel {
                 rows.pull(&self.pieces[i], &[], ridge_strength(ridge, count)?)?;
             }
             model.pieces[i] = rows.solve(&self.place(i), count)?;
-            model.noise[i] = model.noise_of(i, group, weigh);
+            let ([y, r], freedom) = model.noise_of(i, group, weigh);
+            let [prior_y, prior_r] = &self.noise[i];
+            model.pieces[i].pool(&self.pieces[i], freedom);
+            model.noise[i] = [y.pooled(prior_y, freedom), r.pooled(prior_r, freedom)];
         }
         if !samples.is_empty() {
             model.quality = model.judge(samples);
@@ -140,19 +147,19 @@ impl ReachModel {
     fn groups<'a>(&self, samples: &'a [ReachSample]) -> Result<Vec<Vec<(usize, &'a ReachSample)>>, FitError> {
         let mut groups = vec![Vec::new(); self.edges.len() + 1];
         for (index, sample) in samples.iter().enumerate() {
-            check(index, sample)?;
+            samples::check(index, sample)?;
             groups[self.piece(sample.jt3_degrees)].push((index, sample));
         }
         Ok(groups)
     }
 
-    /// How far the samples of piece `i` lie from what it predicts for them.
+    /// How far the samples of piece `i` lie from what it predicts for them, and the degrees of freedom that are left.
     fn noise_of(
         &self,
         i: usize,
         group: &[(usize, &ReachSample)],
         weight: impl Fn(&ReachSample) -> f64,
-    ) -> [Noise; 2] {
+    ) -> ([Noise; 2], f64) {
         let mut buffer = [0.0; 22];
         let (mut y, mut r, mut fitted) = (Vec::new(), Vec::new(), 0.0);
         for (_, s) in group {
@@ -165,8 +172,9 @@ impl ReachModel {
             }
         }
         // What the coefficients have taken from the samples is missing in the residuals.
-        let left = (group.len() as f64 - fitted).max(1.0) / group.len() as f64;
-        [Noise::of(&y, left), Noise::of(&r, left)]
+        let freedom = group.len() as f64 - fitted;
+        let left = freedom.max(1.0) / group.len() as f64;
+        ([Noise::of(&y, left), Noise::of(&r, left)], freedom)
     }
 
     /// The form the model was fitted in.
@@ -187,7 +195,7 @@ impl ReachModel {
     }
 
     /// As [`ReachModel::predict`], but also where the ball would count as lost. `None` only where the model places the ball behind
-    /// the camera, or an argument is not finite.
+    /// the camera, an argument is not finite, or `before` shows a radius that is not above zero.
     pub fn predict_unbounded(
         &self,
         before: &Features,
@@ -195,6 +203,23 @@ impl ReachModel {
         d2: f64,
         d3: f64,
     ) -> Option<Features> {
+        (before.r > 0.0)
+            .then(|| self.predict_onward(before, jt3_degrees, d2, d3))
+            .flatten()
+    }
+
+    /// As [`ReachModel::predict_unbounded`], also from a prediction of `Linear` whose radius is not above zero.
+    pub(crate) fn predict_onward(
+        &self,
+        before: &Features,
+        jt3_degrees: f64,
+        d2: f64,
+        d3: f64,
+    ) -> Option<Features> {
+        let arguments = [before.x, before.y, before.r, jt3_degrees, d2, d3];
+        if !arguments.iter().all(|v| v.is_finite()) {
+            return None;
+        }
         let mut buffer = [0.0; 22];
         let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
         let fit = &self.pieces[self.piece(jt3_degrees)];
@@ -202,12 +227,12 @@ impl ReachModel {
         let (y, r) = self
             .form
             .image([from[0] + fit.value(0, terms), from[1] + fit.value(1, terms)])?;
-        (y.is_finite() && r.is_finite() && before.x.is_finite()).then_some(Features { x: before.x, y, r })
+        (y.is_finite() && r.is_finite()).then_some(Features { x: before.x, y, r })
     }
 
     /// The standard deviations of y and r, feature units, that the fit expects of [`ReachModel::predict_unbounded`] around what a
     /// new observation would show: noise of both observations, what the form cannot express, and the uncertainty of the coefficients
-    /// together. `None` as there.
+    /// together. `None` as there, and where they are no finite numbers.
     ///
     /// Noise of `before` is carried along: what comes four times as near shows it four times (in y) and sixteen times (in r) as large.
     pub fn uncertainty(&self, before: &Features, jt3_degrees: f64, d2: f64, d3: f64) -> Option<(f64, f64)> {
@@ -232,14 +257,13 @@ impl ReachModel {
                 )
             }
         };
-        Some((
-            (noise_y.variance(of_y) + from_y).sqrt(),
-            (noise_r.variance(of_r) + from_r).sqrt(),
-        ))
+        let y = (noise_y.variance(of_y) + from_y).sqrt();
+        let r = (noise_r.variance(of_r) + from_r).sqrt();
+        (y.is_finite() && r.is_finite()).then_some((y, r))
     }
 
     /// What the fit leaves of the changes of y and r on its samples, a pair for each elbow interval: standard deviations in feature
-    /// units, with the degrees of freedom that are left.
+    /// units, with the degrees of freedom that are left; of a refit, together with those of its prior.
     pub fn residual_noise(&self) -> Vec<(f64, f64)> {
         self.noise.iter().map(|[y, r]| (y.residual, r.residual)).collect()
     }
@@ -253,9 +277,12 @@ impl ReachModel {
     /// for which it predicts no change, and in [`Quality::unpredicted`].
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] without samples.
+    /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not above zero.
     pub fn quality_on(&self, samples: &[ReachSample]) -> Result<Vec<Quality>, QuantityError> {
         Quality::some(samples.len())?;
+        for (index, sample) in samples.iter().enumerate() {
+            samples::check(index, sample).map_err(FitError::into_quantity)?;
+        }
         Ok(self.judge(samples))
     }
 
@@ -327,30 +354,6 @@ fn push(
         })
 }
 
-/// Refuses samples that cannot be fitted to.
-fn check(index: usize, sample: &ReachSample) -> Result<(), FitError> {
-    let numbers = [
-        ("y before", sample.before.y),
-        ("r before", sample.before.r),
-        ("JT3", sample.jt3_degrees),
-        ("d2", sample.d2),
-        ("d3", sample.d3),
-        ("y after", sample.after.y),
-        ("r after", sample.after.r),
-    ];
-    for (quantity, value) in numbers {
-        let usable = value.is_finite() && (!quantity.starts_with('r') || value > 0.0);
-        if !usable {
-            return Err(FitError::NotFinite {
-                index,
-                quantity,
-                value,
-            });
-        }
-    }
-    Ok(())
-}
-
 impl ReachModel {
     const KIND: &str = "reach-model";
 
@@ -414,10 +417,15 @@ impl ReachModel {
         }
         let terms = self.form.terms();
         if self.pieces.len() != edges.len() + 1 || !self.pieces.iter().all(|p| p.fits(2, terms)) {
-            return damaged("it has the wrong number of coefficients, or some are not finite");
+            return damaged(
+                "it has the wrong number of coefficients, or a number of its fit is out of range",
+            );
         }
         if self.noise.len() != self.pieces.len() || !self.noise.iter().flatten().all(Noise::is_sound) {
             return damaged("its noise is not a finite number of zero or above for each piece");
+        }
+        if !Quality::are_sound(&self.quality, &["dy", "dr"]) {
+            return damaged("its accuracy is out of range");
         }
         Ok(self)
     }

@@ -63,6 +63,15 @@ pub(crate) struct Noise {
     pub(crate) fitted: f64,
 }
 
+/// Degrees of freedom that the variances of a prior count for in a refit.
+const PRIOR_FREEDOM: f64 = 10.0;
+
+/// A variance found with `freedom` degrees of freedom (one, if less), together with that of a prior.
+pub(crate) fn pooled(variance: f64, prior: f64, freedom: f64) -> f64 {
+    let sum = variance * freedom.max(1.0);
+    (sum + PRIOR_FREEDOM * prior) / (PRIOR_FREEDOM + freedom.max(0.0))
+}
+
 impl Noise {
     /// From squared residuals with their shares, `left` being the ratio of the degrees of freedom that are left to the samples.
     pub(crate) fn of(residuals: &[(Shares, f64)], left: f64) -> Self {
@@ -106,6 +115,15 @@ impl Noise {
             residual: (total / left).sqrt(),
             observed: observed / left,
             fitted: fitted / left,
+        }
+    }
+
+    /// This noise, found with `freedom` degrees of freedom, together with that of a prior.
+    pub(crate) fn pooled(self, prior: &Self, freedom: f64) -> Self {
+        Self {
+            residual: pooled(self.residual.powi(2), prior.residual.powi(2), freedom).sqrt(),
+            observed: pooled(self.observed, prior.observed, freedom),
+            fitted: pooled(self.fitted, prior.fitted, freedom),
         }
     }
 

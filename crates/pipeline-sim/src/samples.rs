@@ -6,7 +6,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::amount;
-use crate::{Ball, Cell, QuantityError};
+use crate::{Ball, Cell, FitError, QuantityError};
 
 /// What errors call the noise on features.
 pub(crate) const NOISE: &str = "standard deviation of the features' noise (units)";
@@ -25,6 +25,31 @@ pub struct ReachSample {
     pub d3: f64,
     /// What the image showed after the move.
     pub after: Features,
+}
+
+/// Refuses a sample that no model can be fitted to or judged on.
+pub(crate) fn check(index: usize, sample: &ReachSample) -> Result<(), FitError> {
+    let numbers = [
+        ("x before", sample.before.x),
+        ("y before", sample.before.y),
+        ("r before", sample.before.r),
+        ("JT3", sample.jt3_degrees),
+        ("d2", sample.d2),
+        ("d3", sample.d3),
+        ("y after", sample.after.y),
+        ("r after", sample.after.r),
+    ];
+    for (quantity, value) in numbers {
+        let usable = value.is_finite() && (!quantity.starts_with('r') || value > 0.0);
+        if !usable {
+            return Err(FitError::NotFinite {
+                index,
+                quantity,
+                value,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// One move of `JT1`, and the ball before and after it.
@@ -112,7 +137,7 @@ pub fn sample_moves<R: Rng + ?Sized>(
         return (Vec::new(), Vec::new());
     }
     let moves = MoveLists::paper();
-    let (mut centring, mut reaching) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let (mut centring, mut reaching) = (Vec::new(), Vec::new());
     for _ in 0..count {
         centring.extend(
             tried_sample(cell, noise, rng, |rng| {

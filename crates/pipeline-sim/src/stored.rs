@@ -115,8 +115,12 @@ impl<'a> Reader<'a> {
         let mut lines = text.lines();
         let version = lines
             .next()
-            .and_then(|line| line.strip_prefix(SIGNATURE)?.trim_start().strip_prefix(kind))
-            .and_then(|version| version.trim().parse().ok());
+            .and_then(|line| match line.split_whitespace().collect::<Vec<_>>()[..] {
+                [signature, found, version] if signature == SIGNATURE && found == kind => {
+                    version.parse().ok()
+                }
+                _ => None,
+            });
         known(version.ok_or(StoredModelError::Kind { kind })?)?;
         Ok(Self { lines, line: 1 })
     }

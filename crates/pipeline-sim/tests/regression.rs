@@ -462,7 +462,7 @@ fn the_expected_error_of_centring_is_the_one_that_occurs_near_and_far() {
                     let change = s.after.x - s.before.x;
                     let predicted = model.quality_on(std::slice::from_ref(s)).expect("a sample")[0].rmse;
                     assert!(predicted.is_finite() && change.is_finite());
-                    (predicted / model.uncertainty(&s.before, s.d1)).powi(2)
+                    (predicted / model.uncertainty(&s.before, s.d1).expect("finite")).powi(2)
                 };
                 let thirds = fresh.chunks_exact(fresh.len() / 3).take(3);
                 thirds

@@ -1,0 +1,178 @@
+//! What the regression simulators refuse, and what a refit with few samples expects of itself.
+
+use hough_heuristic::Features;
+use pipeline_sim::{
+    Ball, Cell, CentreModel, CentreSample, ErrorLevel, QuantityError, ReachForm, ReachModel, ReachSample,
+    StoredModelError, sample_moves,
+};
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+fn samples(count: usize) -> (Vec<CentreSample>, Vec<ReachSample>) {
+    sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), count, 0.125, &mut rng(1))
+}
+
+#[test]
+fn damaged_numbers_of_a_stored_model_are_refused() {
+    let (centring, reaching) = samples(300);
+    let reach = ReachModel::fit(&reaching, ReachForm::Linear, &[])
+        .expect("enough samples")
+        .to_text();
+    let centre = CentreModel::fit(&centring).expect("enough samples").to_text();
+    let damaged = |text: &str, line: &str| {
+        let name = line.split(' ').next().expect("a name");
+        let put = |old: &str| {
+            if old.split(' ').next() == Some(name) {
+                line.to_owned()
+            } else {
+                old.to_owned()
+            }
+        };
+        text.lines().map(put).collect::<Vec<_>>().join("\n")
+    };
+    let gram = format!("inverse-gram{}", " -1.0".repeat(9));
+    let lopsided = "inverse-gram 1 0.5 0 0 1 0 0 0 1";
+    for line in [
+        "accuracy NaN 1",
+        "accuracy 0.9 -5",
+        "accuracy 1.5 1",
+        "condition NaN",
+        "condition -3",
+        "samples 0",
+        "judged-on 3 900",
+        &gram,
+        lopsided,
+    ] {
+        let said = [
+            ReachModel::from_text(&damaged(&reach, line)).err(),
+            CentreModel::from_text(&damaged(&centre, line)).err(),
+        ];
+        for error in said {
+            assert!(
+                matches!(error, Some(StoredModelError::Contents { .. })),
+                "{line}: {error:?}"
+            );
+        }
+    }
+    assert!(ReachModel::from_text(&damaged(&reach, "residual -1 1")).is_err());
+    assert!(CentreModel::from_text(&damaged(&centre, "residual -1")).is_err());
+    assert!(ReachModel::from_text(&reach.replacen("reach-model 1", "reach-model1", 1)).is_err());
+}
+
+#[test]
+fn a_model_is_not_judged_on_what_is_no_number() {
+    let (centring, reaching) = samples(300);
+    let reach = ReachModel::fit(&reaching, ReachForm::Rigid8, &[]).expect("enough samples");
+    let centre = CentreModel::fit(&centring).expect("enough samples");
+    let (mut moved, mut turned) = (reaching.clone(), centring);
+    moved[4].after.y = f64::NAN;
+    turned[4].after.x = f64::INFINITY;
+    for (refused, name) in [
+        (reach.quality_on(&moved), "sample 4: y after"),
+        (centre.quality_on(&turned), "sample 4: x after"),
+    ] {
+        assert!(
+            matches!(&refused, Err(QuantityError::NotFinite { quantity, .. }) if quantity == name),
+            "{refused:?}"
+        );
+    }
+    let mut aside = reaching;
+    aside[4].before.x = f64::NAN;
+    let refused = ReachModel::fit(&aside, ReachForm::Rigid8, &[]).expect_err("no number");
+    assert!(refused.to_string().contains("x before"), "{refused}");
+}
+
+#[test]
+fn there_is_no_prediction_from_what_is_no_ball_or_no_number() {
+    let (centring, reaching) = samples(300);
+    let goal = Cell::GOAL;
+    for form in [ReachForm::Linear, ReachForm::Rigid8] {
+        let model = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
+        assert!(model.uncertainty(&goal, 180.0, 2.0, 2.0).is_some());
+        let with_radius = |r| Features { r, ..goal };
+        for (before, jt3, d2) in [
+            (goal, f64::NAN, 2.0),
+            (goal, 180.0, f64::INFINITY),
+            (with_radius(-20.0), 180.0, 2.0),
+            (with_radius(f64::NAN), 180.0, 2.0),
+        ] {
+            let place = (form, before, jt3, d2);
+            assert_eq!(model.predict_unbounded(&before, jt3, d2, 2.0), None, "{place:?}");
+            assert_eq!(model.uncertainty(&before, jt3, d2, 2.0), None, "{place:?}");
+        }
+        let speck = model.uncertainty(&with_radius(1e-300), 180.0, 2.0, 2.0);
+        assert!(speck.is_none_or(|(y, r)| y.is_finite() && r.is_finite()));
+    }
+    let centre = CentreModel::fit(&centring).expect("enough samples");
+    assert!(centre.uncertainty(&goal, 2.0).is_some());
+    assert_eq!(centre.uncertainty(&goal, f64::NAN), None);
+    assert_eq!(centre.uncertainty(&Features { r: f64::NAN, ..goal }, 2.0), None);
+}
+
+#[test]
+fn nothing_is_allocated_by_the_number_asked_for() {
+    let (_, reaching) = samples(300);
+    let model = ReachModel::fit(&reaching, ReachForm::Rigid8, &[]).expect("enough samples");
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let errors = model.open_loop_error(&cell, usize::MAX, 0, &mut rng(1));
+    assert_eq!(errors.len(), 10_000);
+    let mut blind = cell;
+    blind.sight.min_share = f64::NAN;
+    let (turns, moves) = sample_moves(&blind, usize::MAX, 0.1, &mut rng(1));
+    assert!(turns.is_empty() && moves.is_empty());
+}
+
+/// Share of the errors of y of refits to `n` samples of moderately wrong cells that lie within 1.96 expected standard deviations.
+fn covered(form: ReachForm, n: usize) -> (f64, f64) {
+    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let (centring, reaching) = samples(1000);
+    let reach = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
+    let centre = CentreModel::fit(&centring).expect("enough samples");
+    let power = if form == ReachForm::Linear { 0.0 } else { 3.0 };
+    let (mut y, mut x) = ((0.0, 0.0), (0.0, 0.0));
+    for seed in 0..8 {
+        let mut rng = rng(seed);
+        let errors = ErrorLevel::Moderate.draw(&mut rng);
+        let wrong = errors.apply(&cell).expect("sound errors");
+        let (few_turns, few) = sample_moves(&wrong, n, 0.5, &mut rng);
+        let (turns, fresh) = sample_moves(&wrong, 100, 0.5, &mut rng);
+        let refit = reach.refit(&few, 1e-3, power).expect("a prior helps out");
+        for s in &fresh {
+            let at = (&s.before, s.jt3_degrees, s.d2, s.d3);
+            let after = refit.predict_unbounded(at.0, at.1, at.2, at.3);
+            if let (Some(after), Some((sd, _))) = (after, refit.uncertainty(at.0, at.1, at.2, at.3)) {
+                y.0 += f64::from((after.y - s.after.y).abs() <= 1.96 * sd);
+                y.1 += 1.0;
+            }
+        }
+        let refit = centre.refit(&few_turns, 1e-2).expect("a prior helps out");
+        for s in &turns {
+            let predicted = refit.predict(&s.before, s.d1);
+            if let (Some(after), Some(sd)) = (predicted, refit.uncertainty(&s.before, s.d1)) {
+                x.0 += f64::from((after.x - s.after.x).abs() <= 1.96 * sd);
+                x.1 += 1.0;
+            }
+        }
+    }
+    (y.0 / y.1, x.0 / x.1)
+}
+
+#[test]
+fn a_refit_to_few_samples_does_not_expect_to_be_exact() {
+    for form in [
+        ReachForm::Linear,
+        ReachForm::Rigid8,
+        ReachForm::Rigid22,
+        ReachForm::RigidBody,
+    ] {
+        for n in [1, 3, 5, 10, 40] {
+            let (y, x) = covered(form, n);
+            println!("{form:?}, {n} samples: y {y:.2}, x {x:.2}");
+            assert!(y > 0.85 && x > 0.9, "{form:?} {n}: {y} {x}");
+        }
+    }
+}
