@@ -92,7 +92,7 @@ impl ReachModel {
     /// is, and so does the whole model without any.
     ///
     /// For [`ReachModel::uncertainty`] the variances of this model count as ten further degrees of freedom. With few samples
-    /// the expected errors are rather too large than too small (the README has the figures).
+    /// the expected errors are rather too large than too small, but for `ReachForm::RigidBody` (the README has the figures).
     ///
     /// # Errors
     /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or is so large that nothing else counts (above 1e100),
