@@ -41,12 +41,10 @@ pub(super) struct Rows {
 struct GradientRow {
     x: Vec<i16>,
     y: Vec<i16>,
-    /// Squared length, for the blocks where it has been asked for.
+    /// Squared length, if it has been asked for.
     square: Vec<i32>,
-    /// Which blocks those are, the first beginning at pixel 0: those with the number of the row in work.
-    squared: Vec<u64>,
-    /// How many rows were differentiated here, of all frames.
-    number: u64,
+    /// Whether it has.
+    squared: bool,
 }
 
 /// A pixel that is a maximum across its edge, and above the low threshold.
@@ -110,7 +108,6 @@ impl Rows {
             row.x.resize(blocks * BLOCK, 0);
             row.y.resize(blocks * BLOCK, 0);
             row.square.resize(blocks * BLOCK, 0);
-            row.squared.resize(blocks, 0);
         }
     }
 
@@ -183,13 +180,19 @@ fn differentiate(a: &[i16], b: &[i16], c: &[i16], out: &mut GradientRow) {
         gx[x] = (a2[x] - a0[x]) + 2 * (b2[x] - b0[x]) + (c2[x] - c0[x]);
         gy[x] = (c0[x] - a0[x]) + 2 * (c1[x] - a1[x]) + (c2[x] - a2[x]);
     }
-    out.number += 1;
+    out.squared = false;
 }
 
 impl GradientRow {
     /// Whether the squared length may exceed `low` anywhere in the block at `x`.
     #[inline(always)]
     fn may_exceed(&self, low: i32, x: usize) -> bool {
+        if self.squared {
+            return block(&self.square, x)
+                .iter()
+                .fold(0, |most, &square| square.max(most))
+                > low;
+        }
         let (gx, gy) = (block(&self.x, x), block(&self.y, x));
         let mut most = 0i16;
         for i in 0..BLOCK {
@@ -200,21 +203,20 @@ impl GradientRow {
         i32::from(most) * i32::from(most) > low
     }
 
-    /// Finds the squares of two blocks, unless they are known.
+    /// Finds the squared lengths, unless they are known.
     #[inline(always)]
-    fn square(&mut self, first: usize) {
-        for index in [first, first + 1] {
-            if self.squared[index] != self.number {
-                self.squared[index] = self.number;
-                let at = index * BLOCK;
-                let (gx, gy) = (block(&self.x, at), block(&self.y, at));
-                let mut squares = [0; BLOCK];
-                for i in 0..BLOCK {
-                    let (x, y) = (i32::from(gx[i]), i32::from(gy[i]));
-                    squares[i] = x * x + y * y;
-                }
-                self.square[at..at + BLOCK].copy_from_slice(&squares);
-            }
+    fn square(&mut self) {
+        if self.squared {
+            return;
+        }
+        self.squared = true;
+        let blocks = self.square.as_chunks_mut::<BLOCK>().0.iter_mut();
+        let gradients = self.x.as_chunks::<BLOCK>().0.iter().zip(self.y.as_chunks::<BLOCK>().0);
+        for (squares, (gx, gy)) in blocks.zip(gradients) {
+            *squares = std::array::from_fn(|i| {
+                let (x, y) = (i32::from(gx[i]), i32::from(gy[i]));
+                x * x + y * y
+            });
         }
     }
 }
@@ -231,12 +233,12 @@ fn maxima(
     if !marks.is_empty() {
         marks.fill(0);
     }
-    for (index, x) in (1..width - 1).step_by(BLOCK).enumerate() {
+    for x in (1..width - 1).step_by(BLOCK) {
         if !rows[y % 3].may_exceed(passes.low, x) {
             continue;
         }
         for row in &mut *rows {
-            row.square(index);
+            row.square();
         }
         let [a, b, c] = [y - 1, y, y + 1].map(|row| &rows[row % 3]);
         let end = (x + BLOCK).min(width - 1);
