@@ -374,23 +374,21 @@ impl Lines {
             *looks += 1;
             let block = |values: &'_ [f32]| -> [f32; LANES] { values[first..first + LANES].as_chunks().0[0] };
             let (qx, qy, nx, ny) = (block(&self.x), block(&self.y), block(&self.nx), block(&self.ny));
-            let mut fits = [0i32; LANES];
+            // By how much what is to be at most 0 is more: one comparison for all of it keeps the lanes together.
+            let more = |a: f32, b: f32| if a > b { a } else { b };
+            let mut excess = [0.0; LANES];
             for lane in 0..LANES {
                 let crossed = (px * ny[lane] + py * nx[lane]).abs();
                 let dx = qx[lane] - x;
                 let along = px + nx[lane].abs();
-                fits[lane] = i32::from(crossed <= mirror_slack)
-                    & i32::from(nx[lane].abs() >= LEAST_ALONG)
-                    & i32::from((qy[lane] - y).abs() <= 1.0)
-                    & i32::from(dx >= radii.0 * along)
-                    & i32::from(dx <= radii.1 * along);
+                let direction = more(crossed - mirror_slack, LEAST_ALONG - nx[lane].abs());
+                let distance = more(radii.0 * along - dx, dx - radii.1 * along);
+                excess[lane] = more(more(direction, distance), (qy[lane] - y).abs() - 1.0);
             }
-            let mut bits = 0u32;
-            for (lane, fit) in fits.iter().enumerate() {
-                bits |= (*fit as u32) << lane;
-            }
+            let fits = std::hint::black_box(excess).map(|excess| u8::from(excess <= 0.0));
+            let mut bits = u64::from_le_bytes(fits);
             while bits != 0 {
-                let lane = bits.trailing_zeros() as usize % LANES;
+                let lane = bits.trailing_zeros() as usize / 8;
                 bits &= bits - 1;
                 if !free[self.id[first + lane] as usize] {
                     continue;
