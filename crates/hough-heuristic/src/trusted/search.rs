@@ -113,6 +113,23 @@ impl Outline {
             .then_some(support)
     }
 
+    /// The pixels of the outline's points at distance `r` from the centre; the largest number for those outside of the frame.
+    #[inline(always)]
+    fn pixels(&self, level: &Level, ring: &Ring, r: f32) -> [u32; LOOKS] {
+        let (width, height) = (level.width as u32, level.height as u32);
+        let mut pixels = [u32::MAX; LOOKS];
+        for (pixel, (x, y)) in pixels.iter_mut().zip(self.x.iter().zip(&self.y)) {
+            // Numbers below 0 become very large ones.
+            let (column, row) = (
+                whole(ring.x + r * x).0 as u32,
+                whole(ring.y + r * y).0 as u32,
+            );
+            let inside = (column < width) & (row < height);
+            *pixel = row.wrapping_mul(width).wrapping_add(column) | (u32::from(inside).wrapping_sub(1));
+        }
+        pixels
+    }
+
     /// Fits the ring to the edge points along it, and counts those that lie on it then; None if they do not determine one.
     #[inline(always)]
     pub(super) fn fit(
@@ -123,16 +140,16 @@ impl Outline {
         looks: &mut u64,
     ) -> Option<(Ring, Support)> {
         let mut support = Support::default();
-        let (mut dx, mut dy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
-        let (mut ux, mut uy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let (mut dx, mut dy, mut length) = ([0.0f32; LOOKS], [0.0f32; LOOKS], [1.0f32; LOOKS]);
         let (mut residual, mut weight) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let pixels = [0.0, -1.5, 1.5].map(|step| self.pixels(level, ring, ring.r + step));
         for index in 0..LOOKS {
-            let (x, y, lowest) = (self.x[index], self.y[index], self.lowest[index]);
+            let lowest = self.lowest[index];
             let mut inside = false;
-            for step in [0.0, -1.5, 1.5] {
+            for pixels in &pixels {
                 *looks += 1;
-                let at = ring.r + step;
-                let Some((mark, pixel)) = level.mark(ring.x + at * x, ring.y + at * y) else {
+                let pixel = pixels[index] as usize;
+                let Some(&mark) = level.marks().get(pixel) else {
                     continue;
                 };
                 inside = true;
@@ -144,12 +161,17 @@ impl Outline {
                 let distance = (dx[index] * dx[index] + dy[index] * dy[index]).sqrt();
                 let off = distance - ring.r;
                 if off.abs() <= reach && distance > 0.5 {
-                    (ux[index], uy[index]) = (dx[index] / distance, dy[index] / distance);
+                    length[index] = distance;
                     (residual[index], weight[index]) = (off, level.strength_at(pixel));
                     break;
                 }
             }
             support.visible += u32::from(inside);
+        }
+        // Those without weight do not count, whatever their directions.
+        let (mut ux, mut uy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        for index in 0..LOOKS {
+            (ux[index], uy[index]) = (dx[index] / length[index], dy[index] / length[index]);
         }
         let mut moments = Moments::default();
         for block in 0..LOOKS / LANES {
