@@ -120,10 +120,7 @@ impl Outline {
         let mut pixels = [u32::MAX; LOOKS];
         for (pixel, (x, y)) in pixels.iter_mut().zip(self.x.iter().zip(&self.y)) {
             // Numbers below 0 become very large ones.
-            let (column, row) = (
-                whole(ring.x + r * x).0 as u32,
-                whole(ring.y + r * y).0 as u32,
-            );
+            let (column, row) = (whole(ring.x + r * x).0 as u32, whole(ring.y + r * y).0 as u32);
             let inside = (column < width) & (row < height);
             *pixel = row.wrapping_mul(width).wrapping_add(column) | (u32::from(inside).wrapping_sub(1));
         }
