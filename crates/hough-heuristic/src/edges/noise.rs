@@ -57,3 +57,36 @@ pub(crate) fn noise_deviation(grey: &[u8], width: usize, row_step: usize) -> f32
     // The median of |response| is 0.6745 deviations of it.
     median.unwrap_or(0) as f32 / (6.0 * 0.6745)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The same one pixel after another.
+    fn plainly(grey: &[u8], width: usize, row_step: usize) -> f32 {
+        let height = grey.len() / width;
+        let mut responses = Vec::new();
+        for y in (1..height - 1).step_by(row_step) {
+            for x in (1..width - 1).step_by(COLUMN_STEP) {
+                let at = |dx: usize, dy: usize| i32::from(grey[(y + dy - 1) * width + x + dx - 1]);
+                let row = |dy: usize| at(0, dy) - 2 * at(1, dy) + at(2, dy);
+                responses.push((row(0) - 2 * row(1) + row(2)).abs());
+            }
+        }
+        responses.sort_unstable();
+        responses[responses.len() / 2] as f32 / (6.0 * 0.6745)
+    }
+
+    proptest! {
+        #[test]
+        fn blocks_give_what_single_pixels_give(
+            width in 3usize..420, height in 3usize..30, row_step in 1usize..14, roughness in 1u32..=256, seed: u64,
+        ) {
+            let grey: Vec<u8> = (0..width * height)
+                .map(|k| ((seed.wrapping_mul(2 * k as u64 + 1) >> 40) as u32 % roughness) as u8)
+                .collect();
+            prop_assert_eq!(noise_deviation(&grey, width, row_step).to_bits(), plainly(&grey, width, row_step).to_bits());
+        }
+    }
+}
