@@ -15,6 +15,12 @@ pub struct Situation {
 }
 
 impl Situation {
+    /// Whether every number of it is one.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Features { x, y, r } = self.features;
+        [x, y, r].iter().chain(&self.joints.0).all(|v| v.is_finite())
+    }
+
     /// The part of it that the paper's behaviours look at.
     pub fn percept(&self) -> Percept {
         Percept::new(self.features, &self.joints)
@@ -158,18 +164,23 @@ impl StepLimits {
     }
 
     /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that, in which no joint turns farther
-    /// than it may; joints that would leave `limits` stop there. No move for what is not finite.
+    /// than it may; joints that would leave `limits` stop there. Of what is not finite, or steps that are NaN, a move that is NaN, which no limits
+    /// admit.
     pub fn apply(&self, wanted: [f64; 3], joints: &Joints, limits: &JointLimits) -> JointDelta {
         let shares = wanted
             .iter()
             .zip(self.0)
             .map(|(wanted, most)| most / wanted.abs());
-        let share = shares.fold(1.0, f64::min);
+        // `min` makes a number of NaN.
+        let known = wanted.iter().all(|v| v.is_finite()) && !self.0.iter().any(|v| v.is_nan());
+        let share = if known {
+            shares.fold(1.0, f64::min)
+        } else {
+            f64::NAN
+        };
         let mut target = *joints;
         for (i, wanted) in wanted.into_iter().enumerate() {
-            if wanted.is_finite() {
-                target.0[i] += share * wanted;
-            }
+            target.0[i] += share * wanted;
         }
         let reached = limits.nearest(&target);
         JointDelta(std::array::from_fn(|i| {
@@ -195,7 +206,14 @@ mod tests {
             "{delta:?}"
         );
         assert!(JointLimits::paper().nearest(&Joints([f64::NAN; 6])).0[0].is_nan());
-        let none = StepLimits::paper().apply([f64::NAN; 3], &at, &JointLimits::paper());
-        assert_eq!(none, JointDelta::default());
+        let (nan, turn) = (f64::NAN, 0.01);
+        for (steps, wanted) in [
+            (StepLimits::paper(), [nan, turn, turn]),
+            (StepLimits::paper(), [f64::INFINITY, turn, turn]),
+            (StepLimits([nan, 1.0, 1.0]), [turn; 3]),
+        ] {
+            let delta = steps.apply(wanted, &at, &JointLimits::paper());
+            assert!(!JointLimits::paper().admit(&(at + delta)), "{wanted:?}: {delta:?}");
+        }
     }
 }

@@ -256,7 +256,12 @@ fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f
         } else {
             from[joint] - low
         };
-        if turn == 0.0 { most } else { room / turn.abs() }
+        match room / turn.abs() {
+            _ if turn == 0.0 => most,
+            // `min` makes a number of NaN.
+            share if share.is_nan() => 0.0,
+            share => share,
+        }
     });
     shares.fold(most, f64::min).max(0.0)
 }
@@ -385,6 +390,16 @@ mod tests {
         // One that goes with the hand is in jaws that the camera sees.
         let (end, _) = activated(&[seen; 5], None);
         assert_eq!(end, GripEnd::Held(AT_GOAL()));
+    }
+
+    #[test]
+    fn limits_that_are_no_numbers_leave_no_share_of_a_lift() {
+        let (limits, lift) = (JointLimits::paper(), JointDelta::of(Joint::J2, -0.2));
+        let at = Joints::from_degrees([0.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
+        assert!((share_within(&limits, &at, &lift, 1.0) - 1.0).abs() < 1e-12);
+        let mut none = limits;
+        none.0[1].0 = f64::NAN;
+        assert!(share_within(&none, &at, &lift, 1.0).abs() < 1e-12);
     }
 
     #[test]

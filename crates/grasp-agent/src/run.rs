@@ -151,7 +151,7 @@ impl<'a> Run<'a> {
 
     fn phases(&mut self) -> Result<Outcome, AgentError> {
         let joints = self.devices.arm.joints()?;
-        self.stand_at(joints);
+        self.stand_at(joints)?;
         self.set_jaws(Gripper::Open)?;
         self.tell(EventKind::Started, None);
         let mut state = State::Search;

@@ -56,14 +56,15 @@ impl ServoSettings {
 
 impl CameraModel {
     /// The pose near `from`, differing in the first three joints, in which a ball at `ball` shows as `features`, or most nearly so, and how
-    /// far the ball is then from its place before the camera, metres. `None` for features that no ball has.
+    /// far the ball is then from its place before the camera, metres. `None` for features that no ball has, and where a number is not finite.
     pub fn pose_showing(
         &self,
         ball: &Point3<f64>,
         features: &Features,
         from: &Joints,
     ) -> Option<(Joints, f64)> {
-        Some(self.pose_placing(ball, &self.in_camera(features)?, from))
+        let (pose, off) = self.pose_placing(ball, &self.in_camera(features)?, from);
+        off.is_finite().then_some((pose, off))
     }
 
     /// The pose near `from`, differing in the first three joints, in which a ball at `ball` is at `wanted` in the camera frame, or most

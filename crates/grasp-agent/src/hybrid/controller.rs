@@ -285,11 +285,16 @@ impl Hybrid {
         last
     }
 
-    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits.
+    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits; NaN stays NaN.
     fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
         let target = limits.nearest(motors);
         JointDelta(std::array::from_fn(|i| match self.settings.steps.0.get(i) {
-            Some(most) => (target.0[i] - from.0[i]).min(*most).max(-most),
+            // Not `min` and `max`, which make a whole step of NaN, nor `clamp`, which panics on a step that is NaN.
+            Some(most) => match target.0[i] - from.0[i] {
+                turn if turn.abs() <= *most => turn,
+                turn if turn.abs() > *most => most.copysign(turn),
+                _ => f64::NAN,
+            },
             None => 0.0,
         }))
     }
@@ -333,6 +338,10 @@ impl Controller for Hybrid {
     }
 
     fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        if !now.is_finite() {
+            // As evidence it would make everything learned NaN.
+            return Err(GaveUp::NoMoveLeft);
+        }
         let off = self.surprise(&now.features);
         let odd = off.is_some();
         if off.is_some_and(|off| off > FAR_OFF) && !self.doubt && self.moving == 0 {
@@ -384,6 +393,9 @@ impl Controller for Hybrid {
     }
 
     fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        if !now.is_finite() {
+            return None;
+        }
         self.current.saw(now.features);
         self.estimate = self.estimate();
         let estimate = self.estimate.as_ref()?;
@@ -414,5 +426,63 @@ impl Controller for Hybrid {
         if let Some(fit) = Fit::of(&before, &self.belief.numbers(), &self.settings.nominal, &all) {
             self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_is_cut_to_a_step_and_what_is_no_number_stays_none() {
+        let (hybrid, limits) = (Hybrid::new(HybridSettings::paper()), JointLimits::paper());
+        let from = Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]);
+        let cut = |turn: f64, hybrid: &Hybrid| {
+            let delta = hybrid.cut(&(from + JointDelta::of(Joint::J1, turn)), &from, &limits);
+            (delta[Joint::J1], limits.admit(&(from + delta)))
+        };
+        let step = 5_f64.to_radians();
+        for (turn, expected) in [(0.01, 0.01), (1.0, step), (-1.0, -step)] {
+            let (turned, admitted) = cut(turn, &hybrid);
+            assert!((turned - expected).abs() < 1e-12 && admitted, "{turned}");
+        }
+        assert!(!cut(f64::NAN, &hybrid).1);
+        let mut endless = HybridSettings::paper();
+        endless.steps.0[0] = f64::NAN;
+        assert!(!cut(0.01, &Hybrid::new(endless)).1);
+    }
+
+    #[test]
+    fn what_is_no_number_is_no_evidence() {
+        let limits = JointLimits::paper();
+        let seen = Situation {
+            features: Features {
+                x: 80.0,
+                y: 60.0,
+                r: 15.0,
+            },
+            joints: Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]),
+        };
+        let mut hybrid = Hybrid::new(HybridSettings::paper());
+        let learned = |hybrid: &mut Hybrid, unseen: bool| {
+            hybrid.begin();
+            let mut now = seen;
+            for _ in 0..3 {
+                hybrid.arm_at(&now.joints);
+                now.joints = now.joints + hybrid.decide(&now, &limits).unwrap();
+            }
+            if unseen {
+                for features in [f64::NAN, f64::INFINITY].map(|x| Features { x, ..now.features }) {
+                    let nothing = Situation { features, ..now };
+                    assert_eq!(hybrid.decide(&nothing, &limits), Err(GaveUp::NoMoveLeft));
+                    assert_eq!(hybrid.grip(&nothing, &limits), None);
+                }
+            }
+            hybrid.end();
+            hybrid.belief().clone()
+        };
+        let as_well = learned(&mut hybrid.clone(), false);
+        assert_ne!(as_well, *hybrid.belief());
+        assert_eq!(learned(&mut hybrid, true), as_well);
     }
 }

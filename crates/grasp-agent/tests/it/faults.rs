@@ -1,6 +1,6 @@
 //! Bad input and faults: the arm stops, the cause is in the log and in a typed error, what was learned is kept.
 
-use grasp_agent::puma_val2::{ArmError, JointDelta};
+use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, ApproachLimit, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp,
     Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
@@ -83,6 +83,22 @@ fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
             "{fault:?}"
         );
         assert!(cell.0.borrow().stops > 0 && !cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
+    for moves in [0, 1, 3] {
+        let (end, log, cell) = end_of(Fault::Nowhere(moves));
+        let error = end.unwrap_err();
+        assert!(
+            matches!(error, AgentError::Pose { joint: Joint::J2 }),
+            "{moves}: {error}"
+        );
+        assert!(cell.0.borrow().stops > 0 && cell.0.borrow().joints.non_finite().is_none());
+        let before = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+        let replayed = log.replay(&before).unwrap_err();
+        assert_eq!(replayed.to_string(), error.to_string());
     }
 }
 
