@@ -1,8 +1,11 @@
 //! The door of everything that decides how the arm moves while the ball is in view.
 
 use hough_heuristic::Features;
-use puma_val2::{JointDelta, Joints};
+use puma_val2::{Joint, JointDelta, Joints};
 
+use crate::checked::checked;
+#[cfg(feature = "serde")]
+use crate::config::above_zero;
 use crate::{GaveUp, Percept};
 
 /// What a [`Controller`] decides by: the ball in the image, and the pose it is seen from.
@@ -110,8 +113,14 @@ impl<C: Controller + ?Sized> Controller for Box<C> {
 
 /// The range that a task keeps each joint in, radians (low, high), `JT1` first; closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct JointLimits(pub [(f64, f64); 6]);
+
+checked!(JointLimits);
 
 impl JointLimits {
     /// The reaching task's: -160..160, -150..-20, 120..215, -110..170, -100..100, -266..266 degrees.
@@ -127,6 +136,16 @@ impl JointLimits {
             ]
             .map(|(low, high)| (low.to_radians(), high.to_radians())),
         )
+    }
+
+    /// Whether they are ranges; if not, why.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.0) {
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(format!("the limits of {joint} are {low} to {high} radians"));
+            }
+        }
+        Ok(())
     }
 
     /// Whether every joint is in its range, to a millionth of a degree.
@@ -154,13 +173,28 @@ impl JointLimits {
 
 /// The farthest that a continuous controller turns each joint in one cycle, radians, `JT1` first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct StepLimits(pub [f64; 3]);
+
+checked!(StepLimits);
 
 impl StepLimits {
     /// The largest steps of the paper's behaviours (section 3.1): 5, 20 and 16 degrees.
     pub fn paper() -> Self {
         Self([5.0_f64, 20.0, 16.0].map(f64::to_radians))
+    }
+
+    /// Whether they are steps; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let steps = Joint::ALL.into_iter().zip(self.0);
+        steps
+            .into_iter()
+            .try_for_each(|(joint, most)| above_zero(&format!("the longest step of {joint}"), most))
     }
 
     /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that, in which no joint turns farther
@@ -213,7 +247,10 @@ mod tests {
             (StepLimits([nan, 1.0, 1.0]), [turn; 3]),
         ] {
             let delta = steps.apply(wanted, &at, &JointLimits::paper());
-            assert!(!JointLimits::paper().admit(&(at + delta)), "{wanted:?}: {delta:?}");
+            assert!(
+                !JointLimits::paper().admit(&(at + delta)),
+                "{wanted:?}: {delta:?}"
+            );
         }
     }
 }

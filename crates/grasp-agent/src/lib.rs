@@ -99,6 +99,7 @@ mod agent;
 mod arm_plane;
 mod behaviour;
 mod camera_model;
+mod checked;
 mod config;
 mod controller;
 mod error;

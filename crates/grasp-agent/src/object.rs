@@ -6,6 +6,7 @@ use hough_heuristic::{
 };
 
 use crate::Sighting;
+use crate::checked::checked;
 
 /// A set of image features that describes one kind of object: the door through which objects other than balls come in.
 ///
@@ -69,7 +70,11 @@ pub struct EggFeatures<E = Canny> {
 
 /// Which ellipses can be the outline of an egg.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct EggLimits {
     /// Least shorter half-axis, pixels.
     pub min_minor: f64,
@@ -77,6 +82,26 @@ pub struct EggLimits {
     pub max_minor: f64,
     /// How many times as long as the shorter half-axis the longer one may be at most.
     pub elongation: f64,
+}
+
+checked!(EggLimits);
+
+#[cfg(feature = "serde")]
+impl EggLimits {
+    /// Whether an ellipse can be within them; if not, why.
+    fn check(&self) -> Result<(), String> {
+        let Self {
+            min_minor,
+            max_minor,
+            elongation,
+        } = *self;
+        if min_minor >= 0.0 && max_minor >= min_minor && elongation >= 1.0 {
+            return Ok(());
+        }
+        Err(format!(
+            "an outline with a shorter half-axis of {min_minor} to {max_minor} pixels and a longer one of up to {elongation} times that is none"
+        ))
+    }
 }
 
 impl<E: EdgeDetector> EggFeatures<E> {

@@ -233,22 +233,18 @@ impl SavedRun {
     ///
     /// # Errors
     /// [`AgentError::SavedRun`], with the place where there is one: no JSON, another format, a missing part, a policy that
-    /// [`Learned::from_json`] refuses, a belief or settings of a hybrid that are not finite; [`AgentError::Config`] for settings that cannot work.
+    /// [`Learned::from_json`] refuses, a belief that is not finite, settings that cannot work.
     pub fn from_json(text: &str) -> Result<Self, AgentError> {
         let refused = |error: BehaviourError| AgentError::SavedRun(error.to_string());
         let document: Document =
             serde_json::from_str(text).map_err(|error| AgentError::SavedRun(error.to_string()))?;
         check_format(&document.format, FORMAT).map_err(refused)?;
-        document.config.check()?;
         let controller = match document.controller {
             ControllerText::Learned { policy, learning } => SavedController::Learned {
                 learned: Box::new(policy.into_learned().map_err(refused)?.0),
                 learning,
             },
-            ControllerText::Hybrid { settings, belief } => {
-                settings.check().map_err(AgentError::SavedRun)?;
-                SavedController::Hybrid { settings, belief }
-            }
+            ControllerText::Hybrid { settings, belief } => SavedController::Hybrid { settings, belief },
         };
         Ok(Self {
             config: document.config,

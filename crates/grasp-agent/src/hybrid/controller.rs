@@ -7,11 +7,18 @@ use puma_val2::{Joint, JointDelta, Joints};
 use super::belief::{Belief, Numbers, Prior, corrected};
 use super::evidence::{Evidence, Links};
 use super::fit::{Fit, WITH_BALL, deviations, sensitivity};
+use crate::checked::checked;
+#[cfg(feature = "serde")]
+use crate::servo::check_goal;
 use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits, TaughtGoal};
 
 /// What a [`Hybrid`] is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct HybridSettings {
     /// The camera and the arm as they should be.
     pub nominal: CameraModel,
@@ -34,6 +41,8 @@ pub struct HybridSettings {
     /// \[0.008\].
     pub grip_certainty: f64,
 }
+
+checked!(HybridSettings);
 
 impl HybridSettings {
     /// The settings in the brackets of the fields.
@@ -58,41 +67,23 @@ impl HybridSettings {
     /// Whether they can be used; if not, why.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
-        let Self {
-            nominal, goal, steps, ..
-        } = self;
-        let arm = &nominal.arm;
-        let mount = nominal.mount.to_homogeneous();
-        let mut numbers = [
-            arm.a2,
-            arm.a3,
-            arm.d2,
-            arm.d4,
-            arm.d6,
-            nominal.tool,
-            goal.x,
-            goal.y,
-        ]
-        .into_iter()
-        .chain(nominal.centre)
-        .chain(mount.iter().copied())
-        .chain([self.grip_turn]);
-        let positive = [nominal.focal, nominal.ball_radius, goal.r]
-            .into_iter()
-            .chain(steps.0);
-        let not_negative = [self.drift, self.caution, self.grip_certainty];
-        let wrong = if !self.prior.is_sound() {
-            "a number of the prior is not finite and above zero"
-        } else if !numbers.all(f64::is_finite) {
-            "a length, angle or feature is not finite"
-        } else if !positive.into_iter().all(|v| v.is_finite() && v > 0.0) {
-            "focal length, radius or a step is not finite and above zero"
-        } else if !not_negative.iter().all(|v| v.is_finite() && *v >= 0.0) {
-            "drift, caution or grip_certainty is not finite, or negative"
-        } else {
+        self.nominal.check()?;
+        self.prior.check()?;
+        check_goal(&self.goal)?;
+        self.steps.check()?;
+        for (name, value) in [
+            ("drift", self.drift),
+            ("caution", self.caution),
+            ("grip_certainty", self.grip_certainty),
+        ] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(format!("{name} is {value}; it must be finite, 0 or above"));
+            }
+        }
+        if self.grip_turn.is_finite() {
             return Ok(());
-        };
-        Err(format!("settings of the hybrid: {wrong}"))
+        }
+        Err(format!("grip_turn is {}; it must be finite", self.grip_turn))
     }
 }
 

@@ -359,7 +359,7 @@ fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
 #[test]
 fn settings_that_cannot_work_are_refused() {
     type Change = fn(&mut AgentConfig);
-    let changes: [(&str, Change); 22] = [
+    let changes: [(&str, Change); 23] = [
         ("same_frames", |c| c.same_frames = 0),
         ("lift", |c| c.lift = Some(JointDelta::default())),
         ("lift", |c| c.lift = Some(JointDelta([f64::NAN; 6]))),
@@ -370,6 +370,7 @@ fn settings_that_cannot_work_are_refused() {
         ("grip", |c| c.grip.0[0] = f64::NAN),
         ("looks", |c| c.looks = 0),
         ("max_cycles", |c| c.max_cycles = 0),
+        ("max_views", |c| c.max_views = 0),
         ("goal of X", |c| {
             (c.goal[0].low, c.goal[0].high) = (108.0, 99.0);
         }),

@@ -12,3 +12,5 @@ mod modules;
 mod object;
 mod phases;
 mod rivals;
+#[cfg(feature = "serde")]
+mod settings;
