@@ -20,6 +20,7 @@ impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
         /// Width that the circle of a sighting is given for: that of the paper's frame.
         const FRAME: u32 = 768;
         let ball = self.0.look().map(|features| Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(FRAME),

@@ -15,6 +15,8 @@ pub struct Situation {
     pub features: Features,
     /// The joint angles that the arm reports.
     pub joints: Joints,
+    /// [`Sighting::long_axis`](crate::Sighting::long_axis) of what is seen.
+    pub long_axis: Option<f64>,
 }
 
 impl Situation {

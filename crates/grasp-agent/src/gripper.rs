@@ -296,7 +296,11 @@ mod tests {
             circle: features.to_circle(768),
             score: 1.0,
         };
-        Sighting { detection, features }
+        Sighting {
+            detection,
+            features,
+            long_axis: None,
+        }
     }
 
     /// A hand whose looks and moves come to what is written down.

@@ -336,6 +336,7 @@ impl<'a> Run<'a> {
                     seen: Situation {
                         features: ball.features,
                         joints: from,
+                        long_axis: ball.long_axis,
                     },
                     why: Gone::Missed,
                 }
@@ -383,6 +384,7 @@ impl<'a> Run<'a> {
         Situation {
             features: sighting.features,
             joints: self.joints,
+            long_axis: sighting.long_axis,
         }
     }
 

@@ -447,6 +447,7 @@ mod tests {
     fn what_is_no_number_is_no_evidence() {
         let limits = JointLimits::paper();
         let seen = Situation {
+            long_axis: None,
             features: Features {
                 x: 80.0,
                 y: 60.0,

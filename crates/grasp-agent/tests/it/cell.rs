@@ -245,6 +245,7 @@ impl Eye for Shared {
             }
         };
         let ball = seen.map(|features| Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(768),

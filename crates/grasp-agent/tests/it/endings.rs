@@ -66,6 +66,7 @@ impl Eye for Scene {
         let bytes = self.looks.to_le_bytes();
         let frame = GrayImage::from_fn(4, 1, |x, _| Luma([bytes[x as usize]]));
         let ball = (self.finds)(self.looks).map(|features| Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(768),

@@ -147,6 +147,7 @@ fn what_the_fixed_grip_has_missed_is_aimed_at() {
     let mut hybrid = Hybrid::new(HybridSettings::paper());
     hybrid.begin();
     let at_goal = Situation {
+        long_axis: None,
         features: Features {
             x: 103.5,
             y: 78.0,

@@ -13,4 +13,6 @@ mod object;
 mod phases;
 mod rivals;
 #[cfg(feature = "serde")]
+mod saved_controllers;
+#[cfg(feature = "serde")]
 mod settings;
