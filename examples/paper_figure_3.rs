@@ -12,6 +12,7 @@
 )]
 
 use std::error::Error;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Parser;
@@ -41,11 +42,16 @@ struct Options {
     seed: u64,
 }
 
+/// Radii of a ball in reach, pixels.
+const RADII: Range<f64> = 20.0..250.0;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse();
     let frame = render(options.seed)?;
     let mut detector = Heuristic::with_canny(HeuristicConfig {
         seed: options.seed,
+        min_radius: RADII.start,
+        max_radius: RADII.end,
         ..HeuristicConfig::default()
     })?;
     let found = detector.detect(&frame);
@@ -114,7 +120,7 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         let pixels: [EdgePixel; 3] =
             std::array::from_fn(|_| edges.pixels()[rng.random_range(0..edges.pixels().len())]);
         Circle::through(&pixels)
-            .filter(|circle| (20.0..250.0).contains(&circle.radius))
+            .filter(|circle| RADII.contains(&circle.radius))
             .map(|circle| (pixels, circle))
     });
     let drawn = if edges.pixels().is_empty() {
