@@ -266,13 +266,13 @@ fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f
     shares.fold(most, f64::min).max(0.0)
 }
 
-/// A grip in two parts: first the arm, with the fingers still beside the ball, then the hand, which brings them to both sides of it. An arm that
-/// hardly moves need not go first.
+/// A grip in two parts: first the arm and `JT4`, with the fingers still beside the ball, then the hand, which brings them to both sides of it.
+/// What hardly moves need not go first.
 fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     const HARDLY: f64 = 0.01;
     let mut parts = [JointDelta::default(), *delta];
-    if Joint::ALL[..3].iter().any(|joint| delta[*joint].abs() > HARDLY) {
-        for i in 0..3 {
+    if Joint::ALL[..4].iter().any(|joint| delta[*joint].abs() > HARDLY) {
+        for i in 0..4 {
             (parts[0].0[i], parts[1].0[i]) = (delta.0[i], 0.0);
         }
     }
@@ -394,6 +394,15 @@ mod tests {
         // One that goes with the hand is in jaws that the camera sees.
         let (end, _) = activated(&[seen; 5], None);
         assert_eq!(end, GripEnd::Held(AT_GOAL()));
+    }
+
+    #[test]
+    fn the_hand_turns_aside_before_it_swings_in() {
+        let [aside, swing] = in_two(&JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, -18.0, 30.0]));
+        assert_eq!(aside, JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, 0.0, 0.0]));
+        assert_eq!(swing, JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.0, 30.0]));
+        let plain = JointDelta::of(Joint::J5, -0.3);
+        assert_eq!(in_two(&plain), [JointDelta::default(), plain]);
     }
 
     #[test]

@@ -37,6 +37,9 @@ pub struct HybridSettings {
     pub memory: usize,
     /// How far `JT5` turns for the grip, radians \[-18.01 degrees\].
     pub grip_turn: f64,
+    /// How far `JT4` turns for the grip, radians \[0\].
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub grip_aside: f64,
     /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and not left to the agent's settings
     /// \[0.008\].
     pub grip_certainty: f64,
@@ -60,6 +63,7 @@ impl HybridSettings {
             caution: 2.0,
             memory: 400,
             grip_turn: -18.01_f64.to_radians(),
+            grip_aside: 0.0,
             grip_certainty: 0.008,
         }
     }
@@ -80,10 +84,12 @@ impl HybridSettings {
                 return Err(format!("{name} is {value}; it must be finite, 0 or above"));
             }
         }
-        if self.grip_turn.is_finite() {
-            return Ok(());
+        for (name, value) in [("grip_turn", self.grip_turn), ("grip_aside", self.grip_aside)] {
+            if !value.is_finite() {
+                return Err(format!("{name} is {value}; it must be finite"));
+            }
         }
-        Err(format!("grip_turn is {}; it must be finite", self.grip_turn))
+        Ok(())
     }
 }
 
@@ -183,6 +189,7 @@ impl Hybrid {
         (self.before, self.belief) = (seen(self.before), seen(self.belief));
         self.settings.goal = goal.features();
         self.settings.grip_turn = goal.grip()[Joint::J5];
+        self.settings.grip_aside = goal.grip()[Joint::J4];
         self
     }
 
@@ -402,6 +409,7 @@ impl Controller for Hybrid {
         let links = self.current.links(&estimate.numbers);
         let mut from = *links.stand();
         from.0[Joint::J5.index()] += self.settings.grip_turn;
+        from.0[Joint::J4.index()] += self.settings.grip_aside;
         let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
         let motors = links.motors_for(&stand, &now.joints);
         limits.admit(&motors).then(|| motors - now.joints)

@@ -89,8 +89,11 @@ fn every_controller_comes_back_and_decides_the_same_moves() {
         let earlier = text
             .replace(",\"long_axis\":0.4", "")
             .replace(",\"max_views\":1000", "")
-            .replace("\"max_views\":1000,", "");
-        assert!(!earlier.contains("long_axis") && !earlier.contains("max_views"));
+            .replace("\"max_views\":1000,", "")
+            .replace("\"grip_aside\":0.0,", "");
+        for new in ["long_axis", "max_views", "grip_aside"] {
+            assert!(!earlier.contains(new), "{new}");
+        }
         let replayed = SavedRun::from_json(&earlier).unwrap().replay().unwrap();
         assert_eq!(matches!(replayed, Replayed::Same(Ok(_))), !turned);
     }
