@@ -386,6 +386,10 @@ mod tests {
                 let mut found = Vec::new();
                 path(&canny.passes, grey, width, &mut canny.rows, &mut marks, &mut found);
                 prop_assert_eq!(&marks, &expected_marks);
+                // The list is the same without marks.
+                let mut unmarked = Vec::new();
+                path(&canny.passes, grey, width, &mut canny.rows, &mut [], &mut unmarked);
+                prop_assert_eq!(&unmarked, &found);
                 let listed: Vec<_> = found.iter().map(|c| c.pixel.y as usize * width + c.pixel.x as usize).collect();
                 let indices: Vec<_> = expected.iter().map(|maximum| maximum.index).collect();
                 prop_assert_eq!(listed, indices);

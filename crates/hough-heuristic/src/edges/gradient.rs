@@ -106,3 +106,35 @@ impl<const N: usize> Geometry<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::array::uniform8;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn eight_at_once_are_where_each_is(
+            vectors in uniform8((-16320i16..=16320, -16320i16..=16320)), around in uniform8((0.0f64..1.2, 0.0f64..1.2)),
+        ) {
+            let gradients: [EdgeGradient; 8] = std::array::from_fn(|i| {
+                let (x, y) = vectors[i];
+                let here = i32::from(x).pow(2) + i32::from(y).pow(2);
+                let part = |share: f64| (f64::from(here) * share) as i32;
+                EdgeGradient::new(x, y, [part(around[i].0), here, part(around[i].1)])
+            });
+            let geometry = Geometry::of(gradients.each_ref());
+            for (i, gradient) in gradients.iter().enumerate() {
+                let ((x, y), (dx, dy)) = (gradient.vector(), gradient.offset());
+                prop_assert_eq!((geometry.x[i], geometry.y[i]), ((16.0 * x) as f32, (16.0 * y) as f32));
+                // Where the three lengths are nearly on a line single precision places the top of the parabola anywhere.
+                let [before, here, behind] = gradient.squares.map(|square| f64::from(square).sqrt());
+                if (2.0 * here - before - behind).abs() > 1e-3 * here {
+                    let off = (f64::from(geometry.dx[i]) - dx).abs() + (f64::from(geometry.dy[i]) - dy).abs();
+                    prop_assert!(off < 1e-3, "{:?}: {}", gradient, off);
+                }
+            }
+        }
+    }
+}

@@ -4,6 +4,10 @@
 pub(crate) const ROW_STEP: usize = 12;
 /// Every how many columns a pixel is looked at; odd, so that no two-pixel pattern is met in one phase only.
 const COLUMN_STEP: usize = 3;
+/// Columns that are worked on together, a multiple of the step.
+const BLOCK: usize = 96;
+/// Responses reach 8 * 255.
+const BINS: usize = 2048;
 
 /// The standard deviation of the noise, grey levels, from every `row_step`-th row: 0 for frames smaller than 3x3.
 ///
@@ -15,12 +19,29 @@ pub(crate) fn noise_deviation(grey: &[u8], width: usize, row_step: usize) -> f32
     if width < 3 || height < 3 {
         return 0.0;
     }
-    // Responses reach 8 * 255.
-    let mut histogram = [0u32; 2048];
+    let mut histogram = [0u32; BINS];
     let mut samples = 0;
     for y in (1..height - 1).step_by(row_step) {
         let [a, b, c] = [y - 1, y, y + 1].map(|row| &grey[row * width..][..width]);
-        for x in (1..width - 1).step_by(COLUMN_STEP) {
+        let mut x = 1;
+        while x + BLOCK < width {
+            let [a, b, c] = [a, b, c].map(|row| &row[x - 1..=x + BLOCK]);
+            let mut down = [0i16; BLOCK + 2];
+            for (((down, a), b), c) in down.iter_mut().zip(a).zip(b).zip(c) {
+                *down = i16::from(*a) - 2 * i16::from(*b) + i16::from(*c);
+            }
+            // All of them by vectors take less time than every third one by one.
+            let mut responses = [0; BLOCK];
+            for (k, response) in responses.iter_mut().enumerate() {
+                *response = (down[k] - 2 * down[k + 1] + down[k + 2]).unsigned_abs();
+            }
+            for response in responses.iter().step_by(COLUMN_STEP) {
+                histogram[usize::from(*response) % BINS] += 1;
+            }
+            samples += (BLOCK / COLUMN_STEP) as u32;
+            x += BLOCK;
+        }
+        for x in (x..width - 1).step_by(COLUMN_STEP) {
             let three = |row: &[u8]| i32::from(row[x - 1]) - 2 * i32::from(row[x]) + i32::from(row[x + 1]);
             let response = three(a) - 2 * three(b) + three(c);
             histogram[response.unsigned_abs() as usize] += 1;
@@ -35,4 +56,37 @@ pub(crate) fn noise_deviation(grey: &[u8], width: usize, row_step: usize) -> f32
     });
     // The median of |response| is 0.6745 deviations of it.
     median.unwrap_or(0) as f32 / (6.0 * 0.6745)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The same one pixel after another.
+    fn plainly(grey: &[u8], width: usize, row_step: usize) -> f32 {
+        let height = grey.len() / width;
+        let mut responses = Vec::new();
+        for y in (1..height - 1).step_by(row_step) {
+            for x in (1..width - 1).step_by(COLUMN_STEP) {
+                let at = |dx: usize, dy: usize| i32::from(grey[(y + dy - 1) * width + x + dx - 1]);
+                let row = |dy: usize| at(0, dy) - 2 * at(1, dy) + at(2, dy);
+                responses.push((row(0) - 2 * row(1) + row(2)).abs());
+            }
+        }
+        responses.sort_unstable();
+        responses[responses.len() / 2] as f32 / (6.0 * 0.6745)
+    }
+
+    proptest! {
+        #[test]
+        fn blocks_give_what_single_pixels_give(
+            width in 3usize..420, height in 3usize..30, row_step in 1usize..14, roughness in 1u32..=256, seed: u64,
+        ) {
+            let grey: Vec<u8> = (0..width * height)
+                .map(|k| ((seed.wrapping_mul(2 * k as u64 + 1) >> 40) as u32 % roughness) as u8)
+                .collect();
+            prop_assert_eq!(noise_deviation(&grey, width, row_step).to_bits(), plainly(&grey, width, row_step).to_bits());
+        }
+    }
 }

@@ -211,7 +211,12 @@ impl GradientRow {
         }
         self.squared = true;
         let blocks = self.square.as_chunks_mut::<BLOCK>().0.iter_mut();
-        let gradients = self.x.as_chunks::<BLOCK>().0.iter().zip(self.y.as_chunks::<BLOCK>().0);
+        let gradients = self
+            .x
+            .as_chunks::<BLOCK>()
+            .0
+            .iter()
+            .zip(self.y.as_chunks::<BLOCK>().0);
         for (squares, (gx, gy)) in blocks.zip(gradients) {
             *squares = std::array::from_fn(|i| {
                 let (x, y) = (i32::from(gx[i]), i32::from(gy[i]));

@@ -29,7 +29,8 @@ pub(super) struct Budget {
     /// Places looked at, or what takes as long as that.
     pub(super) looks: u64,
     most_draws: u64,
-    most_looks: u64,
+    /// By [`Stage`].
+    most_looks: [u64; 3],
     deadline: Option<Instant>,
     /// Whether the deadline has passed.
     late: bool,
@@ -43,9 +44,10 @@ impl Budget {
         let megapixels = pixels as f64 * 1e-6;
         let draws = f64::from(config.draws_per_megapixel) * megapixels.max(LEAST_MEGAPIXELS);
         let most_draws = draws.ceil() as u64;
+        let looks = LOOKS_PER_DRAW * most_draws + 4 * (PROOF + MEASURING);
         Self {
             most_draws,
-            most_looks: LOOKS_PER_DRAW * most_draws + 4 * (PROOF + MEASURING),
+            most_looks: [14, 17, 20].map(|twentieths| looks / 20 * twentieths),
             deadline: config
                 .milliseconds_per_megapixel
                 .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3)),
@@ -56,13 +58,8 @@ impl Budget {
     /// Whether this part of the work is to end.
     #[inline(always)]
     pub(super) fn is_over(&mut self, stage: Stage) -> bool {
-        let twentieths = match stage {
-            Stage::Search => 14,
-            Stage::Proofs => 17,
-            Stage::Measurements => 20,
-        };
         let drawn = matches!(stage, Stage::Search) && self.draws >= self.most_draws;
-        let over = drawn || self.late || self.looks >= self.most_looks / 20 * twentieths;
+        let over = drawn || self.late || self.looks >= self.most_looks[stage as usize];
         self.spent |= over;
         over
     }

@@ -274,7 +274,11 @@ impl Steepest {
             let [mut before, mut here, mut behind] = [first; 3];
             let [mut last, mut now] = [first; 2];
             for step in 0..polar.steps {
-                let next = if step + 1 < polar.steps { slopes(step + 1) } else { now };
+                let next = if step + 1 < polar.steps {
+                    slopes(step + 1)
+                } else {
+                    now
+                };
                 let ends = step == 0 || step + 1 == polar.steps;
                 let (earlier, later) = if ends { (&now, &now) } else { (&last, &next) };
                 let along: &[f32; LANES] = &polar.along[step * count..][..count].as_chunks().0[block];

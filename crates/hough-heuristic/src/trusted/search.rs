@@ -113,6 +113,20 @@ impl Outline {
             .then_some(support)
     }
 
+    /// The pixels of the outline's points at distance `r` from the centre; the largest number for those outside of the frame.
+    #[inline(always)]
+    fn pixels(&self, level: &Level, ring: &Ring, r: f32) -> [u32; LOOKS] {
+        let (width, height) = (level.width as u32, level.height as u32);
+        let mut pixels = [u32::MAX; LOOKS];
+        for (pixel, (x, y)) in pixels.iter_mut().zip(self.x.iter().zip(&self.y)) {
+            // Numbers below 0 become very large ones.
+            let (column, row) = (whole(ring.x + r * x).0 as u32, whole(ring.y + r * y).0 as u32);
+            let inside = (column < width) & (row < height);
+            *pixel = row.wrapping_mul(width).wrapping_add(column) | (u32::from(inside).wrapping_sub(1));
+        }
+        pixels
+    }
+
     /// Fits the ring to the edge points along it, and counts those that lie on it then; None if they do not determine one.
     #[inline(always)]
     pub(super) fn fit(
@@ -123,16 +137,16 @@ impl Outline {
         looks: &mut u64,
     ) -> Option<(Ring, Support)> {
         let mut support = Support::default();
-        let (mut dx, mut dy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
-        let (mut ux, mut uy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let (mut dx, mut dy, mut length) = ([0.0f32; LOOKS], [0.0f32; LOOKS], [1.0f32; LOOKS]);
         let (mut residual, mut weight) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        let pixels = [0.0, -1.5, 1.5].map(|step| self.pixels(level, ring, ring.r + step));
         for index in 0..LOOKS {
-            let (x, y, lowest) = (self.x[index], self.y[index], self.lowest[index]);
+            let lowest = self.lowest[index];
             let mut inside = false;
-            for step in [0.0, -1.5, 1.5] {
+            for pixels in &pixels {
                 *looks += 1;
-                let at = ring.r + step;
-                let Some((mark, pixel)) = level.mark(ring.x + at * x, ring.y + at * y) else {
+                let pixel = pixels[index] as usize;
+                let Some(&mark) = level.marks().get(pixel) else {
                     continue;
                 };
                 inside = true;
@@ -144,12 +158,17 @@ impl Outline {
                 let distance = (dx[index] * dx[index] + dy[index] * dy[index]).sqrt();
                 let off = distance - ring.r;
                 if off.abs() <= reach && distance > 0.5 {
-                    (ux[index], uy[index]) = (dx[index] / distance, dy[index] / distance);
+                    length[index] = distance;
                     (residual[index], weight[index]) = (off, level.strength_at(pixel));
                     break;
                 }
             }
             support.visible += u32::from(inside);
+        }
+        // Those without weight do not count, whatever their directions.
+        let (mut ux, mut uy) = ([0.0f32; LOOKS], [0.0f32; LOOKS]);
+        for index in 0..LOOKS {
+            (ux[index], uy[index]) = (dx[index] / length[index], dy[index] / length[index]);
         }
         let mut moments = Moments::default();
         for block in 0..LOOKS / LANES {
@@ -374,23 +393,21 @@ impl Lines {
             *looks += 1;
             let block = |values: &'_ [f32]| -> [f32; LANES] { values[first..first + LANES].as_chunks().0[0] };
             let (qx, qy, nx, ny) = (block(&self.x), block(&self.y), block(&self.nx), block(&self.ny));
-            let mut fits = [0i32; LANES];
+            // By how much what is to be at most 0 is more: one comparison for all of it keeps the lanes together.
+            let more = |a: f32, b: f32| if a > b { a } else { b };
+            let mut excess = [0.0; LANES];
             for lane in 0..LANES {
                 let crossed = (px * ny[lane] + py * nx[lane]).abs();
                 let dx = qx[lane] - x;
                 let along = px + nx[lane].abs();
-                fits[lane] = i32::from(crossed <= mirror_slack)
-                    & i32::from(nx[lane].abs() >= LEAST_ALONG)
-                    & i32::from((qy[lane] - y).abs() <= 1.0)
-                    & i32::from(dx >= radii.0 * along)
-                    & i32::from(dx <= radii.1 * along);
+                let direction = more(crossed - mirror_slack, LEAST_ALONG - nx[lane].abs());
+                let distance = more(radii.0 * along - dx, dx - radii.1 * along);
+                excess[lane] = more(more(direction, distance), (qy[lane] - y).abs() - 1.0);
             }
-            let mut bits = 0u32;
-            for (lane, fit) in fits.iter().enumerate() {
-                bits |= (*fit as u32) << lane;
-            }
+            let fits = std::hint::black_box(excess).map(|excess| u8::from(excess <= 0.0));
+            let mut bits = u64::from_le_bytes(fits);
             while bits != 0 {
-                let lane = bits.trailing_zeros() as usize % LANES;
+                let lane = bits.trailing_zeros() as usize / 8;
                 bits &= bits - 1;
                 if !free[self.id[first + lane] as usize] {
                     continue;
