@@ -55,7 +55,9 @@ impl Starts {
                 Balls::Within([near, far], [low, high]) => {
                     (near..=far).contains(&place.x.hypot(place.y)) && (low..=high).contains(&place.z)
                 }
-                _ => place.z > start.table + start.ball.radius,
+                // Not those behind the waist, which the arm could reach after turning round.
+                Balls::InPlane => place.x > 0.0 && place.z > start.table + start.ball.radius,
+                Balls::Anywhere => place.z > start.table + start.ball.radius,
             };
             let kept = there && start.circle(&joints).is_some() && start.reachable();
             kept.then_some((start, joints))
