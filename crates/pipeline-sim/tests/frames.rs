@@ -370,7 +370,10 @@ fn the_overview_fills_its_page_and_its_field_of_view_ends_on_the_table() {
         let svg = cell.overview_svg(&Workspace::paper(), &[search, pose]);
         let (cones, tables) = (lines_of(&svg, "cone"), lines_of(&svg, "table"));
         let (cone, surface) = (&cones[0], tables[0][0].1);
-        assert_eq!([cone[1].1, cone[2].1], [surface; 2], "{cone:?}");
+        assert!(
+            cone[1..3].iter().all(|(_, y)| (y - surface).abs() < 0.11),
+            "{cone:?}"
+        );
         // From above it is the frame's outline on the table.
         assert_eq!(cones[1].len(), 5);
         let drawn: Vec<(f64, f64)> = ["arm", "space"]

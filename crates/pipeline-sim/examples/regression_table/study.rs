@@ -113,6 +113,17 @@ impl Setting {
             kept.push([share]);
         }
         println!("\nshare of moves kept: {}", spread(&kept).join(""));
+        let spreads: Vec<_> = own.iter().map(|samples| changes(samples)).collect();
+        println!("spread of dy and dr: {}", spread(&spreads).join(", "));
+        let mut strict = self.cell;
+        strict.sight.min_share = Cell::paper(self.cell.ball).sight.min_share;
+        let spreads: Vec<_> = (0..seeds)
+            .map(|seed| {
+                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+                changes(&sample(&strict, &self.starts, self.count, 0.125, &mut rng).1)
+            })
+            .collect();
+        println!("with 60 % of the outline inside: {}", spread(&spreads).join(", "));
         println!(
             "\n| form | R² of dy | R² of dr | error of y | error of r | on others: R² of dy | of dr | error of y | of r | runs end: y after 1 | 3 | 5 | runs go on: 1 | 3 | 5 |"
         );
@@ -170,7 +181,12 @@ impl Setting {
                         &mut rng,
                     )
                 });
-                rows.push(row(form.quality(own), form.quality(fresh), ends, goes_on));
+                rows.push(joined::<14>(&[
+                    &form.quality(own),
+                    &form.quality(fresh),
+                    &ends,
+                    &goes_on,
+                ]));
             }
             println!("| {name} | {} |", spread(&rows).join(" | "));
         }
@@ -182,7 +198,7 @@ impl Setting {
                     let q = model.quality_on(on)?;
                     Ok([q[0].r2, q[1].r2, q[0].rmse, q[1].rmse])
                 };
-                rows.push(row(quality(own)?, quality(fresh)?, [f64::NAN; 3], [f64::NAN; 3]));
+                rows.push(joined::<8>(&[&quality(own)?, &quality(fresh)?]));
             }
             println!("| `{form:?}` | {} |", spread(&rows).join(" | "));
         }
@@ -215,7 +231,21 @@ impl Setting {
     }
 }
 
-fn row(own: [f64; 4], fresh: [f64; 4], ends: [f64; 3], goes_on: [f64; 3]) -> [f64; 14] {
-    let all = [&own[..], &fresh, &ends, &goes_on].concat();
+fn joined<const N: usize>(parts: &[&[f64]]) -> [f64; N] {
+    let all = parts.concat();
     std::array::from_fn(|k| all[k])
+}
+
+/// Standard deviations of the changes of y and r.
+fn changes(samples: &[ReachSample]) -> [f64; 2] {
+    let spread = |change: fn(&ReachSample) -> f64| {
+        let n = samples.len() as f64;
+        let mean = samples.iter().map(change).sum::<f64>() / n;
+        let squares = samples.iter().map(|s| (change(s) - mean).powi(2)).sum::<f64>();
+        (squares / n).sqrt()
+    };
+    [
+        spread(|s| s.after.y - s.before.y),
+        spread(|s| s.after.r - s.before.r),
+    ]
 }
