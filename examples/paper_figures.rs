@@ -41,6 +41,7 @@ mod plot;
 mod program;
 #[path = "paper_figures/snapshots.rs"]
 mod snapshots;
+mod wilson;
 
 /// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut, Fig. 9 through the full chain; and what
 /// becomes of the behaviours when they are taken from simulation to an arm with errors, and go on learning there.

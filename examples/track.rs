@@ -43,6 +43,7 @@ mod shortcut;
 mod stages;
 #[path = "track/tally.rs"]
 mod tally;
+mod wilson;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
