@@ -15,6 +15,7 @@ use image::GrayImage;
 pub use canny::{Canny, CannyConfig};
 pub use dispatch::{Vectorized, widest};
 pub use gradient::EdgeGradient;
+pub(crate) use gradient::Geometry;
 pub use imageproc_canny::ImageprocCanny;
 pub(crate) use maxima::Maxima;
 pub(crate) use noise::{ROW_STEP, noise_deviation};

@@ -49,25 +49,6 @@ impl EdgeGradient {
         self.squares[1]
     }
 
-    /// The gradient in units of its own, and the [`offset`](EdgeGradient::offset), in single precision.
-    #[inline]
-    pub(crate) fn level_geometry(&self) -> (f32, f32, f32, f32) {
-        let [before, here, behind] = self.squares.map(|square| (square as f32).sqrt());
-        let bend = 2.0 * here - before - behind;
-        let along = if bend > 0.0 {
-            (0.5 * (behind - before) / bend).clamp(-0.5, 0.5)
-        } else {
-            0.0
-        };
-        let (dx, dy) = self.sector();
-        (
-            f32::from(self.x),
-            f32::from(self.y),
-            along * f32::from(dx),
-            along * f32::from(dy),
-        )
-    }
-
     /// The step from the pixel to the neighbour behind.
     fn sector(&self) -> (i8, i8) {
         let (ax, ay) = (i32::from(self.x).abs(), i32::from(self.y).abs());
@@ -79,6 +60,49 @@ impl EdgeGradient {
             (1, 1)
         } else {
             (-1, 1)
+        }
+    }
+}
+
+/// Gradients and where they are steepest, in single precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Geometry<const N: usize> {
+    /// The gradient, in units of its own.
+    pub(crate) x: [f32; N],
+    pub(crate) y: [f32; N],
+    /// The [`offset`](EdgeGradient::offset).
+    pub(crate) dx: [f32; N],
+    pub(crate) dy: [f32; N],
+}
+
+impl<const N: usize> Geometry<N> {
+    /// That of so many gradients at once.
+    #[inline(always)]
+    pub(crate) fn of(gradients: [&EdgeGradient; N]) -> Self {
+        let (x, y) = (
+            gradients.map(|gradient| i32::from(gradient.x)),
+            gradients.map(|gradient| i32::from(gradient.y)),
+        );
+        let lengths = |index: usize| gradients.map(|gradient| (gradient.squares[index] as f32).sqrt());
+        let (before, here, behind) = (lengths(0), lengths(1), lengths(2));
+        let (mut dx, mut dy) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            let bend = 2.0 * here[i] - before[i] - behind[i];
+            let top = (0.5 * (behind[i] - before[i]) / bend).clamp(-0.5, 0.5);
+            let along = if bend > 0.0 { top } else { 0.0 };
+            let (ax, ay) = (x[i].abs(), y[i].abs());
+            let level = super::rows::is_shallow(ay, ax);
+            let upright = super::rows::is_shallow(ax, ay);
+            let slanted = if (x[i] ^ y[i]) >= 0 { 1.0 } else { -1.0 };
+            let aside = if upright { 0.0 } else { slanted };
+            dx[i] = along * if level { 1.0 } else { aside };
+            dy[i] = along * if level { 0.0 } else { 1.0 };
+        }
+        Self {
+            x: x.map(|x| x as f32),
+            y: y.map(|y| y as f32),
+            dx,
+            dy,
         }
     }
 }

@@ -10,7 +10,6 @@ pub(crate) struct Maxima {
     passes: Passes,
     noise_gain: f32,
     rows: Rows,
-    marks: Vec<u8>,
     candidates: Vec<Candidate>,
     squares: Vec<i32>,
     #[cfg(feature = "parallel")]
@@ -29,7 +28,6 @@ impl Maxima {
                 high: i32::MAX,
             },
             rows: Rows::default(),
-            marks: Vec::new(),
             candidates: Vec::new(),
             squares: Vec::new(),
             #[cfg(feature = "parallel")]
@@ -74,13 +72,12 @@ impl Maxima {
     }
 
     fn find_at_once(&mut self, grey: &[u8], width: usize) {
-        self.marks.resize(grey.len(), 0);
         dispatch::candidates(
             &self.passes,
             grey,
             width,
             &mut self.rows,
-            &mut self.marks,
+            &mut [],
             &mut self.candidates,
         );
     }
@@ -91,7 +88,6 @@ impl Maxima {
 #[derive(Clone, Debug, Default)]
 struct Strip {
     rows: Rows,
-    marks: Vec<u8>,
     candidates: Vec<Candidate>,
 }
 
@@ -126,14 +122,9 @@ impl Maxima {
             let own = index * height / count..(index + 1) * height / count;
             let (first, end) = (own.start.saturating_sub(around), (own.end + around).min(height));
             let part = &grey[first * width..end * width];
-            let Strip {
-                rows,
-                marks,
-                candidates,
-            } = strip;
-            marks.resize(part.len(), 0);
+            let Strip { rows, candidates } = strip;
             candidates.clear();
-            dispatch::candidates(passes, part, width, rows, marks, candidates);
+            dispatch::candidates(passes, part, width, rows, &mut [], candidates);
             candidates.retain_mut(|candidate| {
                 candidate.pixel.y += first as u32;
                 own.contains(&(candidate.pixel.y as usize))

@@ -41,8 +41,10 @@ pub(super) struct Rows {
 struct GradientRow {
     x: Vec<i16>,
     y: Vec<i16>,
-    /// Squared length.
+    /// Squared length, if it has been asked for.
     square: Vec<i32>,
+    /// Whether it has.
+    squared: bool,
 }
 
 /// A pixel that is a maximum across its edge, and above the low threshold.
@@ -57,7 +59,7 @@ pub(super) const WEAK: u8 = 1;
 /// See [`WEAK`].
 pub(super) const STRONG: u8 = 2;
 
-/// Marks the candidates of a frame of at least 3x3 pixels in `marks`, of the frame's size, and lists them row by row.
+/// Lists the candidates of a frame of at least 3x3 pixels row by row, and marks them in `marks`, which has the frame's size or is empty.
 #[inline(always)]
 pub(super) fn candidates(
     passes: &Passes,
@@ -83,26 +85,29 @@ pub(super) fn candidates(
         }
         if y >= 3 {
             let row = y - 2;
-            let [a, b, c] = [row - 1, row, row + 1].map(|row| &rows.gradient[row % 3]);
-            maxima(passes, [a, b, c], row, &mut marks[row * width..][..width], found);
+            let marks = marks.get_mut(row * width..(row + 1) * width).unwrap_or_default();
+            maxima(passes, &mut rows.gradient, (row, width), marks, found);
         }
     }
-    marks[..width].fill(0);
-    marks[last * width..].fill(0);
+    if !marks.is_empty() {
+        marks[..width].fill(0);
+        marks[last * width..].fill(0);
+    }
 }
 
 impl Rows {
     /// Makes room for rows of `width` pixels. What an earlier frame left beyond them is never looked at in a way that shows.
     fn resize(&mut self, width: usize, reach: usize) {
-        let blocks = 1 + (width - 2).next_multiple_of(BLOCK) + 1;
+        // The maxima of a block are sought a pixel farther to the right, and need a pixel beyond.
+        let blocks = (width - 2).div_ceil(BLOCK) + 1;
         self.across.resize(width + 2 * reach, 0);
         for row in &mut self.smooth {
             row.resize(width + 2, 0);
         }
         for row in &mut self.gradient {
-            row.x.resize(blocks, 0);
-            row.y.resize(blocks, 0);
-            row.square.resize(blocks, 0);
+            row.x.resize(blocks * BLOCK, 0);
+            row.y.resize(blocks * BLOCK, 0);
+            row.square.resize(blocks * BLOCK, 0);
         }
     }
 
@@ -170,32 +175,75 @@ fn differentiate(a: &[i16], b: &[i16], c: &[i16], out: &mut GradientRow) {
     let [a0, a1, a2] = [&a[..width], &a[1..][..width], &a[2..][..width]];
     let [b0, b2] = [&b[..width], &b[2..][..width]];
     let [c0, c1, c2] = [&c[..width], &c[1..][..width], &c[2..][..width]];
-    let (gx, gy, square) = (&mut out.x[..width], &mut out.y[..width], &mut out.square[..width]);
+    let (gx, gy) = (&mut out.x[..width], &mut out.y[..width]);
     for x in 0..width {
-        let dx = (a2[x] - a0[x]) + 2 * (b2[x] - b0[x]) + (c2[x] - c0[x]);
-        let dy = (c0[x] - a0[x]) + 2 * (c1[x] - a1[x]) + (c2[x] - a2[x]);
-        gx[x] = dx;
-        gy[x] = dy;
-        square[x] = i32::from(dx) * i32::from(dx) + i32::from(dy) * i32::from(dy);
+        gx[x] = (a2[x] - a0[x]) + 2 * (b2[x] - b0[x]) + (c2[x] - c0[x]);
+        gy[x] = (c0[x] - a0[x]) + 2 * (c1[x] - a1[x]) + (c2[x] - a2[x]);
+    }
+    out.squared = false;
+}
+
+impl GradientRow {
+    /// Whether the squared length may exceed `low` anywhere in the block at `x`.
+    #[inline(always)]
+    fn may_exceed(&self, low: i32, x: usize) -> bool {
+        if self.squared {
+            return block(&self.square, x)
+                .iter()
+                .fold(0, |most, &square| square.max(most))
+                > low;
+        }
+        let (gx, gy) = (block(&self.x, x), block(&self.y, x));
+        let mut most = 0i16;
+        for i in 0..BLOCK {
+            let (ax, ay) = (gx[i].abs(), gy[i].abs());
+            // Never below the length, and at most an eighth above it.
+            most = most.max(ax.max(ay) + ((ax.min(ay) + 1) >> 1));
+        }
+        i32::from(most) * i32::from(most) > low
+    }
+
+    /// Finds the squared lengths, unless they are known.
+    #[inline(always)]
+    fn square(&mut self) {
+        if self.squared {
+            return;
+        }
+        self.squared = true;
+        let blocks = self.square.as_chunks_mut::<BLOCK>().0.iter_mut();
+        let gradients = self.x.as_chunks::<BLOCK>().0.iter().zip(self.y.as_chunks::<BLOCK>().0);
+        for (squares, (gx, gy)) in blocks.zip(gradients) {
+            *squares = std::array::from_fn(|i| {
+                let (x, y) = (i32::from(gx[i]), i32::from(gy[i]));
+                x * x + y * y
+            });
+        }
     }
 }
 
 /// Marks the pixels of a row whose gradient is above the low threshold and a maximum across the edge.
 #[inline(always)]
-fn maxima(passes: &Passes, rows: [&GradientRow; 3], y: usize, marks: &mut [u8], found: &mut Vec<Candidate>) {
-    let last = marks.len() - 1;
-    marks[0] = 0;
-    marks[last] = 0;
-    for (index, out) in marks[1..last].chunks_mut(BLOCK).enumerate() {
-        let x = 1 + index * BLOCK;
-        let above = block(&rows[1].square, x)
-            .iter()
-            .fold(0, |most, &square| square.max(most));
-        if above <= passes.low {
-            out.fill(0);
-        } else {
-            block_maxima(passes, rows, (x, y), out, found);
+fn maxima(
+    passes: &Passes,
+    rows: &mut [GradientRow; 3],
+    (y, width): (usize, usize),
+    marks: &mut [u8],
+    found: &mut Vec<Candidate>,
+) {
+    if !marks.is_empty() {
+        marks.fill(0);
+    }
+    for x in (1..width - 1).step_by(BLOCK) {
+        if !rows[y % 3].may_exceed(passes.low, x) {
+            continue;
         }
+        for row in &mut *rows {
+            row.square();
+        }
+        let [a, b, c] = [y - 1, y, y + 1].map(|row| &rows[row % 3]);
+        let end = (x + BLOCK).min(width - 1);
+        let out = marks.get_mut(x..end).unwrap_or_default();
+        block_maxima(passes, [a, b, c], (x, y), end - x, out, found);
     }
 }
 
@@ -205,6 +253,7 @@ fn block_maxima(
     passes: &Passes,
     [a, b, c]: [&GradientRow; 3],
     (x, y): (usize, usize),
+    count: usize,
     out: &mut [u8],
     found: &mut Vec<Candidate>,
 ) {
@@ -251,8 +300,12 @@ fn block_maxima(
         marks[i] = wide[i] as u8;
     }
     // The last block of a row reaches over its end.
-    marks[out.len()..].fill(0);
-    out.copy_from_slice(&marks[..out.len()]);
+    if count < BLOCK {
+        marks[count..].fill(0);
+    }
+    if !out.is_empty() {
+        out.copy_from_slice(&marks[..count]);
+    }
     for (eight, word) in marks.as_chunks::<8>().0.iter().enumerate() {
         let mut bits = u64::from_le_bytes(*word);
         while bits != 0 {

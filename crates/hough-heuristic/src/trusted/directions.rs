@@ -1,5 +1,7 @@
 //! Directions as small whole numbers, and points on the unit circle, without sines: the same bits on every machine.
 
+use super::polar::whole;
+
 /// Codes of the direction of a line, 0..180 degrees: one stands for 2.8 degrees.
 pub(super) const CODES: u8 = 64;
 /// Points of the table of the unit circle.
@@ -9,6 +11,8 @@ pub(super) const TURN: usize = 1024;
 #[derive(Clone, Debug)]
 pub(super) struct UnitCircle {
     points: Vec<(f32, f32)>,
+    /// Their codes.
+    codes: Vec<u8>,
     /// The same in lists of x and of y, for 64, 128 and 256 steps.
     rays: [(Vec<f32>, Vec<f32>); 3],
 }
@@ -42,7 +46,8 @@ impl UnitCircle {
         }
         let points: Vec<(f32, f32)> = points.into_iter().map(|(x, y)| (x as f32, y as f32)).collect();
         let rays = [64, 128, 256].map(|count| points.iter().step_by(TURN / count).copied().unzip());
-        Self { points, rays }
+        let codes = points.iter().map(|&(x, y)| code(x, y)).collect();
+        Self { points, codes, rays }
     }
 
     /// About `wanted` evenly spaced directions: 64, 128 or 256.
@@ -61,10 +66,17 @@ impl UnitCircle {
     pub(super) fn point(&self, index: usize, count: usize) -> (f32, f32) {
         self.points[(index * TURN / count) % TURN]
     }
+
+    /// The same, and its code.
+    #[inline(always)]
+    pub(super) fn coded_point(&self, index: usize, count: usize) -> ((f32, f32), u8) {
+        let index = (index * TURN / count) % TURN;
+        (self.points[index], self.codes[index])
+    }
 }
 
 /// The code of the line along `(x, y)`; opposite vectors have one code.
-#[inline]
+#[inline(always)]
 pub(super) fn code(x: f32, y: f32) -> u8 {
     let (ax, ay) = (x.abs(), y.abs());
     let (small, large) = if ax < ay { (ax, ay) } else { (ay, ax) };
@@ -77,7 +89,9 @@ pub(super) fn code(x: f32, y: f32) -> u8 {
     } else {
         64.0 - quarter
     };
-    (half + 0.5) as u8 % CODES
+    // The whole number below, which is the nearest one or the one below that.
+    let (nearest, place) = whole(half + 0.5);
+    (nearest - i32::from(place > half + 0.5)) as u8 % CODES
 }
 
 /// How far apart two codes are, 0..=32.

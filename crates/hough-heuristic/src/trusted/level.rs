@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::directions::code;
 use super::polar::{LANES, whole};
-use crate::edges::Candidate;
+use crate::edges::{Candidate, Geometry, Vectorized, widest};
 
 /// Set in the mark of a pixel with an edge.
 pub(super) const EDGE: u8 = 0x80;
@@ -51,43 +51,65 @@ impl Level {
         self.nearest.resize(width * height, 0);
         self.free.clear();
         self.free.resize(candidates.len(), true);
+        widest(Filling {
+            level: self,
+            candidates,
+        });
+    }
 
-        self.strength.clear();
-
-        let rows = &mut self.rows;
-        rows.resize(candidates.len());
+    /// Lists the candidates row by row, and marks them.
+    #[inline(always)]
+    fn fill_rows(&mut self, candidates: &[Candidate]) {
+        let (width, rows) = (self.width, &mut self.rows);
+        rows.make_room(candidates.len());
+        let ids = rows.id.len() as u32..(candidates.len() + LANES) as u32;
+        rows.id.extend(ids);
+        self.strength
+            .resize(self.strength.len().max(candidates.len() + LANES), 0.0);
         rows.starts.clear();
-        for (index, candidate) in candidates.iter().enumerate() {
-            let (px, py) = (candidate.pixel.x as usize, candidate.pixel.y as usize);
-            let id = index as u32;
-            while rows.starts.len() <= py {
-                rows.starts.push(id);
+        for (block, eight) in candidates.chunks(LANES).enumerate() {
+            let lane = |lane: usize| &eight[lane.min(eight.len() - 1)];
+            let Geometry { x, y, dx, dy } = Geometry::<LANES>::of(std::array::from_fn(|i| &lane(i).gradient));
+            let pixel: [_; LANES] = std::array::from_fn(|i| lane(i).pixel);
+            let (mut px, mut py) = ([0.0; LANES], [0.0; LANES]);
+            let (mut strength, mut nx, mut ny) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            let mut marks = [0; LANES];
+            for i in 0..LANES {
+                strength[i] = (x[i] * x[i] + y[i] * y[i]).sqrt();
+                let unit = 1.0 / strength[i].max(1e-20);
+                (nx[i], ny[i]) = (x[i] * unit, y[i] * unit);
+                (px[i], py[i]) = (pixel[i].x as i32 as f32 + dx[i], pixel[i].y as i32 as f32 + dy[i]);
+                marks[i] = EDGE | code(x[i], y[i]);
             }
-            let (gx, gy, dx, dy) = candidate.gradient.level_geometry();
-            let strength = (gx * gx + gy * gy).sqrt();
-            self.strength.push(strength);
-            let unit = 1.0 / strength.max(1e-20);
-            rows.x[index] = px as f32 + dx;
-            rows.y[index] = py as f32 + dy;
-            rows.nx[index] = gx * unit;
-            rows.ny[index] = gy * unit;
-            rows.id[index] = id;
-            // The candidate's own pixel and its four neighbours; candidates never lie on the border.
-            let mark = EDGE | code(gx, gy);
-            let centre = py * width + px;
-            for pixel in [centre - width, centre - 1, centre + 1, centre + width] {
-                if self.near[pixel] == 0 {
-                    self.near[pixel] = mark;
-                    self.nearest[pixel] = id;
+            // The last block reaches into the margin.
+            let first = block * LANES;
+            rows.x[first..first + LANES].copy_from_slice(&px);
+            rows.y[first..first + LANES].copy_from_slice(&py);
+            rows.nx[first..first + LANES].copy_from_slice(&nx);
+            rows.ny[first..first + LANES].copy_from_slice(&ny);
+            self.strength[first..first + LANES].copy_from_slice(&strength);
+            for i in 0..eight.len() {
+                let id = (first + i) as u32;
+                let row = pixel[i].y as usize;
+                while rows.starts.len() <= row {
+                    rows.starts.push(id);
                 }
+                // The candidate's own pixel and its four neighbours; candidates never lie on the border.
+                let centre = row * width + pixel[i].x as usize;
+                for pixel in [centre - width, centre - 1, centre + 1, centre + width] {
+                    if self.near[pixel] == 0 {
+                        self.near[pixel] = marks[i];
+                        self.nearest[pixel] = id;
+                    }
+                }
+                self.near[centre] = marks[i];
+                self.nearest[centre] = id;
             }
-            self.near[centre] = mark;
-            self.nearest[centre] = id;
         }
-        while rows.starts.len() <= height {
+        while rows.starts.len() <= self.height {
             rows.starts.push(candidates.len() as u32);
         }
-        self.columns.transpose(&self.rows, candidates.len(), width);
+        rows.end(candidates.len());
     }
 
     /// The mark of the pixel, or None outside.
@@ -146,17 +168,21 @@ impl Level {
 }
 
 impl Lines {
-    /// Makes room for `count` points and a margin that is far from all of them.
-    fn resize(&mut self, count: usize) {
-        for values in [&mut self.x, &mut self.nx, &mut self.ny] {
-            values.resize(count + LANES, 0.0);
+    /// Makes room for `count` points and a margin.
+    fn make_room(&mut self, count: usize) {
+        let room = self.x.len().max(count + LANES);
+        for values in [&mut self.x, &mut self.y, &mut self.nx, &mut self.ny] {
+            values.resize(room, 0.0);
         }
-        self.y.resize(count + LANES, 0.0);
-        self.y[count..].fill(f32::INFINITY);
-        self.id.resize(count + LANES, 0);
+    }
+
+    /// Makes the margin behind `count` points one that is far from all of them.
+    fn end(&mut self, count: usize) {
+        self.y[count..count + LANES].fill(f32::INFINITY);
     }
 
     /// Makes this list the columns of `rows`.
+    #[inline(always)]
     fn transpose(&mut self, rows: &Self, count: usize, width: usize) {
         self.starts.clear();
         self.starts.resize(width + 2, 0);
@@ -167,7 +193,8 @@ impl Lines {
         for index in 2..self.starts.len() {
             self.starts[index] += self.starts[index - 1];
         }
-        self.resize(count);
+        self.make_room(count);
+        self.id.resize(self.x.len(), 0);
         for index in 0..count {
             let slot = &mut self.starts[column(rows.x[index]) + 1];
             let at = *slot as usize;
@@ -176,6 +203,26 @@ impl Lines {
             (self.nx[at], self.ny[at]) = (rows.ny[index], rows.nx[index]);
             self.id[at] = index as u32;
         }
+        self.end(count);
         self.starts.pop();
+    }
+}
+
+/// Taking in the maxima of a frame.
+struct Filling<'a> {
+    level: &'a mut Level,
+    candidates: &'a [Candidate],
+}
+
+impl Vectorized for Filling<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { level, candidates } = self;
+        level.fill_rows(candidates);
+        level
+            .columns
+            .transpose(&level.rows, candidates.len(), level.width);
     }
 }

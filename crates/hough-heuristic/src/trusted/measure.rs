@@ -263,35 +263,45 @@ impl Steepest {
             distance: [0.0; MOST],
             weight: [0.0; MOST],
         };
-        for ray in 0..count.min(MOST) {
-            if polar.visible[ray] == 0.0 {
-                continue;
-            }
-            let slope = |step: usize| polar.outward[step * count + ray].abs();
-            let (mut best, mut at) = (0.0, 0);
-            for step in 0..polar.steps {
-                let off = polar.distance(step as f32) / (focus + 1.5);
-                let strength =
-                    slope(step) * (1.0 - off * off).max(0.0) - 0.5 * polar.along[step * count + ray].abs();
-                if strength > best {
-                    (best, at) = (strength, step);
-                }
-            }
-            let here = slope(at);
-            let mut place = at as f32;
-            if at > 0 && at + 1 < polar.steps {
-                let (before, behind) = (slope(at - 1), slope(at + 1));
-                let bend = 2.0 * here - before - behind;
-                if bend > 0.0 {
-                    place += (0.5 * (behind - before) / bend).clamp(-0.5, 0.5);
-                }
-            }
-            steepest.distance[ray] = polar.distance(place);
-            steepest.weight[ray] = if best > 0.0 {
-                weight_of(here.min(60.0), doubtful)
-            } else {
-                0.0
+        for block in 0..count.min(MOST) / LANES {
+            let (mut best, mut at) = ([0.0f32; LANES], [0i32; LANES]);
+            // The slope where it is best, and a step before and behind; all three the same at the ends of the ray.
+            let slopes = |step: usize| {
+                let row: &[f32; LANES] = &polar.outward[step * count..][..count].as_chunks().0[block];
+                row.map(f32::abs)
             };
+            let first = slopes(0);
+            let [mut before, mut here, mut behind] = [first; 3];
+            let [mut last, mut now] = [first; 2];
+            for step in 0..polar.steps {
+                let next = if step + 1 < polar.steps { slopes(step + 1) } else { now };
+                let ends = step == 0 || step + 1 == polar.steps;
+                let (earlier, later) = if ends { (&now, &now) } else { (&last, &next) };
+                let along: &[f32; LANES] = &polar.along[step * count..][..count].as_chunks().0[block];
+                let off = polar.distance(step as f32) / (focus + 1.5);
+                let nearness = (1.0 - off * off).max(0.0);
+                for lane in 0..LANES {
+                    let strength = now[lane] * nearness - 0.5 * along[lane].abs();
+                    let better = strength > best[lane];
+                    best[lane] = if better { strength } else { best[lane] };
+                    at[lane] = if better { step as i32 } else { at[lane] };
+                    before[lane] = if better { earlier[lane] } else { before[lane] };
+                    here[lane] = if better { now[lane] } else { here[lane] };
+                    behind[lane] = if better { later[lane] } else { behind[lane] };
+                }
+                (last, now) = (now, next);
+            }
+            let visible: &[f32; LANES] = &polar.visible.as_chunks().0[block];
+            for lane in 0..LANES {
+                let bend = 2.0 * here[lane] - before[lane] - behind[lane];
+                let top = (0.5 * (behind[lane] - before[lane]) / bend).clamp(-0.5, 0.5);
+                let place = at[lane] as f32 + if bend > 0.0 { top } else { 0.0 };
+                let weight = weight_of(here[lane].min(60.0), doubtful);
+                let seen = visible[lane] > 0.0;
+                let ray = block * LANES + lane;
+                steepest.distance[ray] = if seen { polar.distance(place) } else { 0.0 };
+                steepest.weight[ray] = if seen && best[lane] > 0.0 { weight } else { 0.0 };
+            }
         }
         steepest
     }

@@ -187,7 +187,7 @@ fn bilinear(
     let (mut upper, mut lower) = ([0i32; LANES], [0i32; LANES]);
     for lane in 0..LANES {
         let left = at[lane] as u32 as usize;
-        if left < below.len() - 1 {
+        if left + 1 < below.len() {
             upper[lane] = i32::from(u16::from_le_bytes([above[left], above[left + 1]]));
             lower[lane] = i32::from(u16::from_le_bytes([below[left], below[left + 1]]));
         }

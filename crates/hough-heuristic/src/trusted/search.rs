@@ -180,8 +180,8 @@ impl Outline {
         let count = ((6.3 * ring.r) as usize).clamp(16, 512);
         *looks += 3 * count as u64;
         for index in 0..count {
-            let (ux, uy) = circle.point(index, count);
-            let lowest = code(ux, uy).wrapping_sub(DIRECTION_SLACK) % CODES;
+            let ((ux, uy), code) = circle.coded_point(index, count);
+            let lowest = code.wrapping_sub(DIRECTION_SLACK) % CODES;
             for step in [0.0, -1.5, 1.5] {
                 let at = ring.r + step;
                 if let Some((mark, pixel)) = level.mark(ring.x + at * ux, ring.y + at * uy)
