@@ -67,8 +67,8 @@ struct Options {
     seed: u64,
 
     /// How many eggs to go for
-    #[arg(long, value_name = "N", default_value_t = 20)]
-    runs: usize,
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..))]
+    runs: u16,
 
     /// Length of the egg, millimetres; it is 40 thick
     #[arg(long, value_name = "MM", default_value_t = 56.0, value_parser = length)]
@@ -109,7 +109,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let (mut gripped, mut moves) = (0, 0);
     println!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
-    for run in 1..=options.runs {
+    for run in 1..=usize::from(options.runs) {
         let (place, _) = workspace
             .sample_seen_ball(&rig.cell().get(), &mut rng)
             .ok_or("no place of the workspace is in view from a search pose")?;
@@ -200,7 +200,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     println!(
         "\n{gripped} of {} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
         options.runs,
-        100.0 * gripped as f64 / options.runs.max(1) as f64,
+        100.0 * gripped as f64 / f64::from(options.runs),
         moves as f64 / gripped.max(1) as f64,
         options.out.display()
     );

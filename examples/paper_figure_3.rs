@@ -14,6 +14,7 @@
 use std::error::Error;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Parser;
 use hough_heuristic::image::{GenericImage, GrayImage, Luma, Rgb, RgbImage};
@@ -26,9 +27,11 @@ use rand::{RngExt, SeedableRng};
 
 use files::{writable_folder, write_png};
 use overlay::Overlay;
+use program::ended;
 
 mod files;
 mod overlay;
+mod program;
 
 /// Draw original, edges, structure D and the found circle of a rendered scene.
 #[derive(Parser, Debug)]
@@ -45,8 +48,11 @@ struct Options {
 /// Radii of a ball in reach, pixels.
 const RADII: Range<f64> = 20.0..250.0;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
+fn main() -> ExitCode {
+    ended(run(&Options::parse()))
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let frame = render(options.seed)?;
     let mut detector = Heuristic::with_canny(HeuristicConfig {
         seed: options.seed,

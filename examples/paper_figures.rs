@@ -52,7 +52,7 @@ struct Options {
     out: PathBuf,
 
     /// Seeds to learn from
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     seeds: u64,
 
     /// The first of them

@@ -15,7 +15,8 @@
 //!   [`EventLog`] keeps them, and a `SavedRun` what else it takes to make the run again.
 //! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those that the paper names as alternatives,
 //!   [`PositionBased`], [`ImageBased`], [`Fuzzy`] and [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins
-//!   with such a model and learns what is wrong with it.
+//!   with such a model and learns what is wrong with it. [`Retargeted`] gives one of them a goal that was shown on the arm, [`GripAcross`] a grip that
+//!   turns the hand by how the object lies.
 //!
 //! # The state machine
 //!
