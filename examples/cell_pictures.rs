@@ -57,7 +57,8 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     let save = |name: &str, bytes: &[u8]| {
         let path = options.out.join(name);
         write_whole(&path, bytes)?;
-        writeln!(std::io::stdout(), "{}", path.display())?;
+        // A reader who has seen enough does not keep the other pictures from being written.
+        let _ = writeln!(std::io::stdout(), "{}", path.display());
         Ok::<(), Box<dyn Error>>(())
     };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);

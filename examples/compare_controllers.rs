@@ -16,8 +16,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, Controller, EventKind, EventLog, Fuzzy, Hybrid, HybridSettings, ImageBased,
-    JacobianAt, Learned, LookAhead, Percept, PositionBased, Retargeted, ServoSettings, TaughtGoal,
+    Agent, BehaviourSpec, EventKind, Hybrid, HybridSettings, JacobianAt, Learned, Percept, SavedController,
+    SavedRun, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
@@ -34,6 +34,7 @@ mod files;
 mod program;
 #[path = "compare_controllers/table.rs"]
 mod table;
+mod wilson;
 #[path = "compare_controllers/world.rs"]
 mod world;
 
@@ -65,7 +66,7 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 1000)]
     moves: usize,
 
-    /// Levels of errors: none, moderate, heavy, extreme
+    /// Levels of errors, separated by commas: none, moderate, heavy, extreme
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', default_values_t = ErrorLevel::ALL)]
     levels: Vec<ErrorLevel>,
 
@@ -89,7 +90,7 @@ struct Options {
     #[arg(long, value_name = "NAME", default_value_t, requires = "full_chain")]
     detector: BallDetector,
 
-    /// Write the event log of every run that fails or is broken off to failures/ in the folder
+    /// Write every run that fails or is broken off to failures/ in the folder, complete, for `replay`
     #[arg(long)]
     logs: bool,
 }
@@ -135,38 +136,38 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             let config = goal.map_or(untaught.clone(), |goal| goal.applied_to(untaught));
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
                 let run_of = |run: String| format!("{level} {} cell {draw} {run}", rival.name);
-                let made = match rival.made {
-                    Made::Once(ref controller) => controller(goal.as_ref()),
+                let controller = match rival.made {
+                    Made::Once(ref make) => make(goal.as_ref()),
                     Made::InEachCell => {
                         let agent = Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
                         let seed = seed_of(options.seed, &[2, draw]);
                         let (hybrid, fault) = taught_hybrid(&mut world, agent, seed, options.moves);
                         // What had been learned until then goes to work.
-                        if let Some(Fault { run, log, error }) = fault {
-                            failures.broken_off(&run_of(format!("teaching {run}")), &log, &*error)?;
+                        if let Some(Fault { run, saved, error }) = fault {
+                            failures.broken_off(&run_of(format!("teaching {run}")), &saved, &*error)?;
                             world = new_world()?;
                         }
-                        Box::new(hybrid)
+                        SavedController::of_hybrid(&hybrid)
                     }
                 };
                 tally.begin_draw();
-                let mut agent = Agent::with_controller(config.clone(), made)?;
+                let mut agent = Agent::with_controller(config.clone(), controller.controller())?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
-                    let mut log = EventLog::default();
+                    let mut saved = SavedRun::before(&agent, controller.clone());
                     let mut at_goal = None;
                     let outcome = world.run(&mut agent, seed, &mut |event| {
                         if event.kind == EventKind::AtGoal {
                             at_goal.get_or_insert(event.cycle);
                         }
-                        log.note(event);
+                        saved.note(event);
                     });
                     let mut trial = match outcome {
                         Ok(Some(trial)) => trial,
                         Ok(None) => continue,
                         // A run that an arm or a camera ends is one that has failed, and no more.
                         Err(error) => {
-                            failures.broken_off(&run_of(format!("ball {start}")), &log, &*error)?;
+                            failures.broken_off(&run_of(format!("ball {start}")), &saved, &*error)?;
                             tally.add_broken_off();
                             world = new_world()?;
                             continue;
@@ -182,7 +183,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         *tally.collisions.get_or_insert(0) += collisions;
                     }
                     if !success {
-                        failures.keep(&run_of(format!("ball {start}")), &log)?;
+                        failures.keep(&run_of(format!("ball {start}")), &saved)?;
                     }
                 }
             }
@@ -208,27 +209,24 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Where the event logs of runs that failed are kept, if they are.
+/// Where the runs that failed are kept, if they are.
 struct Failures {
     folder: Option<PathBuf>,
 }
 
 impl Failures {
-    fn keep(&self, run: &str, log: &EventLog) -> Result<(), Box<dyn Error>> {
+    fn keep(&self, run: &str, saved: &SavedRun) -> Result<(), Box<dyn Error>> {
         let Some(folder) = &self.folder else {
             return Ok(());
         };
         writable_folder(folder)?;
-        write_whole(
-            &folder.join(format!("{run}.json")),
-            &serde_json::to_vec_pretty(log)?,
-        )
+        write_whole(&folder.join(format!("{run}.json")), saved.to_json().as_bytes())
     }
 
     /// A run that did not even come to an end.
-    fn broken_off(&self, run: &str, log: &EventLog, error: &dyn Error) -> Result<(), Box<dyn Error>> {
+    fn broken_off(&self, run: &str, saved: &SavedRun, error: &dyn Error) -> Result<(), Box<dyn Error>> {
         eprintln!("{run}: broken off: {error}");
-        self.keep(run, log)
+        self.keep(run, saved)
     }
 }
 
@@ -238,8 +236,8 @@ struct Rival {
     made: Made,
 }
 
-/// Makes a controller for a goal that was taught, if one was.
-type Make = Box<dyn Fn(Option<&TaughtGoal>) -> Box<dyn Controller>>;
+/// Makes a controller, as data, for a goal that was taught, if one was.
+type Make = Box<dyn Fn(Option<&TaughtGoal>) -> SavedController>;
 
 enum Made {
     /// The same for every cell.
@@ -264,38 +262,51 @@ fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
     for (gain, tag) in [(1.0, "gain 1"), (0.5, "gain 0.5")] {
         rivals.push(fixed(
             &format!("position-based, {tag}"),
-            Box::new(move |goal| Box::new(PositionBased::new(servo(gain, goal)))),
+            Box::new(move |goal| SavedController::PositionBased {
+                settings: servo(gain, goal),
+            }),
         ));
         for (at, which) in [(JacobianAt::Goal, "goal J"), (JacobianAt::Now, "current J")] {
             let name = format!("image-based {which}, {tag}");
             rivals.push(fixed(
                 &name,
-                Box::new(move |goal| Box::new(ImageBased::new(servo(gain, goal), at))),
+                Box::new(move |goal| SavedController::ImageBased {
+                    settings: servo(gain, goal),
+                    at,
+                }),
             ));
         }
     }
     for (gain, tag) in [(1.0, "gain 1"), (0.7, "gain 0.7"), (0.5, "gain 0.5")] {
         rivals.push(fixed(
             &format!("fuzzy, {tag}"),
-            Box::new(move |goal| Box::new(Fuzzy::new(servo(gain, goal)))),
+            Box::new(move |goal| SavedController::Fuzzy {
+                settings: servo(gain, goal),
+            }),
         ));
     }
     rivals.push(fixed(
         "look-ahead",
-        Box::new(move |goal| Box::new(LookAhead::new(servo(1.0, goal)))),
+        Box::new(move |goal| SavedController::LookAhead {
+            settings: servo(1.0, goal),
+        }),
     ));
     for (name, learned) in learned(options)? {
+        let learned = SavedController::of_learned(&learned, None);
         rivals.push(fixed(
             name,
             Box::new(move |goal| match goal {
-                None => Box::new(learned.clone()),
-                Some(goal) => Box::new(Retargeted::new(learned.clone(), *goal)),
+                None => learned.clone(),
+                Some(goal) => SavedController::Retargeted {
+                    controller: Box::new(learned.clone()),
+                    goal: *goal,
+                },
             }),
         ));
     }
     rivals.push(fixed(
         "hybrid, untaught",
-        Box::new(|goal| Box::new(new_hybrid(goal).frozen())),
+        Box::new(|goal| SavedController::of_hybrid(&new_hybrid(goal))),
     ));
     rivals.push(Rival {
         name: "hybrid".into(),
@@ -313,8 +324,19 @@ fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
     }
 }
 
-/// The paper's controller, learned in simulation without errors: in the regression simulator, and in the exact plane.
+/// The paper's controller, learned in simulation without errors: in the regression simulator, and in the exact plane. Nothing is learned where
+/// none of them is asked for.
 fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Error>> {
+    const NAMES: [&str; 5] = [
+        "Q 90, linear regression",
+        "Q 90, rigid regression",
+        "Q 540, rigid regression",
+        "Q 90, exact plane",
+        "Q 540, exact plane",
+    ];
+    if !NAMES.iter().any(|name| name.contains(&options.only)) {
+        return Ok(Vec::new());
+    }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
@@ -327,38 +349,20 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     let centering = learn_best(spec, &rigid, &anywhere, 60_000, &mut rng, quiet)?.behaviour;
     let (paper, fine) = (BehaviourSpec::approaching, BehaviourSpec::approaching_fine);
     let approaching = [
-        (
-            "Q 90, linear regression",
-            learn_best(paper(), &linear, &trials, 500_000, &mut rng, quiet)?,
-        ),
-        (
-            "Q 90, rigid regression",
-            learn_best(paper(), &rigid, &trials, 500_000, &mut rng, quiet)?,
-        ),
-        (
-            "Q 540, rigid regression",
-            learn_best(fine(), &rigid, &trials, 4_000_000, &mut rng, quiet)?,
-        ),
-        (
-            "Q 90, exact plane",
-            plane.learn_best(paper(), &trials, 500_000, &mut rng, quiet)?,
-        ),
-        (
-            "Q 540, exact plane",
-            plane.learn_best(fine(), &trials, 4_000_000, &mut rng, quiet)?,
-        ),
+        learn_best(paper(), &linear, &trials, 500_000, &mut rng, quiet)?,
+        learn_best(paper(), &rigid, &trials, 500_000, &mut rng, quiet)?,
+        learn_best(fine(), &rigid, &trials, 4_000_000, &mut rng, quiet)?,
+        plane.learn_best(paper(), &trials, 500_000, &mut rng, quiet)?,
+        plane.learn_best(fine(), &trials, 4_000_000, &mut rng, quiet)?,
     ];
-    let both = |lesson: puma_grasp::Lesson| Learned::new(centering.clone(), lesson.behaviour);
-    Ok(approaching
-        .into_iter()
-        .map(|(name, lesson)| (name, both(lesson)))
-        .collect())
+    let both = approaching.map(|lesson| Learned::new(centering.clone(), lesson.behaviour));
+    Ok(NAMES.into_iter().zip(both).collect())
 }
 
 /// A run of teaching that was broken off.
 struct Fault {
     run: u64,
-    log: EventLog,
+    saved: SavedRun,
     error: Box<dyn Error>,
 }
 
@@ -376,11 +380,11 @@ fn taught_hybrid(
         if made + longest > moves || run > moves as u64 {
             break;
         }
-        let mut log = EventLog::default();
-        match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| log.note(event)) {
+        let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
+        match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| saved.note(event)) {
             Ok(trial) => made += trial.map_or(0, |trial| trial.outcome.cycles),
             Err(error) => {
-                fault = Some(Fault { run, log, error });
+                fault = Some(Fault { run, saved, error });
                 break;
             }
         }
@@ -395,4 +399,42 @@ fn seed_of(seed: u64, uses: &[u64]) -> u64 {
             .wrapping_mul(0xd134_2543_de82_ef95)
             .rotate_left(29)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use grasp_agent::Replayed;
+
+    #[test]
+    fn every_run_that_is_kept_is_made_again_and_comes_out_the_same() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let out = folder.path().to_string_lossy().into_owned();
+        let one = [
+            "compare", "--draws", "1", "--starts", "1", "--moves", "60", "--levels", "extreme",
+        ];
+        let kept = ["--grip", "--logs", "--out", &out];
+        let names = [
+            "position-based, gain 1",
+            "goal J, gain 0.5",
+            "current J, gain 1",
+            "fuzzy, gain 0.7",
+        ];
+        for only in names.into_iter().chain(["look-ahead", "hybrid, untaught"]) {
+            let arguments = one.into_iter().chain(kept).chain(["--only", only]);
+            run(&Options::parse_from(arguments)).expect("a comparison");
+        }
+        // With another camera's goal none of them grasps.
+        let files = std::fs::read_dir(folder.path().join("failures")).expect("they failed");
+        let replayed = files.map(|file| {
+            let text = std::fs::read_to_string(file.expect("a file").path()).expect("text");
+            SavedRun::from_json(&text).expect("a saved run").replay()
+        });
+        let replayed: Vec<_> = replayed.map(|end| end.expect("sound settings")).collect();
+        assert_eq!(replayed.len(), 6);
+        assert!(
+            replayed.iter().all(|end| matches!(end, Replayed::Same(_))),
+            "{replayed:?}"
+        );
+    }
 }

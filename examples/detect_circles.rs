@@ -221,7 +221,7 @@ impl Results {
             self.found
                 .iter()
                 .for_each(|detection| picture.circle(&detection.circle));
-            picture.caption(&format!("{} circles", self.found.len()));
+            let picture = picture.captioned(&format!("{} circles", self.found.len()));
             write_png(
                 &folder.join(unused_name(path, ".png", &mut self.overlays)),
                 &picture.into_image(),

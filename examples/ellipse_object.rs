@@ -21,15 +21,15 @@ use std::rc::Rc;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourPair, CameraEye, Consequence, Controller, EggFeatures, EggLimits, EventKind,
-    EventLog, GaveUp, JointLimits, Learned, ObjectFeatures, Percept, Sighting, Situation,
+    Agent, AgentConfig, BehaviourPair, CameraEye, EggFeatures, EggLimits, EventKind, GripAcross, Learned,
+    ObjectFeatures, Percept, SavedController, SavedRun, Sighting,
 };
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse};
 use nalgebra::Vector3;
 use pipeline_sim::{ReachForm, Workspace, sample_moves};
 use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts};
-use puma_val2::{JointDelta, Joints};
+use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
@@ -55,8 +55,7 @@ mod program;
 /// of the egg's outline. For the grip the hand is turned so that the jaws close across the egg.
 ///
 /// What the camera shows is an egg; what the hand can touch and hold in the simulated cell is the ball of 40 mm inside it. That the jaws close across
-/// the egg is therefore asked for beside that they hold the ball. The events of a run that fails are kept in the folder, without the
-/// settings and the controller: to read, and no saved run for `replay`.
+/// the egg is therefore asked for beside that they hold the ball. A run that fails is kept in the folder, complete, for `replay`.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for a picture of each egg as it was seen last
@@ -68,8 +67,8 @@ struct Options {
     seed: u64,
 
     /// How many eggs to go for
-    #[arg(long, value_name = "N", default_value_t = 20)]
-    runs: usize,
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..))]
+    runs: u16,
 
     /// Length of the egg, millimetres; it is 40 thick
     #[arg(long, value_name = "MM", default_value_t = 56.0, value_parser = length)]
@@ -100,15 +99,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         outline: Rc::default(),
     };
     let workspace = Workspace::paper();
-    let controller = AcrossTheEgg {
-        learned: taught_for_balls(&rig, options.seed, &mut rng)?,
-        outline: Rc::clone(&features.outline),
+    let config = AgentConfig::paper(workspace.search_poses());
+    let learned = taught_for_balls(&rig, options.seed, &mut rng)?;
+    let controller = SavedController::GripAcross {
+        controller: Box::new(SavedController::of_learned(&learned, None)),
+        grip: config.grip,
     };
-    let agent = Agent::with_controller(AgentConfig::paper(workspace.search_poses()), controller)?;
+    let agent = Agent::with_controller(config.clone(), GripAcross::new(learned, config.grip))?;
 
     let (mut gripped, mut moves) = (0, 0);
     println!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
-    for run in 1..=options.runs {
+    for run in 1..=usize::from(options.runs) {
         let (place, _) = workspace
             .sample_seen_ball(&rig.cell().get(), &mut rng)
             .ok_or("no place of the workspace is in view from a search pose")?;
@@ -129,13 +130,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
         let params = cell.get().params;
-        let mut log = EventLog::default();
+        let mut saved = SavedRun::before(&agent, controller.clone());
         let end = agent.run(
             &mut eye,
             &mut Detour { arm, params },
             &mut *sensor,
             &mut |event| {
-                log.note(event);
+                saved.note(event);
                 match (&event.kind, event.frame, outline.get()) {
                     (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
                         last = Some((frame.clone(), ellipse));
@@ -155,7 +156,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let outcome = match end {
             Ok(outcome) => outcome,
             Err(error) => {
-                let kept = keep_log(&options.out, run, &log)?;
+                let kept = keep_run(&options.out, run, &saved)?;
                 return Err(format!("run {run} was broken off: {error}; {kept}").into());
             }
         };
@@ -181,7 +182,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             outcome.cycles, outcome.losses
         );
         if !held {
-            println!("      {}", keep_log(&options.out, run, &log)?);
+            println!("      {}", keep_run(&options.out, run, &saved)?);
         }
         if let Some((frame, ellipse)) = last {
             let mut overlay = Overlay::new(&frame);
@@ -199,18 +200,18 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     println!(
         "\n{gripped} of {} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
         options.runs,
-        100.0 * gripped as f64 / options.runs.max(1) as f64,
+        100.0 * gripped as f64 / f64::from(options.runs),
         moves as f64 / gripped.max(1) as f64,
         options.out.display()
     );
     Ok(())
 }
 
-/// Writes the events of a run that failed, and says where.
-fn keep_log(out: &Path, run: usize, log: &EventLog) -> Result<String, Box<dyn Error>> {
+/// Writes a run that failed, and says where.
+fn keep_run(out: &Path, run: usize, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
     let path = out.join(format!("egg{run:03}.json"));
-    write_whole(&path, &serde_json::to_vec_pretty(log)?)?;
-    Ok(format!("its events: {}", path.display()))
+    write_whole(&path, saved.to_json().as_bytes())?;
+    Ok(format!("for `replay`: {}", path.display()))
 }
 
 /// Ellipses among the edges of the frame.
@@ -262,46 +263,6 @@ impl ObjectFeatures for Watched {
         let found = self.features.find(frame);
         self.outline.set(self.features.outline());
         found
-    }
-}
-
-/// The learned controller, and a grip that turns the hand by what the outline says.
-#[derive(Clone)]
-struct AcrossTheEgg {
-    learned: Learned,
-    outline: Rc<Cell<Option<Ellipse>>>,
-}
-
-impl Controller for AcrossTheEgg {
-    fn name(&self) -> &str {
-        "learned, gripping across"
-    }
-
-    fn begin(&mut self) {
-        self.learned.begin();
-    }
-
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        self.learned.decide(now, limits)
-    }
-
-    fn judge(&mut self, consequence: &Consequence) {
-        self.learned.judge(consequence);
-    }
-
-    fn arm_at(&mut self, joints: &Joints) {
-        self.learned.arm_at(joints);
-    }
-
-    /// The paper's turn of the fifth joint, and one of the sixth.
-    ///
-    /// The jaws open along the rows of the image, and a turn of `JT6` turns them from x toward y. They shall close along the shorter axis.
-    fn grip(&mut self, _now: &Situation, _limits: &JointLimits) -> Option<JointDelta> {
-        const LONG: f64 = 1.1;
-        let ellipse = self.outline.get().filter(|e| e.major > LONG * e.minor)?;
-        let across = ellipse.angle.to_degrees() + 90.0;
-        let turn = if across > 90.0 { across - 180.0 } else { across };
-        Some(JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.01, turn]))
     }
 }
 

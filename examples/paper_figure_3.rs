@@ -12,7 +12,9 @@
 )]
 
 use std::error::Error;
+use std::ops::Range;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Parser;
 use hough_heuristic::image::{GenericImage, GrayImage, Luma, Rgb, RgbImage};
@@ -25,9 +27,11 @@ use rand::{RngExt, SeedableRng};
 
 use files::{writable_folder, write_png};
 use overlay::Overlay;
+use program::ended;
 
 mod files;
 mod overlay;
+mod program;
 
 /// Draw original, edges, structure D and the found circle of a rendered scene.
 #[derive(Parser, Debug)]
@@ -41,36 +45,41 @@ struct Options {
     seed: u64,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::parse();
+/// Radii of a ball in reach, pixels.
+const RADII: Range<f64> = 20.0..250.0;
+
+fn main() -> ExitCode {
+    ended(run(&Options::parse()))
+}
+
+fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let frame = render(options.seed)?;
     let mut detector = Heuristic::with_canny(HeuristicConfig {
         seed: options.seed,
+        min_radius: RADII.start,
+        max_radius: RADII.end,
         ..HeuristicConfig::default()
     })?;
     let found = detector.detect(&frame);
 
-    let mut original = Overlay::new(&frame);
-    original.caption("Original");
     let edges = detector.edges();
-    let mut edge_picture = Overlay::new(edges.image());
-    edge_picture.caption(&format!("Canny edges: {} pixels", edges.pixels().len()));
+    let edge_words = format!("Canny edges: {} pixels", edges.pixels().len());
     let mut result = Overlay::new(&frame);
     for detection in &found {
         result.circle(&detection.circle);
     }
-    result.caption(&found.first().map_or("No circle".into(), |best| {
+    let result_words = found.first().map_or("No circle".into(), |best| {
         let Features { x, y, r } = Features::from_circle(&best.circle, frame.width());
         format!(
             "Found: beta {:.2}, x {x:.1}  y {y:.1}  r {r:.1} units",
             best.score
         )
-    }));
+    });
     let panels = [
-        original.into_image(),
-        edge_picture.into_image(),
+        Overlay::new(&frame).captioned("Original").into_image(),
+        Overlay::new(edges.image()).captioned(&edge_words).into_image(),
         structure(&frame, edges, options.seed),
-        result.into_image(),
+        result.captioned(&result_words).into_image(),
     ];
 
     if let Some(folder) = options
@@ -117,7 +126,7 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         let pixels: [EdgePixel; 3] =
             std::array::from_fn(|_| edges.pixels()[rng.random_range(0..edges.pixels().len())]);
         Circle::through(&pixels)
-            .filter(|circle| (20.0..250.0).contains(&circle.radius))
+            .filter(|circle| RADII.contains(&circle.radius))
             .map(|circle| (pixels, circle))
     });
     let drawn = if edges.pixels().is_empty() {
@@ -126,7 +135,8 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         draws.take(10_000).flatten().next()
     };
     let Some((pixels, circle)) = drawn else {
-        return picture;
+        let words = "D: no three of its pixels make a circle of such a radius";
+        return Overlay::over(picture).captioned(words).into_image();
     };
     let mut plot = |x: i32, y: i32, colour| {
         if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
@@ -146,10 +156,9 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         }
     }
     let beta = matched(edges, &circle);
-    captioned(
-        picture,
-        &format!("D, three of its pixels, their circle: beta {beta:.2}"),
-    )
+    Overlay::over(picture)
+        .captioned(&format!("D, three of its pixels, their circle: beta {beta:.2}"))
+        .into_image()
 }
 
 /// The belonging of a circle at the default tolerance of one pixel, counted pixel by pixel.
@@ -174,12 +183,6 @@ fn matched(edges: &EdgeMap, circle: &Circle) -> f64 {
         true
     });
     f64::from(matched) / f64::from(pixels)
-}
-
-fn captioned(picture: RgbImage, words: &str) -> RgbImage {
-    let mut overlay = Overlay::over(picture);
-    overlay.caption(words);
-    overlay.into_image()
 }
 
 /// Four panels of one size, two by two.

@@ -41,6 +41,7 @@ mod plot;
 mod program;
 #[path = "paper_figures/snapshots.rs"]
 mod snapshots;
+mod wilson;
 
 /// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut, Fig. 9 through the full chain; and what
 /// becomes of the behaviours when they are taken from simulation to an arm with errors, and go on learning there.
@@ -51,7 +52,7 @@ struct Options {
     out: PathBuf,
 
     /// Seeds to learn from
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     seeds: u64,
 
     /// The first of them

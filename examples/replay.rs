@@ -18,7 +18,8 @@ use program::ended;
 
 mod program;
 
-/// Make runs again that `grasp` (failures/, with --save-runs saved/) or `track` has kept, and say whether they come out the same.
+/// Make runs again that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers` (--logs) or `ellipse_object` has kept, and say
+/// whether they come out the same.
 ///
 /// A file holds the settings, the controller before the run, and every event. Arm, sensors and camera answer as they did then; what the controller
 /// and the state machine decide is decided anew.

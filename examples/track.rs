@@ -43,6 +43,7 @@ mod shortcut;
 mod stages;
 #[path = "track/tally.rs"]
 mod tally;
+mod wilson;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
@@ -135,9 +136,11 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+    let belief = options.belief.as_deref().map(Belief::load).transpose()?;
     writable_folder(&options.out)?;
     let mut chain = Chain {
         options,
+        belief,
         detector: options.detector.build(options.seed)?,
         stages: Stages::default(),
         csv: String::from("run,move,x,y,r,event\n"),
@@ -166,12 +169,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 fn keep_run(folder: &Path, name: &str, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
     let file = folder.join(format!("{name}.json"));
     write_whole(&file, saved.to_json().as_bytes())?;
-    Ok(format!("events: {}", file.display()))
+    Ok(format!("for `replay`: {}", file.display()))
 }
 
 /// Rendered frames, circle detection, VAL II on a line, and what is written down of all that.
 struct Chain<'a> {
     options: &'a Options,
+    /// What is known of the camera before.
+    belief: Option<Belief>,
     detector: Box<dyn CircleDetector + Send>,
     stages: Stages,
     csv: String,
@@ -195,8 +200,8 @@ impl Chain<'_> {
         let mut config = AgentConfig::paper(workspace.search_poses());
         config.max_cycles = 120;
         let settings = HybridSettings::paper();
-        let hybrid = match &options.belief {
-            Some(file) => Hybrid::with_belief(settings, Belief::load(file)?),
+        let hybrid = match &self.belief {
+            Some(belief) => Hybrid::with_belief(settings, belief.clone()),
             None => Hybrid::new(settings),
         };
         let stages = self.stages.clone();
@@ -397,4 +402,22 @@ fn animated(frames: &[GrayImage]) -> Result<Vec<u8>, Box<dyn Error>> {
     }
     writer.finish()?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_belief_that_is_none_leaves_the_results_of_an_earlier_run() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let out = folder.path().to_string_lossy().into_owned();
+        let earlier = folder.path().join("track.csv");
+        std::fs::write(&earlier, "an earlier run").expect("a file");
+        let options = Options::parse_from(["track", "--belief", "no-such-belief", "--out", &out]);
+        let error = run(&options).expect_err("there is no such file").to_string();
+        assert!(error.contains("no-such-belief"), "{error}");
+        let left = std::fs::read_to_string(&earlier).expect("still there");
+        assert_eq!(left, "an earlier run");
+    }
 }

@@ -20,6 +20,7 @@ impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
         /// Width that the circle of a sighting is given for: that of the paper's frame.
         const FRAME: u32 = 768;
         let ball = self.0.look().map(|features| Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(FRAME),
@@ -129,17 +130,25 @@ impl TrialCell {
     }
 
     /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5` is taken back, and the camera looks a few
-    /// times. Where the ball is not well in view then, a shorter or a longer turn is tried. `None` where it is with none of them.
+    /// times. Where the ball is not well in view then, a shorter or a longer turn is tried, and then one of `JT4` before it, which brings a ball
+    /// that shows too far aside into view. `None` where it is with none of them.
+    ///
+    /// Both are turns of the wrist, by which jaws and camera move in the same way wherever the arm stands.
     ///
     /// # Errors
     /// What the arm reports.
     pub fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, ArmError> {
         /// What is added to the grip's turn, degrees, in the order it is tried.
         const TURNS: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
+        /// The turns of `JT4` that are tried, degrees.
+        const ASIDE: [f64; 8] = [4.0, -4.0, 8.0, -8.0, 12.0, -12.0, 16.0, -16.0];
         let from = Joints::from_degrees(ImageBased::GOAL_POSE);
         let config = self.agent_config();
-        for more in TURNS {
+        let upright = TURNS.map(|more| (0.0, more));
+        let turned = TURNS.iter().flat_map(|more| ASIDE.map(|aside| (aside, *more)));
+        for (aside, more) in upright.into_iter().chain(turned) {
             let mut grip = config.grip;
+            grip.0[Joint::J4.index()] += f64::to_radians(aside);
             grip.0[Joint::J5.index()] += more.to_radians();
             if let Some(seen) = self.seen_after_taking_back(&grip, from, seed)? {
                 return Ok(TaughtGoal::new(&config.goal, seen, from, grip));

@@ -452,3 +452,25 @@ fn the_emulator_names_what_it_cannot_serve_on() {
         );
     }
 }
+
+#[test]
+fn pictures_are_written_for_a_reader_who_has_left() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(mut command) = example("cell_pictures") else {
+        return;
+    };
+    let mut running = command
+        .args(["--frames", "4", "--out"])
+        .arg(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the example starts");
+    drop(running.stdout.take());
+    let output = running.wait_with_output().expect("the example ends");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && errors.is_empty(), "{errors}");
+    for name in ["overview.svg", "search.png", "goal.png", "run.png", "run.y4m"] {
+        assert!(folder.path().join(name).exists(), "{name}");
+    }
+}

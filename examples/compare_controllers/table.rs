@@ -7,6 +7,8 @@ use grasp_agent::Outcome;
 use pipeline_sim::ErrorLevel;
 use plotters::prelude::*;
 
+use crate::wilson::wilson;
+
 /// The runs of one controller at one level of errors.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
@@ -48,12 +50,7 @@ impl Tally {
     /// Its 95 % interval, percent: Wilson's, with each cell counting as one. It holds however much the runs in one cell are alike, and says
     /// something where all runs succeed, or none; for cells whose runs are not alike it is wider than it need be. Not a number without cells.
     fn interval(&self) -> [f64; 2] {
-        const Z: f64 = 1.96;
-        let (n, share) = (self.shares().len() as f64, 0.01 * self.success());
-        let middle = share + 0.5 * Z * Z / n;
-        let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
-        let scale = 100.0 / (1.0 + Z * Z / n);
-        [middle - half, middle + half].map(|end| (scale * end).clamp(0.0, 100.0).abs())
+        wilson(0.01 * self.success(), self.shares().len() as f64)
     }
 
     /// In how many cells all runs succeeded.

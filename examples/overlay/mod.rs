@@ -82,8 +82,8 @@ impl Overlay {
         }
     }
 
-    /// Words on a dark bar at the top.
-    pub(crate) fn caption(&mut self, words: &str) {
+    /// Words on a dark bar at the top, which covers what is there.
+    fn caption(&mut self, words: &str) {
         let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), CAPTION));
         let Ok(()) = bar
             .into_styled(PrimitiveStyle::with_fill(Rgb888::new(20, 20, 40)))
@@ -93,7 +93,7 @@ impl Overlay {
     }
 
     /// Words in a dark strip above the picture, which becomes higher by as much.
-    #[allow(dead_code, reason = "not every example that draws needs the whole picture")]
+    #[allow(dead_code, reason = "not every example that draws has words")]
     pub(crate) fn captioned(self, words: &str) -> Self {
         let mut higher = RgbImage::new(self.0.width(), self.0.height() + CAPTION);
         image::imageops::replace(&mut higher, &self.0, 0, i64::from(CAPTION));

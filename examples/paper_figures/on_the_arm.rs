@@ -9,7 +9,8 @@ use puma_grasp::{Simulator, TrialCell, learn_best, search_percepts};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use crate::plot::{Panel, drawn, mean_and_interval};
+use crate::plot::{Panel, drawn};
+use crate::wilson::wilson;
 
 /// Moves on the arm after which the behaviours are looked at.
 const MOVES: [usize; 4] = [0, 500, 2_000, 10_000];
@@ -31,10 +32,11 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
         "\nFrom simulation to the arm: the behaviours at once, and after learning on there from so many moves"
     );
     println!(
-        "learned in          errors of the arm  goal   moves learned from  success %        moves of a success"
+        "learned in          errors of the arm  goal   moves learned from  success %  95 % interval  moves of a success"
     );
-    let mut csv =
-        String::from("learned_in,errors,goal,moves_learned_from,success_percent,half_interval,moves\n");
+    let mut csv = String::from(
+        "learned_in,errors,goal,moves_learned_from,success_percent,interval_low,interval_high,moves\n",
+    );
     let mut panels = Vec::new();
     for (name, form) in [
         ("rigid regression", ReachForm::Rigid22),
@@ -53,27 +55,31 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
                 .enumerate()
             {
                 let success: Vec<f64> = scores.iter().map(|score| score[column].0).collect();
-                let (mean, half) = mean_and_interval(&success);
+                let arms = success.len() as f64;
+                let mean = success.iter().sum::<f64>() / arms;
+                // Each arm counts as one: the balls on it share its errors.
+                let [low, high] = wilson(0.01 * mean, arms);
                 let moves: Vec<f64> = scores
                     .iter()
                     .map(|score| score[column].1)
                     .filter(|moves| moves.is_finite())
                     .collect();
                 let moves = moves.iter().sum::<f64>() / moves.len() as f64;
-                // One arm has no interval, and no success no moves.
-                let half = (seeds > 1).then_some(half);
-                let interval = half.map_or(String::new(), |half| format!("+- {half:4.1}"));
+                let interval = format!("{low:.1}..{high:.1}");
+                // No success, no moves.
                 let moves = if moves.is_finite() {
                     format!("{moves:.1}")
                 } else {
                     String::new()
                 };
                 println!(
-                    "{name:19} {level:18} {goal:5} {made:19}  {mean:5.1} {interval:7} {moves:>17}",
+                    "{name:19} {level:18} {goal:5} {made:19}  {mean:9.1} {interval:>14} {moves:>18}",
                     level = level.to_string()
                 );
-                let half = half.map_or(String::new(), |half| format!("{half:.2}"));
-                let _ = writeln!(csv, "{name},{level},{goal},{made},{mean:.2},{half},{moves}");
+                let _ = writeln!(
+                    csv,
+                    "{name},{level},{goal},{made},{mean:.2},{low:.2},{high:.2},{moves}"
+                );
                 if goal == "all" {
                     line.push((made as f64, mean));
                 }

@@ -15,9 +15,9 @@ use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use crate::overlay::Overlay;
+use crate::overlay::{CAPTION, Overlay};
 
-/// Size of each picture.
+/// Size of each picture, below its caption.
 const TILE: (u32, u32) = (384, 288);
 /// Pixels a metre, and where the shoulder is, in the drawing of the pose.
 const SCALE: f64 = 290.0;
@@ -56,12 +56,12 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
         }
     })?;
     let last = moments.len().checked_sub(1).ok_or("the ball was never seen")?;
-    let mut sheet = RgbImage::from_pixel(4 * TILE.0, 3 * TILE.1, image::Rgb([255; 3]));
+    let mut sheet = RgbImage::from_pixel(4 * TILE.0, 3 * (TILE.1 + CAPTION), image::Rgb([255; 3]));
     for column in 0..4_usize {
         let moment = &moments[column * last / 3];
         let rows = [pose(moment, &ball, table), seen(moment), edges(moment)?];
         for (row, picture) in (0_u32..).zip(rows) {
-            let at = (column as u32 * TILE.0, row * TILE.1);
+            let at = (column as u32 * TILE.0, row * (TILE.1 + CAPTION));
             replace(&mut sheet, &picture, at.0.into(), at.1.into());
         }
     }
@@ -108,11 +108,11 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
     drawing.disc(at(camera * Point3::origin()), 5.0, Rgb888::new(20, 130, 60));
     drawing.disc(at(ball.centre), SCALE * ball.radius, Rgb888::new(220, 110, 20));
     let degrees = joints.degrees();
-    drawing.caption(&format!(
+    let words = format!(
         "move {}: {:.0} {:.0} {:.0} deg",
         moment.moves, degrees[0], degrees[1], degrees[2]
-    ));
-    drawing.into_image()
+    );
+    drawing.captioned(&words).into_image()
 }
 
 fn seen(moment: &Moment) -> RgbImage {
@@ -137,18 +137,10 @@ fn edges(moment: &Moment) -> Result<RgbImage, Box<dyn Error>> {
         );
         image.put_pixel(x, y, image::Rgb([255; 3]));
     }
-    let mut overlay = Overlay::over(image);
-    overlay.caption("edges");
-    Ok(overlay.into_image())
+    Ok(Overlay::over(image).captioned("edges").into_image())
 }
 
 fn small(overlay: Overlay, words: &str) -> RgbImage {
-    let mut overlay = Overlay::over(resize(
-        &overlay.into_image(),
-        TILE.0,
-        TILE.1,
-        FilterType::Triangle,
-    ));
-    overlay.caption(words);
-    overlay.into_image()
+    let small = resize(&overlay.into_image(), TILE.0, TILE.1, FilterType::Triangle);
+    Overlay::over(small).captioned(words).into_image()
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::wilson::wilson;
+
 /// A run that counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counted {
@@ -64,7 +66,7 @@ impl fmt::Display for Tally {
         if runs == 0 {
             write!(f, "no run to count")?;
         } else {
-            let (low, high) = interval(grasped, runs);
+            let [low, high] = wilson(grasped as f64 / runs as f64, runs as f64);
             write!(
                 f,
                 "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {} stops by the proximity sensors",
@@ -85,18 +87,6 @@ impl fmt::Display for Tally {
         }
         Ok(())
     }
-}
-
-/// Wilson's interval of a share of at least one run, percent.
-fn interval(successes: usize, runs: usize) -> (f64, f64) {
-    const Z: f64 = 1.96;
-    let (n, share) = (runs as f64, successes as f64 / runs as f64);
-    let middle = share + 0.5 * Z * Z / n;
-    let half = Z * (share * (1.0 - share) / n + 0.25 * Z * Z / (n * n)).sqrt();
-    let scale = 100.0 / (1.0 + Z * Z / n);
-    // None of the runs, or all of them: rounding must not lead out of what a share can be.
-    let [low, high] = [middle - half, middle + half].map(|end| (scale * end).clamp(0.0, 100.0).abs());
-    (low, high)
 }
 
 #[cfg(test)]

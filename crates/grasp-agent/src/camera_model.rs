@@ -6,6 +6,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use nalgebra::{Quaternion, Vector4};
 use puma_val2::{Joint, JointDelta, Joints, PumaParams};
 
+#[cfg(feature = "serde")]
+use crate::config::above_zero;
 use crate::percept::THETA3_ZERO;
 use crate::{JointLimits, Percept};
 
@@ -55,6 +57,23 @@ impl CameraModel {
             ball_radius: 0.020,
             tool: 0.126,
         }
+    }
+
+    /// Whether something can be seen by it; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let arm = &self.arm;
+        let mount = self.mount.to_homogeneous();
+        let lengths = [arm.a2, arm.a3, arm.d2, arm.d4, arm.d6, self.tool];
+        let mut numbers = lengths
+            .into_iter()
+            .chain(self.centre)
+            .chain(mount.iter().copied());
+        if !numbers.all(f64::is_finite) {
+            return Err("a length or an angle of the camera or the arm is not finite".into());
+        }
+        above_zero("the focal length", self.focal)?;
+        above_zero("the radius of the ball", self.ball_radius)
     }
 
     /// The ball's outline with the arm at `joints` and the ball's centre at `ball`, in the frame or outside it; `None` where it has
@@ -186,7 +205,7 @@ impl TryFrom<Written> for CameraModel {
                 written.mount_turn
             ));
         }
-        Ok(Self {
+        let model = Self {
             arm: written.arm,
             focal: written.focal,
             centre: written.centre,
@@ -197,7 +216,9 @@ impl TryFrom<Written> for CameraModel {
             ),
             ball_radius: written.ball_radius,
             tool: written.tool,
-        })
+        };
+        model.check()?;
+        Ok(model)
     }
 }
 

@@ -2,11 +2,16 @@
 
 use puma_val2::{Joint, JointDelta, Joints};
 
+use crate::checked::checked;
 use crate::{AgentError, GoalInterval, Input, JointLimits};
 
 /// Settings of an [`Agent`](crate::Agent).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct AgentConfig {
     /// Poses to look around from, at least one (section 2.2 of the paper: six). They are tried nearest first.
     pub search_poses: Vec<Joints>,
@@ -27,6 +32,10 @@ pub struct AgentConfig {
     /// Moves after the first sighting before the run is given up \[60\]; two looks at the goal that show the ball at different places
     /// count as one, and so does a ball there that the second look does not show. At least 1.
     pub max_cycles: usize,
+    /// Viewpoints of one search before it counts as one that found nothing \[1000\]; at least 1. The search of the paper's poses has 18, another one
+    /// might never end. With `max_cycles`, which bounds the moves between two searches and their number, it bounds the run.
+    #[cfg_attr(feature = "serde", serde(default = "many_views"))]
+    pub max_views: usize,
     /// Frames to look at from one pose before the ball counts as not in view \[2\]. Sampling can miss a circle once.
     pub looks: usize,
     /// How fast the hand may come nearer to the ball.
@@ -52,12 +61,21 @@ pub struct AgentConfig {
     pub same_frames: usize,
 }
 
+/// Of settings that were saved before they had such a number: far more than any search that ends needs.
+fn many_views() -> usize {
+    1000
+}
+
 /// What is too rapid an approach (section 2.2 of the paper: one "that could damage the camera").
 ///
 /// Of a ball of known size the radius is a measure of the distance: the product of both is constant. A move that ends with the ball
 /// at a radius beyond `radius`, more than `growth` times what it was, is taken back.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct ApproachLimit {
     /// Radius up to which any approach is slow enough, feature units \[62\].
     pub radius: f64,
@@ -65,12 +83,23 @@ pub struct ApproachLimit {
     pub growth: f64,
 }
 
+checked!(ApproachLimit);
+
 impl ApproachLimit {
+    /// Whether it is one; if not, why.
+    fn check(&self) -> Result<(), String> {
+        let Self { radius, growth } = *self;
+        above_zero("approach.radius", radius)?;
+        above_zero("approach.growth", growth)
+    }
+
     /// Whether a move that took the radius from `before` to `after` units was too rapid.
     pub fn exceeded(&self, before: f64, after: f64) -> bool {
         after > self.radius && after > self.growth * before
     }
 }
+
+checked!(AgentConfig);
 
 impl AgentConfig {
     /// The paper's controller with the given search poses; where the paper gives no number, the ones in the brackets of the
@@ -94,6 +123,7 @@ impl AgentConfig {
                 .into(),
             limits: JointLimits::paper(),
             max_cycles: 60,
+            max_views: many_views(),
             looks: 2,
             approach: ApproachLimit {
                 radius: 62.0,
@@ -157,6 +187,11 @@ impl AgentConfig {
                 "same_frames is 0; every camera would count as frozen, give at least 1".into(),
             ));
         }
+        if self.max_views == 0 {
+            return Err(AgentError::Config(
+                "max_views is 0; the search could look from nowhere, give at least 1".into(),
+            ));
+        }
         if self.looks == 0 {
             return Err(AgentError::Config(
                 "looks is 0; the agent must look at least once".into(),
@@ -167,11 +202,7 @@ impl AgentConfig {
 
     /// What must be a number, and of which size.
     fn check_numbers(&self) -> Result<(), String> {
-        for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.limits.0) {
-            if !(low.is_finite() && high.is_finite() && low <= high) {
-                return Err(format!("the limits of {joint} are {low} to {high} radians"));
-            }
-        }
+        self.limits.check()?;
         self.goal.iter().try_for_each(GoalInterval::check)?;
         for (name, moves) in [("search_again", &self.search_again), ("recovery", &self.recovery)] {
             if moves
@@ -182,18 +213,19 @@ impl AgentConfig {
                 return Err(format!("{name} has a displacement that is not finite"));
             }
         }
-        for (name, value) in [
-            ("reach_tolerance", self.reach_tolerance),
-            ("approach.radius", self.approach.radius),
-            ("approach.growth", self.approach.growth),
-        ] {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(format!("{name} is {value}; it must be finite and above 0"));
-            }
-        }
+        above_zero("reach_tolerance", self.reach_tolerance)?;
+        self.approach.check()?;
         if self.max_cycles == 0 {
             return Err("max_cycles is 0; no move could be made, give at least 1".into());
         }
         Ok(())
     }
+}
+
+/// Refuses a quantity that must be a size and is none, by its name.
+pub(crate) fn above_zero(name: &str, value: f64) -> Result<(), String> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(format!("{name} is {value}; it must be finite and above 0"))
 }

@@ -1,8 +1,11 @@
 //! The door of everything that decides how the arm moves while the ball is in view.
 
 use hough_heuristic::Features;
-use puma_val2::{JointDelta, Joints};
+use puma_val2::{Joint, JointDelta, Joints};
 
+use crate::checked::checked;
+#[cfg(feature = "serde")]
+use crate::config::above_zero;
 use crate::{GaveUp, Percept};
 
 /// What a [`Controller`] decides by: the ball in the image, and the pose it is seen from.
@@ -12,9 +15,17 @@ pub struct Situation {
     pub features: Features,
     /// The joint angles that the arm reports.
     pub joints: Joints,
+    /// [`Sighting::long_axis`](crate::Sighting::long_axis) of what is seen.
+    pub long_axis: Option<f64>,
 }
 
 impl Situation {
+    /// Whether every number of it is one.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Features { x, y, r } = self.features;
+        [x, y, r].iter().chain(&self.joints.0).all(|v| v.is_finite())
+    }
+
     /// The part of it that the paper's behaviours look at.
     pub fn percept(&self) -> Percept {
         Percept::new(self.features, &self.joints)
@@ -104,8 +115,14 @@ impl<C: Controller + ?Sized> Controller for Box<C> {
 
 /// The range that a task keeps each joint in, radians (low, high), `JT1` first; closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct JointLimits(pub [(f64, f64); 6]);
+
+checked!(JointLimits);
 
 impl JointLimits {
     /// The reaching task's: -160..160, -150..-20, 120..215, -110..170, -100..100, -266..266 degrees.
@@ -121,6 +138,16 @@ impl JointLimits {
             ]
             .map(|(low, high)| (low.to_radians(), high.to_radians())),
         )
+    }
+
+    /// Whether they are ranges; if not, why.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.0) {
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(format!("the limits of {joint} are {low} to {high} radians"));
+            }
+        }
+        Ok(())
     }
 
     /// Whether every joint is in its range, to a millionth of a degree.
@@ -148,8 +175,14 @@ impl JointLimits {
 
 /// The farthest that a continuous controller turns each joint in one cycle, radians, `JT1` first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct StepLimits(pub [f64; 3]);
+
+checked!(StepLimits);
 
 impl StepLimits {
     /// The largest steps of the paper's behaviours (section 3.1): 5, 20 and 16 degrees.
@@ -157,19 +190,33 @@ impl StepLimits {
         Self([5.0_f64, 20.0, 16.0].map(f64::to_radians))
     }
 
+    /// Whether they are steps; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let steps = Joint::ALL.into_iter().zip(self.0);
+        steps
+            .into_iter()
+            .try_for_each(|(joint, most)| above_zero(&format!("the longest step of {joint}"), most))
+    }
+
     /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that, in which no joint turns farther
-    /// than it may; joints that would leave `limits` stop there. No move for what is not finite.
+    /// than it may; joints that would leave `limits` stop there. Of what is not finite, or steps that are NaN, a move that is NaN, which no limits
+    /// admit.
     pub fn apply(&self, wanted: [f64; 3], joints: &Joints, limits: &JointLimits) -> JointDelta {
         let shares = wanted
             .iter()
             .zip(self.0)
             .map(|(wanted, most)| most / wanted.abs());
-        let share = shares.fold(1.0, f64::min);
+        // `min` makes a number of NaN.
+        let known = wanted.iter().all(|v| v.is_finite()) && !self.0.iter().any(|v| v.is_nan());
+        let share = if known {
+            shares.fold(1.0, f64::min)
+        } else {
+            f64::NAN
+        };
         let mut target = *joints;
         for (i, wanted) in wanted.into_iter().enumerate() {
-            if wanted.is_finite() {
-                target.0[i] += share * wanted;
-            }
+            target.0[i] += share * wanted;
         }
         let reached = limits.nearest(&target);
         JointDelta(std::array::from_fn(|i| {
@@ -195,7 +242,17 @@ mod tests {
             "{delta:?}"
         );
         assert!(JointLimits::paper().nearest(&Joints([f64::NAN; 6])).0[0].is_nan());
-        let none = StepLimits::paper().apply([f64::NAN; 3], &at, &JointLimits::paper());
-        assert_eq!(none, JointDelta::default());
+        let (nan, turn) = (f64::NAN, 0.01);
+        for (steps, wanted) in [
+            (StepLimits::paper(), [nan, turn, turn]),
+            (StepLimits::paper(), [f64::INFINITY, turn, turn]),
+            (StepLimits([nan, 1.0, 1.0]), [turn; 3]),
+        ] {
+            let delta = steps.apply(wanted, &at, &JointLimits::paper());
+            assert!(
+                !JointLimits::paper().admit(&(at + delta)),
+                "{wanted:?}: {delta:?}"
+            );
+        }
     }
 }

@@ -76,6 +76,12 @@ pub enum AgentError {
         /// The first event that differs.
         event: usize,
     },
+    /// The arm does not say where it stands.
+    #[error("the arm reports an angle of {joint} that is not finite")]
+    Pose {
+        /// The first joint that has no finite angle.
+        joint: Joint,
+    },
     /// A search or a recovery named a viewpoint that is no pose.
     #[error("viewpoint {number} is no pose to look from: its {joint} is not finite")]
     Viewpoint {

@@ -160,7 +160,7 @@ impl EventKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GaveUp {
-    /// The ball is in view from none of the search poses.
+    /// The ball is in view from none of the search poses, or of the first [`AgentConfig::max_views`](crate::AgentConfig::max_views) of them.
     NotFound,
     /// The goal was not reached within the allowed number of moves.
     OutOfCycles,

@@ -31,6 +31,9 @@ pub struct Sighting {
     pub detection: Detection,
     /// The same in feature units.
     pub features: Features,
+    /// Where the longer axis of its outline points in the image, radians from x toward y; `None` for what is round, or where that is not known.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub long_axis: Option<f64>,
 }
 
 /// A camera, and what is looked for in its frames.

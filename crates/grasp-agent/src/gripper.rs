@@ -256,18 +256,23 @@ fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f
         } else {
             from[joint] - low
         };
-        if turn == 0.0 { most } else { room / turn.abs() }
+        match room / turn.abs() {
+            _ if turn == 0.0 => most,
+            // `min` makes a number of NaN.
+            share if share.is_nan() => 0.0,
+            share => share,
+        }
     });
     shares.fold(most, f64::min).max(0.0)
 }
 
-/// A grip in two parts: first the arm, with the fingers still beside the ball, then the hand, which brings them to both sides of it. An arm that
-/// hardly moves need not go first.
+/// A grip in two parts: first the arm and `JT4`, with the fingers still beside the ball, then the hand, which brings them to both sides of it.
+/// What hardly moves need not go first.
 fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     const HARDLY: f64 = 0.01;
     let mut parts = [JointDelta::default(), *delta];
-    if Joint::ALL[..3].iter().any(|joint| delta[*joint].abs() > HARDLY) {
-        for i in 0..3 {
+    if Joint::ALL[..4].iter().any(|joint| delta[*joint].abs() > HARDLY) {
+        for i in 0..4 {
             (parts[0].0[i], parts[1].0[i]) = (delta.0[i], 0.0);
         }
     }
@@ -291,7 +296,11 @@ mod tests {
             circle: features.to_circle(768),
             score: 1.0,
         };
-        Sighting { detection, features }
+        Sighting {
+            detection,
+            features,
+            long_axis: None,
+        }
     }
 
     /// A hand whose looks and moves come to what is written down.
@@ -385,6 +394,25 @@ mod tests {
         // One that goes with the hand is in jaws that the camera sees.
         let (end, _) = activated(&[seen; 5], None);
         assert_eq!(end, GripEnd::Held(AT_GOAL()));
+    }
+
+    #[test]
+    fn the_hand_turns_aside_before_it_swings_in() {
+        let [aside, swing] = in_two(&JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, -18.0, 30.0]));
+        assert_eq!(aside, JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, 0.0, 0.0]));
+        assert_eq!(swing, JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.0, 30.0]));
+        let plain = JointDelta::of(Joint::J5, -0.3);
+        assert_eq!(in_two(&plain), [JointDelta::default(), plain]);
+    }
+
+    #[test]
+    fn limits_that_are_no_numbers_leave_no_share_of_a_lift() {
+        let (limits, lift) = (JointLimits::paper(), JointDelta::of(Joint::J2, -0.2));
+        let at = Joints::from_degrees([0.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
+        assert!((share_within(&limits, &at, &lift, 1.0) - 1.0).abs() < 1e-12);
+        let mut none = limits;
+        none.0[1].0 = f64::NAN;
+        assert!(share_within(&none, &at, &lift, 1.0).abs() < 1e-12);
     }
 
     #[test]

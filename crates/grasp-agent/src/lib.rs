@@ -15,7 +15,8 @@
 //!   [`EventLog`] keeps them, and a `SavedRun` what else it takes to make the run again.
 //! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those that the paper names as alternatives,
 //!   [`PositionBased`], [`ImageBased`], [`Fuzzy`] and [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins
-//!   with such a model and learns what is wrong with it.
+//!   with such a model and learns what is wrong with it. [`Retargeted`] gives one of them a goal that was shown on the arm, [`GripAcross`] a grip that
+//!   turns the hand by how the object lies.
 //!
 //! # The state machine
 //!
@@ -99,6 +100,7 @@ mod agent;
 mod arm_plane;
 mod behaviour;
 mod camera_model;
+mod checked;
 mod config;
 mod controller;
 mod error;
@@ -108,6 +110,7 @@ mod export;
 #[cfg(feature = "serde")]
 mod export_policy;
 mod eye;
+mod grip_across;
 mod gripper;
 mod hybrid;
 mod learned;
@@ -120,6 +123,8 @@ mod preset;
 mod recovery;
 mod reward;
 mod run;
+#[cfg(feature = "serde")]
+mod saved_controller;
 #[cfg(feature = "serde")]
 mod saved_run;
 mod search;
@@ -144,6 +149,7 @@ pub use controller::{Consequence, Controller, JointLimits, Situation, StepLimits
 pub use error::{AgentError, BehaviourError};
 pub use event::{Event, EventKind, GaveUp, Order, Phase};
 pub use eye::{CameraEye, Eye, Look, Sighting};
+pub use grip_across::GripAcross;
 pub use gripper::{GripEnd, GripperActivation, Hand, Went};
 pub use hybrid::{Belief, Hybrid, HybridSettings, Prior};
 pub use learned::{Learned, OnlineLearning};
@@ -154,7 +160,9 @@ pub use preset::{BehaviourPair, YGoal};
 pub use recovery::{Recovery, RecoveryMoves};
 pub use reward::{Reward, RewardTerm};
 #[cfg(feature = "serde")]
-pub use saved_run::{Replayed, SavedController, SavedRun};
+pub use saved_controller::SavedController;
+#[cfg(feature = "serde")]
+pub use saved_run::{Replayed, SavedRun};
 pub use search::{LastLook, PoseSearch, Search, Viewpoint};
 pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSettings};
 pub use spec::{BehaviourSpec, GoalInterval, JointSteps};

@@ -47,22 +47,22 @@ impl EventLog {
     /// [`AgentError::Replay`] when the agent does something else than was done then; otherwise what the run ended with, if it ended
     /// with an error.
     pub fn replay<C: Controller + Clone>(&self, agent: &Agent<C>) -> Result<(Outcome, Self), AgentError> {
-        let Played { end, log, differs } = self.play(agent);
+        let Played { end, log, differs } = self.play(agent.clone());
         match (differs, end) {
             (Some(event), _) => Err(AgentError::Replay { event }),
             (None, end) => Ok((end?, log)),
         }
     }
 
-    /// Lets a copy of `agent` make the run again, whatever comes of it.
-    pub(crate) fn play<C: Controller + Clone>(&self, agent: &Agent<C>) -> Played {
+    /// Lets `agent` make the run again, whatever comes of it.
+    pub(crate) fn play<C: Controller>(&self, agent: Agent<C>) -> Played {
         let tape = RefCell::new(Tape {
             events: &self.events,
             next: 0,
             frame: 0,
         });
         let mut log = Self::default();
-        let end = agent.clone().having_seen(numbered(0)).run_and_learn(
+        let end = agent.having_seen(numbered(0)).run_and_learn(
             &mut Player(&tape),
             &mut Player(&tape),
             &mut Player(&tape),

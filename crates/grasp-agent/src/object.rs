@@ -6,6 +6,7 @@ use hough_heuristic::{
 };
 
 use crate::Sighting;
+use crate::checked::checked;
 
 /// A set of image features that describes one kind of object: the door through which objects other than balls come in.
 ///
@@ -44,7 +45,7 @@ impl ObjectFeatures for BallFeatures<'_> {
         self.detector.detect_into(frame, &mut self.found);
         self.found
             .iter()
-            .find_map(|detection| sighting(*detection, frame))
+            .find_map(|detection| sighting(*detection, None, frame))
     }
 }
 
@@ -58,7 +59,8 @@ impl std::fmt::Debug for BallFeatures<'_> {
 ///
 /// The outline of such a body is (nearly) an ellipse. Its longer half-axis depends on where one looks from, its shorter one is the
 /// radius of a ball that is as thick as the egg at the same distance, from everywhere: with it in the place of the radius, behaviours
-/// learned for that ball reach the egg.
+/// learned for that ball reach the egg. Where the outline is longer than it is wide by a tenth, its direction is [`Sighting::long_axis`], by
+/// which [`GripAcross`](crate::GripAcross) turns the hand.
 #[derive(Clone, Debug)]
 pub struct EggFeatures<E = Canny> {
     edge_detector: E,
@@ -69,7 +71,11 @@ pub struct EggFeatures<E = Canny> {
 
 /// Which ellipses can be the outline of an egg.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct EggLimits {
     /// Least shorter half-axis, pixels.
     pub min_minor: f64,
@@ -77,6 +83,26 @@ pub struct EggLimits {
     pub max_minor: f64,
     /// How many times as long as the shorter half-axis the longer one may be at most.
     pub elongation: f64,
+}
+
+checked!(EggLimits);
+
+#[cfg(feature = "serde")]
+impl EggLimits {
+    /// Whether an ellipse can be within them; if not, why.
+    fn check(&self) -> Result<(), String> {
+        let Self {
+            min_minor,
+            max_minor,
+            elongation,
+        } = *self;
+        if min_minor >= 0.0 && max_minor >= min_minor && elongation >= 1.0 {
+            return Ok(());
+        }
+        Err(format!(
+            "an outline with a shorter half-axis of {min_minor} to {max_minor} pixels and a longer one of up to {elongation} times that is none"
+        ))
+    }
 }
 
 impl<E: EdgeDetector> EggFeatures<E> {
@@ -113,17 +139,28 @@ impl<E: EdgeDetector> ObjectFeatures for EggFeatures<E> {
                 },
                 score: found.beta,
             };
-            Some((found.curve, sighting(detection, frame)?))
+            let Ellipse {
+                major, minor, angle, ..
+            } = found.curve;
+            let long_axis = (major > LONG * minor).then_some(angle);
+            Some((found.curve, sighting(detection, long_axis, frame)?))
         });
         self.last = seen.map(|(ellipse, _)| ellipse);
         seen.map(|(_, sighting)| sighting)
     }
 }
 
+/// How many times as long as the shorter half-axis the longer one must be for its direction to be known.
+const LONG: f64 = 1.1;
+
 /// A detection in feature units, if its centre lies in the frame.
-fn sighting(detection: Detection, frame: &GrayImage) -> Option<Sighting> {
+fn sighting(detection: Detection, long_axis: Option<f64>, frame: &GrayImage) -> Option<Sighting> {
     let height = Features::WIDTH * f64::from(frame.height()) / f64::from(frame.width());
     let features = Features::from_circle(&detection.circle, frame.width());
     let inside = (0.0..=Features::WIDTH).contains(&features.x) && (0.0..=height).contains(&features.y);
-    (inside && features.r.is_finite()).then_some(Sighting { detection, features })
+    (inside && features.r.is_finite()).then_some(Sighting {
+        detection,
+        features,
+        long_axis,
+    })
 }

@@ -97,7 +97,11 @@ mod tests {
             r: 20.0,
         };
         let joints = Joints::from_degrees([30.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
-        let seen = Situation { features, joints };
+        let seen = Situation {
+            features,
+            joints,
+            long_axis: None,
+        };
         for _ in 0..2 {
             // Wherever the arm has got to.
             let mut next = |last| recovery.next_view(&seen, &Joints::default(), last);

@@ -1,5 +1,6 @@
 //! The reward module (section 3.2 of the paper, Eq. 5 and 6).
 
+use crate::checked::checked;
 use crate::{Input, Percept};
 
 /// A reward of the paper's form, as data.
@@ -8,7 +9,11 @@ use crate::{Input, Percept};
 /// all terms when at least one of them came closer to its target, and nothing otherwise. With one term (x, 100, 103) that is
 /// Eq. 5, with the two terms (y, 20, 78) and (r, 50, 33) it is Eq. 6.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Reward {
     /// For arriving at the goal \[100\].
     pub goal: f64,
@@ -44,6 +49,8 @@ impl RewardTerm {
         (self.input.of(percept) - self.target).abs()
     }
 }
+
+checked!(Reward);
 
 impl Reward {
     /// Eq. 5 of the paper as printed.

@@ -151,7 +151,7 @@ impl<'a> Run<'a> {
 
     fn phases(&mut self) -> Result<Outcome, AgentError> {
         let joints = self.devices.arm.joints()?;
-        self.stand_at(joints);
+        self.stand_at(joints)?;
         self.set_jaws(Gripper::Open)?;
         self.tell(EventKind::Started, None);
         let mut state = State::Search;
@@ -187,12 +187,16 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Looks around until the ball is in view, or there is nowhere left to look from.
+    /// Looks around until the ball is in view, there is nowhere left to look from, or it has been looked from often enough.
     fn search(&mut self) -> Result<State, AgentError> {
         (self.first_seen, self.wandered, self.barred) = (None, false, 0);
         let (mut barred, mut looked) = (false, false);
         let mut last = LastLook::None;
-        while let Some(view) = self.modules.search.next_view(&self.joints, last) {
+        // A module may be anyone's, and a search of its own never end.
+        for _ in 0..self.config.max_views {
+            let Some(view) = self.modules.search.next_view(&self.joints, last) else {
+                break;
+            };
             match self.look_from(&view, EventKind::AtSearchPose(view.number))? {
                 Ok(ball) => return Ok(State::Reach(ball)),
                 Err(came) => last = came,
@@ -332,6 +336,7 @@ impl<'a> Run<'a> {
                     seen: Situation {
                         features: ball.features,
                         joints: from,
+                        long_axis: ball.long_axis,
                     },
                     why: Gone::Missed,
                 }
@@ -379,6 +384,7 @@ impl<'a> Run<'a> {
         Situation {
             features: sighting.features,
             joints: self.joints,
+            long_axis: sighting.long_axis,
         }
     }
 

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::export::{check_format, plain_text_of};
-use crate::export_policy::Policy;
 use crate::log::{Played, numbered};
+use crate::saved_controller::ControllerText;
 use crate::watch::{Shown, Watch};
 use crate::{
-    Agent, AgentConfig, AgentError, BehaviourError, Belief, Controller, Event, EventKind, EventLog, Hybrid,
-    HybridSettings, Learned, LoggedEvent, OnlineLearning, Outcome,
+    Agent, AgentConfig, AgentError, BehaviourError, Controller, Event, EventKind, EventLog, LoggedEvent,
+    Outcome, SavedController,
 };
 
 /// A run, saved: all that it takes to make it again, and to see whether it comes out the same.
@@ -53,44 +53,6 @@ pub struct SavedRun {
     controller: SavedController,
     camera: Camera,
     log: EventLog,
-}
-
-/// The controller of a [`SavedRun`], as it was before the run.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub enum SavedController {
-    /// The paper's.
-    Learned {
-        /// The two behaviours, with their loop breakers.
-        learned: Box<Learned>,
-        /// How learning went on in the run, from this seed on; `None` for behaviours that were frozen.
-        learning: Option<OnlineLearning>,
-    },
-    /// The hybrid.
-    Hybrid {
-        /// Its settings.
-        settings: Box<HybridSettings>,
-        /// What it believed.
-        belief: Belief,
-    },
-}
-
-impl SavedController {
-    /// Two behaviours, frozen, or learning on from the seed of `learning`.
-    pub fn of_learned(learned: &Learned, learning: Option<OnlineLearning>) -> Self {
-        Self::Learned {
-            learned: Box::new(learned.clone().frozen()),
-            learning,
-        }
-    }
-
-    /// A hybrid. Within a run it goes by what it believed before, whether it learns from that or not.
-    pub fn of_hybrid(hybrid: &Hybrid) -> Self {
-        Self::Hybrid {
-            settings: Box::new(*hybrid.settings()),
-            belief: hybrid.belief().clone(),
-        }
-    }
 }
 
 /// What came of a replay.
@@ -160,33 +122,14 @@ impl SavedRun {
     /// # Errors
     /// [`AgentError::Config`] for settings that cannot work.
     pub fn replay(&self) -> Result<Replayed, AgentError> {
-        match &self.controller {
-            SavedController::Learned { learned, learning } => {
-                let learned = (**learned).clone();
-                self.replay_by(match learning {
-                    Some(settings) => learned.learning(*settings),
-                    None => learned,
-                })
-            }
-            SavedController::Hybrid { settings, belief } => {
-                // What was believed then is believed as firmly now.
-                let settings = HybridSettings {
-                    drift: 0.0,
-                    ..**settings
-                };
-                self.replay_by(Hybrid::with_belief(settings, belief.clone()).frozen())
-            }
-        }
-    }
-
-    fn replay_by<C: Controller + Clone>(&self, controller: C) -> Result<Replayed, AgentError> {
         let watch = Watch {
             from: self.camera.from,
             shown: self.camera.showed.then(|| Shown::Frame(numbered(0))),
             same: self.camera.same,
         };
-        let agent = Agent::with_controller(self.config.clone(), controller)?.watching(watch);
-        let Played { end, log, differs } = self.log.play(&agent);
+        let agent =
+            Agent::with_controller(self.config.clone(), self.controller.controller())?.watching(watch);
+        let Played { end, log, differs } = self.log.play(agent);
         Ok(match differs {
             // The replayed devices fail in words of their own.
             None => Replayed::Same(end.map_err(|error| match self.log.events.last() {
@@ -207,16 +150,7 @@ impl SavedRun {
     /// The run as JSON: its format, settings, controller, what the camera had shown, and the events, one after the other. Numbers that are
     /// not finite are written as the texts `"NaN"`, `"inf"` and `"-inf"`.
     pub fn to_json(&self) -> String {
-        let controller = match &self.controller {
-            SavedController::Learned { learned, learning } => ControllerText::Learned {
-                policy: Box::new(Policy::of(learned, &self.config.limits)),
-                learning: *learning,
-            },
-            SavedController::Hybrid { settings, belief } => ControllerText::Hybrid {
-                settings: settings.clone(),
-                belief: belief.clone(),
-            },
-        };
+        let controller = ControllerText::of(&self.controller, &self.config.limits);
         // The values of a policy in one line, an event in one line each.
         let events: Vec<String> = self.log.events.iter().map(plain_text_of).collect();
         format!(
@@ -233,23 +167,13 @@ impl SavedRun {
     ///
     /// # Errors
     /// [`AgentError::SavedRun`], with the place where there is one: no JSON, another format, a missing part, a policy that
-    /// [`Learned::from_json`] refuses, a belief or settings of a hybrid that are not finite; [`AgentError::Config`] for settings that cannot work.
+    /// [`Learned::from_json`](crate::Learned::from_json) refuses, a belief that is not finite, settings that cannot work.
     pub fn from_json(text: &str) -> Result<Self, AgentError> {
         let refused = |error: BehaviourError| AgentError::SavedRun(error.to_string());
         let document: Document =
             serde_json::from_str(text).map_err(|error| AgentError::SavedRun(error.to_string()))?;
         check_format(&document.format, FORMAT).map_err(refused)?;
-        document.config.check()?;
-        let controller = match document.controller {
-            ControllerText::Learned { policy, learning } => SavedController::Learned {
-                learned: Box::new(policy.into_learned().map_err(refused)?.0),
-                learning,
-            },
-            ControllerText::Hybrid { settings, belief } => {
-                settings.check().map_err(AgentError::SavedRun)?;
-                SavedController::Hybrid { settings, belief }
-            }
-        };
+        let controller = document.controller.into_controller().map_err(refused)?;
         Ok(Self {
             config: document.config,
             controller,
@@ -272,16 +196,4 @@ struct Document {
     #[serde(deserialize_with = "crate::numbers::deserialize")]
     camera: Camera,
     log: EventLog,
-}
-
-#[derive(Debug, Serialize, Deserialize)]
-enum ControllerText {
-    Learned {
-        policy: Box<Policy>,
-        learning: Option<OnlineLearning>,
-    },
-    Hybrid {
-        settings: Box<HybridSettings>,
-        belief: Belief,
-    },
 }

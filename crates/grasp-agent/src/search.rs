@@ -63,7 +63,8 @@ pub enum LastLook {
 pub trait Search: std::fmt::Debug + Send + Sync {
     /// Where to look from next, with the arm at `at`, after what came of the last viewpoint; [`LastLook::None`] begins a new search. `None` when
     /// there is nowhere left to look from: the run ends with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
-    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) where every viewpoint was barred. A search that never says so never ends.
+    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) where every viewpoint was barred. A search that never says so ends in
+    /// the same way after [`AgentConfig::max_views`](crate::AgentConfig::max_views) viewpoints.
     fn next_view(&mut self, at: &Joints, last: LastLook) -> Option<Viewpoint>;
 
     /// A copy, for the copies of an agent: `Box::new(self.clone())`.

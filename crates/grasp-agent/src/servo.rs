@@ -12,6 +12,9 @@ use hough_heuristic::Features;
 use nalgebra::{Matrix3, Point3, Vector3};
 use puma_val2::{JointDelta, Joints};
 
+use crate::checked::checked;
+#[cfg(feature = "serde")]
+use crate::config::above_zero;
 use crate::{CameraModel, Consequence, JointLimits, StepLimits};
 
 pub use fuzzy::Fuzzy;
@@ -21,6 +24,11 @@ pub use position_based::PositionBased;
 
 /// What every servo controller is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct ServoSettings {
     /// The camera and the arm as they are believed to be.
     pub model: CameraModel,
@@ -31,6 +39,8 @@ pub struct ServoSettings {
     /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
     pub steps: StepLimits,
 }
+
+checked!(ServoSettings);
 
 impl ServoSettings {
     /// The settings in the brackets of the fields.
@@ -47,6 +57,21 @@ impl ServoSettings {
         }
     }
 
+    /// Whether they can be used; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self {
+            model,
+            goal,
+            gain,
+            steps,
+        } = self;
+        model.check()?;
+        check_goal(goal)?;
+        above_zero("gain", *gain)?;
+        steps.check()
+    }
+
     /// The same with another gain.
     #[must_use]
     pub fn with_gain(self, gain: f64) -> Self {
@@ -54,16 +79,27 @@ impl ServoSettings {
     }
 }
 
+/// Whether a ball can show so; if not, why.
+#[cfg(feature = "serde")]
+pub(crate) fn check_goal(goal: &Features) -> Result<(), String> {
+    let Features { x, y, r } = *goal;
+    if !(x.is_finite() && y.is_finite()) {
+        return Err(format!("the goal is at {x}, {y}, which is not finite"));
+    }
+    above_zero("the radius of the goal", r)
+}
+
 impl CameraModel {
     /// The pose near `from`, differing in the first three joints, in which a ball at `ball` shows as `features`, or most nearly so, and how
-    /// far the ball is then from its place before the camera, metres. `None` for features that no ball has.
+    /// far the ball is then from its place before the camera, metres. `None` for features that no ball has, and where a number is not finite.
     pub fn pose_showing(
         &self,
         ball: &Point3<f64>,
         features: &Features,
         from: &Joints,
     ) -> Option<(Joints, f64)> {
-        Some(self.pose_placing(ball, &self.in_camera(features)?, from))
+        let (pose, off) = self.pose_placing(ball, &self.in_camera(features)?, from);
+        off.is_finite().then_some((pose, off))
     }
 
     /// The pose near `from`, differing in the first three joints, in which a ball at `ball` is at `wanted` in the camera frame, or most

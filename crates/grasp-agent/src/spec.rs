@@ -3,6 +3,7 @@
 use puma_val2::{Joint, JointDelta};
 use qtable::{Action, DiscretiseError, Intervals, Product, State};
 
+use crate::checked::checked;
 use crate::{Input, Percept, Reward};
 
 /// Everything that defines a behaviour, but for what it has learned.
@@ -10,7 +11,11 @@ use crate::{Input, Percept, Reward};
 /// The state is the product of intervals of some inputs; the action is the product of angle steps of some joints. Both
 /// behaviours of the paper, and finer ones, are values of this type.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct BehaviourSpec {
     /// What it is called, in files and messages.
     pub name: String,
@@ -28,7 +33,11 @@ pub struct BehaviourSpec {
 
 /// The steps that a behaviour can make with one joint, in degrees.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct JointSteps {
     /// The joint.
     pub joint: Joint,
@@ -36,9 +45,30 @@ pub struct JointSteps {
     pub degrees: Vec<f64>,
 }
 
+checked!(JointSteps);
+
+#[cfg(feature = "serde")]
+impl JointSteps {
+    /// Whether there are steps; if not, why.
+    fn check(&self) -> Result<(), String> {
+        let Self { joint, degrees } = self;
+        if degrees.is_empty() {
+            return Err(format!("{joint} has no steps"));
+        }
+        match degrees.iter().find(|step| !step.is_finite()) {
+            Some(step) => Err(format!("{joint} has a step of {step} degrees")),
+            None => Ok(()),
+        }
+    }
+}
+
 /// A goal interval of one input, closed at both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct GoalInterval {
     /// The input.
     pub input: Input,
@@ -47,6 +77,8 @@ pub struct GoalInterval {
     /// Highest value that is still good.
     pub high: f64,
 }
+
+checked!(GoalInterval);
 
 impl GoalInterval {
     /// Whether `percept` lies in the interval.
@@ -66,6 +98,8 @@ impl GoalInterval {
 
 /// Edges of the radius, common to both behaviours; the goal is \[32, 34\].
 const R_EDGES: [f64; 5] = [14.0, 22.0, 32.0, 34.0, 47.0];
+
+checked!(BehaviourSpec);
 
 impl BehaviourSpec {
     /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq. 5 with both mends.
@@ -250,16 +284,11 @@ impl BehaviourSpec {
         if self.moves.is_empty() {
             return Err("it moves no joint".into());
         }
-        for (i, JointSteps { joint, degrees }) in self.moves.iter().enumerate() {
-            if self.moves[..i].iter().any(|before| before.joint == *joint) {
-                return Err(format!("{joint} is moved twice"));
+        for (i, steps) in self.moves.iter().enumerate() {
+            if self.moves[..i].iter().any(|before| before.joint == steps.joint) {
+                return Err(format!("{} is moved twice", steps.joint));
             }
-            if degrees.is_empty() {
-                return Err(format!("{joint} has no steps"));
-            }
-            if let Some(step) = degrees.iter().find(|step| !step.is_finite()) {
-                return Err(format!("{joint} has a step of {step} degrees"));
-            }
+            steps.check()?;
         }
         if self.goal.is_empty() {
             return Err("it has no goal".into());

@@ -144,7 +144,7 @@ impl TaughtGoal {
                 y: seen.y + untaught.y - taught.y,
                 r: seen.r * untaught.r / taught.r,
             },
-            joints: situation.joints,
+            ..*situation
         }
     }
 }
@@ -220,6 +220,7 @@ mod tests {
         let situation = Situation {
             features: seen,
             joints: Joints::default(),
+            long_axis: None,
         };
         let moved = goal.intervals(&intervals);
         let holds = |intervals: &[GoalInterval], situation: &Situation| {

@@ -78,6 +78,7 @@ mod tests {
     fn ball(x: f64) -> Sighting {
         let features = Features { x, y: 70.0, r: 20.0 };
         Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(768),

@@ -1,5 +1,7 @@
 //! Pictures of the stages of a detection.
 
+use std::fs;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Rgb, RgbImage};
@@ -25,7 +27,7 @@ pub struct StageError {
 ///
 /// The stages are those of any detector ([`CircleDetector::stages`](crate::CircleDetector::stages)), candidates included if
 /// they were [kept](crate::CircleDetector::keep_candidates). Each file appears complete or not at all, and replaces one of its
-/// name.
+/// name; what has its name and is no regular file (a device, a pipe) is written to as it is, never replaced, and a link stays a link.
 ///
 /// # Errors
 /// The first file that cannot be written.
@@ -103,19 +105,30 @@ fn plot(picture: &mut RgbImage, x: i32, y: i32, colour: Rgb<u8>) {
 
 fn write(folder: &Path, name: &str, picture: &RgbImage) -> Result<PathBuf, StageError> {
     let path = folder.join(name);
-    let partial = folder.join(format!(".{name}.part"));
-    let failed = |reason: String| StageError {
-        path: path.clone(),
-        reason,
-    };
+    let mut png = Cursor::new(Vec::new());
     let written = picture
-        .save_with_format(&partial, image::ImageFormat::Png)
-        .map_err(|error| failed(error.to_string()))
-        .and_then(|()| std::fs::rename(&partial, &path).map_err(|error| failed(error.to_string())));
-    if let Err(error) = written {
-        // Best effort: the error that matters is the one above.
-        let _ = std::fs::remove_file(&partial);
-        return Err(error);
+        .write_to(&mut png, image::ImageFormat::Png)
+        .map_err(|error| error.to_string())
+        .and_then(|()| write_whole(&path, png.get_ref()).map_err(|error| error.to_string()));
+    match written {
+        Ok(()) => Ok(path),
+        Err(reason) => Err(StageError { path, reason }),
     }
-    Ok(path)
+}
+
+/// Writes a file beside its place and renames it. What is there and is no regular file is written to as it is, not replaced; a link stays a
+/// link.
+fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(&target).is_ok_and(|there| !there.is_file()) {
+        return fs::write(&target, bytes);
+    }
+    let mut beside = target.as_os_str().to_owned();
+    beside.push(".part");
+    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &target));
+    if written.is_err() {
+        // Best effort: the error that matters is the one above.
+        let _ = fs::remove_file(&beside);
+    }
+    written
 }

@@ -2,8 +2,8 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Entry, Fit, Rows, ridge_strength};
-use crate::reach_noise::{Noise, Shares};
+use crate::least_squares::{Entry, Fit, Hold, Rows, ridge_strength};
+use crate::reach_noise::{Misfit, Noise, Shares};
 use crate::stored::{Reader, Writer};
 use crate::{CentreSample, FitError, Quality, QuantityError, SightRule, StoredModelError};
 
@@ -56,7 +56,7 @@ impl CentreModel {
     /// The model fitted anew to samples of another plant, held toward this one, as [`ReachModel::refit`](crate::ReachModel::refit) does it for
     /// the approach: the coefficients c minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with c0 this model's
     /// coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest move of the list at the goal). Without samples the model
-    /// stays as it is. For [`CentreModel::uncertainty`] the variances of this model count as ten further degrees of freedom.
+    /// stays as it is. [`CentreModel::uncertainty`] is found as there.
     ///
     /// # Errors
     /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or above 1e100; otherwise as for
@@ -74,11 +74,12 @@ impl CentreModel {
             enough(samples, needed)?;
         }
         let fit = rows.solve(PLACE, samples.len())?;
-        Ok(Self::with(self.with_radius, fit, samples, Some(self)))
+        let hold = Hold::new(strength, &SCALES, samples.len());
+        Ok(Self::with(self.with_radius, fit, samples, Some((self, hold))))
     }
 
     /// The model with these coefficients, judged on the samples they were fitted to; of a refit, with the prior.
-    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample], prior: Option<&Self>) -> Self {
+    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample], prior: Option<(&Self, Hold)>) -> Self {
         let mut model = Self {
             with_radius,
             fit,
@@ -100,12 +101,30 @@ impl CentreModel {
         let count = samples.len() as f64;
         let freedom = count - taken;
         model.noise = Noise::of(&residuals, freedom.max(1.0) / count);
-        if let Some(prior) = prior {
-            model.fit.pool(&prior.fit, freedom);
-            model.noise = model.noise.pooled(&prior.noise, freedom);
+        if let Some((prior, hold)) = prior {
+            let misfit = prior.misfit(samples, &model.fit, &hold);
+            model.fit.pool(&prior.fit, freedom, [&misfit]);
+            model.fit.hold(&hold);
+            model.noise = model.noise.pooled(&prior.noise, freedom, &misfit);
         }
         model.quality = vec![model.judge(samples)];
         model
+    }
+
+    /// By how much more, or less, than this model expects its refit errs: each sample is predicted by what the others and the prior
+    /// say of it, `fit` without it.
+    fn misfit(&self, samples: &[CentreSample], fit: &Fit, hold: &Hold) -> Misfit {
+        let mut misfit = Misfit::default();
+        for s in samples {
+            let terms = &terms(&s.before, s.d1)[..fit.terms()];
+            let Some((left, leverage)) = fit.without(terms, 1.0, hold) else {
+                continue;
+            };
+            let missed = (s.after.x - s.before.x - fit.value(0, terms)) / left;
+            let noise = self.noise.variance(shares(&s.before, s.d1, self.with_radius));
+            misfit.add(missed * missed / (noise + self.fit.residual[0].powi(2) * leverage));
+        }
+        misfit
     }
 
     /// What the image shows after `JT1` turned by `d1` degrees; y and r stay. `None` if the ball is lost

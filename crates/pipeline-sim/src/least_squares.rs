@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::QuantityError;
-use crate::reach_noise::pooled;
+use crate::reach_noise::{Misfit, pooled};
 
 /// Why a regression has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -127,9 +127,15 @@ impl Fit {
     }
 
     /// Adds to the residual variances of a refit those of its prior; `freedom` is what the refit has left.
-    pub(crate) fn pool(&mut self, prior: &Self, freedom: f64) {
-        for (own, before) in self.residual.iter_mut().zip(&prior.residual) {
-            *own = pooled(own.powi(2), before.powi(2), freedom).sqrt();
+    pub(crate) fn pool<'a>(
+        &mut self,
+        prior: &Self,
+        freedom: f64,
+        misfits: impl IntoIterator<Item = &'a Misfit>,
+    ) {
+        let both = self.residual.iter_mut().zip(&prior.residual);
+        for ((own, before), misfit) in both.zip(misfits) {
+            *own = pooled(own.powi(2), before.powi(2), freedom, misfit).sqrt();
         }
     }
 
@@ -145,6 +151,68 @@ impl Fit {
         let rows = self.inverse_gram.chunks_exact(n.max(1));
         let sum: f64 = terms.iter().zip(rows).map(|(t, row)| t * dot(row, terms)).sum();
         sum.max(0.0)
+    }
+}
+
+/// How a refit's coefficients are held toward those of its prior.
+///
+/// A ridge of k on the mean of the squared errors weighs n k against n samples, and is right where the prior's coefficients are off by one residual
+/// variance over n k each. How far another plant's coefficients are off does not depend on how many samples one has of it: what is expected
+/// is one over k, as for a single sample.
+pub(crate) struct Hold {
+    strength: f64,
+    scales: Vec<f64>,
+    samples: usize,
+}
+
+impl Hold {
+    /// With the `strength` and the `scales` of [`Rows::pull`].
+    pub(crate) fn new(strength: f64, scales: &[f64], samples: usize) -> Self {
+        Self {
+            strength,
+            scales: scales.to_vec(),
+            samples,
+        }
+    }
+
+    /// How strongly coefficient `k` is held.
+    fn of(&self, k: usize) -> f64 {
+        (self.strength * self.scales.get(k).copied().unwrap_or(1.0)).powi(2)
+    }
+
+    /// How much farther the prior's coefficients are off, in variance, than holding them so strongly supposes.
+    fn farther(&self) -> f64 {
+        self.samples.saturating_sub(1) as f64
+    }
+}
+
+impl Fit {
+    /// What a sample of these terms and this weight leaves to the others (1 less its leverage), and how uncertain they are of it: their
+    /// leverage of it. `None` for a sample that alone decides a coefficient: nothing is left to predict it by.
+    pub(crate) fn without(&self, terms: &[f64], weight: f64, hold: &Hold) -> Option<(f64, f64)> {
+        let leverage = self.leverage(terms);
+        let left = 1.0 - weight * leverage;
+        let rows = self.inverse_gram.chunks_exact(terms.len().max(1));
+        let pulled: f64 = rows
+            .enumerate()
+            .map(|(k, row)| hold.of(k) * dot(row, terms).powi(2))
+            .sum();
+        let of_others = leverage / left + hold.farther() * pulled / (left * left);
+        (left > 1e-9).then_some((left, of_others))
+    }
+
+    /// Makes the leverages of a refit say how far its coefficients are off, whose prior is off by as much as `hold` says.
+    pub(crate) fn hold(&mut self, hold: &Hold) {
+        let n = self.terms();
+        let gram = self.inverse_gram.clone();
+        for i in 0..n {
+            for j in 0..n {
+                let pulled: f64 = (0..n)
+                    .map(|k| gram[i * n + k] * hold.of(k) * gram[k * n + j])
+                    .sum();
+                self.inverse_gram[i * n + j] += hold.farther() * pulled;
+            }
+        }
     }
 }
 

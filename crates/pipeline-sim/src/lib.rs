@@ -35,6 +35,7 @@ mod overview;
 mod reach_form;
 mod reach_model;
 mod reach_noise;
+mod reach_refit;
 mod render;
 mod samples;
 mod scene;

@@ -3,7 +3,8 @@
 use puma_val2::{Joint, JointDelta};
 use rand::{Rng, RngExt};
 
-use crate::{Cell, MoveLists, ReachModel, exploring_start};
+use crate::error::at_most;
+use crate::{Cell, MoveLists, QuantityError, ReachModel, exploring_start};
 
 /// Errors of a model after some moves in a row without a look at the plant, feature units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,15 +26,35 @@ pub struct OpenLoopError {
     pub r_median: f64,
 }
 
-/// Most moves in a row that errors are told for.
-const MOST_MOVES: usize = 10_000;
-
 impl ReachModel {
+    /// Most moves in a row that errors are told for.
+    pub const MOST_MOVES: usize = 10_000;
+
+    /// As [`ReachModel::open_loop_error`].
+    ///
+    /// # Errors
+    /// [`QuantityError::TooLarge`] for more than [`ReachModel::MOST_MOVES`] moves.
+    pub fn try_open_loop_error<R: Rng + ?Sized>(
+        &self,
+        cell: &Cell,
+        moves: usize,
+        runs: usize,
+        rng: &mut R,
+    ) -> Result<Vec<OpenLoopError>, QuantityError> {
+        at_most(
+            "the number of moves in a row",
+            moves as f64,
+            Self::MOST_MOVES as f64,
+        )?;
+        Ok(self.open_loop_error(cell, moves, runs, rng))
+    }
+
     /// Compares model and plant over runs of up to `moves` random moves from the paper's lists, starting from [`exploring_start`]s; entry
     /// k holds the errors after k + 1 moves.
     ///
     /// A run goes on while the plant keeps the ball in sight and the arm within its limits (moves that do not are not taken); the
-    /// model gets its own last prediction as its next input. More than 10 000 moves count as 10 000.
+    /// model gets its own last prediction as its next input. More than [`ReachModel::MOST_MOVES`] count as that many
+    /// ([`ReachModel::try_open_loop_error`] refuses them).
     pub fn open_loop_error<R: Rng + ?Sized>(
         &self,
         cell: &Cell,
@@ -42,7 +63,7 @@ impl ReachModel {
         rng: &mut R,
     ) -> Vec<OpenLoopError> {
         let lists = MoveLists::paper();
-        let moves = moves.min(MOST_MOVES);
+        let moves = moves.min(Self::MOST_MOVES);
         let mut errors: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); moves];
         let mut lost = vec![0; moves];
         for _ in 0..runs {

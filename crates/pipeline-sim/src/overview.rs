@@ -7,12 +7,16 @@ use puma_val2::Joints;
 
 use crate::{Cell, Workspace};
 
-/// Pixels per metre of the drawing.
-const SCALE: f64 = 340.0;
-/// Width of each of the two views, and their height, pixels.
-const VIEW: (f64, f64) = (560.0, 470.0);
+/// Width of the drawing, pixels.
+const WIDTH: f64 = 1120.0;
+/// Around what each view shows, pixels.
+const MARGIN: f64 = 24.0;
+/// Height of the name and the scale bar below each view, pixels.
+const CAPTION: f64 = 40.0;
 /// Height of the legend below both views, pixels.
 const LEGEND: f64 = 34.0;
+/// How far lines of sight are drawn that do not meet the table, metres: out of the picture.
+const FAR: f64 = 5.0;
 /// Length of the scale bars, metres.
 const BAR: f64 = 0.2;
 /// What is drawn: class, whether as an area, and its name.
@@ -34,6 +38,43 @@ type Placement = Box<dyn Fn(&Point3<f64>) -> (f64, f64)>;
 struct Page<'a> {
     text: &'a mut String,
     place: Placement,
+    /// Pixels per metre.
+    scale: f64,
+}
+
+/// The rectangle around places in the directions right and down of a view, metres.
+struct Extent {
+    left: f64,
+    top: f64,
+    width: f64,
+    height: f64,
+}
+
+impl Extent {
+    fn of(places: impl Iterator<Item = (f64, f64)>) -> Self {
+        let start = [(f64::INFINITY, f64::NEG_INFINITY); 2];
+        let [(left, right), (top, bottom)] = places
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
+            .fold(start, |[h, v], (x, y)| {
+                [(h.0.min(x), h.1.max(x)), (v.0.min(y), v.1.max(y))]
+            });
+        // Nothing, or a point, is given some room.
+        let sized = |low: f64, high: f64| (high - low).max(0.1);
+        if left > right {
+            return Self {
+                left: 0.0,
+                top: 0.0,
+                width: 1.0,
+                height: 1.0,
+            };
+        }
+        Self {
+            left,
+            top,
+            width: sized(left, right),
+            height: sized(top, bottom),
+        }
+    }
 }
 
 impl Page<'_> {
@@ -57,7 +98,7 @@ impl Page<'_> {
         let _ = writeln!(
             self.text,
             r#"<circle class="{class}" cx="{x:.1}" cy="{y:.1}" r="{:.1}"/>"#,
-            radius * SCALE
+            radius * self.scale
         );
     }
 
@@ -67,8 +108,8 @@ impl Page<'_> {
 }
 
 /// Names what is drawn, below both views.
-fn legend(text: &mut String) {
-    let y = VIEW.1 + 0.5 * LEGEND;
+fn legend(text: &mut String, top: f64) {
+    let y = top + 0.5 * LEGEND;
     let mut x = 16.0;
     let drawn = PARTS.map(|(class, ..)| text.contains(&format!("class=\"{class}\"")));
     for ((class, is_area, name), _) in PARTS.into_iter().zip(drawn).filter(|(_, drawn)| *drawn) {
@@ -101,115 +142,179 @@ impl Cell {
     ///
     /// An empty path, or one with angles that are not finite, gives a drawing without the arm.
     pub fn overview_svg(&self, workspace: &Workspace, path: &[Joints]) -> String {
-        let (width, height) = (2.0 * VIEW.0, VIEW.1 + LEGEND);
+        let pose = path.last().filter(|joints| joints.non_finite().is_none());
+        let pan = pose.map_or(0.0, |joints| joints.0[0]);
+        let shown = Shown {
+            from_side: Self::workspace_side(workspace, pan),
+            from_above: workspace_ring(workspace),
+            way: self.way(path),
+            skeleton: pose.map(|joints| self.skeleton(joints)),
+            sight: pose.map(|joints| self.sight_lines(joints)),
+            pan,
+        };
+        // From the side: along the arm's own plane, so that its links show at full length.
+        let side = move |p: &Point3<f64>| (p.x * pan.cos() + p.y * pan.sin(), -p.z);
+        // From above: x up, y to the left.
+        let above = |p: &Point3<f64>| (-p.y, -p.x);
+        let foot = Point3::new(0.0, 0.0, self.table);
+        let places = || shown.places().chain([self.ball.centre]);
+        let extents = [
+            Extent::of(places().chain(shown.from_side).chain([foot]).map(|p| side(&p))),
+            Extent::of(places().chain(shown.from_above.clone()).map(|p| above(&p))),
+        ];
+        // Both views to the same scale, side by side in the width.
+        let scale = (WIDTH - 4.0 * MARGIN) / (extents[0].width + extents[1].width);
+        let inner = scale * extents[0].height.max(extents[1].height);
+        let (view, height) = (inner + 2.0 * MARGIN, inner + 2.0 * MARGIN + CAPTION + LEGEND);
         let mut text = format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}">
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height:.0}" viewBox="0 0 {WIDTH} {height:.0}">
 <style>
 rect{{fill:#fff}} text{{font:13px sans-serif;fill:#333}} polyline{{fill:none;stroke-linejoin:round;stroke-linecap:round}}
 .arm{{stroke:#3b5b7a;stroke-width:9}} .hand{{stroke:#7a8ea3;stroke-width:5}} .bracket{{stroke:#222;stroke-width:2}} .joint{{fill:#20364a}} .space{{fill:#e8f1e4;stroke:#8fb27c;stroke-width:1}}
-.cone{{fill:#f4c430;fill-opacity:.25;stroke:#c99a00;stroke-width:1}} .ball{{fill:#d8453b}} .holder{{stroke:#777;stroke-width:4}}
+.cone{{fill:#f4c430;fill-opacity:.25;stroke:#c99a00;stroke-width:1}} .edge{{stroke:#c99a00;stroke-width:.7}} .ball{{fill:#d8453b}} .holder{{stroke:#777;stroke-width:4}}
 .table{{stroke:#8a6f4d;stroke-width:3}} .path{{stroke:#d8453b;stroke-width:1.5;stroke-dasharray:4 3}} .camera{{fill:#222}} .bar{{stroke:#333;stroke-width:1.5}}
 </style>
-<rect width="{width}" height="{height}"/>
+<rect width="{WIDTH}" height="{height:.0}"/>
 "##
         );
-        let pose = path.last().filter(|joints| joints.non_finite().is_none());
-        let pan = pose.map_or(0.0, |joints| joints.0[0]);
-        // From the side: along the arm's own plane, so that its links show at full length.
-        let side = move |p: &Point3<f64>| {
-            let along = p.x * pan.cos() + p.y * pan.sin();
-            (120.0 + along * SCALE, 310.0 - p.z * SCALE)
-        };
-        // From above: x up, y to the left.
-        let above = |p: &Point3<f64>| (VIEW.0 + 280.0 - p.y * SCALE, 390.0 - p.x * SCALE);
         let views: [(&str, Placement); 2] = [
             ("from the side, in the plane of the arm", Box::new(side)),
             ("from above", Box::new(above)),
         ];
-        for (k, (name, place)) in views.into_iter().enumerate() {
+        let mut left = 0.0;
+        for (k, ((name, flat), extent)) in views.into_iter().zip(&extents).enumerate() {
+            let width = scale * extent.width + 2.0 * MARGIN;
+            // What is lower than the view is high stands in its middle.
+            let (x0, y0) = (
+                left + MARGIN - scale * extent.left,
+                MARGIN + 0.5 * (inner - scale * extent.height) - scale * extent.top,
+            );
+            // Lines of sight may leave the view.
+            let _ = writeln!(
+                text,
+                r##"<clipPath id="view{k}"><rect x="{left:.1}" width="{width:.1}" height="{view:.1}"/></clipPath>
+<g clip-path="url(#view{k})">"##
+            );
             let mut page = Page {
                 text: &mut text,
-                place,
+                place: Box::new(move |p| {
+                    let (x, y) = flat(p);
+                    (x0 + scale * x, y0 + scale * y)
+                }),
+                scale,
             };
-            self.draw_view(&mut page, k == 0, pan, workspace, path, pose);
-            let left = VIEW.0 * k as f64;
-            page.label(left + 16.0, VIEW.1 - 14.0, name);
-            let (end, y) = (left + VIEW.0 - 24.0, VIEW.1 - 18.0);
+            self.draw_view(&mut page, k == 0, &shown);
+            page.text.push_str("</g>\n");
+            let bottom = view + CAPTION;
+            page.label(left + 16.0, bottom - 14.0, name);
+            let (end, y) = (left + width - 24.0, bottom - 18.0);
             let bar = [
-                (end - BAR * SCALE, y - 4.0),
-                (end - BAR * SCALE, y),
+                (end - BAR * scale, y - 4.0),
+                (end - BAR * scale, y),
                 (end, y),
                 (end, y - 4.0),
             ];
             page.stroke(&bar, "bar");
-            page.label(end - 0.5 * BAR * SCALE - 16.0, y - 5.0, &format!("{BAR} m"));
+            page.label(end - 0.5 * BAR * scale - 16.0, y - 5.0, &format!("{BAR} m"));
+            left += width;
         }
-        legend(&mut text);
+        legend(&mut text, view + CAPTION);
         text.push_str("</svg>\n");
         text
     }
 
-    fn draw_view(
-        &self,
-        page: &mut Page<'_>,
-        from_side: bool,
-        pan: f64,
-        workspace: &Workspace,
-        path: &[Joints],
-        pose: Option<&Joints>,
-    ) {
-        let at = |rho: f64, azimuth: f64, z: f64| Point3::new(rho * azimuth.cos(), rho * azimuth.sin(), z);
-        let (rho, z) = (workspace.rho, workspace.height);
+    fn draw_view(&self, page: &mut Page<'_>, from_side: bool, shown: &Shown) {
         if from_side {
-            let corners = [
-                (rho.0, z.0),
-                (rho.1, z.0),
-                (rho.1, z.1),
-                (rho.0, z.1),
-                (rho.0, z.0),
-            ];
-            page.line(&corners.map(|(r, z)| at(r, pan, z)), "space");
-            page.line(&[at(-0.3, pan, self.table), at(1.2, pan, self.table)], "table");
-            page.line(&[at(0.0, pan, self.table), at(0.0, pan, 0.0)], "arm");
+            page.line(&shown.from_side, "space");
+            let at = |along: f64| Point3::new(along * shown.pan.cos(), along * shown.pan.sin(), self.table);
+            page.line(&[at(-FAR), at(FAR)], "table");
+            page.line(&[at(0.0), Point3::origin()], "arm");
         } else {
-            let arc = |r: f64, from: f64, to: f64| {
-                (0..=40).map(move |i| at(r, from + (to - from) * f64::from(i) / 40.0, 0.0))
-            };
-            let (a, b) = workspace.azimuth;
-            let ring: Vec<_> = arc(rho.0, a, b)
-                .chain(arc(rho.1, b, a))
-                .chain(arc(rho.0, a, a))
-                .collect();
-            page.line(&ring, "space");
+            page.line(&shown.from_above, "space");
         }
         if let Some(holder) = self.holder {
             let foot = Point3::new(holder.foot.x, holder.foot.y, self.table);
             page.line(&[foot, Point3::new(foot.x, foot.y, holder.top)], "holder");
         }
-        if let Some(joints) = pose {
-            let cone = self.sight_lines(joints);
+        if let (Some([eye, upper, lower, corners @ ..]), Some(skeleton)) = (shown.sight, shown.skeleton) {
             if from_side {
-                page.line(&[cone[0], cone[1], cone[2], cone[0]], "cone");
+                page.line(&[eye, upper, lower, eye], "cone");
             } else {
-                page.line(&[cone[0], cone[3], cone[4], cone[0]], "cone");
+                let [a, b, c, d] = corners;
+                page.line(&[a, b, c, d, a], "cone");
+                corners
+                    .iter()
+                    .for_each(|corner| page.line(&[eye, *corner], "edge"));
             }
-            let [waist, shoulder, elbow, wrist, tool] = self.skeleton(joints);
+            let [waist, shoulder, elbow, wrist, tool] = skeleton;
             page.line(&[waist, shoulder, elbow, wrist], "arm");
             page.line(&[wrist, tool], "hand");
-            page.line(&[wrist, cone[0]], "bracket");
+            page.line(&[wrist, eye], "bracket");
             for joint in [shoulder, elbow, wrist] {
                 page.dot(&joint, 0.014, "joint");
             }
-            page.dot(&cone[0], 0.016, "camera");
+            page.dot(&eye, 0.016, "camera");
         }
-        let finite = path.iter().filter(|joints| joints.non_finite().is_none());
-        let way: Vec<_> = finite.map(|joints| self.tool_point(joints)).collect();
-        page.line(&way, "path");
+        page.line(&shown.way, "path");
         page.dot(&self.ball.centre, self.ball.radius, "ball");
     }
 }
 
+/// What both views show, in the world frame.
+struct Shown {
+    /// The workspace's section with the arm's plane, and its outline from above.
+    from_side: [Point3<f64>; 5],
+    from_above: Vec<Point3<f64>>,
+    /// The way of the tool point.
+    way: Vec<Point3<f64>>,
+    /// See [`Cell::skeleton`] and [`Cell::sight_lines`].
+    skeleton: Option<[Point3<f64>; 5]>,
+    sight: Option<[Point3<f64>; 7]>,
+    /// `JT1`, radians.
+    pan: f64,
+}
+
+impl Shown {
+    /// The places of arm, camera and way, which either view has room for.
+    fn places(&self) -> impl Iterator<Item = Point3<f64>> {
+        let eye = self.sight.map(|lines| lines[0]);
+        self.skeleton
+            .into_iter()
+            .flatten()
+            .chain(eye)
+            .chain(self.way.iter().copied())
+    }
+}
+
+fn around(rho: f64, azimuth: f64, z: f64) -> Point3<f64> {
+    Point3::new(rho * azimuth.cos(), rho * azimuth.sin(), z)
+}
+
+/// The outline of the workspace from above.
+fn workspace_ring(workspace: &Workspace) -> Vec<Point3<f64>> {
+    let ((near, far), (a, b)) = (workspace.rho, workspace.azimuth);
+    let arc = |r: f64, from: f64, to: f64| {
+        (0..=40).map(move |i| around(r, from + (to - from) * f64::from(i) / 40.0, 0.0))
+    };
+    arc(near, a, b)
+        .chain(arc(far, b, a))
+        .chain(arc(near, a, a))
+        .collect()
+}
+
 impl Cell {
+    /// The workspace in the arm's plane, turned by `pan`.
+    fn workspace_side(workspace: &Workspace, pan: f64) -> [Point3<f64>; 5] {
+        let ((near, far), (low, high)) = (workspace.rho, workspace.height);
+        [(near, low), (far, low), (far, high), (near, high), (near, low)].map(|(r, z)| around(r, pan, z))
+    }
+
+    /// The way of the tool point.
+    fn way(&self, path: &[Joints]) -> Vec<Point3<f64>> {
+        let finite = path.iter().filter(|joints| joints.non_finite().is_none());
+        finite.map(|joints| self.tool_point(joints)).collect()
+    }
+
     /// Shoulder on the waist axis, shoulder in the arm's plane, elbow, wrist and tool point, world frame.
     fn skeleton(&self, joints: &Joints) -> [Point3<f64>; 5] {
         let waist = Isometry3::rotation(Vector3::z() * joints.0[0]);
@@ -229,8 +334,9 @@ impl Cell {
         ]
     }
 
-    /// The camera, and where its sight ends above, below, left and right of the middle of the image: on the table, or after 0.9 m.
-    fn sight_lines(&self, joints: &Joints) -> [Point3<f64>; 5] {
+    /// The camera, and where its sight meets the table above and below the middle of the image and in its corners, in turn; far away
+    /// where it does not.
+    fn sight_lines(&self, joints: &Joints) -> [Point3<f64>; 7] {
         let pose = self.camera_pose(joints);
         let eye = Point3::from(pose.translation.vector);
         let (w, h) = self.camera.size();
@@ -242,9 +348,17 @@ impl Cell {
             } else {
                 f64::INFINITY
             };
-            eye + ray * down.clamp(0.0, 0.9)
+            eye + ray * down.clamp(0.0, FAR)
         };
-        let (x, y) = (0.5 * w, 0.5 * h);
-        [eye, end(x, -0.5), end(x, h), end(-0.5, y), end(w, y)]
+        let x = 0.5 * w;
+        [
+            eye,
+            end(x, -0.5),
+            end(x, h),
+            end(-0.5, -0.5),
+            end(w, -0.5),
+            end(w, h),
+            end(-0.5, h),
+        ]
     }
 }

@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Entry, Fit, Rows, ridge_strength};
+use crate::least_squares::{Entry, Fit, Rows};
 use crate::reach_noise::Noise;
 use crate::samples;
 use crate::stored::{Reader, Writer};
@@ -28,12 +28,12 @@ use crate::{FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule,
     serde(into = "stored::ReachModelData", try_from = "stored::ReachModelData")
 )]
 pub struct ReachModel {
-    form: ReachForm,
+    pub(crate) form: ReachForm,
     edges: Vec<f64>,
-    pieces: Vec<Fit>,
+    pub(crate) pieces: Vec<Fit>,
     /// Of each piece: how far observations of y and of r lie from predictions.
-    noise: Vec<[Noise; 2]>,
-    quality: Vec<Quality>,
+    pub(crate) noise: Vec<[Noise; 2]>,
+    pub(crate) quality: Vec<Quality>,
 }
 
 impl ReachModel {
@@ -83,68 +83,11 @@ impl ReachModel {
         Ok(model)
     }
 
-    /// The model fitted anew to samples of another plant, held toward this one: what N real moves teach about an arm that is not
-    /// the one the model was made for.
-    ///
-    /// For each elbow interval and output the coefficients c minimise the mean of w (change - terms · c)² plus `ridge` · |c - c0|², with
-    /// c0 this model's coefficients and w = r before to the power `radius_power`, normalised to mean 1 (the fitted quantities of the
-    /// `Rigid` forms are the noisier the smaller the ball; 2 to 4 is right for them, 0 for `Linear`). An interval without samples stays as it
-    /// is, and so does the whole model without any.
-    ///
-    /// For [`ReachModel::uncertainty`] the variances of this model count as ten further degrees of freedom. With few samples
-    /// the expected errors are rather too large than too small, but for `ReachForm::RigidBody` (the README has the figures).
-    ///
-    /// # Errors
-    /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or is so large that nothing else counts (above 1e100),
-    /// and for a power that is not finite; otherwise as for [`ReachModel::fit`] (with a ridge of 1e-12 or above neither too few samples nor
-    /// a lack of rank is an error).
-    pub fn refit(&self, samples: &[ReachSample], ridge: f64, radius_power: f64) -> Result<Self, FitError> {
-        ridge_strength(ridge, 0)?;
-        if !radius_power.is_finite() {
-            let what = format!("a refit needs a finite power, not {radius_power}");
-            return Err(FitError::Prior { what });
-        }
-        let mut model = self.clone();
-        let groups = self.groups(samples)?;
-        for (i, group) in groups.iter().enumerate().filter(|(_, group)| !group.is_empty()) {
-            let count = group.len();
-            if ridge == 0.0 && count < self.form.terms() {
-                return Err(FitError::TooFewSamples {
-                    place: self.place(i),
-                    got: count,
-                    needed: self.form.terms(),
-                });
-            }
-            // By way of logarithms, and relative to the greatest: no power is too large to be taken.
-            let log_weight = |sample: &ReachSample| radius_power * sample.before.r.ln();
-            let greatest = group
-                .iter()
-                .map(|(_, s)| log_weight(s))
-                .fold(f64::NEG_INFINITY, f64::max);
-            let relative = |sample: &ReachSample| (log_weight(sample) - greatest).exp();
-            let mean = group.iter().map(|(_, s)| relative(s)).sum::<f64>() / count as f64;
-            let weigh = |sample: &ReachSample| relative(sample) / mean;
-            let mut rows = Rows::default();
-            for (index, sample) in group {
-                push(self.form, &mut rows, *index, sample, weigh(sample).sqrt())?;
-            }
-            if ridge > 0.0 {
-                rows.pull(&self.pieces[i], &[], ridge_strength(ridge, count)?)?;
-            }
-            model.pieces[i] = rows.solve(&self.place(i), count)?;
-            let ([y, r], freedom) = model.noise_of(i, group, weigh);
-            let [prior_y, prior_r] = &self.noise[i];
-            model.pieces[i].pool(&self.pieces[i], freedom);
-            model.noise[i] = [y.pooled(prior_y, freedom), r.pooled(prior_r, freedom)];
-        }
-        if !samples.is_empty() {
-            model.quality = model.judge(samples);
-        }
-        Ok(model)
-    }
-
     /// The samples by elbow interval, each with its position.
-    fn groups<'a>(&self, samples: &'a [ReachSample]) -> Result<Vec<Vec<(usize, &'a ReachSample)>>, FitError> {
+    pub(crate) fn groups<'a>(
+        &self,
+        samples: &'a [ReachSample],
+    ) -> Result<Vec<Vec<(usize, &'a ReachSample)>>, FitError> {
         let mut groups = vec![Vec::new(); self.edges.len() + 1];
         for (index, sample) in samples.iter().enumerate() {
             samples::check(index, sample)?;
@@ -154,7 +97,7 @@ impl ReachModel {
     }
 
     /// How far the samples of piece `i` lie from what it predicts for them, and the degrees of freedom that are left.
-    fn noise_of(
+    pub(crate) fn noise_of(
         &self,
         i: usize,
         group: &[(usize, &ReachSample)],
@@ -240,11 +183,25 @@ impl ReachModel {
         let mut buffer = [0.0; 22];
         let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
         let piece = self.piece(jt3_degrees);
-        let fit = &self.pieces[piece];
-        let [of_y, of_r] = self.form.shares(before, &after, d2, d3);
-        let [noise_y, noise_r] = &self.noise[piece];
-        let leverage = fit.leverage(terms);
-        let [first, second] = [0, 1].map(|i| leverage * fit.residual[i].powi(2));
+        let leverage = self.pieces[piece].leverage(terms);
+        let [y, r] = self
+            .variances(piece, before, &after, (d2, d3), leverage)
+            .map(f64::sqrt);
+        (y.is_finite() && r.is_finite()).then_some((y, r))
+    }
+
+    /// Variances of y and r around a prediction `after` of piece `i`.
+    pub(crate) fn variances(
+        &self,
+        i: usize,
+        before: &Features,
+        after: &Features,
+        (d2, d3): (f64, f64),
+        leverage: f64,
+    ) -> [f64; 2] {
+        let [of_y, of_r] = self.form.shares(before, after, d2, d3);
+        let [noise_y, noise_r] = &self.noise[i];
+        let [first, second] = [0, 1].map(|k| leverage * self.pieces[i].residual[k].powi(2));
         let (from_y, from_r) = match self.form {
             ReachForm::Linear => (first, second),
             // r = 33 / Z and y = 72 + r V: first order in the errors of Z and V.
@@ -257,9 +214,7 @@ impl ReachModel {
                 )
             }
         };
-        let y = (noise_y.variance(of_y) + from_y).sqrt();
-        let r = (noise_r.variance(of_r) + from_r).sqrt();
-        (y.is_finite() && r.is_finite()).then_some((y, r))
+        [noise_y.variance(of_y) + from_y, noise_r.variance(of_r) + from_r]
     }
 
     /// What the fit leaves of the changes of y and r on its samples, a pair for each elbow interval: standard deviations in feature
@@ -286,7 +241,7 @@ impl ReachModel {
         Ok(self.judge(samples))
     }
 
-    fn judge(&self, samples: &[ReachSample]) -> Vec<Quality> {
+    pub(crate) fn judge(&self, samples: &[ReachSample]) -> Vec<Quality> {
         let predicted = samples.iter().map(|s| {
             let after = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3);
             (s, after)
@@ -311,7 +266,7 @@ impl ReachModel {
         self.edges.iter().filter(|edge| jt3_degrees >= **edge).count()
     }
 
-    fn place(&self, piece: usize) -> String {
+    pub(crate) fn place(&self, piece: usize) -> String {
         let edge = |i: usize| {
             self.edges
                 .get(i)
@@ -327,7 +282,7 @@ impl ReachModel {
 }
 
 /// One more sample in the rows of its piece.
-fn push(
+pub(crate) fn push(
     form: ReachForm,
     rows: &mut Rows,
     index: usize,

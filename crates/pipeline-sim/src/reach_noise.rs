@@ -63,13 +63,46 @@ pub(crate) struct Noise {
     pub(crate) fitted: f64,
 }
 
-/// Degrees of freedom that the variances of a prior count for in a refit.
-const PRIOR_FREEDOM: f64 = 10.0;
+/// Degrees of freedom for which a prior says how errors depend on where the ball is.
+const SHAPE_FREEDOM: f64 = 10.0;
+
+/// Degrees of freedom for which a prior says how large they are.
+const SCALE_FREEDOM: f64 = 1.0;
+
+/// By how much more than expected a refit errs, from squared errors over the variances that its prior expects.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Misfit {
+    sum: f64,
+    count: f64,
+}
+
+impl Misfit {
+    /// One more squared error over its variance.
+    pub(crate) fn add(&mut self, ratio: f64) {
+        if ratio.is_finite() {
+            self.sum += ratio;
+            self.count += 1.0;
+        }
+    }
+
+    /// What the prior's variances are multiplied by.
+    fn scale(&self) -> f64 {
+        (SCALE_FREEDOM + self.sum) / (SCALE_FREEDOM + self.count)
+    }
+
+    /// By how much the middle 95 % of Student's distribution are wider than those of the normal one: a variance found from few errors is
+    /// itself uncertain. (Cornish and Fisher's expansion.)
+    fn widening(&self) -> f64 {
+        let n = SCALE_FREEDOM + self.count;
+        (1.0 + 1.2107 / n + 1.4408 / (n * n) + 1.3401 / (n * n * n)).powi(2)
+    }
+}
 
 /// A variance found with `freedom` degrees of freedom (one, if less), together with that of a prior.
-pub(crate) fn pooled(variance: f64, prior: f64, freedom: f64) -> f64 {
+pub(crate) fn pooled(variance: f64, prior: f64, freedom: f64, misfit: &Misfit) -> f64 {
     let sum = variance * freedom.max(1.0);
-    (sum + PRIOR_FREEDOM * prior) / (PRIOR_FREEDOM + freedom.max(0.0))
+    let both = (sum + SHAPE_FREEDOM * prior * misfit.scale()) / (SHAPE_FREEDOM + freedom.max(0.0));
+    both * misfit.widening()
 }
 
 impl Noise {
@@ -119,11 +152,11 @@ impl Noise {
     }
 
     /// This noise, found with `freedom` degrees of freedom, together with that of a prior.
-    pub(crate) fn pooled(self, prior: &Self, freedom: f64) -> Self {
+    pub(crate) fn pooled(self, prior: &Self, freedom: f64, misfit: &Misfit) -> Self {
         Self {
-            residual: pooled(self.residual.powi(2), prior.residual.powi(2), freedom).sqrt(),
-            observed: pooled(self.observed, prior.observed, freedom),
-            fitted: pooled(self.fitted, prior.fitted, freedom),
+            residual: pooled(self.residual.powi(2), prior.residual.powi(2), freedom, misfit).sqrt(),
+            observed: pooled(self.observed, prior.observed, freedom, misfit),
+            fitted: pooled(self.fitted, prior.fitted, freedom, misfit),
         }
     }
 

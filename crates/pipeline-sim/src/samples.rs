@@ -5,11 +5,14 @@ use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::error::amount;
+use crate::error::{amount, at_most};
 use crate::{Ball, Cell, FitError, QuantityError};
 
 /// What errors call the noise on features.
 pub(crate) const NOISE: &str = "standard deviation of the features' noise (units)";
+
+/// Most samples of each kind that are not taken for a mistake.
+const MOST_SAMPLES: f64 = 1e7;
 
 /// One move of `JT2` and `JT3`, and the ball before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,8 +128,9 @@ pub fn exploring_start<R: Rng + ?Sized>(cell: &Cell, rng: &mut R) -> Option<(Cel
 /// Draws `count` samples of each kind in `cell`, each from an [`exploring_start`] of its own and with a move from the
 /// [`MoveLists`] of the paper; kept if the arm stays within its working limits and the ball in sight.
 ///
-/// Features carry normal noise of standard deviation `noise` units. In a cell in which nothing can be seen or reached the
-/// vectors come back short; with noise that is no finite number they come back empty ([`try_sample_moves`] refuses it).
+/// Features carry normal noise of standard deviation `noise` units ([`with_noise`]). In a cell in which nothing can be seen or reached the
+/// vectors come back short; with noise that is no finite number they come back empty. A hundred thousand samples of each kind take about a
+/// second and 13 MB; any number is drawn that is asked for. [`try_sample_moves`] refuses what makes no sense.
 pub fn sample_moves<R: Rng + ?Sized>(
     cell: &Cell,
     count: usize,
@@ -172,7 +176,8 @@ pub fn sample_moves<R: Rng + ?Sized>(
 /// As [`sample_moves`].
 ///
 /// # Errors
-/// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of zero or above.
+/// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of zero or above;
+/// [`QuantityError::TooLarge`] for more than ten million samples of each kind, which would fill 1.3 GB.
 pub fn try_sample_moves<R: Rng + ?Sized>(
     cell: &Cell,
     count: usize,
@@ -180,6 +185,7 @@ pub fn try_sample_moves<R: Rng + ?Sized>(
     rng: &mut R,
 ) -> Result<(Vec<CentreSample>, Vec<ReachSample>), QuantityError> {
     amount(NOISE, noise)?;
+    at_most("the number of samples of each kind", count as f64, MOST_SAMPLES)?;
     Ok(sample_moves(cell, count, noise, rng))
 }
 
@@ -206,8 +212,8 @@ fn tried_sample<R: Rng + ?Sized, M>(
     None
 }
 
-/// `features` with normal noise of standard deviation `sigma` units on each; the radius stays above a tenth of a unit. With a
-/// `sigma` that is no finite number, none of the three is a number.
+/// `features` with normal noise of standard deviation `sigma` units on each, whose sign does not count; the radius stays above a tenth of a
+/// unit. With a `sigma` that is no finite number, none of the three is a number.
 pub fn with_noise<R: Rng + ?Sized>(features: Features, sigma: f64, rng: &mut R) -> Features {
     if sigma == 0.0 {
         return features;
@@ -216,6 +222,7 @@ pub fn with_noise<R: Rng + ?Sized>(features: Features, sigma: f64, rng: &mut R) 
         let [x, y, r] = [f64::NAN; 3];
         return Features { x, y, r };
     }
+    let sigma = sigma.abs();
     let mut draw = || -> f64 { StandardNormal.sample(rng) };
     Features {
         x: features.x + sigma * draw(),

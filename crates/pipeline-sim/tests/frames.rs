@@ -349,6 +349,44 @@ fn the_overview_shows_arm_ball_and_workspace() {
     assert!(svg.contains(">field of view</text>") && !without.contains(">field of view</text>"));
 }
 
+/// The points of all lines of a class, view after view.
+fn lines_of(svg: &str, class: &str) -> Vec<Vec<(f64, f64)>> {
+    let start = format!("<polyline class=\"{class}\" points=\"");
+    let number = |text: &str| text.parse::<f64>().expect("a number");
+    svg.lines()
+        .filter_map(|line| line.strip_prefix(&start)?.strip_suffix("\"/>"))
+        .map(|points| {
+            let pairs = points.split(' ').filter_map(|p| p.split_once(','));
+            pairs.map(|(x, y)| (number(x), number(y))).collect()
+        })
+        .collect()
+}
+
+#[test]
+fn the_overview_fills_its_page_and_its_field_of_view_ends_on_the_table() {
+    let (cell, goal) = cell_at_goal();
+    let search = Workspace::paper().search_poses()[3];
+    for pose in [goal, search] {
+        let svg = cell.overview_svg(&Workspace::paper(), &[search, pose]);
+        let (cones, tables) = (lines_of(&svg, "cone"), lines_of(&svg, "table"));
+        let (cone, surface) = (&cones[0], tables[0][0].1);
+        assert!(
+            cone[1..3].iter().all(|(_, y)| (y - surface).abs() < 0.11),
+            "{cone:?}"
+        );
+        // From above it is the frame's outline on the table.
+        assert_eq!(cones[1].len(), 5);
+        let drawn: Vec<(f64, f64)> = ["arm", "space"]
+            .iter()
+            .flat_map(|class| lines_of(&svg, class))
+            .flatten()
+            .collect();
+        let least = |of: fn(&(f64, f64)) -> f64| drawn.iter().map(of).fold(f64::INFINITY, f64::min);
+        let greatest = drawn.iter().map(|(x, _)| *x).fold(0.0, f64::max);
+        assert!(least(|p| p.1) < 30.0 && least(|p| p.0) < 30.0 && greatest > 1090.0);
+    }
+}
+
 #[test]
 fn things_far_off_the_table_throw_no_shadow() {
     let (cell, joints) = (

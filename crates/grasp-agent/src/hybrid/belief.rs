@@ -11,6 +11,9 @@ use super::fit::{sensitivity, vector};
 #[cfg(feature = "serde")]
 use crate::BehaviourError;
 use crate::CameraModel;
+use crate::checked::checked;
+#[cfg(feature = "serde")]
+use crate::config::above_zero;
 
 /// How many numbers are learned.
 pub(crate) const LEARNED: usize = 13;
@@ -30,7 +33,11 @@ pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
 
 /// How wrong a cell may be before anything is known of it: standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Prior {
     /// Of the logarithm of the focal length \[0.3\].
     pub focal: f64,
@@ -45,6 +52,8 @@ pub struct Prior {
     /// Of the play in each of the first three joints, whole width, radians \[0.015\].
     pub play: f64,
 }
+
+checked!(Prior);
 
 impl Prior {
     /// A cell that was set up by eye: the values in the brackets of the fields.
@@ -61,8 +70,11 @@ impl Prior {
 
     /// Whether each of them is a number above zero.
     #[cfg(feature = "serde")]
-    pub(crate) fn is_sound(&self) -> bool {
-        self.deviations().iter().all(|s| s.is_finite() && *s > 0.0)
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let deviations = self.deviations();
+        deviations
+            .iter()
+            .try_for_each(|s| above_zero("a standard deviation of the prior", *s))
     }
 
     fn deviations(&self) -> Numbers {

@@ -7,11 +7,18 @@ use puma_val2::{Joint, JointDelta, Joints};
 use super::belief::{Belief, Numbers, Prior, corrected};
 use super::evidence::{Evidence, Links};
 use super::fit::{Fit, WITH_BALL, deviations, sensitivity};
+use crate::checked::checked;
+#[cfg(feature = "serde")]
+use crate::servo::check_goal;
 use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits, TaughtGoal};
 
 /// What a [`Hybrid`] is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
 pub struct HybridSettings {
     /// The camera and the arm as they should be.
     pub nominal: CameraModel,
@@ -30,10 +37,15 @@ pub struct HybridSettings {
     pub memory: usize,
     /// How far `JT5` turns for the grip, radians \[-18.01 degrees\].
     pub grip_turn: f64,
+    /// How far `JT4` turns for the grip, radians \[0\].
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub grip_aside: f64,
     /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and not left to the agent's settings
     /// \[0.008\].
     pub grip_certainty: f64,
 }
+
+checked!(HybridSettings);
 
 impl HybridSettings {
     /// The settings in the brackets of the fields.
@@ -51,6 +63,7 @@ impl HybridSettings {
             caution: 2.0,
             memory: 400,
             grip_turn: -18.01_f64.to_radians(),
+            grip_aside: 0.0,
             grip_certainty: 0.008,
         }
     }
@@ -58,41 +71,25 @@ impl HybridSettings {
     /// Whether they can be used; if not, why.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
-        let Self {
-            nominal, goal, steps, ..
-        } = self;
-        let arm = &nominal.arm;
-        let mount = nominal.mount.to_homogeneous();
-        let mut numbers = [
-            arm.a2,
-            arm.a3,
-            arm.d2,
-            arm.d4,
-            arm.d6,
-            nominal.tool,
-            goal.x,
-            goal.y,
-        ]
-        .into_iter()
-        .chain(nominal.centre)
-        .chain(mount.iter().copied())
-        .chain([self.grip_turn]);
-        let positive = [nominal.focal, nominal.ball_radius, goal.r]
-            .into_iter()
-            .chain(steps.0);
-        let not_negative = [self.drift, self.caution, self.grip_certainty];
-        let wrong = if !self.prior.is_sound() {
-            "a number of the prior is not finite and above zero"
-        } else if !numbers.all(f64::is_finite) {
-            "a length, angle or feature is not finite"
-        } else if !positive.into_iter().all(|v| v.is_finite() && v > 0.0) {
-            "focal length, radius or a step is not finite and above zero"
-        } else if !not_negative.iter().all(|v| v.is_finite() && *v >= 0.0) {
-            "drift, caution or grip_certainty is not finite, or negative"
-        } else {
-            return Ok(());
-        };
-        Err(format!("settings of the hybrid: {wrong}"))
+        self.nominal.check()?;
+        self.prior.check()?;
+        check_goal(&self.goal)?;
+        self.steps.check()?;
+        for (name, value) in [
+            ("drift", self.drift),
+            ("caution", self.caution),
+            ("grip_certainty", self.grip_certainty),
+        ] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(format!("{name} is {value}; it must be finite, 0 or above"));
+            }
+        }
+        for (name, value) in [("grip_turn", self.grip_turn), ("grip_aside", self.grip_aside)] {
+            if !value.is_finite() {
+                return Err(format!("{name} is {value}; it must be finite"));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -192,6 +189,7 @@ impl Hybrid {
         (self.before, self.belief) = (seen(self.before), seen(self.belief));
         self.settings.goal = goal.features();
         self.settings.grip_turn = goal.grip()[Joint::J5];
+        self.settings.grip_aside = goal.grip()[Joint::J4];
         self
     }
 
@@ -285,11 +283,16 @@ impl Hybrid {
         last
     }
 
-    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits.
+    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits; NaN stays NaN.
     fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
         let target = limits.nearest(motors);
         JointDelta(std::array::from_fn(|i| match self.settings.steps.0.get(i) {
-            Some(most) => (target.0[i] - from.0[i]).min(*most).max(-most),
+            // Not `min` and `max`, which make a whole step of NaN, nor `clamp`, which panics on a step that is NaN.
+            Some(most) => match target.0[i] - from.0[i] {
+                turn if turn.abs() <= *most => turn,
+                turn if turn.abs() > *most => most.copysign(turn),
+                _ => f64::NAN,
+            },
             None => 0.0,
         }))
     }
@@ -333,6 +336,10 @@ impl Controller for Hybrid {
     }
 
     fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        if !now.is_finite() {
+            // As evidence it would make everything learned NaN.
+            return Err(GaveUp::NoMoveLeft);
+        }
         let off = self.surprise(&now.features);
         let odd = off.is_some();
         if off.is_some_and(|off| off > FAR_OFF) && !self.doubt && self.moving == 0 {
@@ -384,6 +391,9 @@ impl Controller for Hybrid {
     }
 
     fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        if !now.is_finite() {
+            return None;
+        }
         self.current.saw(now.features);
         self.estimate = self.estimate();
         let estimate = self.estimate.as_ref()?;
@@ -399,6 +409,7 @@ impl Controller for Hybrid {
         let links = self.current.links(&estimate.numbers);
         let mut from = *links.stand();
         from.0[Joint::J5.index()] += self.settings.grip_turn;
+        from.0[Joint::J4.index()] += self.settings.grip_aside;
         let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
         let motors = links.motors_for(&stand, &now.joints);
         limits.admit(&motors).then(|| motors - now.joints)
@@ -414,5 +425,64 @@ impl Controller for Hybrid {
         if let Some(fit) = Fit::of(&before, &self.belief.numbers(), &self.settings.nominal, &all) {
             self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_is_cut_to_a_step_and_what_is_no_number_stays_none() {
+        let (hybrid, limits) = (Hybrid::new(HybridSettings::paper()), JointLimits::paper());
+        let from = Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]);
+        let cut = |turn: f64, hybrid: &Hybrid| {
+            let delta = hybrid.cut(&(from + JointDelta::of(Joint::J1, turn)), &from, &limits);
+            (delta[Joint::J1], limits.admit(&(from + delta)))
+        };
+        let step = 5_f64.to_radians();
+        for (turn, expected) in [(0.01, 0.01), (1.0, step), (-1.0, -step)] {
+            let (turned, admitted) = cut(turn, &hybrid);
+            assert!((turned - expected).abs() < 1e-12 && admitted, "{turned}");
+        }
+        assert!(!cut(f64::NAN, &hybrid).1);
+        let mut endless = HybridSettings::paper();
+        endless.steps.0[0] = f64::NAN;
+        assert!(!cut(0.01, &Hybrid::new(endless)).1);
+    }
+
+    #[test]
+    fn what_is_no_number_is_no_evidence() {
+        let limits = JointLimits::paper();
+        let seen = Situation {
+            long_axis: None,
+            features: Features {
+                x: 80.0,
+                y: 60.0,
+                r: 15.0,
+            },
+            joints: Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]),
+        };
+        let mut hybrid = Hybrid::new(HybridSettings::paper());
+        let learned = |hybrid: &mut Hybrid, unseen: bool| {
+            hybrid.begin();
+            let mut now = seen;
+            for _ in 0..3 {
+                hybrid.arm_at(&now.joints);
+                now.joints = now.joints + hybrid.decide(&now, &limits).unwrap();
+            }
+            if unseen {
+                for features in [f64::NAN, f64::INFINITY].map(|x| Features { x, ..now.features }) {
+                    let nothing = Situation { features, ..now };
+                    assert_eq!(hybrid.decide(&nothing, &limits), Err(GaveUp::NoMoveLeft));
+                    assert_eq!(hybrid.grip(&nothing, &limits), None);
+                }
+            }
+            hybrid.end();
+            hybrid.belief().clone()
+        };
+        let as_well = learned(&mut hybrid.clone(), false);
+        assert_ne!(as_well, *hybrid.belief());
+        assert_eq!(learned(&mut hybrid, true), as_well);
     }
 }

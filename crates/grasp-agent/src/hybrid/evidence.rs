@@ -80,10 +80,13 @@ impl Links {
     pub(crate) fn follow(&mut self, motors: &Joints) {
         for i in 0..6 {
             let half = if i < 3 { self.half[i] } else { 0.0 };
-            self.stand.0[i] = if self.begun {
-                self.stand.0[i].max(motors.0[i] - half).min(motors.0[i] + half)
-            } else {
-                motors.0[i]
+            let motor = motors.0[i];
+            // Not `max` and `min`, which make a number of NaN.
+            self.stand.0[i] = match self.stand.0[i] {
+                _ if !self.begun || motor.is_nan() => motor,
+                at if at < motor - half => motor - half,
+                at if at > motor + half => motor + half,
+                at => at,
             };
         }
         self.begun = true;

@@ -71,9 +71,16 @@ impl Hand for Run<'_> {
 }
 
 impl Run<'_> {
-    pub(super) fn stand_at(&mut self, joints: Joints) {
+    /// Takes down where the arm says it stands. An arm may be anyone's: from where no number says it is, nothing can be decided.
+    pub(super) fn stand_at(&mut self, joints: Joints) -> Result<(), AgentError> {
         self.joints = joints;
-        self.controller.arm_at(&joints);
+        match joints.non_finite() {
+            Some(joint) => Err(AgentError::Pose { joint }),
+            None => {
+                self.controller.arm_at(&joints);
+                Ok(())
+            }
+        }
     }
 
     /// Goes back the way the arm came. Where that is barred too, the arm stands where it is.
@@ -109,8 +116,9 @@ impl Run<'_> {
             Err(error) => Err(error),
         };
         let (reached, halted, fault) = self.answered(order, answer)?;
-        self.stand_at(reached);
+        let stands = self.stand_at(reached);
         self.tell(done, None);
+        stands?;
         let near = halted || self.devices.proximity.object_near()?;
         let arrival = Arrival {
             target,

@@ -18,6 +18,7 @@ pub struct ImageBased {
 
 /// Where the Jacobian is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum JacobianAt {
     /// Where the arm is now, with the ball where the model places it.
     Now,

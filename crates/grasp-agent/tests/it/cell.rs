@@ -32,6 +32,8 @@ pub(crate) enum Fault {
     StopDead(usize),
     /// The arm stops halfway in this move, for a reason of its own.
     StoppedShort(usize),
+    /// After so many moves the arm reports no angle of its second joint, and something is near.
+    Nowhere(usize),
     /// After so many moves.
     SensorDead(usize),
     Near(usize),
@@ -86,6 +88,14 @@ impl Cell {
     /// From now on the gripper does not answer.
     pub(crate) fn cut_gripper(&mut self) {
         self.fault = Fault::GripperDead(0);
+    }
+
+    /// What the arm says of where it stands.
+    fn reported(&self, mut joints: Joints) -> Joints {
+        if matches!(self.fault, Fault::Nowhere(after) if self.moves >= after) {
+            joints.0[1] = f64::NAN;
+        }
+        joints
     }
 
     fn dead_line(&self, doing: &str) -> ArmError {
@@ -235,6 +245,7 @@ impl Eye for Shared {
             }
         };
         let ball = seen.map(|features| Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(768),
@@ -247,7 +258,8 @@ impl Eye for Shared {
 
 impl Manipulator for Shared {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        Ok(self.0.borrow().joints)
+        let cell = self.0.borrow();
+        Ok(cell.reported(cell.joints))
     }
 
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
@@ -302,7 +314,7 @@ impl Manipulator for Shared {
                 joints: cell.joints,
             });
         }
-        Ok(cell.joints)
+        Ok(cell.reported(cell.joints))
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
@@ -337,7 +349,7 @@ impl ProximitySensor for Shared {
         let cell = self.0.borrow();
         match cell.fault {
             Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
-            Fault::Near(at) | Fault::StopDead(at) => Ok(cell.moves == at),
+            Fault::Near(at) | Fault::StopDead(at) | Fault::Nowhere(at) => Ok(cell.moves == at),
             _ => Ok(false),
         }
     }

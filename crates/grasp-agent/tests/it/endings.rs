@@ -4,8 +4,8 @@ use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, LastLook, Look, Outcome, PositionBased,
-    Recovery, Search, ServoSettings, Sighting, Situation, Viewpoint,
+    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, LastLook, LoggedEvent, Look, Outcome,
+    PositionBased, Recovery, Search, ServoSettings, Sighting, Situation, Viewpoint,
 };
 
 const AT_GOAL: Features = Features {
@@ -66,6 +66,7 @@ impl Eye for Scene {
         let bytes = self.looks.to_le_bytes();
         let frame = GrayImage::from_fn(4, 1, |x, _| Luma([bytes[x as usize]]));
         let ball = (self.finds)(self.looks).map(|features| Sighting {
+            long_axis: None,
             features,
             detection: Detection {
                 circle: features.to_circle(768),
@@ -186,6 +187,49 @@ fn a_viewpoint_that_is_not_finite_is_an_error_and_no_pose() {
             );
         }
     }
+}
+
+/// Looks from the same pose for ever.
+#[derive(Clone, Debug)]
+struct Endless;
+
+impl Search for Endless {
+    fn next_view(&mut self, _at: &Joints, _last: LastLook) -> Option<Viewpoint> {
+        let pose = pose();
+        Some(Viewpoint { number: 0, pose })
+    }
+
+    fn boxed(&self) -> Box<dyn Search> {
+        Box::new(self.clone())
+    }
+}
+
+#[test]
+fn a_search_that_never_ends_has_found_nothing_after_so_many_viewpoints() {
+    let (end, log) = run(agent(1).searching_by(Endless), false, |_| None);
+    let outcome = end.unwrap();
+    assert_eq!((outcome.gave_up, outcome.cycles), (Some(GaveUp::NotFound), 0));
+    let views = |log: &EventLog| {
+        let at_pose = |e: &&LoggedEvent| matches!(e.kind, EventKind::AtSearchPose(_));
+        log.events.iter().filter(at_pose).count()
+    };
+    assert_eq!(views(&log), 1000);
+    // Nor is it ever over where every way is barred, or when the ball shows now and then.
+    let few = |max_views| {
+        let config = AgentConfig {
+            max_views,
+            ..AgentConfig::paper([pose()])
+        };
+        let servo = PositionBased::new(ServoSettings::paper());
+        let agent = Agent::with_controller(config, servo).unwrap();
+        agent.searching_by(Endless).recovering_by(Once(None))
+    };
+    let (end, log) = run(few(7), true, |_| None);
+    assert_eq!((end.unwrap().gave_up, views(&log)), (Some(GaveUp::Obstructed), 7));
+    let (end, log) = run(few(20), false, |n| n.is_multiple_of(21).then_some(ASIDE));
+    let outcome = end.unwrap();
+    assert_eq!((outcome.gave_up, outcome.cycles), (Some(GaveUp::OutOfCycles), 60));
+    assert!(views(&log) <= 20 * 61, "{}", views(&log));
 }
 
 #[test]

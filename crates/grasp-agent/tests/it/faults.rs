@@ -1,6 +1,6 @@
 //! Bad input and faults: the arm stops, the cause is in the log and in a typed error, what was learned is kept.
 
-use grasp_agent::puma_val2::{ArmError, JointDelta};
+use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, ApproachLimit, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp,
     Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
@@ -83,6 +83,22 @@ fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
             "{fault:?}"
         );
         assert!(cell.0.borrow().stops > 0 && !cell.0.borrow().closed, "{fault:?}");
+    }
+}
+
+#[test]
+fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
+    for moves in [0, 1, 3] {
+        let (end, log, cell) = end_of(Fault::Nowhere(moves));
+        let error = end.unwrap_err();
+        assert!(
+            matches!(error, AgentError::Pose { joint: Joint::J2 }),
+            "{moves}: {error}"
+        );
+        assert!(cell.0.borrow().stops > 0 && cell.0.borrow().joints.non_finite().is_none());
+        let before = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+        let replayed = log.replay(&before).unwrap_err();
+        assert_eq!(replayed.to_string(), error.to_string());
     }
 }
 
@@ -343,7 +359,7 @@ fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
 #[test]
 fn settings_that_cannot_work_are_refused() {
     type Change = fn(&mut AgentConfig);
-    let changes: [(&str, Change); 22] = [
+    let changes: [(&str, Change); 23] = [
         ("same_frames", |c| c.same_frames = 0),
         ("lift", |c| c.lift = Some(JointDelta::default())),
         ("lift", |c| c.lift = Some(JointDelta([f64::NAN; 6]))),
@@ -354,6 +370,7 @@ fn settings_that_cannot_work_are_refused() {
         ("grip", |c| c.grip.0[0] = f64::NAN),
         ("looks", |c| c.looks = 0),
         ("max_cycles", |c| c.max_cycles = 0),
+        ("max_views", |c| c.max_views = 0),
         ("goal of X", |c| {
             (c.goal[0].low, c.goal[0].high) = (108.0, 99.0);
         }),

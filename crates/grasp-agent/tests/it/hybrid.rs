@@ -2,9 +2,10 @@
 
 use grasp_agent::hough_heuristic::Features;
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use grasp_agent::puma_val2::Joints;
+use grasp_agent::puma_val2::{JointDelta, Joints};
 use grasp_agent::{
     Agent, CameraModel, Controller, EventLog, GaveUp, Hybrid, HybridSettings, JointLimits, Situation,
+    TaughtGoal,
 };
 #[cfg(feature = "serde")]
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
@@ -147,6 +148,7 @@ fn what_the_fixed_grip_has_missed_is_aimed_at() {
     let mut hybrid = Hybrid::new(HybridSettings::paper());
     hybrid.begin();
     let at_goal = Situation {
+        long_axis: None,
         features: Features {
             x: 103.5,
             y: 78.0,
@@ -163,6 +165,18 @@ fn what_the_fixed_grip_has_missed_is_aimed_at() {
         .next()
         .expect("an aim of its own, sooner or later");
     assert!((aim.degrees()[4] + 18.01).abs() < 1e-6, "{aim:?}");
+    // A goal that was shown with a turn of JT4 is aimed at with that turn.
+    let grip = JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, -14.0, 0.0]);
+    let goal = TaughtGoal::new(&config().goal, at_goal.features, at_goal.joints, grip).unwrap();
+    let mut shown = Hybrid::new(HybridSettings::paper()).shown(&goal);
+    shown.begin();
+    shown.arm_at(&at_goal.joints);
+    let mut tries = (0..4).filter_map(|_| shown.grip(&at_goal, &limits));
+    let aim = tries.next().expect("an aim of its own").degrees();
+    assert!(
+        (aim[3] - 8.0).abs() < 1e-6 && (aim[4] + 14.0).abs() < 1e-6,
+        "{aim:?}"
+    );
     // In the next run it is as careful as ever.
     hybrid.begin();
     hybrid.arm_at(&at_goal.joints);

@@ -12,3 +12,7 @@ mod modules;
 mod object;
 mod phases;
 mod rivals;
+#[cfg(feature = "serde")]
+mod saved_controllers;
+#[cfg(feature = "serde")]
+mod settings;

@@ -176,6 +176,7 @@ impl ObjectFeatures for Brightest {
         Some(Sighting {
             features: Features::from_circle(&detection.circle, frame.width()),
             detection,
+            long_axis: None,
         })
     }
 }

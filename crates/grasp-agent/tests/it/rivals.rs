@@ -35,6 +35,7 @@ fn every_rival_reaches_the_ball_with_the_right_model() {
 fn look_ahead_does_not_repeat_a_move_that_lost_the_ball_or_was_taken_back() {
     let limits = JointLimits::paper();
     let now = Situation {
+        long_axis: None,
         features: Features {
             x: 60.0,
             y: 100.0,

@@ -58,6 +58,40 @@ fn each_stage_of_each_detector_has_its_picture() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_not_replaced_by_a_picture() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
+
+    let (frame, _) = Scene::default().render();
+    let mut detector = detectors::all_on(Acceptance::default(), CannyConfig::default())
+        .remove(0)
+        .1;
+    let found = detector.detect(&frame);
+    let stages = detector.stages().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    // A link stays a link.
+    let (elsewhere, link) = (
+        folder.path().join("elsewhere.png"),
+        folder.path().join("4_accepted.png"),
+    );
+    std::fs::write(&elsewhere, b"older").unwrap();
+    symlink(&elsewhere, &link).unwrap();
+    write_stages(folder.path(), &frame, &stages, &found).unwrap();
+    assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert!(image::open(&elsewhere).is_ok());
+    // A socket cannot be written to, and stays what it is.
+    let socket = folder.path().join("1_edges.png");
+    std::fs::remove_file(&socket).unwrap();
+    let _listening = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    let error = write_stages(folder.path(), &frame, &stages, &found).unwrap_err();
+    assert!(error.to_string().contains("1_edges.png"), "{error}");
+    assert!(std::fs::metadata(&socket).unwrap().file_type().is_socket());
+    let parts = std::fs::read_dir(folder.path()).unwrap();
+    let unfinished = |entry: &std::fs::DirEntry| entry.file_name().to_string_lossy().ends_with(".part");
+    assert!(!parts.map(Result::unwrap).any(|entry| unfinished(&entry)));
+}
+
 /// The picture of `D` shows as explained what an accepted circle takes out of `D`: a band that widens with the tolerance and
 /// with the radius.
 #[test]

@@ -6,17 +6,22 @@
 //!
 //! R² and root mean square errors (feature units) are those of as many other samples; the open-loop error is the mean error of y after 1, 3 and 5
 //! moves that the model does not see. For features noisy by 0, 0.125 and 0.5 units. Then two forms linear in y and r that the library does
-//! not offer, and the fits to balls in the arm's plane only, or in the task's workspace only, with the standard deviations of the changes.
+//! not offer, and the fits to balls in the arm's plane only, or in the task's workspace only, with the standard deviations of the changes. Last,
+//! what the README sets beside an independent study: in this cell, and in an earlier one with another mount and another range of the elbow.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod otherwise;
+mod study;
 
 use std::error::Error;
 
-use otherwise::{Balls, Form, Terms, centring_with_square, sample, to_second_order, with_products};
+use otherwise::{
+    Balls, Form, Linear, Starts, Terms, centring_with_square, sample, to_second_order, with_products,
+};
 use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
 use pipeline_sim::{Ball, Cell, CentreModel, ReachForm, ReachModel, sample_moves};
+use study::Setting;
 
 /// Runs of five moves for the open-loop error of a fit.
 const RUNS: usize = 200;
@@ -93,7 +98,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("| {} |", spread(&rows).join(" | "));
     }
     other_forms(&cell, count, seeds)?;
-    other_samples(&cell, count, seeds)
+    other_samples(&cell, count, seeds)?;
+    Setting::present().print(seeds)?;
+    Setting::earlier().print(seeds)
 }
 
 /// Forms linear in y and r, which the library does not offer, for noise of 0.125 units.
@@ -107,9 +114,10 @@ fn other_forms(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Erro
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
             let (_, training) = sample_moves(cell, count, 0.125, &mut rng);
             let (_, fresh) = sample_moves(cell, count, 0.125, &mut rng);
-            let form = Form::fit(&training, terms, &ReachModel::PAPER_ELBOW_EDGES).ok_or("no fit")?;
+            let form =
+                Form::fit(&training, Linear::Image, terms, &ReachModel::PAPER_ELBOW_EDGES).ok_or("no fit")?;
             let [a, b, c, d] = form.quality(&fresh);
-            let [e, f, g] = form.open_loop(cell, RUNS, &mut rng);
+            let [e, f, g] = form.open_loop(cell, &Starts::paper(Balls::Anywhere), false, RUNS, &mut rng);
             rows.push([a, b, c, d, e, f, g]);
         }
         println!("| {name} | {} |", spread(&rows).join(" | "));
@@ -132,8 +140,9 @@ fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Er
     for (balls, noise) in [
         (Balls::InPlane, 0.125),
         (Balls::InPlane, 0.5),
-        (Balls::InWorkspace, 0.125),
+        (Balls::Within([0.5, 0.8], [-0.2, 0.05]), 0.125),
     ] {
+        let starts = Starts::paper(balls);
         println!("\nBalls {balls:?}, noise of {noise} units\n");
         println!("| form | R² of dy | R² of dr | error of y | error of r | spread of dy | of dr |");
         println!("|---|---|---|---|---|---|---|");
@@ -141,8 +150,8 @@ fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Er
             let mut rows = Vec::new();
             for seed in 0..seeds {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let (_, training) = sample(cell, balls, count, noise, &mut rng);
-                let (_, fresh) = sample(cell, balls, count, noise, &mut rng);
+                let (_, training, _) = sample(cell, &starts, count, noise, &mut rng);
+                let (_, fresh, _) = sample(cell, &starts, count, noise, &mut rng);
                 let model = ReachModel::fit(&training, form, &ReachModel::PAPER_ELBOW_EDGES)?;
                 let quality = model.quality_on(&fresh)?;
                 let (y, r) = (&quality[0], &quality[1]);
@@ -155,9 +164,10 @@ fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Er
             let mut rows = Vec::new();
             for seed in 0..seeds {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let (_, training) = sample(cell, balls, count, noise, &mut rng);
-                let (_, fresh) = sample(cell, balls, count, noise, &mut rng);
-                let form = Form::fit(&training, terms, &ReachModel::PAPER_ELBOW_EDGES).ok_or("no fit")?;
+                let (_, training, _) = sample(cell, &starts, count, noise, &mut rng);
+                let (_, fresh, _) = sample(cell, &starts, count, noise, &mut rng);
+                let form = Form::fit(&training, Linear::Image, terms, &ReachModel::PAPER_ELBOW_EDGES)
+                    .ok_or("no fit")?;
                 rows.push(form.quality(&fresh));
             }
             println!("| {name} | {} | | |", spread(&rows).join(" | "));
@@ -165,7 +175,7 @@ fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Er
         let mut rows = Vec::new();
         for seed in 0..seeds {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let (training, _) = sample(cell, balls, count, noise, &mut rng);
+            let (training, _, _) = sample(cell, &starts, count, noise, &mut rng);
             let plain = CentreModel::fit_without_radius(&training)?.quality();
             let full = CentreModel::fit(&training)?.quality();
             rows.push([plain[0].r2, plain[0].rmse, full[0].r2, full[0].rmse]);

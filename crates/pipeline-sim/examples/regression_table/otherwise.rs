@@ -3,56 +3,82 @@
 use hough_heuristic::Features;
 use pipeline_sim::nalgebra::{DMatrix, DVector};
 use pipeline_sim::rand::{Rng, RngExt};
-use pipeline_sim::{Cell, CentreSample, MoveLists, ReachSample, Workspace, exploring_start, with_noise};
+use pipeline_sim::{Cell, CentreSample, MoveLists, ReachSample, with_noise};
 use puma_val2::{JointDelta, Joints};
 
 /// Where balls are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Balls {
+    /// Anywhere in the image.
+    Anywhere,
     /// In the arm's plane, as if the arm had been turned toward them.
     InPlane,
-    /// In the workspace of the task only.
-    InWorkspace,
+    /// Anywhere in the image, at these distances from the waist's axis and these heights, metres.
+    Within([f64; 2], [f64; 2]),
 }
 
-/// As `exploring_start`, with the ball in the arm's plane, or in the workspace only.
-fn start<R: Rng>(cell: &Cell, balls: Balls, rng: &mut R) -> Option<(Cell, Joints)> {
-    (0..100_000).find_map(|_| match balls {
-        Balls::InWorkspace => {
-            exploring_start(cell, rng).filter(|(start, _)| Workspace::paper().contains(&start.ball.centre))
+/// What samples start from: balls, and uniform `JT2` and `JT3`, degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Starts {
+    pub(crate) balls: Balls,
+    pub(crate) jt2: [f64; 2],
+    pub(crate) jt3: [f64; 2],
+}
+
+impl Starts {
+    /// As `exploring_start`, for other balls.
+    pub(crate) fn paper(balls: Balls) -> Self {
+        Self {
+            balls,
+            jt2: [-125.0, -30.0],
+            jt3: [150.0, 214.0],
         }
-        Balls::InPlane => {
-            let (y, r) = (
-                rng.random_range(4.0..140.0),
-                rng.random_range(6.0_f64.ln()..60.0_f64.ln()).exp(),
-            );
-            // The camera sits 4.5 mm beside that plane, and the ball's radius of 20 mm shows as r.
-            let x = 96.0 + r * 4.5 / 20.0;
-            let jt3 = 170.0 + rng.random_range(-20.0..44.0);
-            let jt2 = rng.random_range(-125.0..-30.0);
+    }
+
+    /// A ball in sight that the arm can reach, above the table, and the joints.
+    pub(crate) fn draw<R: Rng>(&self, cell: &Cell, rng: &mut R) -> Option<(Cell, Joints)> {
+        let uniform = |[low, high]: [f64; 2], rng: &mut R| rng.random_range(low..high);
+        (0..100_000).find_map(|_| {
+            let y = rng.random_range(4.0..140.0);
+            let r = rng.random_range(6.0_f64.ln()..60.0_f64.ln()).exp();
+            let x = match self.balls {
+                // The camera sits 4.5 mm beside the arm's plane, and the ball's radius of 20 mm shows as r.
+                Balls::InPlane => 96.0 + r * 4.5 / 20.0,
+                _ => rng.random_range(4.0..188.0),
+            };
+            let (jt2, jt3) = (uniform(self.jt2, rng), uniform(self.jt3, rng));
             let joints = Joints::from_degrees([0.0, jt2, jt3, 0.0, Cell::REACHING_JT5_DEGREES, 0.0]);
             let mut start = *cell;
             start.place_ball(cell.ball_showing(&joints, &Features { x, y, r })?);
-            let kept = start.ball.centre.z > start.table + start.ball.radius
-                && start.circle(&joints).is_some()
-                && start.reachable();
+            let place = start.ball.centre;
+            let there = match self.balls {
+                Balls::Within([near, far], [low, high]) => {
+                    (near..=far).contains(&place.x.hypot(place.y)) && (low..=high).contains(&place.z)
+                }
+                // Not those behind the waist, which the arm could reach after turning round.
+                Balls::InPlane => place.x > 0.0 && place.z > start.table + start.ball.radius,
+                Balls::Anywhere => place.z > start.table + start.ball.radius,
+            };
+            let kept = there && start.circle(&joints).is_some() && start.reachable();
             kept.then_some((start, joints))
-        }
-    })
+        })
+    }
 }
 
-/// As `sample_moves`, from other starts.
+/// `count` samples of each kind from these starts, as `sample_moves` has them, and the share of moves of `JT2` and `JT3` that keep the ball
+/// in sight and the arm within its limits.
 pub(crate) fn sample<R: Rng>(
     cell: &Cell,
-    balls: Balls,
+    starts: &Starts,
     count: usize,
     noise: f64,
     rng: &mut R,
-) -> (Vec<CentreSample>, Vec<ReachSample>) {
+) -> (Vec<CentreSample>, Vec<ReachSample>, f64) {
     let moves = MoveLists::paper();
     let (mut centring, mut reaching) = (Vec::new(), Vec::new());
+    let (mut tried, mut kept) = (0.0, 0.0);
     while centring.len() < count || reaching.len() < count {
-        let Some((start, joints)) = start(cell, balls, rng) else {
+        let Some((start, joints)) = starts.draw(cell, rng) else {
             break;
         };
         let mut draw = |list: &[f64; 9]| list[rng.random_range(0..9)];
@@ -70,7 +96,9 @@ pub(crate) fn sample<R: Rng>(
         {
             centring.push(CentreSample { before, d1, after });
         }
-        if let Some((before, after)) = seen([0.0, d2, d3, 0.0, 0.0, 0.0]).filter(|_| reaching.len() < count) {
+        tried += 1.0;
+        if let Some((before, after)) = seen([0.0, d2, d3, 0.0, 0.0, 0.0]) {
+            kept += 1.0;
             let jt3_degrees = joints.degrees()[2];
             reaching.push(ReachSample {
                 before,
@@ -81,38 +109,92 @@ pub(crate) fn sample<R: Rng>(
             });
         }
     }
-    (centring, reaching)
+    reaching.truncate(count);
+    (centring, reaching, kept / tried)
 }
 
 /// The terms of a form.
 pub(crate) type Terms = fn(&Features, f64, f64, f64) -> Vec<f64>;
 
+/// 1 and the moves, as `ReachForm::Linear` has them.
+pub(crate) fn linear(_: &Features, _: f64, d2: f64, d3: f64) -> Vec<f64> {
+    vec![1.0, d2 / 20.0, d3 / 16.0]
+}
+
 /// 1, the moves, and their products with r, the elbow angle and y: changes of y and r in units.
 pub(crate) fn with_products(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
-    let place = [
-        1.0,
-        before.r / 33.0,
-        (before.y - 72.0) / 33.0,
-        (jt3 - 140.0) / 40.0,
-    ];
+    let [r, y, e] = place(before, jt3);
     let moved = [d2 / 20.0, d3 / 16.0];
-    let products = moved.iter().flat_map(|m| place.map(|p| m * p));
+    let products = moved.iter().flat_map(|m| [1.0, r, y, e].map(|p| m * p));
     std::iter::once(1.0).chain(products).collect()
 }
 
-/// The same with the moves to the second order, 22 terms as `Rigid22` has them.
+/// 1, the moves times 1, r, y, the elbow angle, r² and r y, and their squares and product times 1, r and r²: 22 terms.
 pub(crate) fn to_second_order(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
+    let [r, y, e] = place(before, jt3);
     let (a, b) = (d2 / 20.0, d3 / 16.0);
-    let e = (jt3 - 140.0) / 40.0;
-    let place = [1.0, before.r / 33.0, (before.y - 72.0) / 33.0, e];
+    let first = [a, b]
+        .into_iter()
+        .flat_map(|m| [1.0, r, y, e, r * r, r * y].map(|p| m * p));
+    let second = [a * a, a * b, b * b]
+        .into_iter()
+        .flat_map(|m| [1.0, r, r * r].map(|p| m * p));
+    std::iter::once(1.0).chain(first).chain(second).collect()
+}
+
+/// 1, and the moves, their squares and product times 1, r, y and the elbow angle, and its square times the first: 22 terms, those of `Rigid22`
+/// with r and y in the place of Z and V.
+pub(crate) fn as_rigid22(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
+    let [r, y, e] = place(before, jt3);
+    let (a, b) = (d2 / 20.0, d3 / 16.0);
     let products = [a, b, a * a, a * b, b * b]
         .into_iter()
-        .flat_map(|m| place.map(|p| m * p));
+        .flat_map(|m| [1.0, r, y, e].map(|p| m * p));
     std::iter::once(1.0).chain(products).chain([e * e * a]).collect()
 }
 
-/// A linear form of the changes of y and r, a fit for each interval of the elbow.
+fn place(before: &Features, jt3: f64) -> [f64; 3] {
+    [before.r / 33.0, (before.y - 72.0) / 33.0, (jt3 - 140.0) / 40.0]
+}
+
+/// 1, the moves times 1, r, y, the elbow angle, its product with r and its square, and the squares and product of the moves times 1, r and y:
+/// 22 terms.
+pub(crate) fn elbow_to_second_order(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
+    let [r, y, e] = place(before, jt3);
+    let (a, b) = (d2 / 20.0, d3 / 16.0);
+    let first = [a, b]
+        .into_iter()
+        .flat_map(|m| [1.0, r, y, e, r * e, e * e].map(|p| m * p));
+    let second = [a * a, a * b, b * b]
+        .into_iter()
+        .flat_map(|m| [1.0, r, y].map(|p| m * p));
+    std::iter::once(1.0).chain(first).chain(second).collect()
+}
+
+/// What a form is linear in: y and r themselves, or Z = 33 / r and V = (y - 72) / r in units that make them alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Linear {
+    Image,
+    Plane,
+}
+
+impl Linear {
+    /// There and, which is the same, back.
+    fn swap(self, f: &Features) -> Features {
+        match self {
+            Self::Image => *f,
+            Self::Plane => Features {
+                y: 72.0 + 33.0 * (f.y - 72.0) / f.r,
+                r: 33.0 * 33.0 / f.r,
+                ..*f
+            },
+        }
+    }
+}
+
+/// A form linear in y and r, or Z and V, a fit for each interval of the elbow.
 pub(crate) struct Form {
+    linear: Linear,
     terms: Terms,
     edges: Vec<f64>,
     /// For each interval the coefficients of dy and of dr.
@@ -120,8 +202,9 @@ pub(crate) struct Form {
 }
 
 impl Form {
-    pub(crate) fn fit(samples: &[ReachSample], terms: Terms, edges: &[f64]) -> Option<Self> {
+    pub(crate) fn fit(samples: &[ReachSample], linear: Linear, terms: Terms, edges: &[f64]) -> Option<Self> {
         let mut form = Self {
+            linear,
             terms,
             edges: edges.to_vec(),
             pieces: Vec::new(),
@@ -133,10 +216,14 @@ impl Form {
                 .collect();
             let rows: Vec<Vec<f64>> = group
                 .iter()
-                .map(|s| terms(&s.before, s.jt3_degrees, s.d2, s.d3))
+                .map(|s| terms(&linear.swap(&s.before), s.jt3_degrees, s.d2, s.d3))
                 .collect();
-            let dy = group.iter().map(|s| s.after.y - s.before.y).collect();
-            let dr = group.iter().map(|s| s.after.r - s.before.r).collect();
+            let pairs: Vec<[Features; 2]> = group
+                .iter()
+                .map(|s| [&s.before, &s.after].map(|f| linear.swap(f)))
+                .collect();
+            let dy = pairs.iter().map(|[before, after]| after.y - before.y).collect();
+            let dr = pairs.iter().map(|[before, after]| after.r - before.r).collect();
             form.pieces
                 .push([least_squares(&rows, dy)?, least_squares(&rows, dr)?]);
         }
@@ -148,14 +235,14 @@ impl Form {
     }
 
     pub(crate) fn predict(&self, before: &Features, jt3: f64, d2: f64, d3: f64) -> Features {
-        let terms = DVector::from_vec((self.terms)(before, jt3, d2, d3));
+        let before = self.linear.swap(before);
+        let terms = DVector::from_vec((self.terms)(&before, jt3, d2, d3));
         let [y, r] = self.pieces[self.piece(jt3)].each_ref().map(|c| c.dot(&terms));
-        Features {
+        self.linear.swap(&Features {
             y: before.y + y,
-            // A believed ball does not vanish.
-            r: (before.r + r).max(1.0),
-            ..*before
-        }
+            r: before.r + r,
+            ..before
+        })
     }
 
     /// R² of dy and dr, and their errors.
@@ -172,19 +259,27 @@ impl Form {
         [y.0, r.0, y.1, r.1]
     }
 
-    /// Mean error of y after 1, 3 and 5 moves that the form does not see.
-    pub(crate) fn open_loop<R: Rng>(&self, cell: &Cell, runs: usize, rng: &mut R) -> [f64; 3] {
+    /// Mean error of y after 1, 3 and 5 moves that the form does not see. A run ends with the first move that loses the ball or leaves the
+    /// limits, if `at_loss`; otherwise another move is drawn.
+    pub(crate) fn open_loop<R: Rng>(
+        &self,
+        cell: &Cell,
+        starts: &Starts,
+        at_loss: bool,
+        runs: usize,
+        rng: &mut R,
+    ) -> [f64; 3] {
         let lists = MoveLists::paper();
         let mut errors = vec![Vec::new(); 5];
         for _ in 0..runs {
-            let Some((start, mut joints)) = exploring_start(cell, rng) else {
+            let Some((start, mut joints)) = starts.draw(cell, rng) else {
                 break;
             };
             let Some(mut believed) = start.features(&joints) else {
                 continue;
             };
             for error in &mut errors {
-                let next = (0..100).find_map(|_| {
+                let next = (0..if at_loss { 1 } else { 100 }).find_map(|_| {
                     let mut draw = |list: &[f64; 9]| list[rng.random_range(0..9)];
                     let (d2, d3) = (draw(&lists.jt2), draw(&lists.jt3));
                     let there = joints + JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]);
@@ -196,6 +291,8 @@ impl Form {
                 });
                 let Some((d2, d3, there, seen)) = next else { break };
                 believed = self.predict(&believed, joints.degrees()[2], d2, d3);
+                // A believed ball does not vanish.
+                believed.r = believed.r.max(1.0);
                 joints = there;
                 error.push((believed.y - seen.y).abs());
             }
