@@ -149,9 +149,7 @@ const NEAR: f32 = 0.1;
 #[inline(always)]
 fn overlap(body: f32, lamp: f32, across2: f32) -> f32 {
     let lamp = lamp.max(1e-4);
-    let t = ((body + lamp - across2.sqrt()) / (2.0 * lamp.min(body)))
-        .max(0.0)
-        .min(1.0);
+    let t = ((body + lamp - across2.sqrt()) / (2.0 * lamp.min(body))).clamp(0.0, 1.0);
     let depth = (body / lamp).min(1.0);
     t * t * (3.0 - 2.0 * t) * depth * depth.sqrt()
 }

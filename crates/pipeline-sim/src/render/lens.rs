@@ -67,9 +67,9 @@ impl Warp {
         let runs = (width as usize).div_ceil(run);
         let ends: Vec<usize> = (0..=runs).map(|k| (k * run).min(width as usize - 1)).collect();
         let shares: Vec<(usize, [f64; 4])> = ends.iter().map(|x| across.shares(*x)).collect();
-        let mut sources = Vec::with_capacity(ends.len() * height as usize);
+        let mut sources = vec![[0.0; 2]; ends.len() * height as usize];
         let mut row = vec![[0.0; 2]; across.count];
-        for y in 0..height as usize {
+        for (y, sources) in sources.chunks_exact_mut(ends.len()).enumerate() {
             let (top, weights) = down.shares(y);
             let nodes = |k: usize| &grid[(top + k) * across.count..][..across.count];
             let four = nodes(0).iter().zip(nodes(1)).zip(nodes(2)).zip(nodes(3));
@@ -80,7 +80,7 @@ impl Warp {
             widest(Sources {
                 row: &row,
                 shares: &shares,
-                sources: &mut sources,
+                sources,
             });
         }
         Some(Self {
@@ -179,13 +179,13 @@ impl Vectorized for Applying<'_> {
     }
 }
 
-/// Adds the places that pixels of a row are taken from.
+/// Writes the places that pixels of a row are taken from.
 struct Sources<'a> {
     /// At the nodes of the row.
     row: &'a [[f64; 2]],
     /// For each place the first of four nodes, and their shares.
     shares: &'a [(usize, [f64; 4])],
-    sources: &'a mut Vec<[f32; 2]>,
+    sources: &'a mut [[f32; 2]],
 }
 
 impl Vectorized for Sources<'_> {
@@ -193,16 +193,14 @@ impl Vectorized for Sources<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let row = self.row;
-        self.sources.extend(self.shares.iter().map(|(left, w)| {
-            let nodes: [[f64; 2]; 4] = row
-                .get(*left..)
-                .and_then(|row| row.first_chunk().copied())
-                .unwrap_or_default();
-            [0, 1].map(|c| {
-                (nodes[0][c] * w[0] + nodes[1][c] * w[1] + nodes[2][c] * w[2] + nodes[3][c] * w[3]) as f32
-            })
-        }));
+        for (source, (left, w)) in self.sources.iter_mut().zip(self.shares) {
+            let Some([n0, n1, n2, n3]) = self.row.get(*left..).and_then(|row| row.first_chunk()) else {
+                continue;
+            };
+            for c in 0..2 {
+                source[c] = (n0[c] * w[0] + n1[c] * w[1] + n2[c] * w[2] + n3[c] * w[3]) as f32;
+            }
+        }
     }
 }
 

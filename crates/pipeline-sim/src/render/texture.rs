@@ -50,21 +50,20 @@ impl Level {
     fn place(u: u32, v: u32, bits: u32) -> u32 {
         let (column, row) = (u >> (32 - bits), v >> (32 - bits));
         let size = ((1 << bits) + 1) * PITCH;
-        let halves = u << bits & HALF_U | v << bits >> 1 & HALF_V;
-        row * PITCH + (column & (STRIP - 1)) + (column / STRIP) * size | halves
+        let halves = ((u << bits) & HALF_U) | ((v << bits >> 1) & HALF_V);
+        (row * PITCH + (column & (STRIP - 1)) + (column / STRIP) * size) | halves
     }
 
     /// The texel at a place, and the next along u, along v, and along both: a byte each, the lowest first.
     #[inline(always)]
     fn four(values: &[u8], place: u32) -> u32 {
-        let at = (place & !(HALF_U | HALF_V)) as usize;
-        let Some(v) = values
-            .get(at..)
-            .and_then(|v| v.first_chunk::<{ PITCH as usize + 2 }>())
-        else {
-            return 0x8080_8080;
+        const AROUND: usize = PITCH as usize + 2;
+        let Some(last) = values.len().checked_sub(AROUND) else {
+            return 0;
         };
-        u32::from_le_bytes([v[0], v[1], v[PITCH as usize], v[PITCH as usize + 1]])
+        let at = ((place & !(HALF_U | HALF_V)) as usize).min(last);
+        let v = &values[at..at + AROUND];
+        u32::from_le_bytes([v[0], v[1], v[AROUND - 2], v[AROUND - 1]])
     }
 }
 
