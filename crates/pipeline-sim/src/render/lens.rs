@@ -114,12 +114,13 @@ impl Warp {
         let part = |v: i32| (v & 0xffff) as f32 / 65536.0;
         let (mut x, mut y) = (vec![0_i32; width], vec![0_i32; width]);
         let mut places = vec![0_u32; width];
+        // Of each pixel the two above its place, and the two below.
         let (mut upper, mut lower) = (vec![[0.0_f32; 2]; width], vec![[0.0_f32; 2]; width]);
         let rows = out.light.chunks_exact_mut(width.max(1));
         for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
+            let runs = sources.windows(2);
             // The last place of a row is that of its last pixel.
             let last = (self.columns - 2) * self.run;
-            let runs = sources.windows(2);
             if let Some(ends) = runs.clone().last() {
                 let length = (width - 1 - last).max(1) as f32;
                 let from = ends[0].map(fixed);
@@ -147,7 +148,6 @@ impl Warp {
             for ((place, x), y) in places.iter_mut().zip(&x).zip(&y) {
                 *place = (y >> 16) as u32 * w as u32 + (x >> 16) as u32;
             }
-            // Of each pixel the two above its place and the two below.
             for ((upper, lower), place) in upper.iter_mut().zip(&mut lower).zip(&places) {
                 if let Some(four) = ideal.light.get(*place as usize..*place as usize + w + 2) {
                     *upper = [four[0], four[1]];
