@@ -1,5 +1,6 @@
 //! The frame in linear light, and the filling of convex shapes with smooth edges.
 
+use hough_heuristic::{Vectorized, widest};
 use nalgebra::Point2;
 
 /// Light per pixel, 1 = just white.
@@ -92,11 +93,21 @@ impl Canvas {
         }
     }
 
-    /// Gives the canvas another size, if it is another.
+    /// Gives the canvas another size, if it is another. A canvas that is laid over another is empty then; of any other all is to be drawn.
     pub(super) fn resize(&mut self, width: usize, height: usize) {
-        if (self.width, self.height) != (width, height) {
-            *self = Self::new(width, height);
+        if (self.width, self.height) == (width, height) {
+            return;
         }
+        let over = !self.cover.is_empty();
+        if over {
+            // All of it is zero from here on, whatever its size.
+            self.wipe();
+            self.cover.resize(width * height, 0.0);
+        }
+        self.light.resize(width * height, 0.0);
+        self.coverage.resize(width + 2, 0.0);
+        self.shade.resize(width + 2, 0.0);
+        (self.width, self.height) = (width, height);
     }
 
     /// Makes this a canvas of the given size that is laid over another, with nothing on it.
@@ -106,7 +117,6 @@ impl Canvas {
             self.wipe();
         } else {
             self.light.fill(0.0);
-            self.cover.clear();
             self.cover.resize(width * height, 0.0);
             self.touched = Area::default();
         }
@@ -152,7 +162,16 @@ impl Canvas {
     }
 
     /// Fills a convex polygon. `shade(y, x0, row)` writes the light of the pixels x0.. of row y into `row`.
-    pub(super) fn fill(&mut self, polygon: &[Point2<f64>], mut shade: impl FnMut(usize, usize, &mut [f32])) {
+    pub(super) fn fill(&mut self, polygon: &[Point2<f64>], shade: impl FnMut(usize, usize, &mut [f32])) {
+        widest(Filling {
+            canvas: self,
+            polygon,
+            shade,
+        });
+    }
+
+    #[inline(always)]
+    fn fill_rows(&mut self, polygon: &[Point2<f64>], mut shade: impl FnMut(usize, usize, &mut [f32])) {
         let Some(rows) = self.rows_of(polygon) else { return };
         for y in rows {
             let Some((start, end, solid)) = self.cover_row(y) else {
@@ -195,6 +214,7 @@ impl Canvas {
     }
 
     /// Lists the edges of a polygon and tells the rows that it may touch.
+    #[inline(always)]
     fn rows_of(&mut self, polygon: &[Point2<f64>]) -> Option<std::ops::Range<usize>> {
         if polygon.len() < 3 {
             return None;
@@ -231,6 +251,7 @@ impl Canvas {
     }
 
     /// Coverage of one row, after those above it: the touched pixels start..end, and whether all of them are covered wholly.
+    #[inline(always)]
     fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
         let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
         let lines: [f64; SUBROWS] = std::array::from_fn(|i| above + (i as f64 + 0.5) / SUBROWS as f64);
@@ -288,6 +309,22 @@ impl Canvas {
             }
         }
         Some((start, end, false))
+    }
+}
+
+/// The work of [`Canvas::fill`].
+struct Filling<'a, S> {
+    canvas: &'a mut Canvas,
+    polygon: &'a [Point2<f64>],
+    shade: S,
+}
+
+impl<S: FnMut(usize, usize, &mut [f32])> Vectorized for Filling<'_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.canvas.fill_rows(self.polygon, self.shade);
     }
 }
 

@@ -9,7 +9,8 @@ use crate::render::canvas::{Area, Canvas};
 /// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts of the focal length.
 const STEP: (f64, f64) = (16.0, 1.0 / 60.0);
 /// The same for places between which pixels of a row are taken from a straight line.
-const RUN: (f64, f64) = (4.0, 1.0 / 250.0);
+const RUN: (f64, f64) = (WHOLE_RUN as f64, 1.0 / 250.0);
+const WHOLE_RUN: usize = 4;
 
 /// The map from a distorted frame to the ideal one it is taken from.
 ///
@@ -66,19 +67,21 @@ impl Warp {
         let runs = (width as usize).div_ceil(run);
         let ends: Vec<usize> = (0..=runs).map(|k| (k * run).min(width as usize - 1)).collect();
         let shares: Vec<(usize, [f64; 4])> = ends.iter().map(|x| across.shares(*x)).collect();
-        let mut sources = Vec::with_capacity(ends.len() * height as usize);
-        let mut row = vec![Vector2::zeros(); across.count];
-        for y in 0..height as usize {
+        let mut sources = vec![[0.0; 2]; ends.len() * height as usize];
+        let mut row = vec![[0.0; 2]; across.count];
+        for (y, sources) in sources.chunks_exact_mut(ends.len()).enumerate() {
             let (top, weights) = down.shares(y);
-            for (i, place) in row.iter_mut().enumerate() {
-                let node = |k: usize| grid[(top + k) * across.count + i] * weights[k];
-                *place = node(0) + node(1) + node(2) + node(3) - low;
+            let nodes = |k: usize| &grid[(top + k) * across.count..][..across.count];
+            let four = nodes(0).iter().zip(nodes(1)).zip(nodes(2)).zip(nodes(3));
+            for (place, (((a, b), c), d)) in row.iter_mut().zip(four) {
+                let p = a * weights[0] + b * weights[1] + c * weights[2] + d * weights[3] - low;
+                *place = [p.x, p.y];
             }
-            sources.extend(shares.iter().map(|(left, weights)| {
-                let node = |k: usize| row[left + k] * weights[k];
-                let place = node(0) + node(1) + node(2) + node(3);
-                [place.x as f32, place.y as f32]
-            }));
+            widest(Sources {
+                row: &row,
+                shares: &shares,
+                sources,
+            });
         }
         Some(Self {
             camera: *camera,
@@ -110,27 +113,49 @@ impl Warp {
         let fixed = |v: f32| (v * 65536.0) as i32;
         let part = |v: i32| (v & 0xffff) as f32 / 65536.0;
         let (mut x, mut y) = (vec![0_i32; width], vec![0_i32; width]);
-        let mut corners = vec![[0.0_f32; 4]; width];
+        let mut places = vec![0_u32; width];
+        // Of each pixel the two above its place, and the two below.
+        let (mut upper, mut lower) = (vec![[0.0_f32; 2]; width], vec![[0.0_f32; 2]; width]);
         let rows = out.light.chunks_exact_mut(width.max(1));
         for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
-            let runs = x.chunks_mut(self.run).zip(y.chunks_mut(self.run));
-            for ((k, (x, y)), ends) in runs.enumerate().zip(sources.windows(2)) {
-                // The last place of a row is that of its last pixel.
-                let length = self.run.min((width - 1 - k * self.run).max(1));
-                let share = 1.0 / length as f32;
-                let (x0, dx) = (fixed(ends[0][0]), fixed((ends[1][0] - ends[0][0]) * share));
-                let (y0, dy) = (fixed(ends[0][1]), fixed((ends[1][1] - ends[0][1]) * share));
-                for ((x, y), i) in x.iter_mut().zip(y).zip(0..) {
-                    (*x, *y) = (x0 + i * dx, y0 + i * dy);
+            let runs = sources.windows(2);
+            // The last place of a row is that of its last pixel.
+            let last = (self.columns - 2) * self.run;
+            if let Some(ends) = runs.clone().last() {
+                let length = (width - 1 - last).max(1) as f32;
+                let from = ends[0].map(fixed);
+                let step = [0, 1].map(|c| fixed((ends[1][c] - ends[0][c]) / length));
+                for ((x, y), i) in x[last..].iter_mut().zip(&mut y[last..]).zip(0..) {
+                    (*x, *y) = (from[0] + i * step[0], from[1] + i * step[1]);
                 }
             }
-            for ((corners, x), y) in corners.iter_mut().zip(&x).zip(&y) {
-                let at = (y >> 16) as usize * w + (x >> 16) as usize;
-                if let Some(four) = ideal.light.get(at..at + w + 2) {
-                    *corners = [four[0], four[1], four[w], four[w + 1]];
+            for (c, line) in [&mut x[..last], &mut y[..last]].into_iter().enumerate() {
+                let ends = runs.clone().map(|ends| (ends[0][c], ends[1][c]));
+                if self.run == WHOLE_RUN {
+                    for (run, (from, to)) in line.as_chunks_mut::<WHOLE_RUN>().0.iter_mut().zip(ends) {
+                        let (at, step) = (fixed(from), fixed((to - from) * (1.0 / WHOLE_RUN as f32)));
+                        *run = [at, at + step, at + 2 * step, at + 3 * step];
+                    }
+                } else {
+                    for (run, (from, to)) in line.chunks_mut(self.run).zip(ends) {
+                        let step = fixed((to - from) / self.run as f32);
+                        for (at, i) in run.iter_mut().zip(0..) {
+                            *at = fixed(from) + i * step;
+                        }
+                    }
                 }
             }
-            for (((light, [a, b, c, d]), x), y) in row.iter_mut().zip(&corners).zip(&x).zip(&y) {
+            for ((place, x), y) in places.iter_mut().zip(&x).zip(&y) {
+                *place = (y >> 16) as u32 * w as u32 + (x >> 16) as u32;
+            }
+            for ((upper, lower), place) in upper.iter_mut().zip(&mut lower).zip(&places) {
+                if let Some(four) = ideal.light.get(*place as usize..*place as usize + w + 2) {
+                    *upper = [four[0], four[1]];
+                    *lower = [four[w], four[w + 1]];
+                }
+            }
+            let pairs = upper.iter().zip(&lower).zip(x.iter().zip(&y));
+            for (light, (([a, b], [c, d]), (x, y))) in row.iter_mut().zip(pairs) {
                 let (upper, lower) = (a + (b - a) * part(*x), c + (d - c) * part(*x));
                 *light = upper + (lower - upper) * part(*y);
             }
@@ -151,6 +176,31 @@ impl Vectorized for Applying<'_> {
     #[inline(always)]
     fn run(self) {
         self.warp.apply_rows(self.ideal, self.out);
+    }
+}
+
+/// Writes the places that pixels of a row are taken from.
+struct Sources<'a> {
+    /// At the nodes of the row.
+    row: &'a [[f64; 2]],
+    /// For each place the first of four nodes, and their shares.
+    shares: &'a [(usize, [f64; 4])],
+    sources: &'a mut [[f32; 2]],
+}
+
+impl Vectorized for Sources<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (source, (left, w)) in self.sources.iter_mut().zip(self.shares) {
+            let Some([n0, n1, n2, n3]) = self.row.get(*left..).and_then(|row| row.first_chunk()) else {
+                continue;
+            };
+            for c in 0..2 {
+                source[c] = (n0[c] * w[0] + n1[c] * w[1] + n2[c] * w[2] + n3[c] * w[3]) as f32;
+            }
+        }
     }
 }
 

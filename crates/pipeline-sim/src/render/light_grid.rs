@@ -1,7 +1,7 @@
 //! Slowly varying light on the table, worked out at few pixels and interpolated between them.
 
 use hough_heuristic::{Vectorized, widest};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::render::view::View;
 
@@ -11,53 +11,119 @@ const STEP: usize = 4;
 /// Share of their sum by which two nodes may differ to be taken as alike.
 const ALIKE: f32 = 0.01;
 
+/// Something that tells the light on a plane.
+pub(super) trait Lighting {
+    /// Writes the light at places of the plane; `spare` holds three times as many numbers. To be inlined always.
+    fn shed(&self, x: &[f32], y: &[f32], light: &mut [f32], spare: &mut [f32]);
+}
+
 /// Light at every [`STEP`]th column of every [`STEP`]th row.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LightGrid {
     columns: usize,
     values: Vec<f32>,
+    row: Row,
+}
+
+/// Nodes of a row at which the light is to be worked out.
+#[derive(Clone, Debug, Default)]
+struct Row {
+    /// Their columns.
+    wanted: Vec<u32>,
+    /// Where they are on the plane, whether they are at all (1 or 0), the light there, and room to work it out.
+    x: Vec<f32>,
+    y: Vec<f32>,
+    met: Vec<f32>,
+    light: Vec<f32>,
+    spare: Vec<f32>,
+}
+
+impl Row {
+    /// Works out the light at the wanted nodes, pixels `step` apart from `start` on, and writes it to their places in `values`.
+    #[inline(always)]
+    fn work_out(
+        &mut self,
+        (start, step): (Vector3<f64>, Vector3<f64>),
+        lighting: &impl Lighting,
+        values: &mut [f32],
+    ) {
+        let n = self.wanted.len();
+        let places = self.x[..n].iter_mut().zip(&mut self.y[..n]);
+        for (((x, y), met), i) in places.zip(&mut self.met).zip(&self.wanted) {
+            let i = f64::from(*i as i32);
+            let z = start.z + step.z * i;
+            let before = z > 0.0;
+            let w = if before { 1.0 / z } else { 0.0 };
+            *x = ((start.x + step.x * i) * w) as f32;
+            *y = ((start.y + step.y * i) * w) as f32;
+            *met = if before { 1.0 } else { 0.0 };
+        }
+        let light = &mut self.light[..n];
+        lighting.shed(&self.x[..n], &self.y[..n], light, &mut self.spare[..3 * n]);
+        for ((light, met), i) in light.iter().zip(&self.met).zip(&self.wanted) {
+            values[*i as usize] = light * met;
+        }
+    }
 }
 
 impl LightGrid {
-    /// Works out `light` where the rays of the grid's pixels meet the plane; where they do not, it is dark. Between every second node along
+    /// Works out the light where the rays of the grid's pixels meet the plane; where they do not, it is dark. Between every second node along
     /// both axes that is done only where these differ.
-    pub(super) fn lay(&mut self, view: &View, plane: &Matrix3<f64>, light: impl Fn(f64, f64) -> f32) {
+    pub(super) fn lay(&mut self, view: &View, plane: &Matrix3<f64>, lighting: &impl Lighting) {
+        widest(Laying {
+            grid: self,
+            size: (view.width, view.height),
+            plane,
+            lighting,
+        });
+    }
+
+    #[inline(always)]
+    fn lay_rows(&mut self, (width, height): (usize, usize), plane: &Matrix3<f64>, lighting: &impl Lighting) {
         let nodes = |pixels: usize| pixels / (2 * STEP) * 2 + 3;
-        let (columns, rows) = (nodes(view.width), nodes(view.height));
+        let (columns, rows) = (nodes(width), nodes(height));
         self.columns = columns;
-        self.values.clear();
         self.values.resize(columns * rows, 0.0);
-        let (across, down) = (plane.column(0) * STEP as f64, plane.column(1) * STEP as f64);
-        let exact = |i: usize, j: usize| {
-            let p = plane.column(2) + across * i as f64 + down * j as f64;
-            if p.z > 0.0 {
-                let w = 1.0 / p.z;
-                light(p.x * w, p.y * w)
-            } else {
-                0.0
-            }
-        };
-        for j in (0..rows).step_by(2) {
-            for i in (0..columns).step_by(2) {
-                self.values[j * columns + i] = exact(i, j);
-            }
+        let row = &mut self.row;
+        for list in [&mut row.x, &mut row.y, &mut row.met, &mut row.light] {
+            list.resize(columns, 0.0);
         }
-        let between = |a: f32, b: f32| ((a - b).abs() <= ALIKE * (a + b)).then_some(0.5 * (a + b));
+        row.spare.resize(3 * columns, 0.0);
+        let step = plane.column(0) * STEP as f64;
+        let line = |j: usize| (plane.column(2) + plane.column(1) * (j * STEP) as f64, step);
+        for j in (0..rows).step_by(2) {
+            row.wanted.clear();
+            row.wanted.extend((0..columns as u32).step_by(2));
+            row.work_out(line(j), lighting, &mut self.values[j * columns..][..columns]);
+        }
+        let alike = |a: f32, b: f32| (a - b).abs() <= ALIKE * (a + b);
         for j in 0..rows {
-            let start = 1 - j % 2;
-            for i in (start..columns).step_by(1 + start) {
-                let at = |di: isize, dj: isize| {
-                    let place = (j * columns + i).wrapping_add_signed(dj * columns as isize + di);
-                    self.values[place]
-                };
-                let mean = match (i % 2, j % 2) {
-                    (1, 0) => between(at(-1, 0), at(1, 0)),
-                    (0, _) => between(at(0, -1), at(0, 1)),
-                    _ => between(at(-1, -1), at(1, 1))
-                        .zip(between(at(1, -1), at(-1, 1)))
-                        .and_then(|(a, b)| between(a, b)),
-                };
-                self.values[j * columns + i] = mean.unwrap_or_else(|| exact(i, j));
+            row.wanted.clear();
+            let (before, rest) = self.values.split_at_mut(j * columns);
+            let (here, after) = rest.split_at_mut(columns);
+            if j % 2 == 0 {
+                for i in (1..columns).step_by(2) {
+                    let (a, b) = (here[i - 1], here[i + 1]);
+                    here[i] = 0.5 * (a + b);
+                    if !alike(a, b) {
+                        row.wanted.push(i as u32);
+                    }
+                }
+            } else {
+                let (above, below) = (&before[before.len() - columns..], &after[..columns]);
+                for i in 0..columns {
+                    let odd = i % 2;
+                    let (a, b) = (above[i - odd], below[i + odd]);
+                    let (c, d) = (above[i + odd], below[i - odd]);
+                    let (down, up) = (0.5 * (a + b), 0.5 * (c + d));
+                    here[i] = 0.5 * (down + up);
+                    if !(alike(a, b) && alike(c, d) && alike(down, up)) {
+                        row.wanted.push(i as u32);
+                    }
+                }
+            }
+            if !row.wanted.is_empty() {
+                row.work_out(line(j), lighting, here);
             }
         }
     }
@@ -107,6 +173,23 @@ impl LightGrid {
     }
 }
 
+/// The work of [`LightGrid::lay`].
+struct Laying<'a, L> {
+    grid: &'a mut LightGrid,
+    size: (usize, usize),
+    plane: &'a Matrix3<f64>,
+    lighting: &'a L,
+}
+
+impl<L: Lighting> Vectorized for Laying<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.grid.lay_rows(self.size, self.plane, self.lighting);
+    }
+}
+
 /// The work of [`LightGrid::shine`].
 struct Shining<'a> {
     light: &'a LightGrid,
@@ -125,10 +208,24 @@ impl Vectorized for Shining<'_> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+    use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
     use super::*;
     use crate::Camera;
+
+    /// A strip of shadow 12 mm wide along y, with a penumbra of 4 mm.
+    struct Strip;
+
+    fn strip(x: f32) -> f32 {
+        ((x.abs() - 0.004) / 0.004).clamp(0.1, 1.0)
+    }
+
+    impl Lighting for Strip {
+        #[inline(always)]
+        fn shed(&self, x: &[f32], _: &[f32], light: &mut [f32], _: &mut [f32]) {
+            light.iter_mut().zip(x).for_each(|(light, x)| *light = strip(*x));
+        }
+    }
 
     #[test]
     fn a_thin_shadow_has_straight_edges() {
@@ -137,10 +234,9 @@ mod tests {
         let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.5), down);
         let view = View::new(&Camera::paper(), pose);
         let plane = view.plane(&Point3::origin(), &Vector3::x(), &Vector3::y());
-        // A strip of shadow 12 mm wide, 24 pixels, with a penumbra of 4 mm.
-        let light = |x: f64, _: f64| ((x.abs() - 0.004) / 0.004).clamp(0.1, 1.0) as f32;
+        // The shadow is 24 pixels wide.
         let mut grid = LightGrid::default();
-        grid.lay(&view, &plane, light);
+        grid.lay(&view, &plane, &Strip);
         let (mut worst, mut sum) = (0.0_f64, 0.0);
         for y in 0..view.height {
             // Rows need not begin at a node.
@@ -149,7 +245,7 @@ mod tests {
             grid.shine(y, x0, &mut row);
             for (x, value) in (x0..).zip(&row) {
                 let p = plane * Vector3::new(x as f64, y as f64, 1.0);
-                let error = f64::from((value - light(p.x / p.z, p.y / p.z)).abs());
+                let error = f64::from((value - strip((p.x / p.z) as f32)).abs());
                 worst = worst.max(error);
                 sum += error;
             }

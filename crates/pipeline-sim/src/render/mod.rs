@@ -1,5 +1,6 @@
 //! Frames of the cell: table, things, holder and ball as the camera on the hand sees them.
 
+mod ball_shadow;
 mod bodies;
 mod canvas;
 mod lens;

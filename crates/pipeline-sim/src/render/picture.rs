@@ -3,9 +3,11 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::render::Renderer;
+use crate::render::ball_shadow::BallShadow;
 use crate::render::bodies::{Studio, plane_row};
 use crate::render::canvas::Canvas;
-use crate::render::shadow::{BallShadow, lamps, table_light};
+use crate::render::light_grid::Lighting;
+use crate::render::shadow::{ThingShadows, lamps, table_light};
 use crate::render::view::View;
 use crate::{Cell, Look, Thing};
 
@@ -44,12 +46,12 @@ impl Renderer {
             .iter()
             .map(|cell| BallShadow::new(&self.scene, &cell.ball, cell.holder, table))
             .collect();
-        let share = 1.0 / balls.len().max(1) as f32;
-        let plane = table_plane(view, table);
-        self.light.lay(view, &plane, |u, v| {
-            let open = balls.iter().map(|ball| ball.factor(u, v)).sum::<f32>();
-            light * self.table.at(u, v) * (open * share)
-        });
+        let lighting = TableLight {
+            light,
+            things: &self.table,
+            balls: &balls,
+        };
+        self.light.lay(view, &table_plane(view, table), &lighting);
     }
 
     /// What shading depends on.
@@ -186,6 +188,36 @@ impl Renderer {
             plane_row(&plane, studio.texture, 0.4, (y, x0), row);
             row.iter_mut().for_each(|value| *value *= 0.16);
         });
+    }
+}
+
+/// The light on the table.
+struct TableLight<'a> {
+    /// Where nothing hides the lamps.
+    light: f32,
+    things: &'a ThingShadows,
+    /// Shadows of which the mean counts; there is at least one.
+    balls: &'a [BallShadow],
+}
+
+impl Lighting for TableLight<'_> {
+    #[inline(always)]
+    fn shed(&self, x: &[f32], y: &[f32], light: &mut [f32], spare: &mut [f32]) {
+        let n = x.len();
+        let (open, spare) = spare.split_at_mut(n);
+        let (factors, spare) = spare.split_at_mut(n);
+        open.fill(0.0);
+        for ball in self.balls {
+            ball.at(x, y, factors, spare);
+            open.iter_mut()
+                .zip(&*factors)
+                .for_each(|(open, factor)| *open += factor);
+        }
+        self.things.at(x, y, light);
+        let share = self.light / self.balls.len().max(1) as f32;
+        for (light, open) in light.iter_mut().zip(open) {
+            *light *= *open * share;
+        }
     }
 }
 

@@ -11,6 +11,8 @@ use crate::{Camera, Sensor};
 
 const NOISES: usize = 1 << 16;
 const LEVELS: usize = 4096;
+/// 2^23.
+const WHOLE: f32 = 8_388_608.0;
 
 /// The sensor with its tables and row buffers.
 #[derive(Clone, Debug)]
@@ -24,8 +26,15 @@ pub(super) struct Exposure {
     curve: Box<[u8; LEVELS]>,
     mixed: Vec<f32>,
     row: Vec<f32>,
+    /// Squared tangent of the angle to the axis, column by column.
     columns: Vec<f32>,
+    /// Share of the light that the pixels of the present row count, and by how much it changes to the next row.
+    gains: Vec<f32>,
+    changes: Vec<f32>,
 }
+
+/// Rows from one at which the share of light is worked out to the next; between them it changes evenly.
+const GAIN_ROWS: usize = 8;
 
 impl Exposure {
     pub(super) fn new<R: Rng + ?Sized>(sensor: Sensor, rng: &mut R) -> Self {
@@ -41,6 +50,8 @@ impl Exposure {
             mixed: Vec::new(),
             row: Vec::new(),
             columns: Vec::new(),
+            gains: Vec::new(),
+            changes: Vec::new(),
         }
     }
 
@@ -72,10 +83,18 @@ impl Exposure {
         let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
         self.mixed.resize(width + 2, 0.0);
         self.row.resize(width, 0.0);
-        // Squared tangent of the angle to the axis, column by column.
         self.columns.clear();
         self.columns
             .extend((0..width).map(|x| (((x as f64 - principal.x) / focal) as f32).powi(2)));
+        self.gains.resize(width, 0.0);
+        self.changes.resize(width, 0.0);
+        let fall = |y: usize| 1.0 + (((y as f64 - principal.y) / focal) as f32).powi(2);
+        let gain = |fall: f32, tan2: f32| {
+            let cos2 = 1.0 / (fall + tan2);
+            exposure * (1.0 - bend * (1.0 - cos2 * cos2))
+        };
+        // With no gamma to speak of a grey level is found without its table.
+        let straight = s.gamma.to_bits() == 1.0_f64.to_bits();
         // A frame wider than the table of noise repeats it along the row.
         let run = width.min(NOISES / 2);
         for y in 0..height {
@@ -86,32 +105,42 @@ impl Exposure {
             }
             self.mixed[0] = self.mixed[1];
             self.mixed[width + 1] = self.mixed[width];
-            let fall = 1.0 + (((y as f64 - principal.y) / focal) as f32).powi(2);
-            let (left, centre, right) = (&self.mixed[..width], &self.mixed[1..=width], &self.mixed[2..]);
-            for ((((value, l), c), r), tan2) in self
-                .row
-                .iter_mut()
-                .zip(left)
-                .zip(centre)
-                .zip(right)
-                .zip(&self.columns)
-            {
-                let cos2 = 1.0 / (fall + tan2);
-                let light = middle * c + side * (l + r);
-                *value = light * (exposure * (1.0 - bend * (1.0 - cos2 * cos2)));
+            if y % GAIN_ROWS == 0 {
+                let (here, later) = (fall(y), fall(y + GAIN_ROWS));
+                let gains = self.gains.iter_mut().zip(&mut self.changes);
+                for ((now, change), tan2) in gains.zip(&self.columns) {
+                    *now = gain(here, *tan2);
+                    *change = (gain(later, *tan2) - *now) * (1.0 / GAIN_ROWS as f32);
+                }
             }
             let start = rng.random_range(0..NOISES - run);
             let noise = &self.noise[start..start + run];
-            for part in self.row.chunks_mut(run) {
-                for (value, n) in part.iter_mut().zip(noise) {
-                    let light = *value + (read2 + shot2 * value.max(0.0)).sqrt() * n;
+            for left in (0..width).step_by(run) {
+                let length = run.min(width - left);
+                let mixed = &self.mixed[left..left + length + 2];
+                let (before, here, after) = (&mixed[..length], &mixed[1..=length], &mixed[2..]);
+                let gains = self.gains[left..][..length].iter_mut().zip(&self.changes[left..]);
+                let lights = before.iter().zip(here).zip(after);
+                let row = self.row[left..][..length].iter_mut().zip(noise);
+                for (((value, noise), ((l, c), r)), (gain, change)) in row.zip(lights).zip(gains) {
+                    let light = (middle * c + side * (l + r)) * *gain;
+                    *gain += change;
+                    let light = light + (read2 + shot2 * light.max(0.0)).sqrt() * noise;
                     // The sum with 2^23 rounds to a whole number and leaves it in the low bits.
-                    *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + 8_388_608.0;
+                    *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + WHOLE;
                 }
             }
-            let curve = &self.curve;
-            for (grey, value) in out[y * width..(y + 1) * width].iter_mut().zip(&self.row) {
-                *grey = curve[value.to_bits() as usize & (LEVELS - 1)];
+            let greys = out[y * width..(y + 1) * width].iter_mut().zip(&self.row);
+            if straight {
+                // As in the table: no level of it lies half way between two greys.
+                for (grey, value) in greys {
+                    *grey = ((value - WHOLE) * (255.0 / (LEVELS - 1) as f32) + WHOLE).to_bits() as u8;
+                }
+            } else {
+                let curve = &self.curve;
+                for (grey, value) in greys {
+                    *grey = curve[value.to_bits() as usize & (LEVELS - 1)];
+                }
             }
         }
     }
@@ -139,6 +168,29 @@ impl Vectorized for Exposing<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn without_gamma_grey_levels_are_those_of_the_table() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let sensor = Sensor {
+            gamma: 1.0,
+            blur: 0.0,
+            vignetting: 0.0,
+            exposure: 1.0,
+            read_noise: 0.0,
+            shot_noise: 0.0,
+            ..Sensor::default()
+        };
+        let mut exposure = Exposure::new(sensor, &mut rng);
+        let camera = Camera::paper().resized(LEVELS as u32, 1).expect("a size");
+        let mut canvas = Canvas::new(LEVELS, 1);
+        for (k, light) in canvas.light.iter_mut().enumerate() {
+            *light = k as f32 / (LEVELS - 1) as f32;
+        }
+        let mut greys = vec![0; LEVELS];
+        exposure.expose(&canvas, &camera, 5, 0, &mut greys);
+        assert_eq!(greys, *exposure.curve);
+    }
 
     #[test]
     fn wide_vectors_give_the_same_grey_levels() {

@@ -1,11 +1,11 @@
-//! Shadows on the table: those of the things, worked out once, and those of ball and holder, worked out for every frame.
+//! Shadows of the things on the table, worked out once.
 
 use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
 use crate::render::texture::CoarseMap;
-use crate::{Ball, Holder, Light, Scene, Shape, Thing};
+use crate::{Light, Scene, Shape, Thing};
 
 /// Directions toward points of a lamp's disc.
 const LAMP_POINTS: usize = 24;
@@ -70,9 +70,10 @@ impl ThingShadows {
         shadows
     }
 
-    /// Factor on the table's light at (x, y).
-    pub(super) fn at(&self, x: f64, y: f64) -> f32 {
-        self.map.at(x, y)
+    /// Writes the factors on the table's light at places, metres.
+    #[inline(always)]
+    pub(super) fn at(&self, x: &[f32], y: &[f32], factors: &mut [f32]) {
+        self.map.at(x, y, factors);
     }
 
     /// Takes away the shadows of these things, in ascending order, and brings back those of all others.
@@ -259,130 +260,6 @@ fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
     }
 }
 
-/// The soft shadows of ball and holder on the table.
-#[derive(Clone, Debug)]
-pub(super) struct BallShadow {
-    lamps: Vec<Lamp>,
-    ball: Ball,
-    holder: Option<Holder>,
-    table: f64,
-    /// Box on the table outside which nothing is darkened: least and greatest x, least and greatest y.
-    bounds: [f64; 4],
-}
-
-#[derive(Clone, Debug)]
-struct Lamp {
-    axis: Vector3<f64>,
-    reach: f64,
-    share: f64,
-    /// Box on the table that holds both shadows: least and greatest x, least and greatest y.
-    bounds: [f64; 4],
-}
-
-impl BallShadow {
-    pub(super) fn new(scene: &Scene, ball: &Ball, holder: Option<Holder>, table: f64) -> Self {
-        let (_, shares) = table_light(scene);
-        let lamps: Vec<Lamp> = scene
-            .lights
-            .iter()
-            .zip(shares)
-            .map(|(light, share)| {
-                let axis = toward(light);
-                let reach = light.half_angle.clamp(0.0, 0.7).tan();
-                let drop = (ball.centre.z - table).max(0.0) / axis.z.max(0.05);
-                let margin = ball.radius / axis.z.max(0.05) + drop * reach * 1.5 / axis.z.max(0.05) + 0.03;
-                let tip = ball.centre - axis * drop;
-                let foot = holder.map_or(tip.xy(), |h| h.foot);
-                let bounds = [
-                    tip.x.min(foot.x) - margin,
-                    tip.x.max(foot.x) + margin,
-                    tip.y.min(foot.y) - margin,
-                    tip.y.max(foot.y) + margin,
-                ];
-                Lamp {
-                    axis,
-                    reach,
-                    share,
-                    bounds,
-                }
-            })
-            .collect();
-        let foot = holder.map_or(ball.centre.xy(), |h| h.foot);
-        let near = [foot.x - 0.1, foot.x + 0.1, foot.y - 0.1, foot.y + 0.1];
-        let bounds = lamps.iter().map(|l: &Lamp| l.bounds).fold(near, |a, b| {
-            [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
-        });
-        Self {
-            lamps,
-            ball: *ball,
-            holder,
-            table,
-            bounds,
-        }
-    }
-
-    /// Factor on the table's light at (x, y).
-    pub(super) fn factor(&self, x: f64, y: f64) -> f32 {
-        if x < self.bounds[0] || x > self.bounds[1] || y < self.bounds[2] || y > self.bounds[3] {
-            return 1.0;
-        }
-        let mut factor = 1.0;
-        for lamp in &self.lamps {
-            let [x0, x1, y0, y1] = lamp.bounds;
-            if x > x0 && x < x1 && y > y0 && y < y1 {
-                let point = Point3::new(x, y, self.table);
-                factor -= lamp.share * self.ball_share(lamp, &point).max(self.holder_share(lamp, &point));
-            }
-        }
-        if let Some(h) = self.holder {
-            let (dx, dy) = (x - h.foot.x, y - h.foot.y);
-            let distance2 = dx * dx + dy * dy;
-            if distance2 < 0.01 {
-                factor *= 1.0 - 0.35 * (-(distance2.sqrt() - h.radius).max(0.0) / 0.012).exp();
-            }
-        }
-        factor.max(0.02) as f32
-    }
-
-    fn ball_share(&self, lamp: &Lamp, point: &Point3<f64>) -> f64 {
-        let to = self.ball.centre - point;
-        let along = to.dot(&lamp.axis);
-        let across2 = (to.norm_squared() - along * along).max(0.0);
-        overlap(self.ball.radius, along * lamp.reach, across2)
-    }
-
-    fn holder_share(&self, lamp: &Lamp, point: &Point3<f64>) -> f64 {
-        let Some(h) = self.holder else { return 0.0 };
-        // Height at which the ray to the lamp passes the rod's axis most closely.
-        let (dx, dy) = (
-            lamp.axis.x / lamp.axis.z.max(0.05),
-            lamp.axis.y / lamp.axis.z.max(0.05),
-        );
-        let (px, py) = (point.x - h.foot.x, point.y - h.foot.y);
-        let slope2 = dx * dx + dy * dy;
-        let top = (h.top - self.table).max(0.0);
-        let z = if slope2 > 1e-9 {
-            (-(px * dx + py * dy) / slope2).clamp(0.0, top)
-        } else {
-            0.0
-        };
-        let across2 = (px + z * dx).powi(2) + (py + z * dy).powi(2);
-        overlap(h.radius, z * lamp.reach, across2)
-    }
-}
-
-/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body`, `across2` being the squared distance between their middles.
-fn overlap(body: f64, lamp: f64, across2: f64) -> f64 {
-    let lamp = lamp.max(1e-4);
-    if across2 >= (body + lamp) * (body + lamp) {
-        return 0.0;
-    }
-    let across = across2.sqrt();
-    let t = ((body + lamp - across) / (2.0 * lamp.min(body))).clamp(0.0, 1.0);
-    let depth = (body / lamp).min(1.0);
-    t * t * (3.0 - 2.0 * t) * depth * depth.sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -419,10 +296,10 @@ mod tests {
         let map = ThingShadows::new(map, &scene);
         let (sin, cos) = 0.5_f64.sin_cos();
         // Ahead of an end, and as far from the middle but beside the box.
-        let (end, beside) = (
-            map.at(0.053 * cos, 0.053 * sin),
-            map.at(-0.053 * sin, 0.053 * cos),
-        );
+        let (cos, sin) = (0.053 * cos as f32, 0.053 * sin as f32);
+        let mut factors = [0.0; 2];
+        map.at(&[cos, -sin], &[sin, cos], &mut factors);
+        let [end, beside] = factors;
         assert!(end < 0.76 && beside > 0.98, "{end} {beside}");
     }
 

@@ -20,6 +20,7 @@ pub(super) struct Sweep {
 }
 
 /// Where a map has a pixel.
+#[inline(always)]
 pub(super) fn mapped(map: &Matrix3<f64>, p: Point2<f64>) -> Point2<f64> {
     let q = map * Vector3::new(p.x, p.y, 1.0);
     Point2::new(q.x / q.z, q.y / q.z)
@@ -107,6 +108,7 @@ impl Smear {
     }
 
     /// Works out the shares of the pixels along the line from `a` to `b`, in pixels of the layer from the pixel itself.
+    #[inline(always)]
     fn aim(&mut self, a: Vector2<f64>, b: Vector2<f64>, width: isize) {
         self.taps.clear();
         let across = (b.x - a.x).abs() >= (b.y - a.y).abs();
@@ -222,6 +224,7 @@ fn beyond(from: &[f32], at: isize) -> [f32; SQUARE] {
 }
 
 /// The integral of the hat of width 2 and height 1 about 0, from far left to `x`.
+#[inline(always)]
 fn tent_integral(x: f64) -> f64 {
     let x = x.clamp(-1.0, 1.0);
     if x < 0.0 {

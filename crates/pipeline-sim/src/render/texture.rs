@@ -14,28 +14,70 @@ pub(super) struct Texture {
 
 #[derive(Clone, Debug)]
 struct Level {
-    /// Logarithm of the side in half texels.
+    /// Logarithm of the side in texels.
     bits: u32,
-    /// At every half texel: interpolated beforehand, so that to sample is to take the nearest. In tiles of 8 by 8, each a line of the
-    /// processor's cache, and these in blocks of 8 by 8, each a page of memory: a walk in any direction meets few of either.
+    /// Strips of 64 columns, one after another, of rows that are a little longer: the first columns of the next strip are there as well, and
+    /// the first row once more below the last. A place and what is around it are then a row apart, and a walk in any direction meets few pages
+    /// of memory.
     values: Vec<u8>,
 }
 
-/// Bits of a coordinate behind the point.
-const FRACTION: u32 = 16;
-/// Least logarithm of a level's side in half texels: that of a block.
-const BLOCK_BITS: u32 = 6;
+/// Texels of a strip's row, and what it takes in memory.
+const STRIP: u32 = 64;
+const PITCH: u32 = STRIP + 8;
+/// Set in a place that is half a texel further along u, along v.
+const HALF_U: u32 = 1 << 31;
+const HALF_V: u32 = 1 << 30;
 
-/// Where a level of 2^`bits` half texels has the one at (u, v), modulo its side.
+impl Level {
+    fn new(values: &[f32], bits: u32) -> Self {
+        let n = 1_usize << bits;
+        let (strip, pitch) = (STRIP as usize, PITCH as usize);
+        let strips = n.div_ceil(strip);
+        let mut bytes = Vec::with_capacity(strips * (n + 1) * pitch);
+        for left in (0..n).step_by(strip) {
+            for v in 0..=n {
+                let row = &values[v % n * n..][..n];
+                // The sums are positive: adding a half and cutting off rounds.
+                bytes.extend((left..left + pitch).map(|u| (row[u % n] + 0.5) as u8));
+            }
+        }
+        Self { bits, values: bytes }
+    }
+
+    /// Where the half texel nearest below (u, v), in 2^32ths of the side, has its texel; with [`HALF_U`] and [`HALF_V`].
+    #[inline(always)]
+    fn place(u: u32, v: u32, bits: u32) -> u32 {
+        let (column, row) = (u >> (32 - bits), v >> (32 - bits));
+        let size = ((1 << bits) + 1) * PITCH;
+        let halves = ((u << bits) & HALF_U) | ((v << bits >> 1) & HALF_V);
+        (row * PITCH + (column & (STRIP - 1)) + (column / STRIP) * size) | halves
+    }
+
+    /// The texel at a place, and the next along u, along v, and along both: a byte each, the lowest first.
+    #[inline(always)]
+    fn four(values: &[u8], place: u32) -> u32 {
+        const AROUND: usize = PITCH as usize + 2;
+        let Some(last) = values.len().checked_sub(AROUND) else {
+            return 0;
+        };
+        let at = ((place & !(HALF_U | HALF_V)) as usize).min(last);
+        let v = &values[at..at + AROUND];
+        u32::from_le_bytes([v[0], v[1], v[AROUND - 2], v[AROUND - 1]])
+    }
+}
+
+/// Four times the value at a place between the texels that [`Level::four`] gives.
 #[inline(always)]
-fn place(u: u32, v: u32, bits: u32) -> u32 {
-    let blocks = (1 << (bits - BLOCK_BITS)) - 1;
-    let spread = |c: u32| c & 7 | (c >> 3 & 7) << 6;
-    let block = |c: u32| c >> BLOCK_BITS & blocks;
-    spread(u) | spread(v) << 3 | block(u) << 12 | block(v) << (BLOCK_BITS + bits)
+fn sum(four: u32, place: u32) -> u32 {
+    let (left, right) = (four & 0x00ff_00ff, four >> 8 & 0x00ff_00ff);
+    let rows = left + if place & HALF_U == 0 { left } else { right };
+    let (upper, lower) = (rows & 0xffff, rows >> 16);
+    upper + if place & HALF_V == 0 { upper } else { lower }
 }
 
 const FINEST_BITS: u32 = 10;
+const COARSEST_BITS: u32 = 5;
 
 impl Texture {
     /// A wooden surface: grain along u, pores, specks and a few scratches. `size` metres repeat.
@@ -82,12 +124,9 @@ impl Texture {
 
     fn from_values(mut values: Vec<f32>, per_metre: f64) -> Self {
         let mut levels = Vec::new();
-        for bits in (BLOCK_BITS - 1..=FINEST_BITS).rev() {
+        for bits in (COARSEST_BITS..=FINEST_BITS).rev() {
             let n = 1_usize << bits;
-            levels.push(Level {
-                bits: bits + 1,
-                values: at_half_texels(&values, n),
-            });
+            levels.push(Level::new(&values, bits));
             let half = n / 2;
             values = (0..half * half)
                 .map(|i| {
@@ -130,89 +169,81 @@ impl Texture {
         row: &mut [f32],
     ) {
         let Level { bits, values } = &self.levels[index];
-        let scale = 2.0 * self.per_metre / (1_u64 << index) as f64 * f64::from(1 << FRACTION);
-        // Whole numbers have their place at the low end of a number that is this large; and half a step more, to round. The texture repeats,
-        // so the wrap does no harm.
-        const LARGE: f64 = 6_755_399_441_055_744.0 + (1 << (FRACTION - 1)) as f64;
-        let fixed = |metres: f64| (metres * scale + LARGE).to_bits() as u32;
-        let (gain, base) = (strength / 128.0, 1.0 - strength);
-        let value = |byte: u8| base + gain * f32::from(byte);
+        let bits = *bits;
+        // A side is 2^32; the texture repeats, so the wrap does no harm.
+        let scale = self.per_metre / f64::from(1 << FINEST_BITS) * TURN;
+        // To the nearest half texel is down from a quarter of one further.
+        let quarter = 1_u32 << (30 - bits);
+        let (gain, base) = (strength / 512.0, 1.0 - strength);
         // Places of a stretch first, then its values, then their means: each can be done to several at once, or, the values, be waited for
         // several at once.
-        let mut places = [0_u32; STRETCH / 2 + 1];
-        let mut found = [0_u8; STRETCH / 2 + 1];
+        let mut places = [0_u32; STRETCH / 2 + STRIDE / 2];
+        let mut fours = [0_u32; STRETCH / 2 + STRIDE / 2];
+        let mut found = [0.0_f32; STRETCH / 2 + STRIDE / 2];
         let end = x0 + row.len();
         let mut rest = row;
         for left in (x0 / STRETCH * STRETCH..end).step_by(STRETCH) {
             let (from, to) = (x0.max(left) - left, end.min(left + STRETCH) - left);
             let node = |k: usize| {
                 let (u, v) = place_of(left + k * STRIDE);
-                (fixed(u), fixed(v))
+                (u * scale, v * scale)
             };
-            let (first, last) = (from / STRIDE, to.div_ceil(STRIDE));
+            // The last stride is that of the first column behind the last.
+            let (first, last) = (from / STRIDE, to / STRIDE);
             let mut here = node(first);
             let strides = places.as_chunks_mut::<{ STRIDE / 2 }>().0;
-            for (k, stride) in strides[first..last].iter_mut().enumerate() {
-                let next = node(first + k + 1);
-                let at = |here: u32, next: u32, k: u32| {
-                    let way = next.wrapping_sub(here) as i32;
-                    here.wrapping_add((way / (STRIDE / 2) as i32).wrapping_mul(k as i32) as u32)
-                };
-                for (place_at, k) in stride.iter_mut().zip(0_u32..) {
-                    let (u, v) = (at(here.0, next.0, k), at(here.1, next.1, k));
-                    *place_at = place(u >> FRACTION, v >> FRACTION, *bits);
+            for (stride, k) in strides[first..=last].iter_mut().zip(first + 1..) {
+                let next = node(k);
+                let way = |here: f64, next: f64| fixed((next - here) / (STRIDE / 2) as f64);
+                let (u, du) = (fixed(here.0).wrapping_add(quarter), way(here.0, next.0));
+                let (v, dv) = (fixed(here.1).wrapping_add(quarter), way(here.1, next.1));
+                for (place, k) in stride.iter_mut().zip(0_u32..) {
+                    let at = |start: u32, step: u32| start.wrapping_add(step.wrapping_mul(k));
+                    *place = Level::place(at(u, du), at(v, dv), bits);
                 }
                 here = next;
             }
-            places[last * STRIDE / 2] = place(here.0 >> FRACTION, here.1 >> FRACTION, *bits);
             let needed = from / 2..to / 2 + 1;
-            for (found, at) in found[needed.clone()].iter_mut().zip(&places[needed.clone()]) {
-                *found = values.get(*at as usize).copied().unwrap_or(128);
+            for (four, place) in fours[needed.clone()].iter_mut().zip(&places[needed.clone()]) {
+                *four = Level::four(values, *place);
+            }
+            let between = fours[needed.clone()].iter().zip(&places[needed.clone()]);
+            for (found, (four, place)) in found[needed.clone()].iter_mut().zip(between) {
+                *found = base + gain * sum(*four, *place) as f32;
             }
             let (part, further) = std::mem::take(&mut rest).split_at_mut(to - from);
             rest = further;
-            let mean = |k: usize| 0.5 * (value(found[k]) + value(found[k + 1]));
+            let mean = |k: usize| 0.5 * (found[k] + found[k + 1]);
             let (head, part) = part.split_at_mut(from % 2);
             if let [head] = head {
                 *head = mean(needed.start);
             }
             let (pairs, tail) = part.as_chunks_mut::<2>();
             for (pair, two) in pairs.iter_mut().zip(found[from.div_ceil(2)..].windows(2)) {
-                let (here, next) = (value(two[0]), value(two[1]));
-                *pair = [here, 0.5 * (here + next)];
+                *pair = [two[0], 0.5 * (two[0] + two[1])];
             }
             if let [tail] = tail {
-                *tail = value(found[to / 2]);
+                *tail = found[to / 2];
             }
         }
     }
+}
+
+/// 2^32.
+const TURN: f64 = 4_294_967_296.0;
+
+/// The nearest whole number, modulo 2^32.
+#[inline(always)]
+fn fixed(value: f64) -> u32 {
+    // Whole numbers have their place at the low end of a number that is this large.
+    const LARGE: f64 = 6_755_399_441_055_744.0;
+    (value + LARGE).to_bits() as u32
 }
 
 /// Columns between two at which the place on a surface is worked out exactly.
 const STRIDE: usize = 16;
 /// Columns that are worked on at a time.
 const STRETCH: usize = 8 * STRIDE;
-
-/// A repeating square of `n` by `n` values, interpolated at its texels and half way between them, in the order of [`place`].
-fn at_half_texels(values: &[f32], n: usize) -> Vec<u8> {
-    let bits = (2 * n).ilog2();
-    let mut finer = vec![0; 4 * n * n];
-    for v in 0..n {
-        let (here, below) = (&values[v * n..][..n], &values[(v + 1) % n * n..][..n]);
-        let mut line = |row: usize, at: &dyn Fn(usize) -> f32| {
-            for u in 0..n {
-                let (left, right) = (at(u), at((u + 1) % n));
-                // The sums are positive: adding a half and cutting off rounds.
-                for (column, value) in [(2 * u, left), (2 * u + 1, 0.5 * (left + right))] {
-                    finer[place(column as u32, row as u32, bits) as usize] = (value + 0.5) as u8;
-                }
-            }
-        };
-        line(2 * v, &|u| here[u]);
-        line(2 * v + 1, &|u| 0.5 * (here[u] + below[u]));
-    }
-    finer
-}
 
 /// Adds smooth periodic noise with the given number of cells along each side.
 fn add_noise<R: Rng + ?Sized>(
@@ -294,25 +325,26 @@ impl CoarseMap {
         (range(x, self.corner.0), range(y, self.corner.1))
     }
 
-    /// Bilinear value; outside the map that of its border.
-    pub(super) fn at(&self, u: f64, v: f64) -> f32 {
-        let scale = (self.side - 1) as f64 / self.size;
-        let limit = (self.side - 1) as f64 - 1e-6;
-        let (x, y) = (
-            ((u - self.corner.0) * scale).clamp(0.0, limit),
-            ((v - self.corner.1) * scale).clamp(0.0, limit),
-        );
-        let (i, j) = (x as usize, y as usize);
-        let (fx, fy) = ((x - i as f64) as f32, (y - j as f64) as f32);
-        let k = j * self.side + i;
-        let (a, b, c, d) = (
-            self.values[k],
-            self.values[k + 1],
-            self.values[k + self.side],
-            self.values[k + self.side + 1],
-        );
-        let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
-        upper + (lower - upper) * fy
+    /// Writes bilinear values; outside the map those of its border.
+    #[inline(always)]
+    pub(super) fn at(&self, x: &[f32], y: &[f32], values: &mut [f32]) {
+        let scale = ((self.side - 1) as f64 / self.size) as f32;
+        let (left, top) = (self.corner.0 as f32, self.corner.1 as f32);
+        let limit = (self.side - 1) as f32 - 1e-3;
+        for ((value, x), y) in values.iter_mut().zip(x).zip(y) {
+            // In this order what is no number is on the border as well.
+            let (x, y) = (
+                ((x - left) * scale).max(0.0).min(limit),
+                ((y - top) * scale).max(0.0).min(limit),
+            );
+            let (i, j) = (x as u32, y as u32);
+            let (fx, fy) = (x - i as f32, y - j as f32);
+            let k = j as usize * self.side + i as usize;
+            let row = |k: usize| self.values.get(k..k + 2).map_or([0.0; 2], |two| [two[0], two[1]]);
+            let ([a, b], [c, d]) = (row(k), row(k + self.side));
+            let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
+            *value = upper + (lower - upper) * fy;
+        }
     }
 }
 
