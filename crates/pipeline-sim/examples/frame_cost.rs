@@ -23,7 +23,20 @@ const TAKES: usize = 4;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let only = arguments.next().filter(|name| name != "all");
-    let frames: usize = arguments.next().map_or(Ok(9), |n| n.parse())?;
+    let frames: usize = match arguments.next() {
+        None => 9,
+        Some(text) => (text.parse().ok().filter(|n| *n > 0)).ok_or_else(|| {
+            format!("FRAMES is a whole number from 1 on, not {text:?}: frame_cost [KIND [FRAMES]]")
+        })?,
+    };
+    let names = || {
+        let kinds = SceneKind::ALL.iter().map(ToString::to_string);
+        kinds.chain(BenchmarkKind::ALL.iter().map(ToString::to_string))
+    };
+    if let Some(kind) = only.as_ref().filter(|only| names().all(|name| name != **only)) {
+        let names: Vec<String> = names().collect();
+        return Err(format!("no kind {kind:?}: all, or one of {}", names.join(", ")).into());
+    }
     let wanted = |name: &str| only.as_deref().is_none_or(|only| only == name);
     println!("{:20} {:>7} {:>7} {:>7}", "kind", "median", "best", "quiet");
     for kind in SceneKind::ALL {

@@ -2,7 +2,7 @@
 
 use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, ApproachLimit, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp,
+    Agent, AgentConfig, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp,
     Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
 };
 
@@ -326,7 +326,7 @@ fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a
 #[cfg(feature = "serde")]
 #[test]
 fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
-    use grasp_agent::{Behaviour, Learned, OnlineLearning, qtable::QTable};
+    use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning, qtable::QTable};
     let blank = |spec: &grasp_agent::BehaviourSpec| {
         let table = QTable::new(spec.states(), spec.actions()).unwrap();
         Behaviour::new(spec.clone(), table).unwrap()

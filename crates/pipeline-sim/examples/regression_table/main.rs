@@ -34,8 +34,17 @@ const OTHER_FORMS: [(&str, Terms); 2] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let count: usize = arguments.next().map_or(Ok(2083), |n| n.parse())?;
-    let seeds: u64 = arguments.next().map_or(Ok(20), |n| n.parse())?;
+    let mut number = |name: &str, otherwise: u32| {
+        let text = arguments.next();
+        text.map_or(Ok(otherwise), |text| {
+            text.parse().ok().filter(|n| *n > 1).ok_or(text)
+        })
+        .map_err(|text| {
+            format!("{name} is a whole number from 2 on, not {text:?}: regression_table [SAMPLES [SEEDS]]")
+        })
+    };
+    let count = number("SAMPLES", 2083)? as usize;
+    let seeds = u64::from(number("SEEDS", 20)?);
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     for noise in [0.0, 0.125, 0.5] {
         println!(
