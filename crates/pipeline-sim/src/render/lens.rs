@@ -112,16 +112,14 @@ impl Warp {
         // Whole pixels and their 65536ths; no frame is so large that these do not fit.
         let fixed = |v: f32| (v * 65536.0) as i32;
         let part = |v: i32| (v & 0xffff) as f32 / 65536.0;
-        let (mut x, mut y) = (vec![0_i32; width], vec![0_i32; width]);
-        let mut places = vec![0_u32; width];
+        let (mut x, mut y, mut places) = (vec![0_i32; width], vec![0_i32; width], vec![0_u32; width]);
         // Of each pixel the two above its place, and the two below.
         let (mut upper, mut lower) = (vec![[0.0_f32; 2]; width], vec![[0.0_f32; 2]; width]);
         let rows = out.light.chunks_exact_mut(width.max(1));
         for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
-            let runs = sources.windows(2);
             // The last place of a row is that of its last pixel.
             let last = (self.columns - 2) * self.run;
-            if let Some(ends) = runs.clone().last() {
+            if let Some(ends) = sources.windows(2).last() {
                 let length = (width - 1 - last).max(1) as f32;
                 let from = ends[0].map(fixed);
                 let step = [0, 1].map(|c| fixed((ends[1][c] - ends[0][c]) / length));
@@ -130,7 +128,7 @@ impl Warp {
                 }
             }
             for (c, line) in [&mut x[..last], &mut y[..last]].into_iter().enumerate() {
-                let ends = runs.clone().map(|ends| (ends[0][c], ends[1][c]));
+                let ends = sources.windows(2).map(|ends| (ends[0][c], ends[1][c]));
                 if self.run == WHOLE_RUN {
                     for (run, (from, to)) in line.as_chunks_mut::<WHOLE_RUN>().0.iter_mut().zip(ends) {
                         let (at, step) = (fixed(from), fixed((to - from) * (1.0 / WHOLE_RUN as f32)));
