@@ -3,7 +3,7 @@
 use hough_heuristic::Features;
 
 use crate::least_squares::{Entry, Fit, Hold, Rows, ridge_strength};
-use crate::reach_noise::{Misfit, Noise, Shares};
+use crate::reach_noise::{Misfit, Noise, Shares, widening};
 use crate::stored::{Reader, Writer};
 use crate::{CentreSample, FitError, Quality, QuantityError, SightRule, StoredModelError};
 
@@ -148,6 +148,7 @@ impl CentreModel {
         let terms = terms(before, d1);
         let of_fit = self.fit.residual[0].powi(2) * self.fit.leverage(&terms[..self.fit.terms()]);
         let sd = (self.noise.variance(shares(before, d1, self.with_radius)) + of_fit).sqrt();
+        let sd = sd * widening(self.fit.samples);
         sd.is_finite().then_some(sd)
     }
 

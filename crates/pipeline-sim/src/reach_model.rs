@@ -3,7 +3,7 @@
 use hough_heuristic::Features;
 
 use crate::least_squares::{Entry, Fit, Rows};
-use crate::reach_noise::Noise;
+use crate::reach_noise::{Noise, widening};
 use crate::samples;
 use crate::stored::{Reader, Writer};
 use crate::{FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule, StoredModelError};
@@ -175,7 +175,7 @@ impl ReachModel {
 
     /// The standard deviations of y and r, feature units, that the fit expects of [`ReachModel::predict_unbounded`] around what a
     /// new observation would show: noise of both observations, what the form cannot express, and the uncertainty of the coefficients
-    /// together. `None` as there, and where they are no finite numbers.
+    /// together, widened for models of few samples so that 95 % lie within 1.96 of them. `None` as there, and where they are no finite numbers.
     ///
     /// Noise of `before` is carried along: what comes four times as near shows it four times (in y) and sixteen times (in r) as large.
     pub fn uncertainty(&self, before: &Features, jt3_degrees: f64, d2: f64, d3: f64) -> Option<(f64, f64)> {
@@ -183,10 +183,11 @@ impl ReachModel {
         let mut buffer = [0.0; 22];
         let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
         let piece = self.piece(jt3_degrees);
-        let leverage = self.pieces[piece].leverage(terms);
+        let fit = &self.pieces[piece];
+        let wider = widening(fit.samples);
         let [y, r] = self
-            .variances(piece, before, &after, (d2, d3), leverage)
-            .map(f64::sqrt);
+            .variances(piece, before, &after, (d2, d3), fit.leverage(terms))
+            .map(|variance| wider * variance.sqrt());
         (y.is_finite() && r.is_finite()).then_some((y, r))
     }
 

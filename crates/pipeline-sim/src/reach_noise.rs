@@ -89,20 +89,19 @@ impl Misfit {
     fn scale(&self) -> f64 {
         (SCALE_FREEDOM + self.sum) / (SCALE_FREEDOM + self.count)
     }
+}
 
-    /// By how much the middle 95 % of Student's distribution are wider than those of the normal one: a variance found from few errors is
-    /// itself uncertain. (Cornish and Fisher's expansion.)
-    fn widening(&self) -> f64 {
-        let n = SCALE_FREEDOM + self.count;
-        (1.0 + 1.2107 / n + 1.4408 / (n * n) + 1.3401 / (n * n * n)).powi(2)
-    }
+/// By how much the middle 95 % of Student's distribution are wider than those of the normal one: a variance found from few errors is
+/// itself uncertain, here from those of `samples` and of the prior. (Cornish and Fisher's expansion.)
+pub(crate) fn widening(samples: usize) -> f64 {
+    let n = SCALE_FREEDOM + samples as f64;
+    1.0 + 1.2107 / n + 1.4408 / (n * n) + 1.3401 / (n * n * n)
 }
 
 /// A variance found with `freedom` degrees of freedom (one, if less), together with that of a prior.
 pub(crate) fn pooled(variance: f64, prior: f64, freedom: f64, misfit: &Misfit) -> f64 {
     let sum = variance * freedom.max(1.0);
-    let both = (sum + SHAPE_FREEDOM * prior * misfit.scale()) / (SHAPE_FREEDOM + freedom.max(0.0));
-    both * misfit.widening()
+    (sum + SHAPE_FREEDOM * prior * misfit.scale()) / (SHAPE_FREEDOM + freedom.max(0.0))
 }
 
 impl Noise {

@@ -109,3 +109,47 @@ fn a_refit_to_few_samples_expects_what_occurs() {
         }
     }
 }
+
+/// Refitting move by move, the usual way on an arm, must neither blow the expected errors up nor let them vanish.
+#[test]
+fn refits_to_one_sample_after_another_keep_their_measure() {
+    let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+    let (_, reaching) = sample_moves(&nominal, 1000, 0.125, &mut rng(1));
+    for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
+        let cells = drawn(level);
+        for form in [
+            ReachForm::Linear,
+            ReachForm::Rigid8,
+            ReachForm::Rigid22,
+            ReachForm::RigidBody,
+        ] {
+            let reach = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
+            let power = if form == ReachForm::Linear { 0.0 } else { 3.0 };
+            let mut ratios = Vec::new();
+            for n in [1, 5, 10, 20, 40] {
+                let (mut expected, mut errors) = (Vec::new(), Vec::new());
+                for [(_, few), (_, fresh)] in &cells {
+                    let refit = few[..n].iter().fold(reach.clone(), |model, sample| {
+                        let one = std::slice::from_ref(sample);
+                        model.refit(one, 1e-2, power).expect("a prior helps out")
+                    });
+                    for s in fresh {
+                        let at = (&s.before, s.jt3_degrees, s.d2, s.d3);
+                        let after = refit.predict_unbounded(at.0, at.1, at.2, at.3);
+                        if let (Some(after), Some((y, _))) = (after, refit.uncertainty(at.0, at.1, at.2, at.3)) {
+                            expected.push(y);
+                            errors.push((after.y - s.after.y).abs());
+                        }
+                    }
+                }
+                let median = |values: &mut Vec<f64>| {
+                    values.sort_by(f64::total_cmp);
+                    values[values.len() / 2]
+                };
+                let sd = median(&mut errors) / 0.6745;
+                ratios.push((n, median(&mut expected) / sd, sd));
+            }
+            println!("{level} {form:?}: {ratios:.2?}");
+        }
+    }
+}
