@@ -66,7 +66,8 @@ pub use reach_form::ReachForm;
 pub use reach_model::ReachModel;
 pub use render::{Renderer, Round, Shot, Sighting};
 pub use samples::{
-    CentreSample, MoveLists, ReachSample, exploring_start, sample_moves, try_sample_moves, with_noise,
+    CentreSample, MOST_SAMPLES, MoveLists, ReachSample, exploring_start, sample_moves, try_sample_moves,
+    with_noise,
 };
 pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
 pub use scene_kind::{SceneKind, Snapshot};

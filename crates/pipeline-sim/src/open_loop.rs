@@ -29,11 +29,14 @@ pub struct OpenLoopError {
 impl ReachModel {
     /// Most moves in a row that errors are told for.
     pub const MOST_MOVES: usize = 10_000;
+    /// Most moves of all runs together.
+    const MOST_ERRORS: f64 = 1e8;
 
     /// As [`ReachModel::open_loop_error`].
     ///
     /// # Errors
-    /// [`QuantityError::TooLarge`] for more than [`ReachModel::MOST_MOVES`] moves.
+    /// [`QuantityError::TooLarge`] for more than [`ReachModel::MOST_MOVES`] moves, or a hundred million in all runs;
+    /// [`QuantityError::NotPositive`] without a run.
     pub fn try_open_loop_error<R: Rng + ?Sized>(
         &self,
         cell: &Cell,
@@ -46,6 +49,14 @@ impl ReachModel {
             moves as f64,
             Self::MOST_MOVES as f64,
         )?;
+        if runs == 0 {
+            return Err(QuantityError::NotPositive {
+                quantity: "the number of runs".to_owned(),
+                value: 0.0,
+            });
+        }
+        let all = moves.max(1) as f64 * runs as f64;
+        at_most("the number of moves of all runs", all, Self::MOST_ERRORS)?;
         Ok(self.open_loop_error(cell, moves, runs, rng))
     }
 

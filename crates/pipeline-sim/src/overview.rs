@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::Joints;
 
-use crate::{Cell, Workspace};
+use crate::error::{ascending, at_most, finite};
+use crate::{Cell, QuantityError, Workspace};
 
 /// Width of the drawing, pixels.
 const WIDTH: f64 = 1120.0;
@@ -17,6 +18,8 @@ const CAPTION: f64 = 40.0;
 const LEGEND: f64 = 34.0;
 /// How far lines of sight are drawn that do not meet the table, metres: out of the picture.
 const FAR: f64 = 5.0;
+/// Farthest that anything drawn may be from the shoulder, metres.
+const FARTHEST: f64 = 100.0;
 /// Length of the scale bars, metres.
 const BAR: f64 = 0.2;
 /// What is drawn: class, whether as an area, and its name.
@@ -137,15 +140,47 @@ fn legend(text: &mut String, top: f64) {
 }
 
 impl Cell {
+    /// As [`Cell::overview_svg`].
+    ///
+    /// # Errors
+    /// What is to be drawn and not finite, farther than 100 m away, or the wrong way round.
+    pub fn try_overview_svg(&self, workspace: &Workspace, path: &[Joints]) -> Result<String, QuantityError> {
+        let holder = self.holder.map(|h| [h.foot.x, h.foot.y, h.top]);
+        let ball = self.ball.centre;
+        let drawn = [
+            ("the table's height (m)", vec![self.table]),
+            ("the ball's place (m)", vec![ball.x, ball.y, ball.z]),
+            ("the ball's radius (m)", vec![self.ball.radius]),
+            ("the holder's place (m)", holder.into_iter().flatten().collect()),
+        ];
+        let ranges = [
+            ("the workspace's distance (m)", workspace.rho),
+            ("the workspace's azimuth (rad)", workspace.azimuth),
+            ("the workspace's height (m)", workspace.height),
+        ];
+        for (quantity, range) in ranges {
+            ascending(quantity, range)?;
+            at_most(quantity, range.0.abs().max(range.1.abs()), FARTHEST)?;
+        }
+        for (quantity, values) in drawn {
+            for value in values {
+                finite(quantity, value)?;
+                at_most(quantity, value.abs(), FARTHEST)?;
+            }
+        }
+        Ok(self.overview_svg(workspace, path))
+    }
+
     /// Draws the cell as SVG: the arm from the side (in its own vertical plane) and from above, the camera's field of view, the workspace, the
     /// ball, and the way of the tool point through `path`, whose last pose is the one drawn; with scale bars and a legend.
     ///
-    /// An empty path, or one with angles that are not finite, gives a drawing without the arm.
+    /// An empty path, or one with angles that are not finite, gives a drawing without the arm. What lies at places that are not finite spoils
+    /// the drawing; [`Cell::try_overview_svg`] refuses it.
     pub fn overview_svg(&self, workspace: &Workspace, path: &[Joints]) -> String {
         let pose = path.last().filter(|joints| joints.non_finite().is_none());
         let pan = pose.map_or(0.0, |joints| joints.0[0]);
         let shown = Shown {
-            from_side: Self::workspace_side(workspace, pan),
+            from_side: self.workspace_side(workspace, pan),
             from_above: workspace_ring(workspace),
             way: self.way(path),
             skeleton: pose.map(|joints| self.skeleton(joints)),
@@ -303,10 +338,15 @@ fn workspace_ring(workspace: &Workspace) -> Vec<Point3<f64>> {
 }
 
 impl Cell {
-    /// The workspace in the arm's plane, turned by `pan`.
-    fn workspace_side(workspace: &Workspace, pan: f64) -> [Point3<f64>; 5] {
-        let ((near, far), (low, high)) = (workspace.rho, workspace.height);
-        [(near, low), (far, low), (far, high), (near, high), (near, low)].map(|(r, z)| around(r, pan, z))
+    /// The workspace's section with the arm's plane, which passes the waist axis at the shoulder's offset; turned by `pan`.
+    fn workspace_side(&self, workspace: &Workspace, pan: f64) -> [Point3<f64>; 5] {
+        let (low, high) = workspace.height;
+        let along = |rho: f64| (rho * rho - self.params.d2 * self.params.d2).max(0.0).sqrt();
+        let (near, far) = (along(workspace.rho.0), along(workspace.rho.1));
+        let place = |(along, z): (f64, f64)| {
+            Isometry3::rotation(Vector3::z() * pan) * Point3::new(along, self.params.d2, z)
+        };
+        [(near, low), (far, low), (far, high), (near, high), (near, low)].map(place)
     }
 
     /// The way of the tool point.
@@ -360,5 +400,49 @@ impl Cell {
             end(w, h),
             end(-0.5, h),
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ball;
+
+    #[test]
+    fn the_section_holds_what_the_workspace_holds_of_the_arms_plane() {
+        let (cell, workspace) = (Cell::paper(Ball::at(0.6, 0.0, -0.1)), Workspace::paper());
+        for pan in [-0.9_f64, 0.0, 0.4] {
+            let section = cell.workspace_side(&workspace, pan);
+            let (near, far) = (section[0], section[1]);
+            let turn = Isometry3::rotation(Vector3::z() * pan);
+            for k in 0..=60 {
+                let along = 0.3 + 0.01 * f64::from(k);
+                let place = turn * Point3::new(along, cell.params.d2, -0.1);
+                let shown = (turn.inverse() * near).x..(turn.inverse() * far).x;
+                assert_eq!(
+                    workspace.contains(&place),
+                    shown.contains(&along),
+                    "{pan} {along}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_named() {
+        let sound = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+        let workspace = Workspace::paper();
+        assert!(sound.try_overview_svg(&workspace, &[]).is_ok());
+        let refused = |change: &dyn Fn(&mut Cell, &mut Workspace)| {
+            let (mut cell, mut workspace) = (sound, workspace);
+            change(&mut cell, &mut workspace);
+            let refused = cell.try_overview_svg(&workspace, &[]);
+            refused.expect_err("not to be drawn").to_string()
+        };
+        assert!(refused(&|cell, _| cell.table = f64::NAN).contains("table"));
+        assert!(refused(&|cell, _| cell.ball.centre.x = 1e300).contains("ball's place"));
+        assert!(refused(&|cell, _| cell.ball.radius = f64::INFINITY).contains("radius"));
+        assert!(refused(&|_, space| space.rho.1 = f64::INFINITY).contains("distance"));
+        assert!(refused(&|_, space| space.height = (0.0, 1e9)).contains("height"));
     }
 }

@@ -19,7 +19,7 @@ impl ReachModel {
     /// [`ReachModel::uncertainty`] of a refit takes another plant's coefficients to be off by the residual variance over `ridge`, and its
     /// errors to be spread over near and far as this model's are until the samples know better (for ten degrees of freedom). How
     /// large they are the samples say: each is predicted by the others and this model, and the squared error compared with the expected one. With
-    /// few samples intervals are those of Student's distribution (the README has the figures).
+    /// few samples much larger errors are expected than occur (the README has the figures).
     ///
     /// # Errors
     /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or is so large that nothing else counts (above 1e100),

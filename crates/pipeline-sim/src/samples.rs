@@ -11,8 +11,8 @@ use crate::{Ball, Cell, FitError, QuantityError};
 /// What errors call the noise on features.
 pub(crate) const NOISE: &str = "standard deviation of the features' noise (units)";
 
-/// Most samples of each kind that are not taken for a mistake.
-const MOST_SAMPLES: f64 = 1e7;
+/// Most samples of each kind that [`try_sample_moves`] does not take for a mistake.
+pub const MOST_SAMPLES: usize = 10_000_000;
 
 /// One move of `JT2` and `JT3`, and the ball before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,7 +185,11 @@ pub fn try_sample_moves<R: Rng + ?Sized>(
     rng: &mut R,
 ) -> Result<(Vec<CentreSample>, Vec<ReachSample>), QuantityError> {
     amount(NOISE, noise)?;
-    at_most("the number of samples of each kind", count as f64, MOST_SAMPLES)?;
+    at_most(
+        "the number of samples of each kind",
+        count as f64,
+        MOST_SAMPLES as f64,
+    )?;
     Ok(sample_moves(cell, count, noise, rng))
 }
 

@@ -11,7 +11,7 @@ fn rng(seed: u64) -> Xoshiro256PlusPlus {
 }
 
 /// Cells drawn of each level.
-const CELLS: u64 = 40;
+const CELLS: u64 = 200;
 
 /// Samples of wrong cells: first those to learn from, then those to judge on.
 type Drawn = [(Vec<CentreSample>, Vec<ReachSample>); 2];
@@ -27,22 +27,36 @@ fn drawn(level: ErrorLevel) -> Vec<Drawn> {
     cells.collect()
 }
 
-/// Shares of the errors of y and r within 1.96 expected standard deviations, for refits to the first `n` samples.
-fn covered(reach: &ReachModel, cells: &[Drawn], n: usize, ridge: f64, power: f64) -> [f64; 2] {
-    let (mut within, mut all) = ([0.0; 2], 0.0);
-    for [(_, few), (_, fresh)] in cells {
-        let refit = reach.refit(&few[..n], ridge, power).expect("a prior helps out");
+/// What models expect, and what occurs, of y and r on the samples to judge on: pairs of expected standard deviation and error.
+fn expectations<'a>(models: impl Iterator<Item = (ReachModel, &'a [ReachSample])>) -> [Vec<(f64, f64)>; 2] {
+    let mut pairs = [Vec::new(), Vec::new()];
+    for (model, fresh) in models {
         for s in fresh {
             let at = (&s.before, s.jt3_degrees, s.d2, s.d3);
-            let after = refit.predict_unbounded(at.0, at.1, at.2, at.3);
-            if let (Some(after), Some((y, r))) = (after, refit.uncertainty(at.0, at.1, at.2, at.3)) {
-                all += 1.0;
-                within[0] += f64::from((after.y - s.after.y).abs() <= 1.96 * y);
-                within[1] += f64::from((after.r - s.after.r).abs() <= 1.96 * r);
+            let after = model.predict_unbounded(at.0, at.1, at.2, at.3);
+            if let (Some(after), Some((y, r))) = (after, model.uncertainty(at.0, at.1, at.2, at.3)) {
+                pairs[0].push((y, (after.y - s.after.y).abs()));
+                pairs[1].push((r, (after.r - s.after.r).abs()));
             }
         }
     }
-    within.map(|w| w / all)
+    pairs
+}
+
+/// Share of the errors within 1.96 expected standard deviations.
+fn covered(pairs: &[(f64, f64)]) -> f64 {
+    let within = pairs.iter().filter(|(sd, error)| *error <= 1.96 * sd);
+    within.count() as f64 / pairs.len() as f64
+}
+
+/// The median expected standard deviation, by the standard deviation that the median error speaks of.
+fn excess(pairs: &[(f64, f64)]) -> f64 {
+    let median = |pick: fn(&(f64, f64)) -> f64| {
+        let mut values: Vec<f64> = pairs.iter().map(pick).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    median(|pair| pair.0) / (median(|pair| pair.1) / 0.6745)
 }
 
 /// The same for x.
@@ -76,7 +90,7 @@ fn a_refit_to_few_samples_expects_what_occurs() {
         ),
     ];
     println!("within 1.96 expected standard deviations, after {COUNTS:?} samples");
-    for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
+    for level in ErrorLevel::ALL {
         let cells = drawn(level);
         for form in [
             ReachForm::Linear,
@@ -87,18 +101,39 @@ fn a_refit_to_few_samples_expects_what_occurs() {
             let reach = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
             let power = if form == ReachForm::Linear { 0.0 } else { 3.0 };
             for ridge in [1e-3, 1e-2] {
-                let shares = COUNTS.map(|n| covered(&reach, &cells, n, ridge, power));
+                let of_counts = COUNTS.map(|n| {
+                    expectations(cells.iter().map(|[(_, few), (_, fresh)]| {
+                        let refit = reach.refit(&few[..n], ridge, power);
+                        (refit.expect("a prior helps out"), &fresh[..])
+                    }))
+                });
+                let shares = of_counts.each_ref().map(|[y, r]| [covered(y), covered(r)]);
+                let excesses = of_counts.each_ref().map(|[y, r]| [excess(y), excess(r)]);
                 println!("{level} {form:?}, ridge {ridge}, y and r: {shares:.3?}");
+                println!("    expected by actual: {excesses:.1?}");
+                let extreme = level == ErrorLevel::Extreme;
                 for (n, [y, r]) in COUNTS.into_iter().zip(shares) {
                     let least = match n {
-                        1 | 3 => [0.92, 0.84],
-                        5 => [0.93, 0.88],
-                        _ => [0.92, 0.92],
+                        1 | 3 if extreme => [0.80, 0.70],
+                        1 | 3 => [0.90, 0.80],
+                        _ if extreme => [0.88, 0.80],
+                        5 => [0.92, 0.85],
+                        _ => [0.92, 0.91],
                     };
                     assert!(
                         y >= least[0] && r >= least[1],
                         "{level} {form:?} {ridge} {n}: {y} {r}"
                     );
+                }
+                // Nor may it be anything as long as it is much.
+                for (n, [y, r]) in COUNTS.into_iter().zip(excesses) {
+                    let most = match n {
+                        1 => 500.0,
+                        3 | 5 => 120.0,
+                        10 => 30.0,
+                        _ => 10.0,
+                    };
+                    assert!(y <= most && r <= most, "{level} {form:?} {ridge} {n}: {y} {r}");
                 }
             }
         }
@@ -115,7 +150,7 @@ fn a_refit_to_few_samples_expects_what_occurs() {
 fn refits_to_one_sample_after_another_keep_their_measure() {
     let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (_, reaching) = sample_moves(&nominal, 1000, 0.125, &mut rng(1));
-    for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
+    for level in ErrorLevel::ALL {
         let cells = drawn(level);
         for form in [
             ReachForm::Linear,
@@ -125,31 +160,29 @@ fn refits_to_one_sample_after_another_keep_their_measure() {
         ] {
             let reach = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
             let power = if form == ReachForm::Linear { 0.0 } else { 3.0 };
-            let mut ratios = Vec::new();
-            for n in [1, 5, 10, 20, 40] {
-                let (mut expected, mut errors) = (Vec::new(), Vec::new());
-                for [(_, few), (_, fresh)] in &cells {
-                    let refit = few[..n].iter().fold(reach.clone(), |model, sample| {
-                        let one = std::slice::from_ref(sample);
-                        model.refit(one, 1e-2, power).expect("a prior helps out")
-                    });
-                    for s in fresh {
-                        let at = (&s.before, s.jt3_degrees, s.d2, s.d3);
-                        let after = refit.predict_unbounded(at.0, at.1, at.2, at.3);
-                        if let (Some(after), Some((y, _))) = (after, refit.uncertainty(at.0, at.1, at.2, at.3)) {
-                            expected.push(y);
-                            errors.push((after.y - s.after.y).abs());
-                        }
-                    }
+            let mut models = vec![reach; cells.len()];
+            let mut excesses = Vec::new();
+            for k in 0..40 {
+                for (model, [(_, few), _]) in models.iter_mut().zip(&cells) {
+                    let refit = model.refit(&few[k..=k], 1e-2, power);
+                    *model = refit.expect("a prior helps out");
                 }
-                let median = |values: &mut Vec<f64>| {
-                    values.sort_by(f64::total_cmp);
-                    values[values.len() / 2]
-                };
-                let sd = median(&mut errors) / 0.6745;
-                ratios.push((n, median(&mut expected) / sd, sd));
+                if COUNTS.contains(&(k + 1)) {
+                    let judged = models
+                        .iter()
+                        .cloned()
+                        .zip(cells.iter().map(|[_, (_, fresh)]| &fresh[..]));
+                    let [y, r] = expectations(judged);
+                    excesses.push([excess(&y), excess(&r)]);
+                }
             }
-            println!("{level} {form:?}: {ratios:.2?}");
+            println!("{level} {form:?}, move by move, expected by actual, y and r: {excesses:.1?}");
+            for [y, r] in &excesses[3..] {
+                assert!(
+                    (0.7..6.0).contains(y) && (0.7..6.0).contains(r),
+                    "{level} {form:?}: {y} {r}"
+                );
+            }
         }
     }
 }

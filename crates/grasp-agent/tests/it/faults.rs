@@ -2,8 +2,8 @@
 
 use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp,
-    Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
+    Agent, AgentConfig, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp, Hybrid,
+    HybridSettings, LoggedEvent, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
