@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use pipeline_sim::{
-    Ball, Cell, CentreModel, CentreSample, QuantityError, ReachForm, ReachModel, ReachSample,
+    Ball, Cell, CentreModel, CentreSample, MOST_SAMPLES, QuantityError, ReachForm, ReachModel, ReachSample,
     StoredModelError, sample_moves, try_sample_moves, with_noise,
 };
 use rand::SeedableRng;
@@ -138,10 +138,15 @@ fn numbers_that_can_only_be_mistakes_are_refused() {
     ));
     let (told, refused) = (
         model.try_open_loop_error(&cell, 2, 5, &mut rng(1)),
-        try_sample_moves(&cell, 10_000_001, 0.1, &mut rng(1)),
+        try_sample_moves(&cell, MOST_SAMPLES + 1, 0.1, &mut rng(1)),
     );
     assert_eq!(told, Ok(model.open_loop_error(&cell, 2, 5, &mut rng(1))));
     assert!(too_many(refused.err()));
+    assert!(too_many(
+        model.try_open_loop_error(&cell, 1, usize::MAX, &mut rng(1)).err()
+    ));
+    let none = model.try_open_loop_error(&cell, 1, 0, &mut rng(1));
+    assert!(matches!(none, Err(QuantityError::NotPositive { .. })));
 }
 
 #[test]
