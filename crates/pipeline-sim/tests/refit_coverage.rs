@@ -136,7 +136,9 @@ fn refits_to_one_sample_after_another_keep_their_measure() {
                     for s in fresh {
                         let at = (&s.before, s.jt3_degrees, s.d2, s.d3);
                         let after = refit.predict_unbounded(at.0, at.1, at.2, at.3);
-                        if let (Some(after), Some((y, _))) = (after, refit.uncertainty(at.0, at.1, at.2, at.3)) {
+                        if let (Some(after), Some((y, _))) =
+                            (after, refit.uncertainty(at.0, at.1, at.2, at.3))
+                        {
                             expected.push(y);
                             errors.push((after.y - s.after.y).abs());
                         }
