@@ -8,6 +8,7 @@
 //! moves that the model does not see. For features noisy by 0, 0.125 and 0.5 units. Then two forms linear in y and r that the library does
 //! not offer, and the fits to balls in the arm's plane only, or in the task's workspace only, with the standard deviations of the changes. Last,
 //! what the README sets beside an independent study: in this cell, and in an earlier one with another mount and another range of the elbow.
+//! `SAMPLES` does not apply to that part, which has as many samples as the study; `SEEDS` does.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod otherwise;

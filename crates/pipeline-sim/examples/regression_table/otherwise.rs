@@ -26,7 +26,7 @@ pub(crate) struct Starts {
 }
 
 impl Starts {
-    /// As `exploring_start`, for other balls.
+    /// The ranges of `exploring_start`, for other balls.
     pub(crate) fn paper(balls: Balls) -> Self {
         Self {
             balls,
@@ -35,15 +35,14 @@ impl Starts {
         }
     }
 
-    /// A ball in sight that the arm can reach, above the table, and the joints.
+    /// A ball in sight that the arm can reach, on or above the table, and the joints, within their limits.
     pub(crate) fn draw<R: Rng>(&self, cell: &Cell, rng: &mut R) -> Option<(Cell, Joints)> {
         let uniform = |[low, high]: [f64; 2], rng: &mut R| rng.random_range(low..high);
         (0..100_000).find_map(|_| {
             let y = rng.random_range(4.0..140.0);
             let r = rng.random_range(6.0_f64.ln()..60.0_f64.ln()).exp();
             let x = match self.balls {
-                // The camera sits 4.5 mm beside the arm's plane, and the ball's radius of 20 mm shows as r.
-                Balls::InPlane => 96.0 + r * 4.5 / 20.0,
+                Balls::InPlane => in_plane(cell, r),
                 _ => rng.random_range(4.0..188.0),
             };
             let (jt2, jt3) = (uniform(self.jt2, rng), uniform(self.jt3, rng));
@@ -56,13 +55,22 @@ impl Starts {
                     (near..=far).contains(&place.x.hypot(place.y)) && (low..=high).contains(&place.z)
                 }
                 // Not those behind the waist, which the arm could reach after turning round.
-                Balls::InPlane => place.x > 0.0 && place.z > start.table + start.ball.radius,
-                Balls::Anywhere => place.z > start.table + start.ball.radius,
+                Balls::InPlane => place.x > 0.0,
+                Balls::Anywhere => true,
             };
-            let kept = there && start.circle(&joints).is_some() && start.reachable();
+            let kept = there
+                && place.z > start.table + start.ball.radius
+                && start.within_limits(&joints)
+                && start.circle(&joints).is_some()
+                && start.reachable();
             kept.then_some((start, joints))
         })
     }
+}
+
+/// Where a ball of this radius in the arm's plane shows: the camera sits beside that plane.
+pub(crate) fn in_plane(cell: &Cell, r: f64) -> f64 {
+    96.0 + r * cell.mount.0.translation.y / cell.ball.radius
 }
 
 /// `count` samples of each kind from these starts, as `sample_moves` has them, and the share of moves of `JT2` and `JT3` that keep the ball

@@ -9,13 +9,97 @@ use pipeline_sim::{Ball, Cell, CentreModel, Mount, ReachForm, ReachModel, ReachS
 use puma_val2::Joints;
 
 use super::otherwise::{
-    Balls, Form, Linear, Starts, Terms, as_rigid22, centring_with_square, elbow_to_second_order, linear,
-    sample, to_second_order, with_products,
+    Balls, Form, Linear, Starts, Terms, as_rigid22, centring_with_square, elbow_to_second_order, in_plane,
+    linear, sample, to_second_order, with_products,
 };
 use super::spread;
 
-/// Runs for the open-loop error of a fit. Where a run ends with the move that loses the ball, one in seventy has five moves.
+/// Runs for the open-loop error of a fit, where a run ends with the move that loses the ball: few have five moves.
 const RUNS: usize = 2000;
+
+/// The study's noise if its half pixel is one of the frame, units.
+const NOISE: f64 = 0.125;
+
+/// The study's noise if its half pixel is a unit's half.
+const NOISE_IN_UNITS: f64 = 0.5;
+
+/// A form of the library or another.
+#[derive(Clone, Copy)]
+enum Kind {
+    Library(ReachForm),
+    Other(Linear, Terms),
+}
+
+/// The forms, and whether there is a fit for each interval of the elbow.
+const FORMS: [(&str, Kind, bool); 9] = [
+    (
+        "dy, dr on the moves, one fit",
+        Kind::Other(Linear::Image, linear),
+        false,
+    ),
+    (
+        "the same per elbow interval",
+        Kind::Other(Linear::Image, linear),
+        true,
+    ),
+    (
+        "with products, 9 terms",
+        Kind::Other(Linear::Image, with_products),
+        true,
+    ),
+    (
+        "to second order, 22 terms",
+        Kind::Other(Linear::Image, to_second_order),
+        true,
+    ),
+    (
+        "those of `Rigid22` with r, y",
+        Kind::Other(Linear::Image, as_rigid22),
+        true,
+    ),
+    (
+        "elbow to second order",
+        Kind::Other(Linear::Image, elbow_to_second_order),
+        true,
+    ),
+    (
+        "the same for Z and V",
+        Kind::Other(Linear::Plane, elbow_to_second_order),
+        true,
+    ),
+    ("`Rigid8`", Kind::Library(ReachForm::Rigid8), true),
+    ("`Rigid22`", Kind::Library(ReachForm::Rigid22), true),
+];
+
+/// A fit of such a form.
+enum Fitted {
+    Library(ReachModel),
+    Other(Form),
+}
+
+impl Kind {
+    fn fit(self, samples: &[ReachSample], edges: &[f64]) -> Result<Fitted, Box<dyn Error>> {
+        Ok(match self {
+            Self::Library(form) => Fitted::Library(ReachModel::fit(samples, form, edges)?),
+            Self::Other(linear, terms) => {
+                Fitted::Other(Form::fit(samples, linear, terms, edges).ok_or("no fit")?)
+            }
+        })
+    }
+}
+
+impl Fitted {
+    /// R² of dy and dr, and their errors.
+    fn quality(&self, on: &[ReachSample]) -> Result<[f64; 4], Box<dyn Error>> {
+        Ok(match self {
+            Self::Library(model) => {
+                let q = model.quality_on(on)?;
+                [q[0].r2, q[1].r2, q[0].rmse, q[1].rmse]
+            }
+            Self::Other(form) => form.quality(on),
+        })
+    }
+}
 
 /// A cell, the starts of its samples, the elbow's intervals and how many samples the study had.
 pub(crate) struct Setting {
@@ -24,6 +108,8 @@ pub(crate) struct Setting {
     starts: Starts,
     edges: [f64; 2],
     count: usize,
+    /// `JT3` at which the changes of y and r per degree are printed, degrees.
+    gains_at: f64,
 }
 
 impl Setting {
@@ -35,6 +121,7 @@ impl Setting {
             starts: Starts::paper(Balls::InPlane),
             edges: ReachModel::PAPER_ELBOW_EDGES,
             count: 2083,
+            gains_at: 184.0,
         }
     }
 
@@ -67,18 +154,29 @@ impl Setting {
             },
             edges: [200.0, 225.0],
             count: 3331,
+            gains_at: 203.0,
         }
     }
 
     /// Changes of y and r per degree of study's +th2 (-`JT2`), +e (-`JT3`) and both in turn, with the ball at y = 78 and the two radii.
-    fn print_gains(&self, jt3: f64) -> Result<(), Box<dyn Error>> {
+    fn print_gains(&self) -> Result<(), Box<dyn Error>> {
         for r in [33.0, 10.0] {
             let at = |d2: f64, d3: f64| {
-                Joints::from_degrees([0.0, -55.0 - d2, jt3 - d3, 0.0, Cell::REACHING_JT5_DEGREES, 0.0])
+                Joints::from_degrees([
+                    0.0,
+                    -55.0 - d2,
+                    self.gains_at - d3,
+                    0.0,
+                    Cell::REACHING_JT5_DEGREES,
+                    0.0,
+                ])
             };
-            let x = 96.0 + r * 4.5 / 20.0;
             let mut cell = self.cell;
-            let goal = hough_heuristic::Features { x, y: 78.0, r };
+            let goal = hough_heuristic::Features {
+                x: in_plane(&cell, r),
+                y: 78.0,
+                r,
+            };
             cell.place_ball(cell.ball_showing(&at(0.0, 0.0), &goal).ok_or("no ball")?);
             let step = 0.01;
             for (name, d2, d3) in [("J2", 1.0, 0.0), ("J3", 0.0, 1.0), ("-J2+J3", -1.0, 1.0)] {
@@ -98,17 +196,17 @@ impl Setting {
     /// All rows, on the samples they were fitted to and on as many others.
     pub(crate) fn print(&self, seeds: u64) -> Result<(), Box<dyn Error>> {
         println!(
-            "\n# {}: {} samples, {seeds} fits, noise of 0.125 units\n",
+            "\n# {}: {} samples, {seeds} fits, noise of {NOISE} units\n",
             self.name, self.count
         );
-        self.print_gains(if self.count == 2083 { 184.0 } else { 203.0 })?;
+        self.print_gains()?;
         let (mut own, mut fresh) = (Vec::new(), Vec::new());
         let mut kept = Vec::new();
         for seed in 0..seeds {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let (_, samples, share) = sample(&self.cell, &self.starts, self.count, 0.125, &mut rng);
+            let (_, samples, share) = sample(&self.cell, &self.starts, self.count, NOISE, &mut rng);
             own.push(samples);
-            let (_, samples, _) = sample(&self.cell, &self.starts, self.count, 0.125, &mut rng);
+            let (_, samples, _) = sample(&self.cell, &self.starts, self.count, NOISE, &mut rng);
             fresh.push(samples);
             kept.push([share]);
         }
@@ -120,7 +218,7 @@ impl Setting {
         let spreads: Vec<_> = (0..seeds)
             .map(|seed| {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                changes(&sample(&strict, &self.starts, self.count, 0.125, &mut rng).1)
+                changes(&sample(&strict, &self.starts, self.count, NOISE, &mut rng).1)
             })
             .collect();
         println!("with 60 % of the outline inside: {}", spread(&spreads).join(", "));
@@ -128,81 +226,53 @@ impl Setting {
             "\n| form | R² of dy | R² of dr | error of y | error of r | on others: R² of dy | of dr | error of y | of r | runs end: y after 1 | 3 | 5 | runs go on: 1 | 3 | 5 |"
         );
         println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
-        let none: &[f64] = &[];
-        for (name, form_of, terms, edges) in [
-            (
-                "dy, dr on the moves, one fit",
-                Linear::Image,
-                linear as Terms,
-                none,
-            ),
-            ("the same per elbow interval", Linear::Image, linear, &self.edges),
-            (
-                "with products, 9 terms",
-                Linear::Image,
-                with_products,
-                &self.edges,
-            ),
-            (
-                "to second order, 22 terms",
-                Linear::Image,
-                to_second_order,
-                &self.edges,
-            ),
-            (
-                "those of `Rigid22` with r, y",
-                Linear::Image,
-                as_rigid22,
-                &self.edges,
-            ),
-            (
-                "elbow to second order",
-                Linear::Image,
-                elbow_to_second_order,
-                &self.edges,
-            ),
-            (
-                "the same for Z and V",
-                Linear::Plane,
-                elbow_to_second_order,
-                &self.edges,
-            ),
-        ] {
-            let mut rows = Vec::new();
+        for (name, kind, per_interval) in FORMS {
+            let (mut qualities, mut runs) = (Vec::new(), Vec::new());
             for (seed, (own, fresh)) in (0..seeds).zip(own.iter().zip(&fresh)) {
-                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let form = Form::fit(own, form_of, terms, edges).ok_or("no fit")?;
-                let [ends, goes_on] = [true, false].map(|e| {
-                    form.open_loop(
-                        &self.cell,
-                        &self.starts,
-                        e,
-                        if e { RUNS } else { RUNS / 10 },
-                        &mut rng,
-                    )
-                });
-                rows.push(joined::<14>(&[
-                    &form.quality(own),
-                    &form.quality(fresh),
-                    &ends,
-                    &goes_on,
-                ]));
+                let fit = kind.fit(own, self.edges(per_interval))?;
+                qualities.push(joined::<8>(&[&fit.quality(own)?, &fit.quality(fresh)?]));
+                if let Fitted::Other(form) = fit {
+                    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+                    let [ends, goes_on] = [(true, RUNS), (false, RUNS / 10)].map(|(at_loss, runs)| {
+                        form.open_loop(&self.cell, &self.starts, at_loss, runs, &mut rng)
+                    });
+                    runs.push(joined::<6>(&[&ends, &goes_on]));
+                }
+            }
+            let mut row = spread(&qualities).to_vec();
+            if !runs.is_empty() {
+                row.extend(spread(&runs));
+            }
+            println!("| {name} | {} |", row.join(" | "));
+        }
+        self.print_in_units(seeds)?;
+        self.print_centring(seeds)
+    }
+
+    /// The same forms, fitted to samples with half a unit of noise and judged on others without any.
+    fn print_in_units(&self, seeds: u64) -> Result<(), Box<dyn Error>> {
+        let mut samples = Vec::new();
+        for seed in 0..seeds {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let mut draw = |noise| sample(&self.cell, &self.starts, self.count, noise, &mut rng).1;
+            samples.push((draw(NOISE_IN_UNITS), draw(0.0)));
+        }
+        println!("\nFitted with noise of {NOISE_IN_UNITS} units, judged on others without noise\n");
+        println!("| form | R² of dy | R² of dr | error of y | error of r |");
+        println!("|---|---|---|---|---|");
+        for (name, kind, per_interval) in FORMS {
+            let mut rows = Vec::new();
+            for (noisy, exact) in &samples {
+                rows.push(kind.fit(noisy, self.edges(per_interval))?.quality(exact)?);
             }
             println!("| {name} | {} |", spread(&rows).join(" | "));
         }
-        for form in [ReachForm::Rigid8, ReachForm::Rigid22] {
-            let mut rows = Vec::new();
-            for (own, fresh) in own.iter().zip(&fresh) {
-                let model = ReachModel::fit(own, form, &self.edges)?;
-                let quality = |on: &[ReachSample]| -> Result<[f64; 4], Box<dyn Error>> {
-                    let q = model.quality_on(on)?;
-                    Ok([q[0].r2, q[1].r2, q[0].rmse, q[1].rmse])
-                };
-                rows.push(joined::<8>(&[&quality(own)?, &quality(fresh)?]));
-            }
-            println!("| `{form:?}` | {} |", spread(&rows).join(" | "));
-        }
-        self.print_centring(seeds)
+        Ok(())
+    }
+
+    /// The elbow's intervals of a form that has them.
+    fn edges(&self, per_interval: bool) -> &[f64] {
+        if per_interval { &self.edges } else { &[] }
     }
 
     /// Centring with balls anywhere, and in spaces of several widths.
@@ -219,7 +289,7 @@ impl Setting {
             let mut rows = Vec::new();
             for seed in 0..seeds {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let (samples, _, _) = sample(&self.cell, &starts, self.count, 0.125, &mut rng);
+                let (samples, _, _) = sample(&self.cell, &starts, self.count, NOISE, &mut rng);
                 let plain = CentreModel::fit_without_radius(&samples)?.quality();
                 let full = CentreModel::fit(&samples)?.quality();
                 let [r2, error] = centring_with_square(&samples).ok_or("no fit")?;
