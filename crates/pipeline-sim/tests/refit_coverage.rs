@@ -75,6 +75,20 @@ fn covered_turns(centre: &CentreModel, cells: &[Drawn], n: usize) -> f64 {
     within / all
 }
 
+/// A model of each form, with the power that its refits weigh samples by.
+fn priors(samples: &[ReachSample]) -> impl Iterator<Item = (ReachForm, ReachModel, f64)> {
+    let forms = [
+        ReachForm::Linear,
+        ReachForm::Rigid8,
+        ReachForm::Rigid22,
+        ReachForm::RigidBody,
+    ];
+    forms.into_iter().map(|form| {
+        let model = ReachModel::fit(samples, form, &[]).expect("enough samples");
+        (form, model, if form == ReachForm::Linear { 0.0 } else { 3.0 })
+    })
+}
+
 /// Numbers of samples that models are refitted to.
 const COUNTS: [usize; 6] = [1, 3, 5, 10, 20, 40];
 
@@ -92,14 +106,7 @@ fn a_refit_to_few_samples_expects_what_occurs() {
     println!("within 1.96 expected standard deviations, after {COUNTS:?} samples");
     for level in ErrorLevel::ALL {
         let cells = drawn(level);
-        for form in [
-            ReachForm::Linear,
-            ReachForm::Rigid8,
-            ReachForm::Rigid22,
-            ReachForm::RigidBody,
-        ] {
-            let reach = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
-            let power = if form == ReachForm::Linear { 0.0 } else { 3.0 };
+        for (form, reach, power) in priors(&reaching) {
             for ridge in [1e-3, 1e-2] {
                 let of_counts = COUNTS.map(|n| {
                     expectations(cells.iter().map(|[(_, few), (_, fresh)]| {
@@ -152,14 +159,7 @@ fn refits_to_one_sample_after_another_keep_their_measure() {
     let (_, reaching) = sample_moves(&nominal, 1000, 0.125, &mut rng(1));
     for level in ErrorLevel::ALL {
         let cells = drawn(level);
-        for form in [
-            ReachForm::Linear,
-            ReachForm::Rigid8,
-            ReachForm::Rigid22,
-            ReachForm::RigidBody,
-        ] {
-            let reach = ReachModel::fit(&reaching, form, &[]).expect("enough samples");
-            let power = if form == ReachForm::Linear { 0.0 } else { 3.0 };
+        for (form, reach, power) in priors(&reaching) {
             let mut models = vec![reach; cells.len()];
             let mut excesses = Vec::new();
             for k in 0..40 {
