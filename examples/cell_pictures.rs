@@ -1,4 +1,5 @@
-//! Draws the simulated cell: an overview as SVG, and a reach as the camera on the hand sees it, as an animated PNG and as video.
+//! Draws the simulated cell: an overview as SVG, and a reach as the camera on the hand sees it, as
+//! an animated PNG and as video.
 //!
 //! ```text
 //! cargo run --release --example cell_pictures -- --out out/pictures
@@ -109,12 +110,14 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// From the search pose to the goal, slowing down, then the turn of the wrist that brings the gripper to the ball.
+/// From the search pose to the goal, slowing down, then the turn of the wrist that brings the
+/// gripper to the ball.
 fn reach(cell: &Cell, start: &Joints, goal: &Joints, frames: u32) -> Vec<Joints> {
     let mut grip = *goal;
     grip.0[Joint::J5.index()] = cell.grip_angle(goal);
-    let between =
-        |a: &Joints, b: &Joints, t: f64| Joints(std::array::from_fn(|i| a.0[i] + t * (b.0[i] - a.0[i])));
+    let between = |a: &Joints, b: &Joints, t: f64| {
+        Joints(std::array::from_fn(|i| a.0[i] + t * (b.0[i] - a.0[i])))
+    };
     let swing = frames / 4;
     let approach = (0..frames - swing).map(|i| {
         let left = 1.0 - f64::from(i) / f64::from(frames - swing - 1);

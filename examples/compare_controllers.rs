@@ -1,4 +1,5 @@
-//! Every controller on the same balls in the same wrong cells: the paper's learned behaviours, its rivals, and the hybrid.
+//! Every controller on the same balls in the same wrong cells: the paper's learned behaviours, its
+//! rivals, and the hybrid.
 //!
 //! ```text
 //! cargo run --release --example compare_controllers -- --help
@@ -16,8 +17,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, EventKind, Hybrid, HybridSettings, JacobianAt, Learned, Percept, SavedController,
-    SavedRun, ServoSettings, TaughtGoal,
+    Agent, BehaviourSpec, EventKind, Hybrid, HybridSettings, JacobianAt, Learned, Percept,
+    SavedController, SavedRun, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
@@ -38,12 +39,15 @@ mod wilson;
 #[path = "compare_controllers/world.rs"]
 mod world;
 
-/// Compare controllers: drawn errors of arm and camera, drawn balls, the same for all. On the feature shortcut, or, with --full-chain, on
-/// rendered frames, circle detection and VAL II on a line; then fewer --draws and --starts will do.
+/// Compare controllers: drawn errors of arm and camera, drawn balls, the same for all. On the
+/// feature shortcut, or, with --full-chain, on rendered frames, circle detection and VAL II on a
+/// line; then fewer --draws and --starts will do.
 ///
-/// A run succeeds when the ball's features are at the goal within 60 moves, with --grip when the jaws hold the ball in the end. All controllers have the same search, recovery and limits, and none
-/// turns a joint farther in one move than the largest step of the paper's behaviours. The hybrid first makes up to --moves moves in each drawn
-/// cell, on other balls than those it is compared on; `hybrid, untaught` makes none.
+/// A run succeeds when the ball's features are at the goal within 60 moves, with --grip when the
+/// jaws hold the ball in the end. All controllers have the same search, recovery and limits, and
+/// none turns a joint farther in one move than the largest step of the paper's behaviours. The
+/// hybrid first makes up to --moves moves in each drawn cell, on other balls than those it is
+/// compared on; `hybrid, untaught` makes none.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for comparison.csv and comparison.svg
@@ -74,11 +78,13 @@ struct Options {
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
 
-    /// Success is the ball in the jaws; on the feature shortcut the hand has its bodies then and can run into the ball
+    /// Success is the ball in the jaws; on the feature shortcut the hand has its bodies then and
+    /// can run into the ball
     #[arg(long)]
     grip: bool,
 
-    /// In each cell, show the goal on the arm first, the ball between the jaws, and let every controller have it
+    /// In each cell, show the goal on the arm first, the ball between the jaws, and let every
+    /// controller have it
     #[arg(long, conflicts_with = "full_chain")]
     taught_goal: bool,
 
@@ -90,7 +96,8 @@ struct Options {
     #[arg(long, value_name = "NAME", default_value_t, requires = "full_chain")]
     detector: BallDetector,
 
-    /// Write every run that fails or is broken off to failures/ in the folder, complete, for `replay`
+    /// Write every run that fails or is broken off to failures/ in the folder, complete, for
+    /// `replay`
     #[arg(long)]
     logs: bool,
 }
@@ -139,12 +146,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 let controller = match rival.made {
                     Made::Once(ref make) => make(goal.as_ref()),
                     Made::InEachCell => {
-                        let agent = Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
+                        let agent =
+                            Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
                         let seed = seed_of(options.seed, &[2, draw]);
                         let (hybrid, fault) = taught_hybrid(&mut world, agent, seed, options.moves);
                         // What had been learned until then goes to work.
                         if let Some(Fault { run, saved, error }) = fault {
-                            failures.broken_off(&run_of(format!("teaching {run}")), &saved, &*error)?;
+                            failures.broken_off(
+                                &run_of(format!("teaching {run}")),
+                                &saved,
+                                &*error,
+                            )?;
                             world = new_world()?;
                         }
                         SavedController::of_hybrid(&hybrid)
@@ -167,13 +179,21 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         Ok(None) => continue,
                         // A run that an arm or a camera ends is one that has failed, and no more.
                         Err(error) => {
-                            failures.broken_off(&run_of(format!("ball {start}")), &saved, &*error)?;
+                            failures.broken_off(
+                                &run_of(format!("ball {start}")),
+                                &saved,
+                                &*error,
+                            )?;
                             tally.add_broken_off();
                             world = new_world()?;
                             continue;
                         }
                     };
-                    let success = if options.grip { trial.held } else { trial.reached };
+                    let success = if options.grip {
+                        trial.held
+                    } else {
+                        trial.reached
+                    };
                     if let (Some(cycles), false) = (at_goal, options.grip) {
                         // What comes after the goal was reached is another matter.
                         trial.outcome.cycles = cycles;
@@ -200,10 +220,21 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             );
         }
     }
-    write_whole(&options.out.join("comparison.csv"), table::csv(&rows).as_bytes())?;
+    write_whole(
+        &options.out.join("comparison.csv"),
+        table::csv(&rows).as_bytes(),
+    )?;
     write_whole(
         &options.out.join("comparison.svg"),
-        table::plot(&rows, if options.grip { "grasped" } else { "at the goal" })?.as_bytes(),
+        table::plot(
+            &rows,
+            if options.grip {
+                "grasped"
+            } else {
+                "at the goal"
+            },
+        )?
+        .as_bytes(),
     )?;
     println!("results: {}", options.out.display());
     Ok(())
@@ -220,11 +251,19 @@ impl Failures {
             return Ok(());
         };
         writable_folder(folder)?;
-        write_whole(&folder.join(format!("{run}.json")), saved.to_json().as_bytes())
+        write_whole(
+            &folder.join(format!("{run}.json")),
+            saved.to_json().as_bytes(),
+        )
     }
 
     /// A run that did not even come to an end.
-    fn broken_off(&self, run: &str, saved: &SavedRun, error: &dyn Error) -> Result<(), Box<dyn Error>> {
+    fn broken_off(
+        &self,
+        run: &str,
+        saved: &SavedRun,
+        error: &dyn Error,
+    ) -> Result<(), Box<dyn Error>> {
         eprintln!("{run}: broken off: {error}");
         self.keep(run, saved)
     }
@@ -324,8 +363,8 @@ fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
     }
 }
 
-/// The paper's controller, learned in simulation without errors: in the regression simulator, and in the exact plane. Nothing is learned where
-/// none of them is asked for.
+/// The paper's controller, learned in simulation without errors: in the regression simulator, and
+/// in the exact plane. Nothing is learned where none of them is asked for.
 fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Error>> {
     const NAMES: [&str; 5] = [
         "Q 90, linear regression",
@@ -366,7 +405,8 @@ struct Fault {
     error: Box<dyn Error>,
 }
 
-/// The hybrid after at most `moves` moves in `cell`, learning nothing more; after fewer if a run was broken off.
+/// The hybrid after at most `moves` moves in `cell`, learning nothing more; after fewer if a run
+/// was broken off.
 fn taught_hybrid(
     world: &mut World,
     mut agent: Agent<Hybrid>,
@@ -381,7 +421,9 @@ fn taught_hybrid(
             break;
         }
         let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
-        match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| saved.note(event)) {
+        match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| {
+            saved.note(event)
+        }) {
             Ok(trial) => made += trial.map_or(0, |trial| trial.outcome.cycles),
             Err(error) => {
                 fault = Some(Fault { run, saved, error });

@@ -21,8 +21,8 @@ use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Acceptance, Canny, Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic,
-    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StageTimes, StandardHough,
-    StandardHoughConfig, Trusted, TrustedConfig, write_stages,
+    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StageTimes,
+    StandardHough, StandardHoughConfig, Trusted, TrustedConfig, write_stages,
 };
 
 use files::{writable_folder, write_png, write_whole};
@@ -33,8 +33,9 @@ mod overlay;
 
 /// Find circles in images: PNG, JPEG or PGM files, colour turned to luma, or folders of them.
 ///
-/// Without --csv the circles are printed as a table. Coordinates are pixels, (0,0) being the centre of the top-left pixel. The exit code
-/// is 1 when a file could not be read or used; the others are processed all the same.
+/// Without --csv the circles are printed as a table. Coordinates are pixels, (0,0) being the centre
+/// of the top-left pixel. The exit code is 1 when a file could not be read or used; the others are
+/// processed all the same.
 #[derive(Parser, Debug)]
 struct Options {
     /// Which detector to use
@@ -65,12 +66,13 @@ struct Options {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
-    /// Write file,cpu_us,edges_us,structure_us,search_us to FILE: CPU time of this thread from gray image to circles, and the wall time
-    /// of each stage of that run
+    /// Write file,cpu_us,edges_us,structure_us,search_us to FILE: CPU time of this thread from gray
+    /// image to circles, and the wall time of each stage of that run
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
 
-    /// Write a picture of each stage (edges, structure D, candidates, accepted circles) to a folder per image in DIR
+    /// Write a picture of each stage (edges, structure D, candidates, accepted circles) to a folder
+    /// per image in DIR
     #[arg(long, value_name = "DIR")]
     stages: Option<PathBuf>,
 
@@ -193,7 +195,11 @@ impl Results {
         let name = path.display().to_string();
         for Detection { circle, score } in &self.found {
             let Circle { x, y, radius } = circle;
-            writeln!(self.csv, "{},{x:.3},{y:.3},{radius:.3},{score:.4}", quoted(&name))?;
+            writeln!(
+                self.csv,
+                "{},{x:.3},{y:.3},{radius:.3},{score:.4}",
+                quoted(&name)
+            )?;
         }
         let micros = |time: Duration| format!("{:.1}", time.as_secs_f64() * 1e6);
         let [edges, structure, search] = stages.map_or_else(Default::default, |times| {
@@ -241,7 +247,11 @@ impl Results {
         match &options.times {
             Some(path) => write_whole(
                 path,
-                format!("file,cpu_us,edges_us,structure_us,search_us\n{}", self.times).as_bytes(),
+                format!(
+                    "file,cpu_us,edges_us,structure_us,search_us\n{}",
+                    self.times
+                )
+                .as_bytes(),
             ),
             None => Ok(()),
         }

@@ -1,7 +1,9 @@
-//! Another object: an egg, found as an ellipse, reached by the behaviours that were learned for a ball, and gripped across.
+//! Another object: an egg, found as an ellipse, reached by the behaviours that were learned for a
+//! ball, and gripped across.
 //!
-//! "It is possible to extend the grasping behavior to objects of different shapes, characterizing them uniquely, simply by considering a
-//! different set of features of the images" (section 2.1 of the paper).
+//! "It is possible to extend the grasping behavior to objects of different shapes, characterizing
+//! them uniquely, simply by considering a different set of features of the images" (section 2.1 of
+//! the paper).
 //!
 //! ```text
 //! cargo run --release --example ellipse_object -- --help
@@ -21,8 +23,8 @@ use std::rc::Rc;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourPair, CameraEye, EggFeatures, EggLimits, EventKind, GripAcross, Learned,
-    ObjectFeatures, Percept, SavedController, SavedRun, Sighting,
+    Agent, AgentConfig, BehaviourPair, CameraEye, EggFeatures, EggLimits, EventKind, GripAcross,
+    Learned, ObjectFeatures, Percept, SavedController, SavedRun, Sighting,
 };
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse};
@@ -51,11 +53,13 @@ mod program;
 
 /// Find, reach and grip eggs through rendered frames, ellipse detection and VAL II.
 ///
-/// The behaviours are learned for a ball that is as thick as the egg; in the place of its radius the controller is told the shorter half-axis
-/// of the egg's outline. For the grip the hand is turned so that the jaws close across the egg.
+/// The behaviours are learned for a ball that is as thick as the egg; in the place of its radius
+/// the controller is told the shorter half-axis of the egg's outline. For the grip the hand is
+/// turned so that the jaws close across the egg.
 ///
-/// What the camera shows is an egg; what the hand can touch and hold in the simulated cell is the ball of 40 mm inside it. That the jaws close across
-/// the egg is therefore asked for beside that they hold the ball. A run that fails is kept in the folder, complete, for `replay`.
+/// What the camera shows is an egg; what the hand can touch and hold in the simulated cell is the
+/// ball of 40 mm inside it. That the jaws close across the egg is therefore asked for beside that
+/// they hold the ball. A run that fails is kept in the folder, complete, for `replay`.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for a picture of each egg as it was seen last
@@ -108,7 +112,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let agent = Agent::with_controller(config.clone(), GripAcross::new(learned, config.grip))?;
 
     let (mut gripped, mut moves) = (0, 0);
-    println!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
+    println!(
+        " run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result"
+    );
     for run in 1..=usize::from(options.runs) {
         let (place, _) = workspace
             .sample_seen_ball(&rig.cell().get(), &mut rng)
@@ -124,8 +130,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             arm,
             mut sensor,
         } = rig.parts();
-        let mut camera = EggCamera::new(camera, cell.clone(), pose, egg, scene.clone(), rng.random());
-        // The last look at the egg, and where the jaws closed: from the ball's centre, metres, and off straight across, degrees.
+        let mut camera =
+            EggCamera::new(camera, cell.clone(), pose, egg, scene.clone(), rng.random());
+        // The last look at the egg, and where the jaws closed: from the ball's centre, metres, and
+        // off straight across, degrees.
         let (mut last, mut closed) = (None, None);
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
@@ -241,14 +249,32 @@ fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
 }
 
 /// The paper's behaviours, learned for balls.
-fn taught_for_balls(rig: &Rig, seed: u64, rng: &mut Xoshiro256PlusPlus) -> Result<Learned, Box<dyn Error>> {
+fn taught_for_balls(
+    rig: &Rig,
+    seed: u64,
+    rng: &mut Xoshiro256PlusPlus,
+) -> Result<Learned, Box<dyn Error>> {
     let (centring, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, rng);
     let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
     let pair = BehaviourPair::paper_mended();
     let anywhere: Vec<Percept> = (0..500).map(|_| simulator.start(rng)).collect();
     let found = search_percepts(500, seed);
-    let centering = learn_best(pair.centering, &simulator, &anywhere, 60_000, rng, &mut |_| ())?;
-    let approaching = learn_best(pair.approaching, &simulator, &found, 500_000, rng, &mut |_| ())?;
+    let centering = learn_best(
+        pair.centering,
+        &simulator,
+        &anywhere,
+        60_000,
+        rng,
+        &mut |_| (),
+    )?;
+    let approaching = learn_best(
+        pair.approaching,
+        &simulator,
+        &found,
+        500_000,
+        rng,
+        &mut |_| (),
+    )?;
     Ok(Learned::new(centering.behaviour, approaching.behaviour))
 }
 
@@ -269,5 +295,10 @@ impl ObjectFeatures for Watched {
 /// How far the jaws of the arm at `joints` are from closing straight across the egg, degrees.
 fn off_across(cell: &pipeline_sim::Cell, joints: &Joints, egg: &Egg) -> f64 {
     let along_the_jaws = cell.params.wrist(joints).rotation * Vector3::y();
-    along_the_jaws.dot(&egg.axis()).abs().min(1.0).asin().to_degrees()
+    along_the_jaws
+        .dot(&egg.axis())
+        .abs()
+        .min(1.0)
+        .asin()
+        .to_degrees()
 }

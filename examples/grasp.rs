@@ -19,8 +19,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind, JointLimits,
-    Learned, OnlineLearning, Outcome, Percept, SavedController, SavedRun,
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind,
+    JointLimits, Learned, OnlineLearning, Outcome, Percept, SavedController, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -113,7 +113,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         r2: taught.r2,
     };
     if let Some((centering, approaching)) = &taught.reports {
-        let svg = plots::learning_curves(&[("centering", centering), ("approaching", approaching)])?;
+        let svg =
+            plots::learning_curves(&[("centering", centering), ("approaching", approaching)])?;
         write_whole(&options.out.join("learning.svg"), svg.as_bytes())?;
     }
     export(options, &taught.learned, &taught.limits)?;
@@ -136,7 +137,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             broken_off = Some("no place of the workspace is in view from a search pose".into());
             break;
         };
-        // Each run tries by a seed of its own, so that it can be made again without those before it.
+        // Each run tries by a seed of its own, so that it can be made again without those before
+        // it.
         let learning = options
             .keep_learning
             .then(|| OnlineLearning::careful(options.seed.wrapping_add(run as u64)));
@@ -171,7 +173,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 record.fault = Some(error.to_string());
             }
         }
-        for (folder, keep) in [(&failures, !record.grasped), (&saved_runs, options.save_runs)] {
+        for (folder, keep) in [
+            (&failures, !record.grasped),
+            (&saved_runs, options.save_runs),
+        ] {
             let path = folder.join(format!("run{run:03}.json"));
             if keep && let Err(error) = write_whole(&path, record.saved.to_json().as_bytes()) {
                 // No reason to lose what was learned.
@@ -223,7 +228,8 @@ struct Taught {
 }
 
 impl Taught {
-    /// Samples the cell, fits the regression simulator, learns both behaviours in it, and saves them.
+    /// Samples the cell, fits the regression simulator, learns both behaviours in it, and saves
+    /// them.
     fn train(
         options: &Options,
         pair: &BehaviourPair,
@@ -255,17 +261,38 @@ impl Taught {
             RewardName::Mended => TRIALS,
         };
         let anywhere: Vec<Percept> = (0..trials).map(|_| simulator.start(rng)).collect();
-        let first = teach(options, &pair.centering, &simulator, &anywhere, ACTIONS.0, rng)?;
+        let first = teach(
+            options,
+            &pair.centering,
+            &simulator,
+            &anywhere,
+            ACTIONS.0,
+            rng,
+        )?;
         let from_search = search_percepts(trials, options.seed);
-        let actions = if options.fine { ACTIONS_FINE } else { ACTIONS.1 };
-        let second = teach(options, &pair.approaching, &simulator, &from_search, actions, rng)?;
+        let actions = if options.fine {
+            ACTIONS_FINE
+        } else {
+            ACTIONS.1
+        };
+        let second = teach(
+            options,
+            &pair.approaching,
+            &simulator,
+            &from_search,
+            actions,
+            rng,
+        )?;
 
         // What goes to work is what lies on the disk.
         for behaviour in [&first.behaviour, &second.behaviour] {
             behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
         }
         let saved = Self::load(&options.out, pair)?;
-        say(options, &format!("policies saved to {}", options.out.display()));
+        say(
+            options,
+            &format!("policies saved to {}", options.out.display()),
+        );
         Ok(Self {
             reports: Some((first.report, second.report)),
             r2,
@@ -278,8 +305,8 @@ impl Taught {
         let (learned, limits) = if path.is_file() {
             let text = std::fs::read_to_string(path)
                 .map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
-            let (learned, limits) =
-                Learned::from_json(&text).map_err(|error| format!("{}: {error}", path.display()))?;
+            let (learned, limits) = Learned::from_json(&text)
+                .map_err(|error| format!("{}: {error}", path.display()))?;
             let found = [learned.centering(), learned.approaching()].map(Behaviour::spec);
             if found
                 .iter()
@@ -308,7 +335,11 @@ impl Taught {
 }
 
 /// Writes the policy as JSON, if that is asked for.
-fn export(options: &Options, learned: &Learned, limits: &JointLimits) -> Result<(), Box<dyn Error>> {
+fn export(
+    options: &Options,
+    learned: &Learned,
+    limits: &JointLimits,
+) -> Result<(), Box<dyn Error>> {
     let Some(path) = &options.export else {
         return Ok(());
     };
@@ -353,11 +384,22 @@ fn teach(
         spec.states(),
         spec.actions()
     );
-    let lesson = learn_best(spec.clone(), simulator, trials, actions, rng, &mut |progress| {
-        bar.set_position(progress.actions);
-    })?;
+    let lesson = learn_best(
+        spec.clone(),
+        simulator,
+        trials,
+        actions,
+        rng,
+        &mut |progress| {
+            bar.set_position(progress.actions);
+        },
+    )?;
     bar.finish_and_clear();
-    let success = lesson.report.curve.last().and_then(|record| record.success_share);
+    let success = lesson
+        .report
+        .curve
+        .last()
+        .and_then(|record| record.success_share);
     let success = success.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
     say(
         options,
@@ -369,7 +411,8 @@ fn teach(
 /// Takes down an event, if it can.
 type Observe<'a> = dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>> + 'a;
 
-/// One run: places the ball and lets the agent go for it. What `observe` cannot write ends the run's pictures, not the run.
+/// One run: places the ball and lets the agent go for it. What `observe` cannot write ends the
+/// run's pictures, not the run.
 fn reach_for(
     agent: &mut Agent<Timed<Learned>>,
     rig: &mut Rig,
@@ -384,8 +427,11 @@ fn reach_for(
         arm,
         mut sensor,
     } = rig.parts();
-    let (mut camera, mut arm, mut detector) =
-        (stages.around(camera), stages.around(arm), stages.around(detector));
+    let (mut camera, mut arm, mut detector) = (
+        stages.around(camera),
+        stages.around(arm),
+        stages.around(detector),
+    );
     let mut written = Ok(());
     let mut eye = CameraEye::new(&mut camera, &mut detector);
     let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
@@ -396,7 +442,8 @@ fn reach_for(
     written.map(|()| outcome)
 }
 
-/// Makes a folder, or takes out of it what this program wrote there before: files of an earlier run must not mix with those of this one.
+/// Makes a folder, or takes out of it what this program wrote there before: files of an earlier run
+/// must not mix with those of this one.
 fn emptied(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     writable_folder(folder)?;
     for entry in std::fs::read_dir(folder)? {
@@ -413,7 +460,10 @@ fn emptied(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
 /// Whether a file is named as a saved run or a frame is: `run001.json`, `run001-frame002.png`.
 fn is_ours(name: &str) -> bool {
     let number = |text: &str| text.len() >= 3 && text.bytes().all(|byte| byte.is_ascii_digit());
-    let Some((stem, kind)) = name.strip_prefix("run").and_then(|rest| rest.rsplit_once('.')) else {
+    let Some((stem, kind)) = name
+        .strip_prefix("run")
+        .and_then(|rest| rest.rsplit_once('.'))
+    else {
         return false;
     };
     match kind {
@@ -454,13 +504,20 @@ fn write_results(
         &out.join("features.csv"),
         results::features_csv(records).as_bytes(),
     )?;
-    write_whole(&out.join("summary.json"), &serde_json::to_vec_pretty(summary)?)
+    write_whole(
+        &out.join("summary.json"),
+        &serde_json::to_vec_pretty(summary)?,
+    )
 }
 
 fn one_line(run: usize, record: &RunRecord) -> String {
     let [x, y, z] = record.ball_mm;
     let cycles = record.outcome.map_or(0, |outcome| outcome.cycles);
-    let result = if record.grasped { "grasped" } else { "not grasped" };
+    let result = if record.grasped {
+        "grasped"
+    } else {
+        "not grasped"
+    };
     format!("run {run:3}: ball at {x:5.0} {y:5.0} {z:5.0} mm, {cycles:2} moves, {result}")
 }
 
@@ -481,8 +538,9 @@ fn progress_bar(options: &Options, length: u64, unit: &str) -> ProgressBar {
     } else {
         ProgressDrawTarget::stderr()
     };
-    let style = ProgressStyle::with_template("  {bar:40} {pos}/{len} {msg}  {elapsed} (still {eta})")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template("  {bar:40} {pos}/{len} {msg}  {elapsed} (still {eta})")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(length), target)
         .with_style(style)
         .with_message(unit.to_owned())

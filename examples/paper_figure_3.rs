@@ -1,5 +1,5 @@
-//! Draws figure 3 of the paper for a rendered scene: the original, its edges, the structure D with a draw of three pixels and
-//! the circle they estimate, and the circle that is found.
+//! Draws figure 3 of the paper for a rendered scene: the original, its edges, the structure D with
+//! a draw of three pixels and the circle they estimate, and the circle that is found.
 //!
 //! ```text
 //! cargo run --release --example paper_figure_3
@@ -77,7 +77,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     });
     let panels = [
         Overlay::new(&frame).captioned("Original").into_image(),
-        Overlay::new(edges.image()).captioned(&edge_words).into_image(),
+        Overlay::new(edges.image())
+            .captioned(&edge_words)
+            .into_image(),
         structure(&frame, edges, options.seed),
         result.captioned(&result_words).into_image(),
     ];
@@ -111,8 +113,8 @@ fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
         .clone())
 }
 
-/// `D` over a dark ground, and the first draw of three pixels whose circle has a radius of 20 to 250 px, with that circle. It
-/// is a draw as most are: not yet the circle that is found.
+/// `D` over a dark ground, and the first draw of three pixels whose circle has a radius of 20 to
+/// 250 px, with that circle. It is a draw as most are: not yet the circle that is found.
 fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
     let ground = GrayImage::from_fn(frame.width(), frame.height(), |x, y| {
         Luma([frame.get_pixel(x, y).0[0] / 4])
@@ -157,7 +159,9 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
     }
     let beta = matched(edges, &circle);
     Overlay::over(picture)
-        .captioned(&format!("D, three of its pixels, their circle: beta {beta:.2}"))
+        .captioned(&format!(
+            "D, three of its pixels, their circle: beta {beta:.2}"
+        ))
         .into_image()
 }
 
@@ -191,7 +195,11 @@ fn sheet(panels: &[RgbImage; 4]) -> Result<RgbImage, Box<dyn Error>> {
     let (width, height) = panels[0].dimensions();
     let mut sheet = RgbImage::from_pixel(2 * width + GAP, 2 * height + GAP, Rgb([255, 255, 255]));
     for (place, panel) in (0..).zip(panels) {
-        sheet.copy_from(panel, (place % 2) * (width + GAP), (place / 2) * (height + GAP))?;
+        sheet.copy_from(
+            panel,
+            (place % 2) * (width + GAP),
+            (place / 2) * (height + GAP),
+        )?;
     }
     Ok(sheet)
 }

@@ -1,5 +1,5 @@
-//! The paper's experiments: learning (Fig. 6), reaching from three distances (Fig. 7), tracking a ball that is pushed away (Fig. 8), and
-//! from simulation to the arm.
+//! The paper's experiments: learning (Fig. 6), reaching from three distances (Fig. 7), tracking a
+//! ball that is pushed away (Fig. 8), and from simulation to the arm.
 //!
 //! ```text
 //! cargo run --release --example paper_figures -- --help
@@ -20,7 +20,8 @@ use clap::Parser;
 use grasp_agent::{Agent, BehaviourPair, EventKind, Learned, Percept, YGoal};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{
-    ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn_best, score, search_percepts, search_starts,
+    ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn_best, score, search_percepts,
+    search_starts,
 };
 use qtable::Record;
 use rand::SeedableRng;
@@ -43,8 +44,9 @@ mod program;
 mod snapshots;
 mod wilson;
 
-/// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut, Fig. 9 through the full chain; and what
-/// becomes of the behaviours when they are taken from simulation to an arm with errors, and go on learning there.
+/// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut,
+/// Fig. 9 through the full chain; and what becomes of the behaviours when they are taken from
+/// simulation to an arm with errors, and go on learning there.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for the figures
@@ -99,10 +101,15 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Learning, many seeds: curves of both behaviours, and how the learned tables do from the search poses.
+/// Learning, many seeds: curves of both behaviours, and how the learned tables do from the search
+/// poses.
 fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
-    let starts = search_starts(usize::from(options.starts), options.first_seed.wrapping_add(1));
-    let optimum = starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
+    let starts = search_starts(
+        usize::from(options.starts),
+        options.first_seed.wrapping_add(1),
+    );
+    let optimum =
+        starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
     println!(
         "Figure 6: approaching, learned with each simulator and reward, then tried in the exact plane from {} starts of the search \
          (breadth-first optimum {optimum:.2} steps, loop breaker {}); without search and recovery, so that a ball once lost stays lost",
@@ -120,7 +127,10 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
         let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
         let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
-        let (literal, mended) = (BehaviourPair::paper_literal(), BehaviourPair::paper_mended());
+        let (literal, mended) = (
+            BehaviourPair::paper_literal(),
+            BehaviourPair::paper_mended(),
+        );
         let (fine, wide) = (
             BehaviourPair::fine(),
             mended.clone().with_y_goal(YGoal::Section4)?,
@@ -142,7 +152,9 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let lessons = [
             (
                 "exact plane, mended",
-                timed(&mut || plane.learn_best(mended.approaching.clone(), &found, 500_000, rng, quiet)),
+                timed(&mut || {
+                    plane.learn_best(mended.approaching.clone(), &found, 500_000, rng, quiet)
+                }),
             ),
             (
                 "exact plane, mended, last table",
@@ -150,7 +162,9 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
             ),
             (
                 "exact plane, y goal 74..92",
-                timed(&mut || plane.learn_best(wide.approaching.clone(), &found, 500_000, rng, quiet)),
+                timed(&mut || {
+                    plane.learn_best(wide.approaching.clone(), &found, 500_000, rng, quiet)
+                }),
             ),
             (
                 "exact plane, literal",
@@ -163,16 +177,40 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
             (
                 "exact plane, fine",
                 timed(&mut || {
-                    plane.learn_best(fine.approaching.clone(), &more_found, options.fine, rng, quiet)
+                    plane.learn_best(
+                        fine.approaching.clone(),
+                        &more_found,
+                        options.fine,
+                        rng,
+                        quiet,
+                    )
                 }),
             ),
             (
                 "rigid regression, mended",
-                timed(&mut || learn_best(mended.approaching.clone(), &rigid, &found, 500_000, rng, quiet)),
+                timed(&mut || {
+                    learn_best(
+                        mended.approaching.clone(),
+                        &rigid,
+                        &found,
+                        500_000,
+                        rng,
+                        quiet,
+                    )
+                }),
             ),
             (
                 "linear regression, mended",
-                timed(&mut || learn_best(mended.approaching.clone(), &linear, &found, 500_000, rng, quiet)),
+                timed(&mut || {
+                    learn_best(
+                        mended.approaching.clone(),
+                        &linear,
+                        &found,
+                        500_000,
+                        rng,
+                        quiet,
+                    )
+                }),
             ),
         ];
         for (name, (lesson, spent)) in &lessons {
@@ -201,15 +239,22 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     write_whole(&options.out.join("figure6.csv"), csv.as_bytes())?;
     let mut panels = Vec::new();
     for (name, seeds) in &curves {
-        let success = Panel::of_seeds(&format!("{name}: goal reached, % of episodes"), seeds, |r| {
-            r.success_share.map(|s| 100.0 * s)
-        });
+        let success = Panel::of_seeds(
+            &format!("{name}: goal reached, % of episodes"),
+            seeds,
+            |r| r.success_share.map(|s| 100.0 * s),
+        );
         panels.push(success.up_to(105.0));
-        panels.push(Panel::of_seeds(&format!("{name}: mean error of Q"), seeds, |r| {
-            r.mean_td_error
-        }));
+        panels.push(Panel::of_seeds(
+            &format!("{name}: mean error of Q"),
+            seeds,
+            |r| r.mean_td_error,
+        ));
     }
-    write_whole(&options.out.join("figure6.svg"), drawn(&panels, 2)?.as_bytes())?;
+    write_whole(
+        &options.out.join("figure6.svg"),
+        drawn(&panels, 2)?.as_bytes(),
+    )?;
     taught.ok_or_else(|| "at least one seed is needed".into())
 }
 
@@ -224,7 +269,8 @@ fn scored(lesson: &Result<Lesson, LearnError>, starts: &[puma_grasp::PlaneStart]
     }
 }
 
-/// Features per step while reaching, by distance and elbow, and while the ball is pushed away again and again.
+/// Features per step while reaching, by distance and elbow, and while the ball is pushed away again
+/// and again.
 fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Error>> {
     let cell = TrialCell::draw(ErrorLevel::None, 0)?;
     let mut config = cell.agent_config();
@@ -272,7 +318,8 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         }
     }
     write_whole(&options.out.join("figures7and8.csv"), csv.as_bytes())?;
-    // One figure for each interval of theta 3 that the goal is reached in, three distances in each, as in the paper.
+    // One figure for each interval of theta 3 that the goal is reached in, three distances in each,
+    // as in the paper.
     let mut panels = Vec::new();
     for (low, high) in [(-50.0, 6.0), (6.0, 27.0), (27.0, 60.0)] {
         let ends_here = |path: &&Vec<(hough_heuristic::Features, f64)>| {
@@ -283,7 +330,8 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         };
         let mut paths: Vec<_> = reach.iter().filter(ends_here).collect();
         paths.sort_by(|a, b| a[0].0.r.total_cmp(&b[0].0.r));
-        // "The starting position is chosen in such a way as to have the maximum off centering", at each of three distances.
+        // "The starting position is chosen in such a way as to have the maximum off centering", at
+        // each of three distances.
         let third = paths.len().div_ceil(3).max(1);
         let mut thirds = paths.chunks(third);
         let three = ["far", "middle", "near"].map(|start| {
@@ -303,7 +351,10 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
             panels.push(Panel::new(&title, "step", lines.collect()).with_goal(low_end, high_end));
         }
     }
-    write_whole(&options.out.join("figure7.svg"), drawn(&panels, 3)?.as_bytes())?;
+    write_whole(
+        &options.out.join("figure7.svg"),
+        drawn(&panels, 3)?.as_bytes(),
+    )?;
     let panels: Vec<Panel> = track
         .iter()
         .zip(1..)
@@ -316,7 +367,10 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                 .up_to(70.0)
         })
         .collect();
-    write_whole(&options.out.join("figure8.svg"), drawn(&panels, 3)?.as_bytes())
+    write_whole(
+        &options.out.join("figure8.svg"),
+        drawn(&panels, 3)?.as_bytes(),
+    )
 }
 
 /// How far off the goal a ball shows in the image, in halves of its sides.
@@ -325,7 +379,11 @@ fn off_centre(f: &hough_heuristic::Features) -> f64 {
 }
 
 /// A feature: its name, its goal, and how to read it.
-type Feature = (&'static str, (f64, f64), fn(&hough_heuristic::Features) -> f64);
+type Feature = (
+    &'static str,
+    (f64, f64),
+    fn(&hough_heuristic::Features) -> f64,
+);
 const FEATURES: [Feature; 3] = [
     ("x", (99.0, 108.0), |f| f.x),
     ("y", (74.0, 82.0), |f| f.y),

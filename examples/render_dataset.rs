@@ -1,18 +1,22 @@
-//! Renders labelled frames of the simulated cell: PNG files, the exact circles they show, and which scene each belongs to.
+//! Renders labelled frames of the simulated cell: PNG files, the exact circles they show, and which
+//! scene each belongs to.
 //!
 //! ```text
 //! cargo run --release --example render_dataset -- --out out/rendered --frames 20
 //! cargo run --release --example render_dataset -- --out out/benchmark --kinds benchmark --size 1920x1080
 //! ```
 //!
-//! writes `out/rendered/KIND_NNN.png`, `truth.csv` (file,cx,cy,r,what,visible) and `frames.csv` (file,scene). (0, 0) is the centre of the
-//! top-left pixel. Truth holds every outline that is round to 5 % (axis ratio), at least 60 % visible and at least 5 px in radius (of a
-//! frame 768 wide; balls of the benchmark kinds always): the ball (`Target`) and whatever else is round, since a detector that finds the
-//! rim of a disc seen from above is right. What is less visible (`--visible`) has no row: a frame whose ball is just below that shows most of
-//! a ball, yet looks empty in the truth. Ask for `--visible 0` and judge by the column `visible` where that matters.
+//! writes `out/rendered/KIND_NNN.png`, `truth.csv` (file,cx,cy,r,what,visible) and `frames.csv`
+//! (file,scene). (0, 0) is the centre of the top-left pixel. Truth holds every outline that is
+//! round to 5 % (axis ratio), at least 60 % visible and at least 5 px in radius (of a frame 768
+//! wide; balls of the benchmark kinds always): the ball (`Target`) and whatever else is round,
+//! since a detector that finds the rim of a disc seen from above is right. What is less visible
+//! (`--visible`) has no row: a frame whose ball is just below that shows most of a ball, yet looks
+//! empty in the truth. Ask for `--visible 0` and judge by the column `visible` where that matters.
 //!
-//! Kinds are those of `SceneKind` (the arm at work, as hard as it gets there), and those of `BenchmarkKind` (one difficulty at a time), with
-//! `cell` and `benchmark` for all of either. A kind's frames depend on the seed and on nothing else, whatever other kinds are drawn.
+//! Kinds are those of `SceneKind` (the arm at work, as hard as it gets there), and those of
+//! `BenchmarkKind` (one difficulty at a time), with `cell` and `benchmark` for all of either. A
+//! kind's frames depend on the seed and on nothing else, whatever other kinds are drawn.
 
 #![allow(
     clippy::print_stdout,
@@ -55,20 +59,22 @@ struct Options {
     /// Frames of each kind.
     #[arg(long, default_value_t = 20)]
     frames: u64,
-    /// Kinds of scenes, separated by commas, each once; `cell` and `benchmark` stand for all of theirs.
+    /// Kinds of scenes, separated by commas, each once; `cell` and `benchmark` stand for all of
+    /// theirs.
     #[arg(long, value_delimiter = ',', default_value = "cell")]
     kinds: Vec<Kinds>,
     /// Width and height of the frames, pixels.
     #[arg(long, default_value = "768x576", value_parser = size)]
     size: (u32, u32),
-    /// Frames that share a scene (table, lamps, things); ball and pose are new in every frame. Benchmark frames share nothing.
+    /// Frames that share a scene (table, lamps, things); ball and pose are new in every frame.
+    /// Benchmark frames share nothing.
     #[arg(long, default_value_t = 5)]
     per_scene: u64,
     /// Seed: same seed, same files.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Least visible share of an outline in the truth, 0 to 1. A frame whose ball is less visible has no row for it and looks empty; with 0
-    /// everything that shows at all is listed.
+    /// Least visible share of an outline in the truth, 0 to 1. A frame whose ball is less visible
+    /// has no row for it and looks empty; with 0 everything that shows at all is listed.
     #[arg(long, default_value_t = 0.6, value_parser = share)]
     visible: f64,
 }
@@ -102,9 +108,13 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             let (mut renderer, snapshot) = match kind {
                 Kind::Cell(kind) => {
                     let shared = shared.take().filter(|_| i % options.per_scene.max(1) != 0);
-                    let renderer = shared
-                        .unwrap_or_else(|| Renderer::new(&Scene::generate(kind, &mut rng), rng.random()));
-                    (renderer, Snapshot::draw(kind, &mut rng).resized(width, height)?)
+                    let renderer = shared.unwrap_or_else(|| {
+                        Renderer::new(&Scene::generate(kind, &mut rng), rng.random())
+                    });
+                    (
+                        renderer,
+                        Snapshot::draw(kind, &mut rng).resized(width, height)?,
+                    )
                 }
                 Kind::Benchmark(kind) => {
                     let (scene, snapshot) = kind.draw(options.size, &mut rng)?;
@@ -125,7 +135,10 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
                 Kind::Cell(_) => 5.0 * scale,
                 Kind::Benchmark(_) => 0.0,
             };
-            for sighting in sightings.iter().filter(|s| counts(s, options.visible, least)) {
+            for sighting in sightings
+                .iter()
+                .filter(|s| counts(s, options.visible, least))
+            {
                 let circle = sighting.ellipse.circle();
                 writeln!(
                     truth,
@@ -137,8 +150,10 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             bar.inc(1);
         }
         milliseconds.sort_by(f64::total_cmp);
-        if let (Some(least), Some(median)) = (milliseconds.first(), milliseconds.get(milliseconds.len() / 2))
-        {
+        if let (Some(least), Some(median)) = (
+            milliseconds.first(),
+            milliseconds.get(milliseconds.len() / 2),
+        ) {
             bar.suspend(|| {
                 writeln!(
                     std::io::stdout(),
@@ -156,7 +171,8 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
 /// Whether an outline is one that a detector should find.
 fn counts(sighting: &Sighting, visible: f64, least_radius: f64) -> bool {
     let ellipse = &sighting.ellipse;
-    let round = matches!(sighting.what, Round::Target | Round::Ball) || ellipse.minor >= 0.95 * ellipse.major;
+    let round = matches!(sighting.what, Round::Target | Round::Ball)
+        || ellipse.minor >= 0.95 * ellipse.major;
     round && sighting.visible >= visible && ellipse.circle().radius >= least_radius
 }
 

@@ -18,11 +18,13 @@ use program::ended;
 
 mod program;
 
-/// Make runs again that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers` (--logs) or `ellipse_object` has kept, and say
-/// whether they come out the same.
+/// Make runs again that `grasp` (failures/, with --save-runs saved/), `track`,
+/// `compare_controllers` (--logs) or `ellipse_object` has kept, and say whether they come out the
+/// same.
 ///
-/// A file holds the settings, the controller before the run, and every event. Arm, sensors and camera answer as they did then; what the controller
-/// and the state machine decide is decided anew.
+/// A file holds the settings, the controller before the run, and every event. Arm, sensors and
+/// camera answer as they did then; what the controller and the state machine decide is decided
+/// anew.
 #[derive(Parser, Debug)]
 struct Options {
     /// Saved runs
@@ -70,7 +72,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
             Replayed::Differs { event, then, now } => {
                 others += 1;
-                let told = |event: Option<LoggedEvent>| event.as_ref().map_or("the end".into(), told);
+                let told =
+                    |event: Option<LoggedEvent>| event.as_ref().map_or("the end".into(), told);
                 say(&format!("{name}: another course from event {event} on"));
                 say(&format!("  then: {}\n  now:  {}", told(then), told(now)));
             }
@@ -81,9 +84,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         (0, 0) => Ok(()),
         (_, 0) => Err(format!("{others} of {files} runs took another course").into()),
         (0, _) => Err(format!("{unread} of {files} runs cannot be made again").into()),
-        _ => {
-            Err(format!("{others} of {files} runs took another course, {unread} cannot be made again").into())
-        }
+        _ => Err(format!(
+            "{others} of {files} runs took another course, {unread} cannot be made again"
+        )
+        .into()),
     }
 }
 

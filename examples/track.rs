@@ -1,4 +1,5 @@
-//! A ball that does not stay where it is, through the full chain: rendered frames, circle detection, VAL II on a line.
+//! A ball that does not stay where it is, through the full chain: rendered frames, circle
+//! detection, VAL II on a line.
 //!
 //! ```text
 //! cargo run --release --example track -- --help
@@ -35,7 +36,10 @@ use stages::{Stages, Timed};
 use tally::{Counted, Tally};
 
 mod cpu;
-#[allow(dead_code, reason = "shared with the examples that write single pictures")]
+#[allow(
+    dead_code,
+    reason = "shared with the examples that write single pictures"
+)]
 mod files;
 mod program;
 #[path = "track/shortcut.rs"]
@@ -47,12 +51,14 @@ mod wilson;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
-/// In each cell the controller makes --teach runs on balls at rest first, to learn the camera; then come the runs that count. A ball is grasped
-/// when the jaws hold it and the controller says so. Grasps before what was to happen to the ball had happened are left out and told apart; a run
+/// In each cell the controller makes --teach runs on balls at rest first, to learn the camera; then
+/// come the runs that count. A ball is grasped when the jaws hold it and the controller says so.
+/// Grasps before what was to happen to the ball had happened are left out and told apart; a run
 /// that failed before that counts as failed.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the runs that failed or collided, for the example replay
+    /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the runs that
+    /// failed or collided, for the example replay
     #[arg(long, value_name = "DIR", default_value = "out/track")]
     out: PathBuf,
 
@@ -77,10 +83,16 @@ struct Options {
     ball: Fate,
 
     /// How the circle is found: trusted, heuristic, rht, sht
-    #[arg(long, value_name = "NAME", default_value_t, conflicts_with = "shortcut")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value_t,
+        conflicts_with = "shortcut"
+    )]
     detector: BallDetector,
 
-    /// No frames and no line: features straight from the geometry. Only runs that failed are written, and collisions are not counted
+    /// No frames and no line: features straight from the geometry. Only runs that failed are
+    /// written, and collisions are not counted
     #[arg(long)]
     shortcut: bool,
 
@@ -88,7 +100,8 @@ struct Options {
     #[arg(long, value_name = "LEVELS", conflicts_with = "shortcut")]
     noise: Option<f64>,
 
-    /// Begin with what an earlier run learned of the camera: its camera.belief; learning goes on from there in the --teach runs
+    /// Begin with what an earlier run learned of the camera: its camera.belief; learning goes on
+    /// from there in the --teach runs
     #[arg(long, value_name = "FILE", conflicts_with = "shortcut")]
     belief: Option<PathBuf>,
 
@@ -117,7 +130,8 @@ fn at_least_one(text: &str) -> Result<usize, String> {
 enum Fate {
     /// It stays where it is
     Rest,
-    /// Whenever it is reached it is pushed toward the camera, to a radius of 60 units, three times (Fig. 8 of the paper)
+    /// Whenever it is reached it is pushed toward the camera, to a radius of 60 units, three times
+    /// (Fig. 8 of the paper)
     Push,
     /// When it is first reached it jumps 150 mm away
     Jump,
@@ -151,7 +165,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut done = Ok(());
     for cell in 0..options.cells {
         chain.tally.begin_cell();
-        done = chain.go_for_balls(options.seed.wrapping_add(cell as u64), options.runs_in(cell));
+        done = chain.go_for_balls(
+            options.seed.wrapping_add(cell as u64),
+            options.runs_in(cell),
+        );
         if done.is_err() {
             break;
         }
@@ -165,7 +182,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     done
 }
 
-/// Writes what happened in a run that is worth looking into, for the example `replay`, and says where.
+/// Writes what happened in a run that is worth looking into, for the example `replay`, and says
+/// where.
 fn keep_run(folder: &Path, name: &str, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
     let file = folder.join(format!("{name}.json"));
     write_whole(&file, saved.to_json().as_bytes())?;
@@ -261,7 +279,8 @@ impl Chain<'_> {
         world: &mut World,
         counted: Option<usize>,
     ) -> (Result<Outcome, AgentError>, SavedRun) {
-        let mut saved = SavedRun::before(agent, SavedController::of_hybrid(&agent.controller().inner));
+        let mut saved =
+            SavedRun::before(agent, SavedController::of_hybrid(&agent.controller().inner));
         let (shared, mut gripped) = (rig.cell().clone(), false);
         let (csv, film) = (&mut self.csv, &mut self.film);
         let RigParts {
@@ -321,7 +340,8 @@ impl World {
         }
     }
 
-    /// Whether all that was to happen to the ball has; for a ball that drifts until it is gripped, whether it has moved at all.
+    /// Whether all that was to happen to the ball has; for a ball that drifts until it is gripped,
+    /// whether it has moved at all.
     fn has_happened(&self) -> bool {
         self.events
             >= match self.fate {
@@ -342,7 +362,9 @@ impl World {
             Fate::Jump if reached && self.events < 1 => {
                 // To a place where the search can find it again.
                 for _ in 0..100 {
-                    let Some(place) = workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng) else {
+                    let Some(place) =
+                        workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng)
+                    else {
                         return;
                     };
                     let mut there = *cell;
@@ -362,7 +384,8 @@ impl World {
                 let (centre, rng) = (cell.ball.centre, &mut self.rng);
                 let (x, y) = *self.heading.get_or_insert_with(|| {
                     // One of the directions in which it stays in the workspace.
-                    let ways = (0..100).map(|_| rng.random_range(0.0..std::f64::consts::TAU).sin_cos());
+                    let ways =
+                        (0..100).map(|_| rng.random_range(0.0..std::f64::consts::TAU).sin_cos());
                     let stays = |(x, y): &(f64, f64)| {
                         let mut end = centre;
                         (end.x, end.y) = (end.x + 0.2 * x, end.y + 0.2 * y);
@@ -415,7 +438,9 @@ mod tests {
         let earlier = folder.path().join("track.csv");
         std::fs::write(&earlier, "an earlier run").expect("a file");
         let options = Options::parse_from(["track", "--belief", "no-such-belief", "--out", &out]);
-        let error = run(&options).expect_err("there is no such file").to_string();
+        let error = run(&options)
+            .expect_err("there is no such file")
+            .to_string();
         assert!(error.contains("no-such-belief"), "{error}");
         let left = std::fs::read_to_string(&earlier).expect("still there");
         assert_eq!(left, "an earlier run");

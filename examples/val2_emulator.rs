@@ -5,8 +5,8 @@
 //! screen /tmp/puma 9600
 //! ```
 //!
-//! The first line printed is `listening on PATH`. Lines typed here are the controller's panel: `power on`, `power off`, `signal 1001 on`,
-//! `joints`, `restart`, `quit`.
+//! The first line printed is `listening on PATH`. Lines typed here are the controller's panel:
+//! `power on`, `power off`, `signal 1001 on`, `joints`, `restart`, `quit`.
 #![allow(clippy::print_stdout, clippy::print_stderr)] // A program's output.
 
 use std::collections::BTreeMap;
@@ -34,7 +34,8 @@ mod program;
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// Serve on this address (127.0.0.1:5600, or port 0 for any free one) instead of a pseudo-terminal.
+    /// Serve on this address (127.0.0.1:5600, or port 0 for any free one) instead of a
+    /// pseudo-terminal.
     #[arg(long, value_name = "ADDR", conflicts_with = "pty")]
     tcp: Option<String>,
     /// Serve on a pseudo-terminal (the default).
@@ -46,7 +47,8 @@ struct Arguments {
     /// What the controller is like: val2, val2_strict_miz, val2_hardware.
     #[arg(long, value_name = "NAME", default_value = "val2")]
     profile: String,
-    /// Let motions take their time. Otherwise the controller's clock jumps ahead whenever it waits for nothing else.
+    /// Let motions take their time. Otherwise the controller's clock jumps ahead whenever it waits
+    /// for nothing else.
     #[arg(long)]
     realtime: bool,
     /// Pace characters as a line of this speed does; implies --realtime.
@@ -55,7 +57,8 @@ struct Arguments {
     /// Write what passes on the line to this file.
     #[arg(long, value_name = "FILE")]
     transcript: Option<PathBuf>,
-    /// The floppy disk: text files (NAME.v2) of this folder can be loaded, stored files are written to it, deleted ones removed.
+    /// The floppy disk: text files (NAME.v2) of this folder can be loaded, stored files are written
+    /// to it, deleted ones removed.
     #[arg(long, value_name = "FOLDER")]
     floppy: Option<PathBuf>,
 }
@@ -119,7 +122,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 }
 
 #[cfg(unix)]
-fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> Result<Server, Box<dyn Error>> {
+fn serve(
+    arguments: &Arguments,
+    emulator: Emulator,
+    config: ServeConfig,
+) -> Result<Server, Box<dyn Error>> {
     match &arguments.tcp {
         Some(address) => on_socket(address, emulator, config),
         None => Ok(Server::Pty(PtyServer::spawn(emulator, config)?)),
@@ -127,7 +134,11 @@ fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> Resu
 }
 
 #[cfg(not(unix))]
-fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> Result<Server, Box<dyn Error>> {
+fn serve(
+    arguments: &Arguments,
+    emulator: Emulator,
+    config: ServeConfig,
+) -> Result<Server, Box<dyn Error>> {
     on_socket(
         arguments.tcp.as_deref().unwrap_or("127.0.0.1:5600"),
         emulator,
@@ -135,7 +146,11 @@ fn serve(arguments: &Arguments, emulator: Emulator, config: ServeConfig) -> Resu
     )
 }
 
-fn on_socket(address: &str, emulator: Emulator, config: ServeConfig) -> Result<Server, Box<dyn Error>> {
+fn on_socket(
+    address: &str,
+    emulator: Emulator,
+    config: ServeConfig,
+) -> Result<Server, Box<dyn Error>> {
     match TcpServer::spawn(address, emulator, config) {
         Ok(server) => Ok(Server::Tcp(server)),
         Err(problem) => Err(format!("{address} cannot be listened at: {problem}").into()),
@@ -145,7 +160,8 @@ fn on_socket(address: &str, emulator: Emulator, config: ServeConfig) -> Result<S
 /// The floppy disk: a folder of text files, each named as in VAL with `.v2` behind it.
 struct Floppy {
     folder: PathBuf,
-    /// The file that each name of the disk is kept in; VAL knows upper case only, a file system may not.
+    /// The file that each name of the disk is kept in; VAL knows upper case only, a file system may
+    /// not.
     paths: BTreeMap<String, PathBuf>,
     /// What the folder holds.
     kept: BTreeMap<String, String>,
@@ -183,7 +199,8 @@ impl Floppy {
 
     /// Makes the folder hold what the disk does: writes what was stored, removes what was deleted.
     fn follow(&mut self, server: &Server) -> Result<(), Box<dyn Error>> {
-        let Some(now) = server.with(|e| (*e.floppy() != self.kept).then(|| e.floppy().clone())) else {
+        let Some(now) = server.with(|e| (*e.floppy() != self.kept).then(|| e.floppy().clone()))
+        else {
             return Ok(());
         };
         for (name, text) in &now {
@@ -206,7 +223,8 @@ impl Floppy {
     }
 }
 
-/// Follows the panel's lines and the disk until told to quit. Without a panel (input closed) it serves until it is killed.
+/// Follows the panel's lines and the disk until told to quit. Without a panel (input closed) it
+/// serves until it is killed.
 fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Error>> {
     let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || {
@@ -227,7 +245,10 @@ fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Err
             }
         };
         if let Some(floppy) = &mut floppy {
-            let problem = floppy.follow(server).err().map(|problem| problem.to_string());
+            let problem = floppy
+                .follow(server)
+                .err()
+                .map(|problem| problem.to_string());
             if let Some(problem) = problem.as_ref().filter(|_| problem != trouble) {
                 println!("the floppy disk cannot be written: {problem}");
             }
@@ -256,7 +277,9 @@ fn panel(server: &Server, line: &str) -> Result<(), String> {
             server.with(|e| e.set_arm_power(on));
         }
         ["signal", number, word] => {
-            let number: u16 = number.parse().map_err(|_| format!("`{number}` is no signal"))?;
+            let number: u16 = number
+                .parse()
+                .map_err(|_| format!("`{number}` is no signal"))?;
             let on = state(word)?;
             server
                 .with(|e| e.set_signal(number, on))

@@ -4,8 +4,8 @@ use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, Transport, V
 
 /// A [`Val2Client`] whose moves the controller itself watches ([`Val2Client::arm_proximity`]).
 ///
-/// A stop ([`ArmError::ProximityStop`]) uses the guard up, so that the arm can be taken back the way it came; it is armed again as soon as
-/// a move has ended with nothing near.
+/// A stop ([`ArmError::ProximityStop`]) uses the guard up, so that the arm can be taken back the
+/// way it came; it is armed again as soon as a move has ended with nothing near.
 #[derive(Debug)]
 pub(crate) struct GuardedArm<T: Transport> {
     client: Val2Client<T>,

@@ -10,9 +10,10 @@
 //! | [`pipeline_sim`] | an arm pose into a camera frame, and samples of it into a regression simulator |
 //! | [`grasp_agent`] | circles into joint moves: learned behaviours, search, recovery, grip |
 //!
-//! They are re-exported here under their own names. What this package adds is the wiring between the two that do not know each other,
-//! the simulated cell and the controller: a [`Simulator`] is fitted to samples of the cell, [`learn`] teaches a behaviour in it,
-//! and a [`Rig`] is an arm behind a VAL II controller with the cell around it, in which an agent goes for a ball.
+//! They are re-exported here under their own names. What this package adds is the wiring between
+//! the two that do not know each other, the simulated cell and the controller: a [`Simulator`] is
+//! fitted to samples of the cell, [`learn`] teaches a behaviour in it, and a [`Rig`] is an arm
+//! behind a VAL II controller with the cell around it, in which an agent goes for a ball.
 //!
 //! ```
 //! use puma_grasp::grasp_agent::BehaviourSpec;
@@ -30,8 +31,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example `grasp`:
-//! `cargo run --release --example grasp`.
+//! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example
+//! `grasp`: `cargo run --release --example grasp`.
 
 mod guarded_arm;
 mod plane;
@@ -47,7 +48,9 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
-pub use plane::{ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts};
+pub use plane::{
+    ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts,
+};
 pub use rig::{PlaceError, Rig, RigError, RigParts};
 pub use setup::{BallDetector, UnknownDetector, bright_ball_scene};
 pub use surroundings::Contacts;

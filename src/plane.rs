@@ -1,7 +1,9 @@
-//! The arm's plane: approaching alone, with the exact geometry instead of a regression, and the breadth-first optimum as yardstick.
+//! The arm's plane: approaching alone, with the exact geometry instead of a regression, and the
+//! breadth-first optimum as yardstick.
 //!
-//! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything, and (y, r, theta 3) is the whole state:
-//! turning arm and ball together about the shoulder changes nothing. Centering has nothing to do here.
+//! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything, and (y, r,
+//! theta 3) is the whole state: turning arm and ball together about the shoulder changes nothing.
+//! Centering has nothing to do here.
 
 use grasp_agent::{ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
 use hough_heuristic::Features;
@@ -51,7 +53,8 @@ const MOST_STEPS: usize = 60;
 const CAMERA_BESIDE: f64 = 0.225;
 
 impl ExactPlane {
-    /// With `starts` exploring starts drawn from `rng`; with none, every episode begins with the ball as a search pose shows it.
+    /// With `starts` exploring starts drawn from `rng`; with none, every episode begins with the
+    /// ball as a search pose shows it.
     pub fn new(starts: usize, rng: &mut dyn Rng) -> Self {
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let drawn = (0..starts).filter_map(|_| {
@@ -106,7 +109,8 @@ impl ExactPlane {
         self.learn_with(spec, &[], &schedule(actions)?, rng, on_progress)
     }
 
-    /// As [`ExactPlane::learn`], and keeps the table that does best from `trials`: see [`learn_best`](crate::learn_best).
+    /// As [`ExactPlane::learn`], and keeps the table that does best from `trials`: see
+    /// [`learn_best`](crate::learn_best).
     ///
     /// # Errors
     /// As for [`learn`](crate::learn).
@@ -157,8 +161,8 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
     starts.take(count).collect()
 }
 
-/// What is perceived of `count` balls where the search finds them, turned into the arm's plane: trials for
-/// [`learn_best`](crate::learn_best).
+/// What is perceived of `count` balls where the search finds them, turned into the arm's plane:
+/// trials for [`learn_best`](crate::learn_best).
 pub fn search_percepts(count: usize, seed: u64) -> Vec<Percept> {
     let seen = found_by_search(seed).filter_map(|(cell, joints)| {
         let features = cell.features(&joints)?;
@@ -218,13 +222,14 @@ fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Optio
     None
 }
 
-/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after each ([`Cell::fewest_moves`]); `None` if
-/// there is no way.
+/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after
+/// each ([`Cell::fewest_moves`]); `None` if there is no way.
 pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
     let moves: Vec<JointDelta> = (0..spec.actions())
         .map(|action| spec.delta(Action(action)))
         .collect();
-    let reached = |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
+    let reached =
+        |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
     let fewest = cell.fewest_moves(joints, &moves, reached, MOST_STEPS as u32);
     Some(fewest.ok()?? as usize)
 }
@@ -240,7 +245,9 @@ mod tests {
         let start = plane.start(&mut rng);
         assert!(plane.after(&start, &JointDelta::default()).is_some());
         let spec = BehaviourSpec::approaching();
-        let lesson = plane.learn(spec, 2_000, &mut rng, &mut |_| ()).expect("learns");
+        let lesson = plane
+            .learn(spec, 2_000, &mut rng, &mut |_| ())
+            .expect("learns");
         assert!(lesson.report.episodes > 0);
     }
 }

@@ -11,20 +11,23 @@ use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
 use puma_val2::SerialLine;
 use puma_val2::nalgebra::Point3;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, Profile, ProximitySensor,
-    PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, Profile,
+    ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
 use crate::Contacts;
 use crate::guarded_arm::GuardedArm;
 use crate::surroundings::Surroundings;
 
-/// An arm behind a VAL II controller, calibrated, with a simulated cell around it: a ball to place, a camera on the hand whose
-/// frames are rendered from where the arm stands, proximity sensors, and a gripper that holds the ball or misses it.
+/// An arm behind a VAL II controller, calibrated, with a simulated cell around it: a ball to place,
+/// a camera on the hand whose frames are rendered from where the arm stands, proximity sensors, and
+/// a gripper that holds the ball or misses it.
 ///
-/// With [`Rig::emulated`] the controller is emulated here; camera, sensors and ball follow the emulated arm itself, on its way too, and the
-/// sensors are wired to the controller, which stops the arm. With [`Rig::on_port`] and [`Rig::on_socket`] it is somebody else's, and the cell
-/// follows what that controller reports at the end of each move; its moves are guarded by its own sensors' input.
+/// With [`Rig::emulated`] the controller is emulated here; camera, sensors and ball follow the
+/// emulated arm itself, on its way too, and the sensors are wired to the controller, which stops
+/// the arm. With [`Rig::on_port`] and [`Rig::on_socket`] it is somebody else's, and the cell
+/// follows what that controller reports at the end of each move; its moves are guarded by its own
+/// sensors' input.
 pub struct Rig {
     name: String,
     arm: Box<dyn Manipulator>,
@@ -44,8 +47,9 @@ const BAUD: u32 = 9600;
 const SOCKET_TIMEOUT: Duration = Duration::from_secs(5);
 
 impl Rig {
-    /// Starts a controller emulator on a line of its own and connects to it: a pseudo-terminal opened through `serialport`
-    /// like a serial line where the system has them (Unix, feature `serial`), a local socket elsewhere.
+    /// Starts a controller emulator on a line of its own and connects to it: a pseudo-terminal
+    /// opened through `serialport` like a serial line where the system has them (Unix, feature
+    /// `serial`), a local socket elsewhere.
     ///
     /// The emulated arm takes no time unless `realtime`. `scene` and `seed` are the renderer's.
     ///
@@ -73,8 +77,8 @@ impl Rig {
         };
         #[cfg(not(all(unix, feature = "serial")))]
         let (server, line) = {
-            let server =
-                puma_val2::TcpServer::spawn("127.0.0.1:0", emulator, config).map_err(RigError::Serve)?;
+            let server = puma_val2::TcpServer::spawn("127.0.0.1:0", emulator, config)
+                .map_err(RigError::Serve)?;
             let line = TcpLine::connect(&server.address().to_string(), SOCKET_TIMEOUT)?;
             (server, line)
         };
@@ -113,7 +117,11 @@ impl Rig {
         Self::elsewhere(TcpLine::connect(address, SOCKET_TIMEOUT)?, scene, seed)
     }
 
-    fn elsewhere<T: Transport + 'static>(line: T, scene: &Scene, seed: u64) -> Result<Self, RigError> {
+    fn elsewhere<T: Transport + 'static>(
+        line: T,
+        scene: &Scene,
+        seed: u64,
+    ) -> Result<Self, RigError> {
         let name = line.name().to_owned();
         let mut arm = connect(line, ClientConfig::default())?;
         let reported = Arc::new(Mutex::new(arm.joints()?));
@@ -173,10 +181,12 @@ impl Rig {
         &self.cell
     }
 
-    /// Puts the ball, on a holder, at another place, out of the jaws if they held it; contacts are counted from here on.
+    /// Puts the ball, on a holder, at another place, out of the jaws if they held it; contacts are
+    /// counted from here on.
     ///
     /// # Errors
-    /// [`PlaceError::InHand`] where ball or holder would stand in the hand, which rests there; then nothing has changed.
+    /// [`PlaceError::InHand`] where ball or holder would stand in the hand, which rests there; then
+    /// nothing has changed.
     pub fn place(&mut self, ball: &Ball) -> Result<(), PlaceError> {
         let joints = (self.pose)();
         let placed = self.cell.with(|cell| {
@@ -199,7 +209,8 @@ impl Rig {
         Ok(())
     }
 
-    /// As [`Rig::place`]; where the hand is in the way the arm first goes to VAL's READY pose, straight up.
+    /// As [`Rig::place`]; where the hand is in the way the arm first goes to VAL's READY pose,
+    /// straight up.
     ///
     /// # Errors
     /// What kept the arm from getting there.
@@ -213,7 +224,8 @@ impl Rig {
         }
     }
 
-    /// Takes the ball and its holder out of the cell, opens the jaws, and takes the arm to `pose`; then the next ball can be placed.
+    /// Takes the ball and its holder out of the cell, opens the jaws, and takes the arm to `pose`;
+    /// then the next ball can be placed.
     ///
     /// # Errors
     /// What kept the arm from getting there.
@@ -265,7 +277,12 @@ impl Rig {
             arm,
             mut sensor,
         } = self.parts();
-        agent.run_and_learn(&mut CameraEye::new(camera, detector), arm, &mut *sensor, observe)
+        agent.run_and_learn(
+            &mut CameraEye::new(camera, detector),
+            arm,
+            &mut *sensor,
+            observe,
+        )
     }
 
     /// Camera, arm and sensor apart, for an eye of one's own or with something in between.

@@ -1,21 +1,25 @@
-//! What the programs and tests of this package have in common: detectors by name, set for the camera on the hand, and a scene.
+//! What the programs and tests of this package have in common: detectors by name, set for the
+//! camera on the hand, and a scene.
 
 use std::fmt;
 use std::str::FromStr;
 
 use hough_heuristic::{
-    Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, Heuristic, HeuristicConfig, RandomizedHough,
-    RandomizedHoughConfig, StandardHough, StandardHoughConfig, Trusted, TrustedConfig,
+    Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, Heuristic, HeuristicConfig,
+    RandomizedHough, RandomizedHoughConfig, StandardHough, StandardHoughConfig, Trusted,
+    TrustedConfig,
 };
 use pipeline_sim::{Scene, Shape};
 
 /// A way of finding the ball in frames of the camera on the hand.
 ///
-/// This is the one place that knows which there are: what is in [`BallDetector::ALL`] can be named on every command line.
+/// This is the one place that knows which there are: what is in [`BallDetector::ALL`] can be named
+/// on every command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum BallDetector {
-    /// Pairs of edge points at several sizes, each circle proven against chance: goes beyond the paper.
+    /// Pairs of edge points at several sizes, each circle proven against chance: goes beyond the
+    /// paper.
     #[default]
     Trusted,
     /// Three random edge pixels, belonging against a threshold: the paper's.
@@ -51,7 +55,8 @@ impl BallDetector {
         }
     }
 
-    /// The detector, set for the ball of 20 mm radius in frames of 768x576 pixels. `seed` is that of its draws, if it has any.
+    /// The detector, set for the ball of 20 mm radius in frames of 768x576 pixels. `seed` is that
+    /// of its draws, if it has any.
     ///
     /// # Errors
     /// None for the settings that are made here; the type says that others could.
@@ -104,11 +109,13 @@ impl BallDetector {
     }
 }
 
-/// Least score of a circle that the arm goes for. An arm looks at many frames without a ball in them and follows what it sees: a curve of the
-/// clutter that scores half leads it astray, while the ball itself scores above .9 unless the border cuts it.
+/// Least score of a circle that the arm goes for. An arm looks at many frames without a ball in
+/// them and follows what it sees: a curve of the clutter that scores half leads it astray, while
+/// the ball itself scores above .9 unless the border cuts it.
 const MIN_SCORE: f64 = 0.8;
 
-/// The shaded side of the ball is hardly brighter than the table: edges must be taken that are weaker than usual.
+/// The shaded side of the ball is hardly brighter than the table: edges must be taken that are
+/// weaker than usual.
 fn weak_edges() -> Result<Canny, ConfigError> {
     Canny::new(CannyConfig {
         low: 20.0,
@@ -141,7 +148,8 @@ pub struct UnknownDetector(String);
 
 /// A bright ball over a dark wooden table with boxes and tape on it.
 ///
-/// Nothing else in the scene is round: seen straight on, a disc on the table cannot be told from a ball by its outline.
+/// Nothing else in the scene is round: seen straight on, a disc on the table cannot be told from a
+/// ball by its outline.
 pub fn bright_ball_scene() -> Scene {
     let mut scene = Scene::laboratory();
     (scene.table.albedo, scene.table.texture) = (0.20, 0.30);
@@ -174,7 +182,9 @@ mod tests {
             let off = (seen.x - truth.x).hypot(seen.y - truth.y) + (seen.r - truth.r).abs();
             assert!(off < 0.5, "{kind}: {seen:?} for {truth:?}");
         }
-        let unknown = "houhg".parse::<BallDetector>().expect_err("no such detector");
+        let unknown = "houhg"
+            .parse::<BallDetector>()
+            .expect_err("no such detector");
         assert!(unknown.to_string().contains("rht"), "{unknown}");
     }
 }

@@ -45,7 +45,8 @@ impl Surroundings {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The arm is at `joints`, on its way or standing. Returns whether something is too near to the hand there.
+    /// The arm is at `joints`, on its way or standing. Returns whether something is too near to the
+    /// hand there.
     pub(crate) fn hand_at(&self, joints: &Joints) -> bool {
         let mut state = self.lock();
         let from = state.stood.replace(*joints).unwrap_or(*joints);

@@ -1,12 +1,20 @@
-//! From samples of the cell to two learned behaviours: the paper's "first learned in a simulated environment".
+//! From samples of the cell to two learned behaviours: the paper's "first learned in a simulated
+//! environment".
 
-use grasp_agent::{Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Episode, Learned, Percept};
-use pipeline_sim::{CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample};
+use grasp_agent::{
+    Behaviour, BehaviourError, BehaviourSpec, BehaviourTask, Episode, Learned, Percept,
+};
+use pipeline_sim::{
+    CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample,
+};
 use puma_val2::{Joint, JointDelta};
-use qtable::{Action, Progress, QTable, Record, Schedule, State, TrainConfig, TrainReport, train_in_blocks};
+use qtable::{
+    Action, Progress, QTable, Record, Schedule, State, TrainConfig, TrainReport, train_in_blocks,
+};
 use rand::{Rng, RngExt};
 
-/// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted to samples.
+/// The regression simulator of section 4: what becomes of x, y and r when the joints move, fitted
+/// to samples.
 #[derive(Clone, Debug)]
 pub struct Simulator {
     centre: CentreModel,
@@ -46,14 +54,16 @@ impl Simulator {
         })
     }
 
-    /// How well each output is explained: `dx` of centering, `dy` and `dr` of approaching, in feature units.
+    /// How well each output is explained: `dx` of centering, `dy` and `dr` of approaching, in
+    /// feature units.
     pub fn quality(&self) -> Vec<Quality> {
         let mut all = self.centre.quality();
         all.extend(self.reach.quality());
         all
     }
 
-    /// A start for an episode: what one of the samples began with. All of them were in view and within reach.
+    /// A start for an episode: what one of the samples began with. All of them were in view and
+    /// within reach.
     pub fn start(&self, rng: &mut dyn Rng) -> Percept {
         self.starts[rng.random_range(0..self.starts.len())]
     }
@@ -86,15 +96,17 @@ pub struct Lesson {
     pub behaviour: Behaviour,
     /// The learning curve.
     pub report: TrainReport,
-    /// Actions after which the table was as it is in `behaviour`: all of them, or fewer where the best table was kept.
+    /// Actions after which the table was as it is in `behaviour`: all of them, or fewer where the
+    /// best table was kept.
     pub learned_by: u64,
 }
 
-/// Learns `spec` in `simulator` with the paper's settings (section 4): gamma 0.9, alpha falling from 0.6, the temperature from
-/// 1000, exploring starts.
+/// Learns `spec` in `simulator` with the paper's settings (section 4): gamma 0.9, alpha falling
+/// from 0.6, the temperature from 1000, exploring starts.
 ///
 /// # Errors
-/// No actions to learn by, or a reward that is not a number (the literal Eq. 5 and 6 divide by zero on their targets).
+/// No actions to learn by, or a reward that is not a number (the literal Eq. 5 and 6 divide by zero
+/// on their targets).
 pub fn learn(
     spec: BehaviourSpec,
     simulator: &Simulator,
@@ -105,11 +117,13 @@ pub fn learn(
     learn_best(spec, simulator, &[], actions, rng, on_progress)
 }
 
-/// As [`learn`], and keeps the best of the tables met on the way: in the second half of the run, at every record of the learning
-/// curve, the greedy policy goes for the ball from each of `trials` in the simulator, and the table that needs the fewest steps stays,
-/// with an action that lost the ball in a trial not chosen in its state any more. Without trials it is the last one.
+/// As [`learn`], and keeps the best of the tables met on the way: in the second half of the run, at
+/// every record of the learning curve, the greedy policy goes for the ball from each of `trials` in
+/// the simulator, and the table that needs the fewest steps stays, with an action that lost the
+/// ball in a trial not chosen in its state any more. Without trials it is the last one.
 ///
-/// A table on coarse states is never at rest: with each update the policy may lose a way here and find one there.
+/// A table on coarse states is never at rest: with each update the policy may lose a way here and
+/// find one there.
 ///
 /// # Errors
 /// As for [`learn`].
@@ -127,16 +141,18 @@ pub fn learn_best(
     learn_in(spec, simulate, start, trials, &config, rng, on_progress)
 }
 
-/// The paper's settings (section 4) for a number of actions, with the ends of the two courses, which it does not give, at 0.1 for alpha
-/// and 5 for the temperature.
+/// The paper's settings (section 4) for a number of actions, with the ends of the two courses,
+/// which it does not give, at 0.1 for alpha and 5 for the temperature.
 ///
-/// Both are far above those of [`TrainConfig::paper`]: on states as coarse as these, values that are still moving and actions that are
-/// still tried find the policies that reach the goal from everywhere, where a colder end settles early on some that do not.
+/// Both are far above those of [`TrainConfig::paper`]: on states as coarse as these, values that
+/// are still moving and actions that are still tried find the policies that reach the goal from
+/// everywhere, where a colder end settles early on some that do not.
 ///
 /// # Errors
 /// No actions to learn by.
 pub fn schedule(actions: u64) -> Result<TrainConfig, LearnError> {
-    let exponential = |start, end| Schedule::exponential(start, end, actions).map_err(qtable::Error::from);
+    let exponential =
+        |start, end| Schedule::exponential(start, end, actions).map_err(qtable::Error::from);
     Ok(TrainConfig {
         alpha: exponential(0.6, 0.1)?,
         temperature: exponential(1000.0, 5.0)?,
@@ -214,7 +230,8 @@ fn between(schedule: &Schedule, from: u64, to: u64) -> Result<Schedule, qtable::
     Ok(Schedule::piecewise(&[(0, start), (to - from, end)])?)
 }
 
-/// What the greedy policy, with the loop breaker of approaching, came to from a number of starts together.
+/// What the greedy policy, with the loop breaker of approaching, came to from a number of starts
+/// together.
 #[derive(Debug, Default)]
 struct Trials {
     /// Steps to the goal; a trial that did not reach it counts as [`Trials::FAILED`].
@@ -248,7 +265,8 @@ impl Trials {
                     (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
                 };
                 let state = spec.state(&now).ok()?;
-                let action = behaviour.choose(state, &episode, Learned::APPROACHING_KAPPA, admitted)?;
+                let action =
+                    behaviour.choose(state, &episode, Learned::APPROACHING_KAPPA, admitted)?;
                 episode.chose(state, action);
                 let Some(after) = simulate(&now, &deltas[action.0]) else {
                     trials.lost_by.push((state, action));
@@ -272,10 +290,13 @@ impl Trials {
     }
 }
 
-/// `table` without the actions by which its greedy policy loses the ball from `starts`, and what it comes to then.
+/// `table` without the actions by which its greedy policy loses the ball from `starts`, and what it
+/// comes to then.
 ///
-/// A state is a region, and an action that is the best in nearly all of it may lose the ball from one of its corners: on average that costs too
-/// little to be noticed. Such an action gets the lowest value of its state. Not done where even without losses it would take `fewest` steps or more.
+/// A state is a region, and an action that is the best in nearly all of it may lose the ball from
+/// one of its corners: on average that costs too little to be noticed. Such an action gets the
+/// lowest value of its state. Not done where even without losses it would take `fewest` steps or
+/// more.
 fn without_losses(
     starts: &[Percept],
     mut behaviour: Behaviour,
@@ -291,7 +312,11 @@ fn without_losses(
         }
         let mut table = behaviour.table().clone();
         for (state, action) in &tried.lost_by {
-            let lowest = table.row(*state).iter().copied().fold(f64::INFINITY, f64::min);
+            let lowest = table
+                .row(*state)
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min);
             table.set(*state, *action, lowest)?;
         }
         behaviour = Behaviour::new(behaviour.spec().clone(), table)?;
@@ -334,8 +359,12 @@ mod tests {
             let [_, a, b, ..] = spec.delta(action).degrees();
             (a - j2).abs() < 1e-9 && (b - j3).abs() < 1e-9
         };
-        let long = actions().find(|a| turns(*a, 20.0, -16.0)).expect("the paper's");
-        let short = actions().find(|a| turns(*a, 6.0, -1.6)).expect("the paper's");
+        let long = actions()
+            .find(|a| turns(*a, 20.0, -16.0))
+            .expect("the paper's");
+        let short = actions()
+            .find(|a| turns(*a, 6.0, -1.6))
+            .expect("the paper's");
         let mut table = QTable::new(spec.states(), spec.actions()).expect("not empty");
         table.set(state, long, 740.0).expect("in the table");
         table.set(state, short, 700.0).expect("in the table");
@@ -357,8 +386,8 @@ mod tests {
         assert!(lost_by(&behaviour, corner, &mut simulate).contains(&(state, long)));
         assert!(!lost_by(&behaviour, inside, &mut simulate).contains(&(state, long)));
         let starts = [corner, inside];
-        let (_, table) =
-            without_losses(&starts, behaviour.clone(), usize::MAX, &mut simulate).expect("sets values");
+        let (_, table) = without_losses(&starts, behaviour.clone(), usize::MAX, &mut simulate)
+            .expect("sets values");
         let without = Behaviour::new(behaviour.spec().clone(), table).expect("fits");
         let chosen = without.choose(state, &Episode::new(&without), 0.0, |_| true);
         assert_eq!(chosen, Some(short));

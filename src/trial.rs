@@ -1,11 +1,14 @@
-//! Trials on the feature shortcut: one ball in a cell that may be wrong, and an agent that goes for it, without rendering.
+//! Trials on the feature shortcut: one ball in a cell that may be wrong, and an agent that goes for
+//! it, without rendering.
 
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Controller, Event, Eye, ImageBased, Look, Outcome, Sighting, TaughtGoal,
+    Agent, AgentConfig, AgentError, Controller, Event, Eye, ImageBased, Look, Outcome, Sighting,
+    TaughtGoal,
 };
 use hough_heuristic::{Detection, Features, FrameError};
 use pipeline_sim::{
-    Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Hand, SharedCell, SimulatedArm, Workspace,
+    Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Hand, SharedCell, SimulatedArm,
+    Workspace,
 };
 use puma_val2::{ArmError, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -50,7 +53,8 @@ pub struct TrialResult {
     pub reached: bool,
     /// Whether the jaws hold the ball at the end.
     pub held: bool,
-    /// From the point between the finger pads to the ball's centre when the jaws closed, metres; `None` if they did not.
+    /// From the point between the finger pads to the ball's centre when the jaws closed, metres;
+    /// `None` if they did not.
     pub miss: Option<f64>,
     /// How often something came too near to the hand.
     pub near: usize,
@@ -72,8 +76,8 @@ impl TrialCell {
         })
     }
 
-    /// The same cell with a hand that touches nothing: whether the ball is *reached* does not depend then on what stands in the
-    /// way.
+    /// The same cell with a hand that touches nothing: whether the ball is *reached* does not
+    /// depend then on what stands in the way.
     #[must_use]
     pub fn without_bodies(mut self) -> Self {
         // Everything of the hand at the wrist centre, where no ball can be.
@@ -115,7 +119,8 @@ impl TrialCell {
         }))
     }
 
-    /// The paper's settings for this cell. A hand without bodies cannot hold the ball, and is not asked to lift it.
+    /// The paper's settings for this cell. A hand without bodies cannot hold the ball, and is not
+    /// asked to lift it.
     pub fn agent_config(&self) -> AgentConfig {
         let paper = AgentConfig::paper(self.search_poses());
         AgentConfig {
@@ -129,11 +134,13 @@ impl TrialCell {
         self.workspace.search_poses()
     }
 
-    /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5` is taken back, and the camera looks a few
-    /// times. Where the ball is not well in view then, a shorter or a longer turn is tried, and then one of `JT4` before it, which brings a ball
-    /// that shows too far aside into view. `None` where it is with none of them.
+    /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5`
+    /// is taken back, and the camera looks a few times. Where the ball is not well in view then, a
+    /// shorter or a longer turn is tried, and then one of `JT4` before it, which brings a ball that
+    /// shows too far aside into view. `None` where it is with none of them.
     ///
-    /// Both are turns of the wrist, by which jaws and camera move in the same way wherever the arm stands.
+    /// Both are turns of the wrist, by which jaws and camera move in the same way wherever the arm
+    /// stands.
     ///
     /// # Errors
     /// What the arm reports.
@@ -145,7 +152,9 @@ impl TrialCell {
         let from = Joints::from_degrees(ImageBased::GOAL_POSE);
         let config = self.agent_config();
         let upright = TURNS.map(|more| (0.0, more));
-        let turned = TURNS.iter().flat_map(|more| ASIDE.map(|aside| (aside, *more)));
+        let turned = TURNS
+            .iter()
+            .flat_map(|more| ASIDE.map(|aside| (aside, *more)));
         for (aside, more) in upright.into_iter().chain(turned) {
             let mut grip = config.grip;
             grip.0[Joint::J4.index()] += f64::to_radians(aside);
@@ -157,7 +166,8 @@ impl TrialCell {
         Ok(None)
     }
 
-    /// The ball as it shows on average from `from`, having been between the jaws when `grip` led there; `None` if it is not well in view.
+    /// The ball as it shows on average from `from`, having been between the jaws when `grip` led
+    /// there; `None` if it is not well in view.
     fn seen_after_taking_back(
         &self,
         grip: &JointDelta,
@@ -188,8 +198,9 @@ impl TrialCell {
         Ok(seen.map(mean).filter(well_inside))
     }
 
-    /// Lets `agent` go for the ball that `seed` places among those that can be seen from the search poses. `world` is called after each look,
-    /// before it is answered, with the cell and the joints as they are: it may move the ball. `None` if no ball can be seen.
+    /// Lets `agent` go for the ball that `seed` places among those that can be seen from the search
+    /// poses. `world` is called after each look, before it is answered, with the cell and the
+    /// joints as they are: it may move the ball. `None` if no ball can be seen.
     ///
     /// # Errors
     /// What the agent reports.
@@ -277,7 +288,8 @@ impl ProximitySensor for Sensor<'_> {
     }
 }
 
-/// Whether a ball that shows like this still does from a pose that differs by the play of the joints.
+/// Whether a ball that shows like this still does from a pose that differs by the play of the
+/// joints.
 fn well_inside(f: &Features) -> bool {
     const MARGIN: f64 = 8.0;
     f.r > 5.5

@@ -1,6 +1,7 @@
 //! The examples as their users meet them: what bad input gets.
 //!
-//! `cargo test` builds the examples beside the tests; where one is not there, its test says so and is skipped.
+//! `cargo test` builds the examples beside the tests; where one is not there, its test says so and
+//! is skipped.
 
 #![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 
@@ -61,7 +62,10 @@ fn grasp_keeps_what_an_earlier_run_left_when_it_cannot_begin() {
     let kept = folder.path().join("out/failures/run001.json");
     std::fs::create_dir_all(folder.path().join("out/failures")).expect("a folder");
     std::fs::write(&kept, "a run").expect("a file");
-    for wrong in [["--policy", "no-such-policy"], ["--port", "/dev/no-such-port"]] {
+    for wrong in [
+        ["--policy", "no-such-policy"],
+        ["--port", "/dev/no-such-port"],
+    ] {
         if grasp_fails(folder.path(), &wrong).is_none() {
             return;
         }
@@ -187,13 +191,17 @@ fn options_that_would_have_no_effect_are_refused() {
     std::fs::write(&path, blank_policy(BehaviourPair::paper_mended())).expect("a file");
     let argument = path.to_str().expect("a plain path").to_owned();
     for more in [&["--fine"][..], &["--reward", "mended"]] {
-        let Some(errors) = grasp_fails(folder.path(), &[&["--policy", &argument], more].concat()) else {
+        let Some(errors) = grasp_fails(folder.path(), &[&["--policy", &argument], more].concat())
+        else {
             return;
         };
         assert!(errors.contains("--fine and --reward"), "{errors}");
     }
     for (program, options) in [
-        ("grasp", &["--policy", &argument, "--simulator", "linear"][..]),
+        (
+            "grasp",
+            &["--policy", &argument, "--simulator", "linear"][..],
+        ),
         ("track", &["--shortcut", "--noise", "3"]),
         ("track", &["--shortcut", "--detector", "rht"]),
         ("track", &["--shortcut", "--belief", &argument]),
@@ -231,7 +239,9 @@ fn grasp_keeps_what_it_has_when_the_controller_dies() {
     while !link.exists() {
         std::thread::sleep(Duration::from_millis(20));
     }
-    grasp.args(["--quiet", "--keep-learning", "--port"]).arg(&link);
+    grasp
+        .args(["--quiet", "--keep-learning", "--port"])
+        .arg(&link);
     grasp
         .arg("--policy")
         .arg(&policy)
@@ -280,7 +290,8 @@ fn grasp_keeps_what_it_has_when_the_controller_dies() {
     replays(&file, &text);
 }
 
-/// Another program makes a run of which the arm failed again from the file alone, and sees whether something is changed in it.
+/// Another program makes a run of which the arm failed again from the file alone, and sees whether
+/// something is changed in it.
 fn replays(file: &Path, text: &str) {
     let replayed = |file: &Path, options: &[&str]| {
         let (again, errors) = output(example("replay")?.args(options).arg(file));
@@ -300,7 +311,11 @@ fn replays(file: &Path, text: &str) {
     );
 
     let other = file.with_file_name("other.json");
-    std::fs::write(&other, text.replacen("\"AtSearchPose\":", "\"Recovering\":", 1)).expect("a file");
+    std::fs::write(
+        &other,
+        text.replacen("\"AtSearchPose\":", "\"Recovering\":", 1),
+    )
+    .expect("a file");
     let (code, said, errors) = replayed(&other, &["--events"]).expect("it was there");
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("another course from event 2 on"), "{said}");
@@ -308,7 +323,12 @@ fn replays(file: &Path, text: &str) {
 
     std::fs::write(&other, &text[..text.len() / 2]).expect("a file");
     let whole = file.to_str().expect("plain text");
-    let (again, errors) = output(example("replay").expect("it was there").arg(&other).arg(whole));
+    let (again, errors) = output(
+        example("replay")
+            .expect("it was there")
+            .arg(&other)
+            .arg(whole),
+    );
     assert_eq!(again.status.code(), Some(1), "{errors}");
     let said = String::from_utf8_lossy(&again.stdout);
     assert!(said.contains(whole) && said.contains("the same"), "{said}");
@@ -347,7 +367,8 @@ fn detect_circles_names_what_it_cannot_read_and_goes_on() {
     assert_eq!(rows.next(), Some("file,cx,cy,r,score"));
     let ball: Vec<&str> = rows.next().expect("the ball is found").split(',').collect();
     assert!(ball[0].ends_with("c_ball.png"));
-    let near = |field: &str, value: f64| (field.parse::<f64>().expect("a number") - value).abs() < 1.0;
+    let near =
+        |field: &str, value: f64| (field.parse::<f64>().expect("a number") - value).abs() < 1.0;
     assert!(
         near(ball[1], 90.0) && near(ball[2], 80.0) && near(ball[3], 40.0),
         "{ball:?}"
@@ -375,7 +396,10 @@ fn detect_circles_shows_the_stages_of_every_detector() {
         let Some(mut command) = example("detect_circles") else {
             return;
         };
-        let (stages, times) = (folder.path().join(detector), folder.path().join("times.csv"));
+        let (stages, times) = (
+            folder.path().join(detector),
+            folder.path().join("times.csv"),
+        );
         command
             .args(["--detector", detector])
             .arg("--stages")
@@ -409,9 +433,14 @@ fn detect_circles_names_a_frame_that_is_too_large_and_goes_on() {
         return;
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let (large, small) = (folder.path().join("large.pgm"), folder.path().join("small.pgm"));
+    let (large, small) = (
+        folder.path().join("large.pgm"),
+        folder.path().join("small.pgm"),
+    );
     for (path, width, height) in [(&large, 3840, 2160), (&small, 160, 120)] {
-        image::GrayImage::new(width, height).save(path).expect("a file");
+        image::GrayImage::new(width, height)
+            .save(path)
+            .expect("a file");
     }
     let (output, errors) = output(
         command
@@ -470,7 +499,13 @@ fn pictures_are_written_for_a_reader_who_has_left() {
     let output = running.wait_with_output().expect("the example ends");
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && errors.is_empty(), "{errors}");
-    for name in ["overview.svg", "search.png", "goal.png", "run.png", "run.y4m"] {
+    for name in [
+        "overview.svg",
+        "search.png",
+        "goal.png",
+        "run.png",
+        "run.y4m",
+    ] {
         assert!(folder.path().join(name).exists(), "{name}");
     }
 }

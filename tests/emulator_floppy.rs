@@ -1,6 +1,7 @@
 //! The floppy disk of the emulator that `val2_emulator` serves: a folder.
 //!
-//! `cargo test` builds the example beside the tests; where it is not there, the test says so and is skipped.
+//! `cargo test` builds the example beside the tests; where it is not there, the test says so and is
+//! skipped.
 
 #![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 
@@ -13,7 +14,11 @@ use std::time::Duration;
 /// The example on any free socket, with this folder as its floppy disk.
 fn serving(folder: &Path) -> Option<Command> {
     let own = std::env::current_exe().expect("a path of its own");
-    let built = own.ancestors().nth(2).expect("a target folder").join("examples");
+    let built = own
+        .ancestors()
+        .nth(2)
+        .expect("a target folder")
+        .join("examples");
     let mut command = Command::new(
         built
             .join("val2_emulator")
@@ -23,7 +28,9 @@ fn serving(folder: &Path) -> Option<Command> {
         println!("skipped: val2_emulator has not been built");
         return None;
     }
-    command.args(["--tcp", "127.0.0.1:0", "--floppy"]).arg(folder);
+    command
+        .args(["--tcp", "127.0.0.1:0", "--floppy"])
+        .arg(folder);
     Some(command)
 }
 
@@ -44,7 +51,9 @@ impl Terminal {
             .expect("the emulator starts");
         let mut first = String::new();
         let out = emulator.stdout.take().expect("its output");
-        BufReader::new(out).read_line(&mut first).expect("its first line");
+        BufReader::new(out)
+            .read_line(&mut first)
+            .expect("its first line");
         let address = first
             .trim()
             .strip_prefix("listening on ")
@@ -123,7 +132,10 @@ fn the_floppy_folder_holds_what_the_disk_does() {
     terminal.say("STORE CELL.B", "\r\n.");
     terminal.say("STORE OLD", "\r\n.");
     terminal.quit();
-    assert_eq!(names(disk), ["CELL.A.v2", "CELL.B.v2", "notes.txt", "old.v2"]);
+    assert_eq!(
+        names(disk),
+        ["CELL.A.v2", "CELL.B.v2", "notes.txt", "old.v2"]
+    );
     let text = |name| std::fs::read_to_string(disk.join(name)).expect("a file");
     assert_eq!(text("CELL.A.v2"), ".REALS\nN 3\n.END\n");
     assert_eq!(text("CELL.B.v2"), ".REALS\nM 4\nN 3\n.END\n");

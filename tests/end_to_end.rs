@@ -1,7 +1,10 @@
-//! The whole chain on its real parts: samples, regression, learning, policies on disk, the emulated controller on a
-//! pseudo-terminal (a socket where the system has none), rendered frames, the paper's detector, and the grip.
+//! The whole chain on its real parts: samples, regression, learning, policies on disk, the emulated
+//! controller on a pseudo-terminal (a socket where the system has none), rendered frames, the
+//! paper's detector, and the grip.
 
-use grasp_agent::{Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned, Percept};
+use grasp_agent::{
+    Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned, Percept,
+};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{Ball, ReachForm, Workspace, sample_moves};
 use puma_grasp::{BallDetector, Rig, Simulator, bright_ball_scene, learn_best, search_percepts};
@@ -12,11 +15,13 @@ fn detector() -> Box<dyn CircleDetector + Send> {
     BallDetector::Heuristic.build(1).expect("valid settings")
 }
 
-/// Learns both behaviours in a simulator fitted to `rig`'s cell; they pass through files on the way.
+/// Learns both behaviours in a simulator fitted to `rig`'s cell; they pass through files on the
+/// way.
 fn agent(rig: &Rig, seed: u64) -> Agent {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (centring, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, &mut rng);
-    let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
+    let simulator =
+        Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
     assert!(
         simulator.quality().iter().all(|quality| quality.r2 > 0.9),
         "{:?}",
@@ -24,7 +29,8 @@ fn agent(rig: &Rig, seed: u64) -> Agent {
     );
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut taught = |spec: BehaviourSpec, trials: &[Percept], actions| {
-        let lesson = learn_best(spec, &simulator, trials, actions, &mut rng, &mut |_| {}).expect("learns");
+        let lesson =
+            learn_best(spec, &simulator, trials, actions, &mut rng, &mut |_| {}).expect("learns");
         let path = folder.path().join("behaviour.policy");
         lesson.behaviour.save(&path).expect("saves");
         let loaded = Behaviour::load(&path, lesson.behaviour.spec()).expect("loads");
@@ -32,7 +38,11 @@ fn agent(rig: &Rig, seed: u64) -> Agent {
         loaded
     };
     let centering = taught(BehaviourSpec::centering(), &[], 60_000);
-    let approaching = taught(BehaviourSpec::approaching(), &search_percepts(200, seed), 300_000);
+    let approaching = taught(
+        BehaviourSpec::approaching(),
+        &search_percepts(200, seed),
+        300_000,
+    );
     let config = AgentConfig::paper(Workspace::paper().search_poses());
     Agent::with_controller(config, Learned::new(centering, approaching)).expect("valid settings")
 }
@@ -40,7 +50,8 @@ fn agent(rig: &Rig, seed: u64) -> Agent {
 #[test]
 fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
     let run = || {
-        let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
+        let mut rig =
+            Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
         let agent = agent(&rig, 2000);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut log = Vec::new();
@@ -74,7 +85,8 @@ fn a_ball_out_of_view_is_reported_and_not_gripped() {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
     let agent = agent(&rig, 1);
     // Behind the arm.
-    rig.place(&Ball::at(-0.6, 0.0, -0.1)).expect("away from the hand");
+    rig.place(&Ball::at(-0.6, 0.0, -0.1))
+        .expect("away from the hand");
     let mut searched = Vec::new();
     let outcome = rig
         .run(&agent, &mut *detector(), &mut |event| {

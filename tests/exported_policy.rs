@@ -1,5 +1,6 @@
-//! An exported policy says all that another program needs: docs/run_policy.py, which knows nothing but the file and the arm's geometry,
-//! reaches the balls with it, and in as many moves as the controller here.
+//! An exported policy says all that another program needs: docs/run_policy.py, which knows nothing
+//! but the file and the arm's geometry, reaches the balls with it, and in as many moves as the
+//! controller here.
 
 #![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
 
@@ -16,7 +17,8 @@ fn learned() -> Learned {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
-    let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
+    let simulator =
+        Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
     let quiet = &mut |_: &qtable::Progress| ();
     let anywhere: Vec<_> = (0..500).map(|_| simulator.start(&mut rng)).collect();
     let centering = learn_best(
@@ -42,14 +44,18 @@ fn learned() -> Learned {
     )
 }
 
-/// Balls reached, and moves on average, as the script says: "reached 198 of 200 balls, in 9.71 moves on average".
+/// Balls reached, and moves on average, as the script says: "reached 198 of 200 balls, in 9.71
+/// moves on average".
 fn by_the_script(policy: &str) -> Option<(usize, f64)> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("policy.json");
     std::fs::write(&path, policy).expect("a file");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/run_policy.py");
     let output = Command::new("python3").arg(script).arg(&path).output();
-    let Some(output) = output.ok().filter(|output| output.status.code() != Some(127)) else {
+    let Some(output) = output
+        .ok()
+        .filter(|output| output.status.code() != Some(127))
+    else {
         println!("skipped: there is no python3");
         return None;
     };
@@ -99,7 +105,8 @@ fn another_program_reaches_the_balls_with_an_exported_policy() {
         "{reached} in {moves} there, {here} in {here_moves} here"
     );
 
-    // Its parts matter: without loop breakers, or with the actions counted the other way round, the same table does worse.
+    // Its parts matter: without loop breakers, or with the actions counted the other way round, the
+    // same table does worse.
     let endless = policy
         .replace("\"centering\": 20.0", "\"centering\": 0.0")
         .replace("\"approaching\": 20.0", "\"approaching\": 0.0");

@@ -1,9 +1,10 @@
-//! Faults through the real parts, the rendered camera, the detectors and a controller on a line: the arm stops, the cause is the last event and a
-//! typed error, and what was learned until then is kept.
+//! Faults through the real parts, the rendered camera, the detectors and a controller on a line:
+//! the arm stops, the cause is the last event and a typed error, and what was learned until then is
+//! kept.
 
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, GaveUp, Hybrid, HybridSettings,
-    Outcome, Prior,
+    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, GaveUp, Hybrid,
+    HybridSettings, Outcome, Prior,
 };
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{Circle, CircleDetector, Detection, FrameError, FrameSource};
@@ -50,7 +51,11 @@ impl Between<'_> {
         }
     }
 
-    fn run(&mut self, rig: &mut Rig, agent: &mut Agent<Hybrid>) -> (Result<Outcome, AgentError>, EventLog) {
+    fn run(
+        &mut self,
+        rig: &mut Rig,
+        agent: &mut Agent<Hybrid>,
+    ) -> (Result<Outcome, AgentError>, EventLog) {
         let mut log = EventLog::default();
         let RigParts {
             camera: inner,
@@ -66,7 +71,9 @@ impl Between<'_> {
             change: &mut self.arm,
         };
         let mut eye = CameraEye::new(&mut camera, &mut *self.detector);
-        let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| log.note(event));
+        let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
+            log.note(event)
+        });
         (end, log)
     }
 }
@@ -109,12 +116,17 @@ impl Manipulator for Arm<'_> {
     }
 }
 
-/// The error of a run that failed, which is also its last event; the arm stands where it was then, with the jaws open.
+/// The error of a run that failed, which is also its last event; the arm stands where it was then,
+/// with the jaws open.
 fn failure(end: Result<Outcome, AgentError>, log: &EventLog, rig: &Rig) -> AgentError {
     let error = end.expect_err("a fault");
     let last = log.events.last().expect("an event");
     assert_eq!(last.kind, EventKind::Failed(error.to_string()));
-    assert!(!log.events.iter().any(|event| event.kind == EventKind::Gripped));
+    assert!(
+        !log.events
+            .iter()
+            .any(|event| event.kind == EventKind::Gripped)
+    );
     let off = (rig.pose())() - last.joints;
     assert!(off.0.iter().all(|angle| angle.abs() < 1e-3), "{off:?}");
     error
@@ -136,7 +148,10 @@ fn a_camera_that_delivers_nothing_more_ends_the_run_and_leaves_what_was_learned(
     });
     let (end, log) = between.run(&mut rig, &mut agent);
     let error = failure(end, &log, &rig);
-    assert!(matches!(error, AgentError::Camera(FrameError::End)), "{error}");
+    assert!(
+        matches!(error, AgentError::Camera(FrameError::End)),
+        "{error}"
+    );
     assert!(*agent.controller().belief() != untaught());
 }
 
@@ -189,12 +204,19 @@ fn a_camera_that_froze_with_the_ball_at_the_goal_brings_about_no_grip_in_the_nex
         matches!(error, AgentError::Arm(ArmError::NotReached { .. })),
         "{error}"
     );
-    assert!(log.events.iter().any(|event| event.kind == EventKind::AtGoal));
+    assert!(
+        log.events
+            .iter()
+            .any(|event| event.kind == EventKind::AtGoal)
+    );
 
     frozen.set(true);
     let (end, log) = between.run(&mut rig, &mut agent);
     let error = failure(end, &log, &rig);
-    assert!(matches!(error, AgentError::FrozenCamera { looks: 2 }), "{error}");
+    assert!(
+        matches!(error, AgentError::FrozenCamera { looks: 2 }),
+        "{error}"
+    );
 }
 
 #[test]
@@ -208,12 +230,18 @@ fn garbage_in_the_place_of_frames_is_no_ball_for_any_detector() {
         between.camera = Box::new(|_| {
             frames += 1;
             let (width, height) = sizes[frames % sizes.len()];
-            Ok(GrayImage::from_fn(width, height, |_, _| Luma([rng.random()])))
+            Ok(GrayImage::from_fn(width, height, |_, _| {
+                Luma([rng.random()])
+            }))
         });
         let (end, log) = between.run(&mut rig, &mut agent);
         let outcome = end.expect("no fault of a device");
         assert_eq!(outcome.gave_up, Some(GaveUp::NotFound), "{kind}");
-        assert!(!log.events.iter().any(|event| event.kind == EventKind::Gripped));
+        assert!(
+            !log.events
+                .iter()
+                .any(|event| event.kind == EventKind::Gripped)
+        );
         assert!(*agent.controller().belief() == untaught());
     }
 }
@@ -254,7 +282,10 @@ fn circles_where_none_are_end_the_run_within_its_limits_and_without_a_ball() {
         between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(seed)));
         let (end, log) = between.run(&mut rig, &mut agent);
         let outcome = end.expect("no fault of a device");
-        assert!(outcome.gave_up.is_some() && !rig.holds_ball(), "{outcome:?}");
+        assert!(
+            outcome.gave_up.is_some() && !rig.holds_ball(),
+            "{outcome:?}"
+        );
         let config = agent.config();
         assert!(outcome.cycles <= config.max_cycles + config.recovery.len() + 1);
         for event in &log.events {
@@ -311,7 +342,10 @@ fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
         });
         let error = failure(end, &log, &rig);
         assert!(matches!(error, AgentError::Arm(_)), "{error}");
-        assert!(error.to_string().contains(&path), "{error} does not name {path}");
+        assert!(
+            error.to_string().contains(&path),
+            "{error} does not name {path}"
+        );
         assert_eq!(*agent.controller().belief() != untaught(), after > 0);
 
         // Another run on the dead line fails at once, and the one before stays learned.

@@ -1,9 +1,10 @@
-//! The proximity guard, the cell that follows the arm, and the honest grasp: through an emulated controller on a pseudo-terminal (a socket
-//! where the system has none), and with the arm of the cell itself.
+//! The proximity guard, the cell that follows the arm, and the honest grasp: through an emulated
+//! controller on a pseudo-terminal (a socket where the system has none), and with the arm of the
+//! cell itself.
 
 use grasp_agent::{
-    Agent, AgentConfig, Consequence, Controller, EventKind, EventLog, GaveUp, JointLimits, PositionBased,
-    ServoSettings, Situation,
+    Agent, AgentConfig, Consequence, Controller, EventKind, EventLog, GaveUp, JointLimits,
+    PositionBased, ServoSettings, Situation,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, FeatureCamera, Grasp, Workspace};
 use puma_grasp::{FeatureEye, PlaceError, Rig, RigParts, TrialCell, bright_ball_scene};
@@ -13,7 +14,8 @@ fn rig() -> Rig {
     Rig::emulated(false, &bright_ball_scene(), 5).expect("an emulated controller")
 }
 
-/// A ball in view of a search pose, the pose in which it shows in the middle of the goal, and the one in which the jaws are around it.
+/// A ball in view of a search pose, the pose in which it shows in the middle of the goal, and the
+/// one in which the jaws are around it.
 fn ball_and_goal() -> (Ball, Joints, Joints) {
     let ball = Ball::at(0.6, 0.1, -0.1);
     let goal = Cell::paper(ball)
@@ -35,7 +37,9 @@ fn the_controller_stops_the_arm_before_a_ball_in_its_way_and_the_guard_is_armed_
     let beside = grip + JointDelta::from_degrees([4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let across = JointDelta::from_degrees([-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     for _ in 0..2 {
-        let RigParts { arm, mut sensor, .. } = rig.parts();
+        let RigParts {
+            arm, mut sensor, ..
+        } = rig.parts();
         arm.move_to(goal).expect("free");
         assert!(!sensor.object_near().expect("a simulated sensor"));
         let above = beside + JointDelta::from_degrees([4.0, 0.0, 0.0, 0.0, 18.01, 0.0]);
@@ -67,7 +71,10 @@ fn the_ball_goes_with_the_jaws_and_is_pushed_by_fingers() {
     }
     assert!(rig.holds_ball() && rig.grip_miss() < 0.001);
     let contacts = rig.contacts();
-    assert_eq!((contacts.collisions, contacts.grasp), (0, Some(Grasp::Held)));
+    assert_eq!(
+        (contacts.collisions, contacts.grasp),
+        (0, Some(Grasp::Held))
+    );
     assert!((rig.cell().get().ball.centre - ball.centre).norm() > 0.1);
     // Placed elsewhere, it is out of the jaws, and what comes of it is counted anew.
     rig.place(&ball).expect("away from the hand");
@@ -78,7 +85,8 @@ fn the_ball_goes_with_the_jaws_and_is_pushed_by_fingers() {
 fn a_ball_is_not_placed_in_the_hand() {
     let (ball, _, grip) = ball_and_goal();
     let mut rig = rig();
-    rig.place(&Ball::at(-0.6, 0.0, -0.1)).expect("away from the hand");
+    rig.place(&Ball::at(-0.6, 0.0, -0.1))
+        .expect("away from the hand");
     rig.parts().arm.move_to(grip).expect("free");
     let before = rig.cell().get();
     // With the hand a finger's width to the side.
@@ -135,7 +143,9 @@ fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
         rig.place(&ball).expect("away from the hand");
         let mut eye = FeatureEye(FeatureCamera::new(rig.cell().clone(), rig.pose(), 0.0, 1));
         let mut log = EventLog::default();
-        let RigParts { arm, mut sensor, .. } = rig.parts();
+        let RigParts {
+            arm, mut sensor, ..
+        } = rig.parts();
         let outcome = agent
             .run_and_learn(&mut eye, arm, &mut *sensor, &mut |event| log.note(event))
             .expect("a stop is no failure");
@@ -145,7 +155,10 @@ fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
             .iter()
             .position(|word| *word == "too-near")
             .expect("the guard stopped it");
-        assert_eq!(words[near - 1..=near + 1], ["moved", "too-near", "taken-back"]);
+        assert_eq!(
+            words[near - 1..=near + 1],
+            ["moved", "too-near", "taken-back"]
+        );
         assert_eq!(outcome.gave_up, None, "{words:?}");
         assert!(rig.holds_ball() && agent.controller().taken_back > 0);
         // It was stopped on the way, and not at its end.
@@ -164,11 +177,14 @@ fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
 #[test]
 fn in_the_cell_without_a_controller_a_run_onto_the_ball_goes_back_and_on_to_the_grip_as_well() {
     let cell = TrialCell::draw(ErrorLevel::None, 1).expect("a cell");
-    let mut agent = Agent::with_controller(cell.agent_config(), Clumsy::default()).expect("valid settings");
+    let mut agent =
+        Agent::with_controller(cell.agent_config(), Clumsy::default()).expect("valid settings");
     for seed in 0..5 {
         let mut log = EventLog::default();
         let result = cell
-            .run(&mut agent, seed, &mut |_, _| (), &mut |event| log.note(event))
+            .run(&mut agent, seed, &mut |_, _| (), &mut |event| {
+                log.note(event)
+            })
             .expect("nothing fails")
             .expect("a ball in view");
         assert!(

@@ -1,10 +1,13 @@
-//! What the rewards of Eq. 5 and 6 ask for, by value iteration: as printed they pay more for going round than for arriving, and Eq. 6
-//! divides by zero besides (the pole of Eq. 5 lies within its goal); with denominators floored and the goal kept for ever they ask for the
-//! goal.
+//! What the rewards of Eq. 5 and 6 ask for, by value iteration: as printed they pay more for going
+//! round than for arriving, and Eq. 6 divides by zero besides (the pole of Eq. 5 lies within its
+//! goal); with denominators floored and the goal kept for ever they ask for the goal.
 //!
 //! `cargo test --test literal_reward -- --nocapture` prints the figures.
 
-#![allow(clippy::print_stdout, reason = "the figures are what one runs this for")]
+#![allow(
+    clippy::print_stdout,
+    reason = "the figures are what one runs this for"
+)]
 
 use grasp_agent::{BehaviourPair, BehaviourSpec, Percept, Reward};
 use hough_heuristic::Features;
@@ -26,8 +29,8 @@ fn at_x(x: usize) -> Percept {
     }
 }
 
-/// Centering at a fixed distance as a decision process of its own: 192 columns of the image, 6.1 of which a degree of `JT1` is worth
-/// where balls are first seen (r about 10).
+/// Centering at a fixed distance as a decision process of its own: 192 columns of the image, 6.1 of
+/// which a degree of `JT1` is worth where balls are first seen (r about 10).
 fn centering(reward: &Reward) -> Model {
     const COLUMNS_PER_DEGREE: f64 = 6.1;
     let spec = BehaviourSpec::centering();
@@ -46,13 +49,16 @@ fn centering(reward: &Reward) -> Model {
     .expect("finite rewards")
 }
 
-/// What the best policy under `reward` comes to from all columns outside the goal: how often it arrives within 60 steps, and the highest
-/// value of a state.
+/// What the best policy under `reward` comes to from all columns outside the goal: how often it
+/// arrives within 60 steps, and the highest value of a state.
 fn best_centering(reward: &Reward) -> (f64, f64) {
     let spec = BehaviourSpec::centering();
     let model = centering(reward);
     let plan = model.value_iteration(GAMMA, 1e-9).expect("converges");
-    let outside: Vec<State> = (0..192).filter(|x| !spec.at_goal(&at_x(*x))).map(State).collect();
+    let outside: Vec<State> = (0..192)
+        .filter(|x| !spec.at_goal(&at_x(*x)))
+        .map(State)
+        .collect();
     let start: Vec<(State, f64)> = outside
         .iter()
         .map(|state| (*state, 1.0 / outside.len() as f64))
@@ -86,8 +92,9 @@ fn equation_5_cycles_and_mended_it_centres() {
     assert!(arrives > 0.999 && most < 1000.001, "{arrives} {most}");
 }
 
-/// Approaching as a decision process on its 90 states, estimated from moves tried in the arm's plane under `reward`, and what the best
-/// policy in it comes to: how often it arrives within 60 steps, and how many rewards were infinite with whole pixels.
+/// Approaching as a decision process on its 90 states, estimated from moves tried in the arm's
+/// plane under `reward`, and what the best policy in it comes to: how often it arrives within 60
+/// steps, and how many rewards were infinite with whole pixels.
 fn best_approaching(reward: &Reward) -> (f64, f64, usize) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     let plane = ExactPlane::new(20_000, &mut rng);
@@ -103,7 +110,9 @@ fn best_approaching(reward: &Reward) -> (f64, f64, usize) {
     for _ in 0..400_000 {
         let before = plane.start(&mut rng);
         let action = Action(rng.random_range(0..spec.actions()));
-        let Ok(state) = spec.state(&before) else { continue };
+        let Ok(state) = spec.state(&before) else {
+            continue;
+        };
         let after = plane.after(&before, &spec.delta(action));
         let next = after.and_then(|after| Some((after, spec.state(&after).ok()?)));
         let step = match next {
@@ -126,19 +135,26 @@ fn best_approaching(reward: &Reward) -> (f64, f64, usize) {
                 }
             }
         };
-        estimate.observe(state, action, &step).expect("finite rewards");
+        estimate
+            .observe(state, action, &step)
+            .expect("finite rewards");
     }
     let (model, starts) = (
         estimate.to_model(reward.lost).expect("a finite reward"),
         spec.states() as f64,
     );
     let plan = model.value_iteration(GAMMA, 1e-6).expect("converges");
-    let start: Vec<(State, f64)> = (0..spec.states()).map(|s| (State(s), 1.0 / starts)).collect();
+    let start: Vec<(State, f64)> = (0..spec.states())
+        .map(|s| (State(s), 1.0 / starts))
+        .collect();
     let arrived = |step: &Step| step.status == Status::Terminated && step.reward > 0.0;
     let assessed = model
         .assess(&plan.table.greedy(), &start, GAMMA, 60, arrived)
         .expect("a policy of the model");
-    let mean = (0..spec.states()).map(|s| plan.table.max(State(s))).sum::<f64>() / starts;
+    let mean = (0..spec.states())
+        .map(|s| plan.table.max(State(s)))
+        .sum::<f64>()
+        / starts;
     (assessed.success, mean, infinite)
 }
 

@@ -11,7 +11,9 @@ use kinds::{Kind, Kinds, repeated, share, size};
 use rand::Rng as _;
 
 fn kinds_of(list: &str) -> Vec<Kind> {
-    let kinds = list.split(',').map(|name| name.parse::<Kinds>().expect("known"));
+    let kinds = list
+        .split(',')
+        .map(|name| name.parse::<Kinds>().expect("known"));
     kinds.flat_map(|k| k.0).collect()
 }
 
@@ -30,7 +32,10 @@ fn shares_sizes_and_kinds_that_make_no_sense_are_refused() {
     assert_eq!(size("768x576"), Ok((768, 576)));
     assert_eq!(repeated(&kinds_of("cell,benchmark")), None);
     assert_eq!(repeated(&kinds_of("cell,plain")).as_deref(), Some("plain"));
-    assert_eq!(repeated(&kinds_of("clean,many,clean")).as_deref(), Some("clean"));
+    assert_eq!(
+        repeated(&kinds_of("clean,many,clean")).as_deref(),
+        Some("clean")
+    );
 }
 
 #[test]
@@ -63,7 +68,9 @@ fn a_file_is_replaced_as_a_whole_and_a_link_stays_a_link() {
     );
     #[cfg(unix)]
     assert!(path.is_symlink());
-    let left: Vec<_> = std::fs::read_dir(folder.path()).expect("a folder").collect();
+    let left: Vec<_> = std::fs::read_dir(folder.path())
+        .expect("a folder")
+        .collect();
     assert_eq!(left.len(), 1 + usize::from(cfg!(unix)), "{left:?}");
 }
 

@@ -1,7 +1,8 @@
 //! A goal that is shown on the arm, in cells whose camera is not what it is taken to be.
 
 use grasp_agent::{
-    Agent, AgentConfig, Controller, Hybrid, HybridSettings, PositionBased, ServoSettings, TaughtGoal,
+    Agent, AgentConfig, Controller, Hybrid, HybridSettings, PositionBased, ServoSettings,
+    TaughtGoal,
 };
 use pipeline_sim::ErrorLevel;
 use puma_grasp::TrialCell;
@@ -48,7 +49,10 @@ fn servoing_grasps_with_a_wrong_camera_once_it_was_shown_the_goal() {
         without += held(&cell, &config, &PositionBased::new(paper));
         with += held(&cell, &goal.applied_to(config), &PositionBased::new(shown));
     }
-    assert!(with >= 23 && without <= 6, "{with} with, {without} without of 24");
+    assert!(
+        with >= 23 && without <= 6,
+        "{with} with, {without} without of 24"
+    );
 }
 
 #[test]

@@ -47,8 +47,9 @@ impl Tally {
         100.0 * shares.iter().sum::<f64>() / shares.len() as f64
     }
 
-    /// Its 95 % interval, percent: Wilson's, with each cell counting as one. It holds however much the runs in one cell are alike, and says
-    /// something where all runs succeed, or none; for cells whose runs are not alike it is wider than it need be. Not a number without cells.
+    /// Its 95 % interval, percent: Wilson's, with each cell counting as one. It holds however much
+    /// the runs in one cell are alike, and says something where all runs succeed, or none; for
+    /// cells whose runs are not alike it is wider than it need be. Not a number without cells.
     fn interval(&self) -> [f64; 2] {
         wilson(0.01 * self.success(), self.shares().len() as f64)
     }
@@ -84,7 +85,8 @@ impl Row {
     pub(crate) const HEADER: &str = "level     controller                       success %  95 % interval  cells without failure  cycles  losses/run  collisions  runs";
 
     pub(crate) fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
-        let count = |part: fn(&(usize, usize)) -> usize| tally.draws.iter().map(part).sum::<usize>();
+        let count =
+            |part: fn(&(usize, usize)) -> usize| tally.draws.iter().map(part).sum::<usize>();
         let (successes, runs) = (count(|draw| draw.0), count(|draw| draw.1));
         Self {
             level,
@@ -164,8 +166,8 @@ pub(crate) fn csv(rows: &[Row]) -> String {
     csv
 }
 
-/// A bar for each controller and level: how long it is says how often it succeeded, in what `success` names, a line across its end how sure that is,
-/// and words how many moves it took.
+/// A bar for each controller and level: how long it is says how often it succeeded, in what
+/// `success` names, a line across its end how sure that is, and words how many moves it took.
 pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>> {
     const NAMES: i32 = 210;
     const COLUMN: i32 = 190;
@@ -192,9 +194,17 @@ pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         let words = |size: i32| ("sans-serif", size).into_font().color(&ink);
-        root.draw(&Text::new(format!("% {success} / moves"), (10, 14), words(13)))?;
+        root.draw(&Text::new(
+            format!("% {success} / moves"),
+            (10, 14),
+            words(13),
+        ))?;
         for (level, left) in levels.iter().zip((NAMES..).step_by(COLUMN as usize)) {
-            root.draw(&Text::new(format!("errors: {level}"), (left, 14), words(14)))?;
+            root.draw(&Text::new(
+                format!("errors: {level}"),
+                (left, 14),
+                words(14),
+            ))?;
         }
         for row in rows {
             let of = |found: Option<usize>| found.unwrap_or(0) as i32;
@@ -210,8 +220,11 @@ pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>
                 RGBColor(90, 120, 185)
             };
             let (mean, [low, high]) = (row.success, row.interval);
-            let at = |percent: f64| left + (0.01 * f64::from(BAR) * percent.clamp(0.0, 100.0)) as i32;
-            let bar = |to: i32, style: ShapeStyle| Rectangle::new([(left, top), (to, top + LINE - 7)], style);
+            let at =
+                |percent: f64| left + (0.01 * f64::from(BAR) * percent.clamp(0.0, 100.0)) as i32;
+            let bar = |to: i32, style: ShapeStyle| {
+                Rectangle::new([(left, top), (to, top + LINE - 7)], style)
+            };
             root.draw(&bar(left + BAR, RGBColor(236, 236, 241).filled()))?;
             root.draw(&bar(at(mean), colour.filled()))?;
             if low < high {

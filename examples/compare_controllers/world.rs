@@ -35,7 +35,11 @@ pub(crate) struct Trial {
 }
 
 impl World {
-    pub(crate) fn shortcut(level: ErrorLevel, seed: u64, with_bodies: bool) -> Result<Self, Box<dyn Error>> {
+    pub(crate) fn shortcut(
+        level: ErrorLevel,
+        seed: u64,
+        with_bodies: bool,
+    ) -> Result<Self, Box<dyn Error>> {
         let cell = TrialCell::draw(level, seed)?;
         Ok(Self::Shortcut(Box::new(if with_bodies {
             cell
@@ -76,7 +80,8 @@ impl World {
         }
     }
 
-    /// The goal as it shows where the jaws are around the ball; `None` where that is out of view. On the feature shortcut only.
+    /// The goal as it shows where the jaws are around the ball; `None` where that is out of view.
+    /// On the feature shortcut only.
     pub(crate) fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, Box<dyn Error>> {
         match self {
             Self::Shortcut(cell) => Ok(cell.teach_goal(seed)?),
@@ -121,10 +126,12 @@ impl Chain {
         self.rig.clear_for(self.workspace.search_poses()[3])?;
         self.rig.place(&ball)?;
         let mut reached = false;
-        let outcome = self.rig.run_and_learn(agent, &mut *self.detector, &mut |event| {
-            reached |= event.kind == EventKind::AtGoal;
-            observe(event);
-        })?;
+        let outcome = self
+            .rig
+            .run_and_learn(agent, &mut *self.detector, &mut |event| {
+                reached |= event.kind == EventKind::AtGoal;
+                observe(event);
+            })?;
         Ok(Some(Trial {
             outcome,
             reached,

@@ -1,4 +1,5 @@
-//! The way of a turned hand to an egg and back: the jaws open aside then, and a hand that swung in from there would run a finger into it.
+//! The way of a turned hand to an egg and back: the jaws open aside then, and a hand that swung in
+//! from there would run a finger into it.
 
 use nalgebra::Translation3;
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, PumaParams};
@@ -40,7 +41,10 @@ impl Manipulator for Detour<'_> {
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
         let from = self.arm.joints()?;
         if (target[Joint::J6] - from[Joint::J6]).abs() > TURNED {
-            for leg in [self.before(&from), self.before(&target)].into_iter().flatten() {
+            for leg in [self.before(&from), self.before(&target)]
+                .into_iter()
+                .flatten()
+            {
                 self.arm.move_to(leg)?;
             }
         }

@@ -25,7 +25,8 @@ impl Egg {
     }
 }
 
-/// A camera that shows the egg where the cell has its ball. The ball lies wholly inside the egg, so nothing of it is left.
+/// A camera that shows the egg where the cell has its ball. The ball lies wholly inside the egg, so
+/// nothing of it is left.
 pub(crate) struct EggCamera<'a> {
     pub(crate) frames: &'a mut dyn FrameSource,
     pub(crate) cell: SharedCell,
@@ -65,8 +66,8 @@ impl<'a> EggCamera<'a> {
         let cell = self.cell.get();
         let camera = cell.camera_pose(&(self.pose)());
         let centre = camera.inverse_transform_point(&cell.ball.centre).coords;
-        let turn =
-            camera.rotation.inverse() * Rotation3::from_axis_angle(&Vector3::z_axis(), self.egg.heading);
+        let turn = camera.rotation.inverse()
+            * Rotation3::from_axis_angle(&Vector3::z_axis(), self.egg.heading);
         let (long, thick) = (self.egg.half_length, cell.ball.radius);
         if centre.z < 2.0 * long {
             return;
@@ -120,7 +121,8 @@ impl<'a> EggCamera<'a> {
                 let grain = self.noise.random_range(-GRAIN..GRAIN);
                 let grey = 255.0 * light.clamp(0.0, 1.0).powf(GAMMA) + grain;
                 let pixel = frame.get_pixel_mut(x, y);
-                pixel.0[0] = (f64::from(pixel.0[0]) * (1.0 - share) + grey * share).clamp(0.0, 255.0) as u8;
+                pixel.0[0] =
+                    (f64::from(pixel.0[0]) * (1.0 - share) + grey * share).clamp(0.0, 255.0) as u8;
             }
         }
     }

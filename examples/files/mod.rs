@@ -15,8 +15,8 @@ pub(crate) fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
         .map_err(|error| format!("{}: cannot be written to: {error}", folder.display()).into())
 }
 
-/// Writes a file: first beside its place, then renamed into it. What is there and is no regular file (a device, a pipe) is written to as it
-/// is, never replaced; a link stays a link.
+/// Writes a file: first beside its place, then renamed into it. What is there and is no regular
+/// file (a device, a pipe) is written to as it is, never replaced; a link stays a link.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
     let failed = |error| format!("{}: cannot be written: {error}", path.display());
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

@@ -7,13 +7,16 @@ use clap::{Parser, ValueEnum};
 use grasp_agent::YGoal;
 use puma_grasp::BallDetector;
 
-/// Learn to reach a ball in simulation, then see, reach and grasp it with a (simulated) PUMA 560 through VAL II.
+/// Learn to reach a ball in simulation, then see, reach and grasp it with a (simulated) PUMA 560
+/// through VAL II.
 ///
-/// Without options everything runs here: a controller emulator is started on a pseudo-terminal, opened like a serial line, and the
-/// camera's frames are rendered from the pose of the emulated arm.
+/// Without options everything runs here: a controller emulator is started on a pseudo-terminal,
+/// opened like a serial line, and the camera's frames are rendered from the pose of the emulated
+/// arm.
 #[derive(Parser, Debug)]
 pub(crate) struct Options {
-    /// Folder for the results, among them each run that failed, for the example replay (failures/); made if need be, files of an earlier run in it are replaced
+    /// Folder for the results, among them each run that failed, for the example replay (failures/);
+    /// made if need be, files of an earlier run in it are replaced
     #[arg(long, value_name = "DIR", default_value = "out/grasp")]
     pub(crate) out: PathBuf,
 
@@ -33,8 +36,9 @@ pub(crate) struct Options {
     #[arg(long, value_name = "ADDR")]
     pub(crate) tcp: Option<String>,
 
-    /// What was learned before: a folder with centering.policy and approaching.policy of an earlier run, or a file written by --export; skips
-    /// training. A folder is read with the --fine and --reward that it was learned with; a file says itself what is in it
+    /// What was learned before: a folder with centering.policy and approaching.policy of an earlier
+    /// run, or a file written by --export; skips training. A folder is read with the --fine and
+    /// --reward that it was learned with; a file says itself what is in it
     #[arg(long, value_name = "PATH", conflicts_with = "simulator")]
     pub(crate) policy: Option<PathBuf>,
 
@@ -54,7 +58,8 @@ pub(crate) struct Options {
     #[arg(long, value_name = "NAME", default_value_t, value_parser = detectors())]
     pub(crate) detector: BallDetector,
 
-    /// Reward while learning: the paper's formulas as printed do not teach the goal [default: mended]
+    /// Reward while learning: the paper's formulas as printed do not teach the goal [default:
+    /// mended]
     #[arg(long, value_enum)]
     pub(crate) reward: Option<RewardName>,
 

@@ -14,15 +14,20 @@ const GOAL: RGBColor = RGBColor(120, 190, 120);
 
 type Drawn = Result<String, Box<dyn Error>>;
 
-/// Share of episodes that reached the goal and mean size of the error of Q, over the actions made so far.
+/// Share of episodes that reached the goal and mean size of the error of Q, over the actions made
+/// so far.
 pub(crate) fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
     let mut svg = String::new();
     {
-        let root = SVGBackend::with_string(&mut svg, (1000, 360 * curves.len() as u32)).into_drawing_area();
+        let root = SVGBackend::with_string(&mut svg, (1000, 360 * curves.len() as u32))
+            .into_drawing_area();
         root.fill(&WHITE)?;
         for (area, (name, report)) in root.split_evenly((curves.len(), 1)).iter().zip(curves) {
             let columns = area.split_evenly((1, 2));
-            let end = report.curve.last().map_or(1.0, |record| record.actions as f64);
+            let end = report
+                .curve
+                .last()
+                .map_or(1.0, |record| record.actions as f64);
             let success = curve(report, |record| Some(100.0 * record.success_share?));
             panel(
                 &columns[0],
@@ -59,7 +64,8 @@ fn curve(report: &TrainReport, pick: impl Fn(&Record) -> Option<f64>) -> Vec<(f6
         .collect()
 }
 
-/// x, y and r at every step of every run, with the goal interval shaded; three runs from far, middle and near stand out.
+/// x, y and r at every step of every run, with the goal interval shaded; three runs from far,
+/// middle and near stand out.
 pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
     let mut tracks: Vec<Vec<(usize, Features)>> = runs
         .iter()
@@ -76,7 +82,11 @@ pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
         .max(1) as f64;
     let distinct = [
         (0, RGBColor(30, 90, 180), "the farthest start"),
-        (tracks.len() / 2, RGBColor(180, 60, 40), "a start in between"),
+        (
+            tracks.len() / 2,
+            RGBColor(180, 60, 40),
+            "a start in between",
+        ),
         (
             tracks.len().saturating_sub(1),
             RGBColor(200, 140, 0),
@@ -109,7 +119,10 @@ pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
         let keys = distinct
             .iter()
             .map(|(_, colour, words)| (*words, colour.mix(1.0)));
-        legend(&top, keys.chain([("other runs", OTHERS.mix(1.0)), goal_key]))?;
+        legend(
+            &top,
+            keys.chain([("other runs", OTHERS.mix(1.0)), goal_key]),
+        )?;
         for (area, (name, range, goal, pick)) in below.split_evenly((3, 1)).iter().zip(panels) {
             let lines: Vec<Line> = order
                 .iter()
@@ -185,11 +198,17 @@ fn panel(
         .bold_line_style(RGBColor(230, 230, 235))
         .draw()?;
     if let Some(goal) = goal {
-        let band = Rectangle::new([(x.start, goal.start), (x.end, goal.end)], GOAL.mix(0.5).filled());
+        let band = Rectangle::new(
+            [(x.start, goal.start), (x.end, goal.end)],
+            GOAL.mix(0.5).filled(),
+        );
         chart.draw_series([band])?;
     }
     for (points, colour) in lines {
-        chart.draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?;
+        chart.draw_series(LineSeries::new(
+            points.iter().copied(),
+            colour.stroke_width(2),
+        ))?;
         if lines.len() > 1 {
             chart.draw_series(points.iter().map(|at| Circle::new(*at, 2, colour.filled())))?;
         }

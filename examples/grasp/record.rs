@@ -17,7 +17,8 @@ pub(crate) struct RunRecord {
     pub(crate) saved: SavedRun,
     /// Frames looked at.
     frames: usize,
-    /// Whether the jaws are closed: what is seen then is not the ball, or is about to be told to have been missed.
+    /// Whether the jaws are closed: what is seen then is not the ball, or is about to be told to
+    /// have been missed.
     gripped: bool,
     pub(crate) outcome: Option<Outcome>,
     /// Why the run was broken off, if it was.
@@ -104,7 +105,12 @@ impl RunRecord {
             overlay.circle(&sighting.detection.circle);
         }
         let full = overlay.into_image();
-        let half = resize(&full, full.width() / 2, full.height() / 2, FilterType::Triangle);
+        let half = resize(
+            &full,
+            full.width() / 2,
+            full.height() / 2,
+            FilterType::Triangle,
+        );
         let found = features.map_or("no ball".into(), |f| {
             format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r)
         });

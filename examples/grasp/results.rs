@@ -79,15 +79,16 @@ impl Summary {
         for (index, run) in self.runs.iter().enumerate() {
             let [x, y, z] = run.ball_mm;
             let ball = format!("{x:6.0} {y:6.0} {z:6.0}");
-            let last = run
-                .last_seen
-                .as_ref()
-                .map_or("-".into(), |f| format!("{:6.1} {:6.1} {:6.1}", f.x, f.y, f.r));
+            let last = run.last_seen.as_ref().map_or("-".into(), |f| {
+                format!("{:6.1} {:6.1} {:6.1}", f.x, f.y, f.r)
+            });
             let miss = run.miss_mm.map_or("-".into(), |miss| format!("{miss:.1}"));
             let result = match (&run.reason, run.grasped) {
                 (_, true) => "grasped".into(),
                 (Some(reason), false) => format!("not grasped: {reason}"),
-                (None, false) => "not grasped: the jaws hold no ball, though none is seen either".into(),
+                (None, false) => {
+                    "not grasped: the jaws hold no ball, though none is seen either".into()
+                }
             };
             let _ = writeln!(
                 table,
@@ -196,7 +197,8 @@ impl ContactSheet {
             return;
         }
         let small = resize(&picture.image, SMALL.0, SMALL.1, FilterType::Triangle);
-        let tile = Overlay::from(small).captioned(&format!("run {} step {}", picture.run, picture.step));
+        let tile =
+            Overlay::from(small).captioned(&format!("run {} step {}", picture.run, picture.step));
         self.0.push(Tile {
             run: picture.run,
             image: tile.into_image(),

@@ -28,7 +28,10 @@ impl Overlay {
     }
 
     /// Draws on a picture that is in colour already.
-    #[allow(dead_code, reason = "not every example that draws begins with such a picture")]
+    #[allow(
+        dead_code,
+        reason = "not every example that draws begins with such a picture"
+    )]
     pub(crate) fn over(picture: RgbImage) -> Self {
         Self(picture)
     }
@@ -38,7 +41,8 @@ impl Overlay {
         let green = Rgb888::new(60, 255, 60);
         let centre = Point::new(circle.x.round() as i32, circle.y.round() as i32);
         let diameter = (2.0 * circle.radius).round().max(1.0) as u32;
-        let outline = Ring::with_center(centre, diameter).into_styled(PrimitiveStyle::with_stroke(green, 3));
+        let outline =
+            Ring::with_center(centre, diameter).into_styled(PrimitiveStyle::with_stroke(green, 3));
         let Ok(()) = outline.draw(self);
         let arm = ((circle.radius * 0.15) as i32).clamp(3, 12);
         for along in [Point::new(arm, 0), Point::new(0, arm)] {
@@ -49,7 +53,10 @@ impl Overlay {
     }
 
     /// A straight line.
-    #[allow(dead_code, reason = "only the examples that draw more than circles need it")]
+    #[allow(
+        dead_code,
+        reason = "only the examples that draw more than circles need it"
+    )]
     pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
         let at = |(x, y): (f64, f64)| Point::new(x.round() as i32, y.round() as i32);
         let style = PrimitiveStyle::with_stroke(colour, width);
@@ -57,7 +64,10 @@ impl Overlay {
     }
 
     /// A filled disc.
-    #[allow(dead_code, reason = "only the examples that draw more than circles need it")]
+    #[allow(
+        dead_code,
+        reason = "only the examples that draw more than circles need it"
+    )]
     pub(crate) fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
         let at = Point::new(centre.0.round() as i32, centre.1.round() as i32);
         let diameter = (2.0 * radius).round().max(1.0) as u32;
@@ -117,7 +127,10 @@ impl DrawTarget for Overlay {
     type Color = Rgb888;
     type Error = std::convert::Infallible;
 
-    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Self::Error> {
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(
+        &mut self,
+        pixels: I,
+    ) -> Result<(), Self::Error> {
         for Pixel(at, colour) in pixels {
             if let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y))
                 && let Some(pixel) = self.0.get_pixel_mut_checked(x, y)

@@ -1,9 +1,12 @@
-//! From simulation to the arm: what the behaviours are worth there at once, and what learning on the arm adds.
+//! From simulation to the arm: what the behaviours are worth there at once, and what learning on
+//! the arm adds.
 
 use std::error::Error;
 use std::fmt::Write as _;
 
-use grasp_agent::{Agent, AgentConfig, BehaviourSpec, GoalInterval, Learned, OnlineLearning, Percept};
+use grasp_agent::{
+    Agent, AgentConfig, BehaviourSpec, GoalInterval, Learned, OnlineLearning, Percept,
+};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{Simulator, TrialCell, learn_best, search_percepts};
 use rand::SeedableRng;
@@ -25,8 +28,8 @@ pub(crate) struct Report {
     pub(crate) csv: String,
 }
 
-/// `seeds` times: learns in both regression simulators, takes the behaviours to an arm with errors drawn anew, and lets them go on
-/// learning there.
+/// `seeds` times: learns in both regression simulators, takes the behaviours to an arm with errors
+/// drawn anew, and lets them go on learning there.
 pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn Error>> {
     println!(
         "\nFrom simulation to the arm: the behaviours at once, and after learning on there from so many moves"
@@ -95,17 +98,25 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
     })
 }
 
-/// Success in percent and moves of a success, on one arm: centering at once, then the whole task after each of [`MOVES`].
-fn one_arm(form: ReachForm, level: ErrorLevel, seed: u64) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
+/// Success in percent and moves of a success, on one arm: centering at once, then the whole task
+/// after each of [`MOVES`].
+fn one_arm(
+    form: ReachForm,
+    level: ErrorLevel,
+    seed: u64,
+) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (centring, reaching) = sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 2_500, 0.5, &mut rng);
+    let (centring, reaching) =
+        sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 2_500, 0.5, &mut rng);
     let simulator = Simulator::fit(&centring, &reaching, form)?;
     let anywhere: Vec<Percept> = (0..500).map(|_| simulator.start(&mut rng)).collect();
     let found = search_percepts(500, 1_000 + seed);
     let (center, approach) = (BehaviourSpec::centering(), BehaviourSpec::approaching());
     let only_x = center.goal.clone();
-    let centering = learn_best(center, &simulator, &anywhere, 60_000, &mut rng, &mut |_| ())?.behaviour;
-    let approaching = learn_best(approach, &simulator, &found, 500_000, &mut rng, &mut |_| ())?.behaviour;
+    let centering =
+        learn_best(center, &simulator, &anywhere, 60_000, &mut rng, &mut |_| ())?.behaviour;
+    let approaching =
+        learn_best(approach, &simulator, &found, 500_000, &mut rng, &mut |_| ())?.behaviour;
     let learned = Learned::new(centering, approaching);
 
     let cell = TrialCell::draw(level, 50 + seed)?.without_bodies();

@@ -77,7 +77,10 @@ impl Panel {
         }
     }
 
-    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>) -> Result<(), Box<dyn Error>> {
+    fn draw(
+        &self,
+        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    ) -> Result<(), Box<dyn Error>> {
         let points = || self.lines.iter().flat_map(|(_, line)| line);
         let right = points().map(|p| p.0).fold(1.0, f64::max);
         let highest = points()
@@ -123,11 +126,14 @@ impl Panel {
             chart.draw_series([Polygon::new(edge.collect::<Vec<_>>(), COLOURS[0].mix(0.2))])?;
         }
         for ((name, line), colour) in self.lines.iter().zip(COLOURS.iter().cycle()) {
-            let drawn = chart.draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)))?;
+            let drawn = chart.draw_series(LineSeries::new(
+                line.iter().copied(),
+                colour.stroke_width(2),
+            ))?;
             if !name.is_empty() {
-                drawn
-                    .label(name)
-                    .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
+                drawn.label(name).legend(|(x, y)| {
+                    PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2))
+                });
             }
             if line.len() < 80 {
                 chart.draw_series(line.iter().map(|at| Circle::new(*at, 2, colour.filled())))?;

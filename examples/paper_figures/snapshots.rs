@@ -31,12 +31,16 @@ struct Moment {
     moves: usize,
 }
 
-/// Four columns: from the first sighting to the goal; three rows: the pose from the side, the frame with the circle, its edges.
+/// Four columns: from the first sighting to the goal; three rows: the pose from the side, the frame
+/// with the circle, its edges.
 pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dyn Error>> {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
     let mut detector = BallDetector::default().build(seed)?;
     let workspace = Workspace::paper();
-    let agent = Agent::with_controller(AgentConfig::paper(workspace.search_poses()), learned.clone())?;
+    let agent = Agent::with_controller(
+        AgentConfig::paper(workspace.search_poses()),
+        learned.clone(),
+    )?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (ball, _) = workspace
         .sample_seen_ball(&rig.cell().get(), &mut rng)
@@ -46,7 +50,8 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
     let (mut moments, mut gripped) = (Vec::new(), false);
     rig.run(&agent, &mut *detector, &mut |event| {
         gripped |= event.kind == EventKind::Gripped;
-        if let (EventKind::Seen(sighting), Some(frame), false) = (&event.kind, event.frame, gripped) {
+        if let (EventKind::Seen(sighting), Some(frame), false) = (&event.kind, event.frame, gripped)
+        {
             moments.push(Moment {
                 frame: frame.clone(),
                 sighting: *sighting,
@@ -55,7 +60,10 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
             });
         }
     })?;
-    let last = moments.len().checked_sub(1).ok_or("the ball was never seen")?;
+    let last = moments
+        .len()
+        .checked_sub(1)
+        .ok_or("the ball was never seen")?;
     let mut sheet = RgbImage::from_pixel(4 * TILE.0, 3 * (TILE.1 + CAPTION), image::Rgb([255; 3]));
     for column in 0..4_usize {
         let moment = &moments[column * last / 3];
@@ -81,7 +89,11 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
     let camera = wrist * model.mount;
     let (sin, cos) = joints[Joint::J2].sin_cos();
     let elbow = into_plane.inverse() * Point3::new(model.arm.a2 * cos, 0.0, -model.arm.a2 * sin);
-    let mut drawing = Overlay::over(RgbImage::from_pixel(TILE.0, TILE.1, image::Rgb([250, 250, 252])));
+    let mut drawing = Overlay::over(RgbImage::from_pixel(
+        TILE.0,
+        TILE.1,
+        image::Rgb([250, 250, 252]),
+    ));
     let surface = SHOULDER.1 - SCALE * table;
     drawing.line(
         (0.0, surface),
@@ -106,7 +118,11 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
         4,
     );
     drawing.disc(at(camera * Point3::origin()), 5.0, Rgb888::new(20, 130, 60));
-    drawing.disc(at(ball.centre), SCALE * ball.radius, Rgb888::new(220, 110, 20));
+    drawing.disc(
+        at(ball.centre),
+        SCALE * ball.radius,
+        Rgb888::new(220, 110, 20),
+    );
     let degrees = joints.degrees();
     let words = format!(
         "move {}: {:.0} {:.0} {:.0} deg",

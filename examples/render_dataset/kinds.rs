@@ -49,7 +49,11 @@ impl Kind {
     /// A generator that no other kind and no other seed shares.
     pub(crate) fn generator(self, seed: u64) -> Xoshiro256PlusPlus {
         // FNV-1a over the name and the seed.
-        let bytes = self.name().into_bytes().into_iter().chain(seed.to_le_bytes());
+        let bytes = self
+            .name()
+            .into_bytes()
+            .into_iter()
+            .chain(seed.to_le_bytes());
         let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         });
@@ -66,7 +70,10 @@ pub(crate) fn repeated(kinds: &[Kind]) -> Option<String> {
 
 /// A share of a whole.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
-    let number: Option<f64> = text.parse().ok().filter(|share| (0.0..=1.0).contains(share));
+    let number: Option<f64> = text
+        .parse()
+        .ok()
+        .filter(|share| (0.0..=1.0).contains(share));
     number.ok_or_else(|| format!("{text} is not a share from 0 to 1"))
 }
 

@@ -1,4 +1,5 @@
-//! Where the time of a control cycle goes: camera, detector, controller and arm, each with a stopwatch around it.
+//! Where the time of a control cycle goes: camera, detector, controller and arm, each with a
+//! stopwatch around it.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -85,8 +86,10 @@ impl FrameSource for Timed<&mut dyn FrameSource> {
 
 impl CircleDetector for Timed<&mut dyn CircleDetector> {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        self.stages
-            .measured(|spent| &mut spent.detect, || self.inner.detect_into(frame, found));
+        self.stages.measured(
+            |spent| &mut spent.detect,
+            || self.inner.detect_into(frame, found),
+        );
     }
 }
 

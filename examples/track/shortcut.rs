@@ -33,7 +33,8 @@ fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Erro
             }
             let fate = if teaching { Fate::Rest } else { options.ball };
             let mut world = World::new(fate, ball as u64);
-            // Nothing happens to the ball before it is seen, nor when it is looked at again without a move, nor in the jaws.
+            // Nothing happens to the ball before it is seen, nor when it is looked at again without
+            // a move, nor in the jaws.
             let (mut seen, mut looked_from) = (false, None);
             let mut go_on = |cell: &mut Cell, joints: &Joints| {
                 let moved = looked_from.replace(*joints) != Some(*joints);
@@ -42,9 +43,12 @@ fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Erro
                 }
                 seen |= cell.features(joints).is_some();
             };
-            let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
+            let mut saved =
+                SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
             let ball_seed = seed.wrapping_mul(1_000).wrapping_add(ball as u64);
-            let end = cell.run(&mut agent, ball_seed, &mut go_on, &mut |event| saved.note(event));
+            let end = cell.run(&mut agent, ball_seed, &mut go_on, &mut |event| {
+                saved.note(event)
+            });
             if teaching {
                 if let Err(error) = end {
                     let kept = keep_run(&options.out, "teaching", &saved)?;
@@ -57,7 +61,8 @@ fn go_for_balls(options: &Options, tally: &mut Tally) -> Result<(), Box<dyn Erro
                 Ok(None) => continue,
                 Err(_) => None,
             };
-            let success = result.is_some_and(|result| result.outcome.gave_up.is_none() && result.held);
+            let success =
+                result.is_some_and(|result| result.outcome.gave_up.is_none() && result.held);
             tally.add(Counted {
                 happened: world.has_happened(),
                 success,

@@ -18,7 +18,8 @@ pub(crate) struct Counted {
 }
 
 impl Counted {
-    /// Whether it is in the denominator: a grasp of a ball to which nothing had happened yet is no answer to what was asked, a failure always is.
+    /// Whether it is in the denominator: a grasp of a ball to which nothing had happened yet is no
+    /// answer to what was asked, a failure always is.
     fn counts(&self) -> bool {
         self.happened || !self.success
     }
@@ -61,7 +62,11 @@ impl fmt::Display for Tally {
                 let grasped = counted().filter(|run| run.success).count();
                 format!("{grasped}/{}", counted().count())
             });
-            writeln!(f, "grasped by cell: {}", by_cell.collect::<Vec<_>>().join(" "))?;
+            writeln!(
+                f,
+                "grasped by cell: {}",
+                by_cell.collect::<Vec<_>>().join(" ")
+            )?;
         }
         if runs == 0 {
             write!(f, "no run to count")?;
@@ -112,7 +117,11 @@ mod tests {
         let told = told(&[(true, true), (false, false), (false, true)], Some(1));
         assert!(told.starts_with("1 of 2 grasped (50.0 %"), "{told}");
         assert!(told.contains("3 collisions"), "{told}");
-        assert!(told.ends_with("not counted: 1 grasps before what was to happen to the ball had happened"));
+        assert!(
+            told.ends_with(
+                "not counted: 1 grasps before what was to happen to the ball had happened"
+            )
+        );
     }
 
     #[test]

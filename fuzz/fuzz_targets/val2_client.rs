@@ -42,7 +42,8 @@ impl Transport for Script<'_> {
 }
 
 fuzz_target!(|data: &[u8]| {
-    let Ok(mut client) = Val2Client::connect(Script(data, Duration::ZERO), ClientConfig::default()) else {
+    let Ok(mut client) = Val2Client::connect(Script(data, Duration::ZERO), ClientConfig::default())
+    else {
         return;
     };
     let step = JointDelta::of(Joint::J1, 0.1);

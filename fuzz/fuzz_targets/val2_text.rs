@@ -8,6 +8,8 @@ fuzz_target!(|text: &str| {
     let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
     if emulator.load_text(text).is_ok() {
         let stored = emulator.text();
-        emulator.load_text(&stored).expect("what was written is read");
+        emulator
+            .load_text(&stored)
+            .expect("what was written is read");
     }
 });

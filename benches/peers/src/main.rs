@@ -1,17 +1,18 @@
 //! Updates per second of tabular Q-learning, qtable beside rurel, in one run.
 //!
-//! `cargo run --release` prints a table: millions of updates per second of CPU time (of wall time where the system does
-//! not tell CPU time), the median over the rounds with their range, and the median over the rounds of the ratio to
-//! rurel within the round. `cargo run --release -- 9 4000000` sets the rounds and the updates in each.
+//! `cargo run --release` prints a table: millions of updates per second of CPU time (of wall time
+//! where the system does not tell CPU time), the median over the rounds with their range, and the
+//! median over the rounds of the ratio to rurel within the round.
+//! `cargo run --release -- 9 4000000` sets the rounds and the updates in each.
 //!
-//! The problem is the same for all: 90 states and 81 actions, the shape of the approaching behaviour of the paper,
-//! and a transition that costs next to nothing. rurel explores at random only, and so it is given no choice to
-//! make; its agent draws from the same generator as ours and only the action needed, which is the fastest that its
-//! interface allows.
+//! The problem is the same for all: 90 states and 81 actions, the shape of the approaching
+//! behaviour of the paper, and a transition that costs next to nothing. rurel explores at random
+//! only, and so it is given no choice to make; its agent draws from the same generator as ours and
+//! only the action needed, which is the fastest that its interface allows.
 
 use qtable::{
-    Action, CachedBoltzmann, Environment, EpsilonGreedy, Policy, QLearning, QTable, Schedule, State, Status, Step,
-    TrainConfig, Value, train, train_in_blocks,
+    Action, CachedBoltzmann, Environment, EpsilonGreedy, Policy, QLearning, QTable, Schedule,
+    State, Status, Step, TrainConfig, Value, train, train_in_blocks,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -37,7 +38,11 @@ fn transition(state: usize, action: usize) -> (usize, f64) {
 #[inline(always)]
 fn step(state: State, action: Action) -> Step {
     let (next, reward) = transition(state.0, action.0);
-    Step { observation: State(next), reward, status: Status::Continuing }
+    Step {
+        observation: State(next),
+        reward,
+        status: Status::Continuing,
+    }
 }
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -51,8 +56,15 @@ fn seconds() -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    nanoseconds
-        .map_or_else(|| START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64(), |ns| ns * 1e-9)
+    nanoseconds.map_or_else(
+        || {
+            START
+                .get_or_init(std::time::Instant::now)
+                .elapsed()
+                .as_secs_f64()
+        },
+        |ns| ns * 1e-9,
+    )
 }
 
 /// Millions of updates per second.
@@ -113,7 +125,13 @@ impl Agent<RurelState> for RurelAgent {
 }
 
 fn rurel(updates: u64) -> Result<f64> {
-    let mut agent = RurelAgent { state: RurelState { index: 0, reward: 0.0 }, rng: rng(1) };
+    let mut agent = RurelAgent {
+        state: RurelState {
+            index: 0,
+            reward: 0.0,
+        },
+        rng: rng(1),
+    };
     let mut trainer = rurel::AgentTrainer::new();
     let learning = RurelQLearning::new(ALPHA, GAMMA, 0.0);
     // Once without the clock, so that its maps have their size.
@@ -176,12 +194,17 @@ fn cached<const LEARNERS: usize>(updates: u64, seed: u64) -> Result<f64> {
     let table = QTable::<f32>::filled(STATES, ACTIONS, 0.0)?;
     let mut learners = Vec::new();
     for learner in 0..LEARNERS as u64 {
-        learners.push((CachedBoltzmann::new(&table, TEMPERATURE)?, rng(seed + learner), State(0)));
+        learners.push((
+            CachedBoltzmann::new(&table, TEMPERATURE)?,
+            rng(seed + learner),
+            State(0),
+        ));
     }
     let mut learners: [_; LEARNERS] = learners.try_into().map_err(|_| "a learner is missing")?;
     let measured = rate(updates, || {
         for _ in 0..updates / LEARNERS as u64 {
-            // All choose, then all learn: a choice waits for memory most of the time, and these wait together.
+            // All choose, then all learn: a choice waits for memory most of the time, and these
+            // wait together.
             let mut actions = [Action(0); LEARNERS];
             for ((cached, rng, state), action) in learners.iter_mut().zip(&mut actions) {
                 *action = cached.choose(*state, rng);
@@ -194,7 +217,12 @@ fn cached<const LEARNERS: usize>(updates: u64, seed: u64) -> Result<f64> {
         }
         Ok(())
     });
-    black_box(learners.iter().map(|(cached, _, state)| cached.max(*state)).sum::<f32>());
+    black_box(
+        learners
+            .iter()
+            .map(|(cached, _, state)| cached.max(*state))
+            .sum::<f32>(),
+    );
     measured
 }
 
@@ -237,7 +265,14 @@ fn whole_training(updates: u64, in_blocks: bool) -> Result<f64> {
     let measured = rate(updates, || {
         let mut problem = Problem(State(0));
         match in_blocks {
-            true => train_in_blocks(&mut problem, &mut table, &config, 500, &mut rng, &mut |_| {})?,
+            true => train_in_blocks(
+                &mut problem,
+                &mut table,
+                &config,
+                500,
+                &mut rng,
+                &mut |_| {},
+            )?,
             false => train(&mut problem, &mut table, &config, &mut rng, &mut |_| {})?,
         };
         Ok(())
@@ -249,7 +284,9 @@ fn whole_training(updates: u64, in_blocks: bool) -> Result<f64> {
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let rounds: usize = arguments.next().map_or(Ok(5), |text| text.parse())?;
-    let updates: u64 = arguments.next().map_or(Ok(4_000_000), |text| text.parse())?;
+    let updates: u64 = arguments
+        .next()
+        .map_or(Ok(4_000_000), |text| text.parse())?;
     type Entry = (&'static str, fn(u64) -> Result<f64>);
     let entries: [Entry; 11] = [
         ("rurel 0.6.0, random actions, f64", rurel),
@@ -260,9 +297,15 @@ fn main() -> Result<()> {
         ("Boltzmann, cached, f32", |n| cached::<1>(n, 1)),
         ("Boltzmann, cached, 2 interleaved", |n| cached::<2>(n, 1)),
         ("Boltzmann, cached, 4 interleaved", |n| cached::<4>(n, 1)),
-        ("Boltzmann, cached, on 2 threads", |n| cached_on_two_threads(n)),
-        ("train(), 500 000 actions", |_| whole_training(500_000, false)),
-        ("train_in_blocks(), 500 000 actions", |_| whole_training(500_000, true)),
+        ("Boltzmann, cached, on 2 threads", |n| {
+            cached_on_two_threads(n)
+        }),
+        ("train(), 500 000 actions", |_| {
+            whole_training(500_000, false)
+        }),
+        ("train_in_blocks(), 500 000 actions", |_| {
+            whole_training(500_000, true)
+        }),
     ];
     let mut rates = vec![Vec::new(); entries.len()];
     for _ in 0..rounds.max(1) {
@@ -270,13 +313,24 @@ fn main() -> Result<()> {
             rates.push(run(updates)?);
         }
     }
-    println!("{:36} {:>9} {:>17} {:>9}", "M updates/s of CPU time", "median", "range", "x rurel");
+    println!(
+        "{:36} {:>9} {:>17} {:>9}",
+        "M updates/s of CPU time", "median", "range", "x rurel"
+    );
     for ((name, _), measured) in entries.iter().zip(&rates) {
-        let ratios = measured.iter().zip(&rates[0]).map(|(ours, rurel)| ours / rurel).collect();
+        let ratios = measured
+            .iter()
+            .zip(&rates[0])
+            .map(|(ours, rurel)| ours / rurel)
+            .collect();
         let least = measured.iter().copied().fold(f64::INFINITY, f64::min);
         let most = measured.iter().copied().fold(0.0, f64::max);
         let median_rate = median(measured.clone());
-        println!("{name:36} {median_rate:9.1} {:>17} {:9.1}", format!("{least:.1} .. {most:.1}"), median(ratios));
+        println!(
+            "{name:36} {median_rate:9.1} {:>17} {:9.1}",
+            format!("{least:.1} .. {most:.1}"),
+            median(ratios)
+        );
     }
     Ok(())
 }

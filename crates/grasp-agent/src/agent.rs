@@ -1,4 +1,5 @@
-//! The controller around the controller: search, reach, recover, grip, supervision, as one explicit state machine.
+//! The controller around the controller: search, reach, recover, grip, supervision, as one explicit
+//! state machine.
 
 use hough_heuristic::image::GrayImage;
 use puma_val2::{Joints, Manipulator, ProximitySensor};
@@ -6,14 +7,15 @@ use puma_val2::{Joints, Manipulator, ProximitySensor};
 use crate::run::{Devices, Modules, Run};
 use crate::watch::Watch;
 use crate::{
-    AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, Guard, Learned, PoseSearch, Recovery,
-    RecoveryMoves, Search, Sighting, Supervision,
+    AgentConfig, AgentError, Behaviour, Controller, Event, Eye, GaveUp, Guard, Learned, PoseSearch,
+    Recovery, RecoveryMoves, Search, Sighting, Supervision,
 };
 
 /// The modules of section 2.2 of the paper, and the state machine that links them.
 ///
-/// Rotation and reaching are a [`Controller`]'s, the paper's two learned behaviours ([`Agent::new`]) or any other ([`Agent::with_controller`]).
-/// Search, recovery and supervision are those of the settings, or others: [`Agent::searching_by`], [`Agent::recovering_by`],
+/// Rotation and reaching are a [`Controller`]'s, the paper's two learned behaviours
+/// ([`Agent::new`]) or any other ([`Agent::with_controller`]). Search, recovery and supervision are
+/// those of the settings, or others: [`Agent::searching_by`], [`Agent::recovering_by`],
 /// [`Agent::supervised_by`].
 #[derive(Clone, Debug)]
 pub struct Agent<C = Learned> {
@@ -26,11 +28,12 @@ pub struct Agent<C = Learned> {
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
-    /// `None` when the gripper has closed at the goal and, unless [`AgentConfig::lift`] is `None`, what was seen there has been lifted;
-    /// otherwise why not. What is lifted is known from the camera alone, see there.
+    /// `None` when the gripper has closed at the goal and, unless [`AgentConfig::lift`] is `None`,
+    /// what was seen there has been lifted; otherwise why not. What is lifted is known from the
+    /// camera alone, see there.
     pub gave_up: Option<GaveUp>,
-    /// Moves after the first sighting, recovery moves included, the grip not; and one for each grip that failed, or was not begun because two looks
-    /// at the goal differed.
+    /// Moves after the first sighting, recovery moves included, the grip not; and one for each grip
+    /// that failed, or was not begun because two looks at the goal differed.
     pub cycles: usize,
     /// How often the ball was lost.
     pub losses: usize,
@@ -91,8 +94,8 @@ impl<C: Controller> Agent<C> {
         self
     }
 
-    /// The same with another supervision, in the place of the one by [`AgentConfig::limits`], [`AgentConfig::approach`] and
-    /// [`AgentConfig::reach_tolerance`].
+    /// The same with another supervision, in the place of the one by [`AgentConfig::limits`],
+    /// [`AgentConfig::approach`] and [`AgentConfig::reach_tolerance`].
     #[must_use]
     pub fn supervised_by(mut self, supervision: impl Supervision + 'static) -> Self {
         self.modules.supervision = Box::new(supervision);
@@ -138,13 +141,15 @@ impl<C: Controller> Agent<C> {
         self
     }
 
-    /// Searches the ball, reaches it and closes the gripper on it; what the controller learns on the way is kept.
+    /// Searches the ball, reaches it and closes the gripper on it; what the controller learns on
+    /// the way is kept.
     ///
     /// Every event goes to `observe` as it happens. The gripper is opened first.
     ///
     /// # Errors
-    /// The camera or the arm failing. The arm is told to stop before the error is returned, the reason is the last event, and what
-    /// the controller had learned until then is still in [`Agent::controller`].
+    /// The camera or the arm failing. The arm is told to stop before the error is returned, the
+    /// reason is the last event, and what the controller had learned until then is still in
+    /// [`Agent::controller`].
     pub fn run_and_learn(
         &mut self,
         eye: &mut dyn Eye,
@@ -158,7 +163,11 @@ impl<C: Controller> Agent<C> {
             &mut self.controller,
             &mut self.modules,
             &mut self.watch,
-            Devices { eye, arm, proximity },
+            Devices {
+                eye,
+                arm,
+                proximity,
+            },
             observe,
         );
         let result = run.until_done();
@@ -166,8 +175,8 @@ impl<C: Controller> Agent<C> {
         result
     }
 
-    /// As [`Agent::run_and_learn`], on a copy of the controller: the agent stays as it is, and the same scene gives the same run
-    /// again.
+    /// As [`Agent::run_and_learn`], on a copy of the controller: the agent stays as it is, and the
+    /// same scene gives the same run again.
     ///
     /// # Errors
     /// As for [`Agent::run_and_learn`].

@@ -8,9 +8,10 @@ use crate::{CameraModel, JointLimits, Percept};
 
 /// An exact simulator of approaching: what is perceived after a move of `JT2` and `JT3`.
 ///
-/// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r, theta 3) is the whole state. It
-/// answers what [`CameraModel::after`] does, to rounding, in a tenth of the time: both joints turn about parallel axes, and the place of
-/// the ball behind the percept given last is remembered.
+/// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r, theta
+/// 3) is the whole state. It answers what [`CameraModel::after`] does, to rounding, in a tenth of
+/// the time: both joints turn about parallel axes, and the place of the ball behind the percept
+/// given last is remembered.
 #[derive(Clone, Debug)]
 pub struct ArmPlane {
     model: CameraModel,
@@ -19,7 +20,8 @@ pub struct ArmPlane {
     elbow: Vector3<f64>,
     /// The camera in a frame that turns with the forearm, with its origin in the elbow.
     camera: Isometry3<f64>,
-    /// The percept given last, and where the ball is that shows so, from the elbow in the frame of the upper arm.
+    /// The percept given last, and where the ball is that shows so, from the elbow in the frame of
+    /// the upper arm.
     last: Option<(Percept, Vector3<f64>)>,
 }
 
@@ -28,7 +30,8 @@ impl ArmPlane {
     pub fn new(model: &CameraModel, limits: JointLimits) -> Self {
         let stretched = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
         let elbow = Vector3::new(model.arm.a2, model.arm.d2, 0.0);
-        let from_elbow = Isometry3::translation(-elbow.x, -elbow.y, -elbow.z) * model.arm.wrist(&stretched);
+        let from_elbow =
+            Isometry3::translation(-elbow.x, -elbow.y, -elbow.z) * model.arm.wrist(&stretched);
         Self {
             model: *model,
             limits,
@@ -38,8 +41,8 @@ impl ArmPlane {
         }
     }
 
-    /// What is perceived after the move, in the frame or outside it. A move that leads `JT3` out of its limits is not made; `None`
-    /// where the ball has no image.
+    /// What is perceived after the move, in the frame or outside it. A move that leads `JT3` out of
+    /// its limits is not made; `None` where the ball has no image.
     pub fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let turned = delta[Joint::J3];
         let theta3 = percept.theta3 + turned.to_degrees();

@@ -76,12 +76,13 @@ impl Behaviour {
         self.table
     }
 
-    /// The action with the highest Q in `state` after the loop breaker, among those that `allowed` admits.
+    /// The action with the highest Q in `state` after the loop breaker, among those that `allowed`
+    /// admits.
     ///
-    /// The loop breaker takes `kappa` off an action's Q when the same action has already been chosen in the same state during this
-    /// episode, three times as much when it has twice, then 7 and 15 times: a greedy policy on coarse states may otherwise go round in
-    /// circles for ever. Equal values go to the
-    /// lowest action. `None` when nothing is allowed.
+    /// The loop breaker takes `kappa` off an action's Q when the same action has already been
+    /// chosen in the same state during this episode, three times as much when it has twice, then 7
+    /// and 15 times: a greedy policy on coarse states may otherwise go round in circles for ever.
+    /// Equal values go to the lowest action. `None` when nothing is allowed.
     pub fn choose(
         &self,
         state: State,
@@ -101,9 +102,9 @@ impl Behaviour {
         best.map(|(action, _)| action)
     }
 
-    /// An action drawn from the Boltzmann distribution (the paper's Eq. 4) at `temperature`, over the Q after the loop breaker (see
-    /// [`Behaviour::choose`]) of the actions that `allowed` admits. `chance`, in 0..1, decides the draw. `None` when nothing is
-    /// allowed.
+    /// An action drawn from the Boltzmann distribution (the paper's Eq. 4) at `temperature`, over
+    /// the Q after the loop breaker (see [`Behaviour::choose`]) of the actions that `allowed`
+    /// admits. `chance`, in 0..1, decides the draw. `None` when nothing is allowed.
     pub fn explore(
         &self,
         state: State,
@@ -115,7 +116,8 @@ impl Behaviour {
     ) -> Option<Action> {
         let best = self.choose(state, episode, kappa, &mut allowed)?;
         let row = self.table.row(state);
-        let worth = |action: Action| row[action.0] - kappa * f64::from(episode.weight(state, action));
+        let worth =
+            |action: Action| row[action.0] - kappa * f64::from(episode.weight(state, action));
         let weights: Vec<f64> = (0..row.len())
             .map(Action)
             .map(|action| {
@@ -134,7 +136,8 @@ impl Behaviour {
         Some(drawn.map_or(best, Action))
     }
 
-    /// Sets a value learned at work and counts the visit; what is not finite, or not in the table, changes nothing.
+    /// Sets a value learned at work and counts the visit; what is not finite, or not in the table,
+    /// changes nothing.
     pub(crate) fn teach(&mut self, state: State, action: Action, value: f64) {
         if self.table.set(state, action, value).is_ok() {
             // The pair is in the table, or `set` would have refused it.
@@ -156,7 +159,8 @@ impl Behaviour {
     /// Reads a behaviour that is exactly `expected`, but for what it has learned.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged or is none of ours; a behaviour with other states, actions, goal or reward.
+    /// A file that cannot be read, is damaged or is none of ours; a behaviour with other states,
+    /// actions, goal or reward.
     pub fn load(path: &std::path::Path, expected: &BehaviourSpec) -> Result<Self, BehaviourError> {
         let behaviour: Self = qtable::load(path, FILE_KIND)?;
         if behaviour.spec != *expected {
@@ -180,7 +184,8 @@ pub struct Episode {
     weights: Vec<u32>,
 }
 
-/// How much choosing an action that lost the ball weighs, in ordinary choices: enough that it is not chosen again.
+/// How much choosing an action that lost the ball weighs, in ordinary choices: enough that it is
+/// not chosen again.
 pub(crate) const LOST_WEIGHT: u32 = 50;
 
 impl Episode {
@@ -274,7 +279,9 @@ mod tests {
         let refused = |change: &dyn Fn(&mut serde_json::Value)| {
             let mut text = sound.clone();
             change(&mut text);
-            serde_json::from_value::<Behaviour>(text).unwrap_err().to_string()
+            serde_json::from_value::<Behaviour>(text)
+                .unwrap_err()
+                .to_string()
         };
         let larger = serde_json::to_value(BehaviourSpec::approaching()).unwrap();
         assert!(refused(&|text| text["spec"] = larger.clone()).contains("42x9"));

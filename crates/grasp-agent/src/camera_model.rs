@@ -13,8 +13,9 @@ use crate::{JointLimits, Percept};
 
 /// An arm with a camera on its hand, as a controller believes it to be, and the size of the ball.
 ///
-/// It answers the two questions of visual servoing: what would be seen ([`CameraModel::view`]), and where is what is seen
-/// ([`CameraModel::locate`]). Lengths in metres, in VAL's world frame (origin at the shoulder, z up).
+/// It answers the two questions of visual servoing: what would be seen ([`CameraModel::view`]), and
+/// where is what is seen ([`CameraModel::locate`]). Lengths in metres, in VAL's world frame (origin
+/// at the shoulder, z up).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -38,8 +39,9 @@ pub struct CameraModel {
 }
 
 impl CameraModel {
-    /// The paper's set-up: an 11.5 mm lens before a 2/3" CCD (8.8 mm wide), 60 mm above the tool axis, 4.5 mm to its left and 20 mm past
-    /// the wrist centre, looking along the tool axis; a ball of 20 mm radius; a gripper of 126 mm.
+    /// The paper's set-up: an 11.5 mm lens before a 2/3" CCD (8.8 mm wide), 60 mm above the tool
+    /// axis, 4.5 mm to its left and 20 mm past the wrist centre, looking along the tool axis; a
+    /// ball of 20 mm radius; a gripper of 126 mm.
     pub fn paper() -> Self {
         let axes = Matrix3::new(
             0.0, 1.0, 0.0, //
@@ -76,22 +78,31 @@ impl CameraModel {
         above_zero("the radius of the ball", self.ball_radius)
     }
 
-    /// The ball's outline with the arm at `joints` and the ball's centre at `ball`, in the frame or outside it; `None` where it has
-    /// none, behind the camera for example.
+    /// The ball's outline with the arm at `joints` and the ball's centre at `ball`, in the frame or
+    /// outside it; `None` where it has none, behind the camera for example.
     pub fn view(&self, joints: &Joints, ball: &Point3<f64>) -> Option<Features> {
         self.view_from(&(self.arm.wrist(joints) * self.mount), ball)
     }
 
-    /// Where the ball is that shows as `features` with the arm at `joints`; `None` for features that no ball has.
+    /// Where the ball is that shows as `features` with the arm at `joints`; `None` for features
+    /// that no ball has.
     pub fn locate(&self, joints: &Joints, features: &Features) -> Option<Point3<f64>> {
         Some(self.arm.wrist(joints) * self.mount * self.in_camera(features)?)
     }
 
-    /// What would be perceived after a move, in the frame or outside it: an exact simulator of approaching, in which the percept is the whole
-    /// state. A move that leads out of `limits` is not made; `None` where the ball has no image.
-    pub fn after(&self, percept: &Percept, delta: &JointDelta, limits: &JointLimits) -> Option<Percept> {
-        // The plane of the upper arm and the forearm looks the same at every angle of the first two joints.
-        let joints = Joints::from_degrees([0.0, -60.0, percept.theta3 + THETA3_ZERO, 0.0, 45.0, 0.0]);
+    /// What would be perceived after a move, in the frame or outside it: an exact simulator of
+    /// approaching, in which the percept is the whole state. A move that leads out of `limits` is
+    /// not made; `None` where the ball has no image.
+    pub fn after(
+        &self,
+        percept: &Percept,
+        delta: &JointDelta,
+        limits: &JointLimits,
+    ) -> Option<Percept> {
+        // The plane of the upper arm and the forearm looks the same at every angle of the first two
+        // joints.
+        let joints =
+            Joints::from_degrees([0.0, -60.0, percept.theta3 + THETA3_ZERO, 0.0, 45.0, 0.0]);
         let moved = joints + *delta;
         let (low, high) = limits.0[Joint::J3.index()];
         if !(low..=high).contains(&moved[Joint::J3]) {
@@ -111,8 +122,8 @@ impl CameraModel {
         self.outline(&camera.inverse_transform_point(ball))
     }
 
-    /// The outline of the ball with its centre at `p` in the camera frame: centre and mean semi-axis of the ellipse in which the image
-    /// plane cuts the cone of rays that touch the ball.
+    /// The outline of the ball with its centre at `p` in the camera frame: centre and mean
+    /// semi-axis of the ellipse in which the image plane cuts the cone of rays that touch the ball.
     pub(crate) fn outline(&self, p: &Point3<f64>) -> Option<Features> {
         let depth2 = p.z * p.z;
         let tangent2 = depth2 - self.ball_radius * self.ball_radius;
@@ -123,14 +134,17 @@ impl CameraModel {
         let scale = self.focal * p.z / tangent2;
         let distance2 = p.coords.norm_squared();
         let minor = self.focal * self.ball_radius / tangent2.sqrt();
-        let major = self.focal * self.ball_radius * (distance2 - self.ball_radius * self.ball_radius).sqrt()
+        let major = self.focal
+            * self.ball_radius
+            * (distance2 - self.ball_radius * self.ball_radius).sqrt()
             / tangent2;
         let features = Features {
             x: self.centre[0] + scale * p.x,
             y: self.centre[1] + scale * p.y,
             r: 0.5 * (major + minor),
         };
-        (features.x.is_finite() && features.y.is_finite() && features.r.is_finite()).then_some(features)
+        (features.x.is_finite() && features.y.is_finite() && features.r.is_finite())
+            .then_some(features)
     }
 
     /// The inverse of [`CameraModel::outline`].
@@ -148,7 +162,8 @@ impl CameraModel {
         };
         let depth = self.focal * self.ball_radius / features.r;
         let mut p = Point3::from(ray(features.x, features.y) * depth.max(1.01 * self.ball_radius));
-        // The outline's centre lies nearly, not exactly, in the direction of the ball's: correct by what is left.
+        // The outline's centre lies nearly, not exactly, in the direction of the ball's: correct by
+        // what is left.
         for _ in 0..30 {
             let seen = self.outline(&p)?;
             let z = (p.z * seen.r / features.r).max(1.001 * self.ball_radius);
@@ -164,7 +179,8 @@ impl CameraModel {
     }
 }
 
-/// A [`CameraModel`] as it is written: the mount by the place of its origin, metres, and its turn, a unit quaternion (i, j, k, w).
+/// A [`CameraModel`] as it is written: the mount by the place of its origin, metres, and its turn,
+/// a unit quaternion (i, j, k, w).
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {

@@ -1,7 +1,7 @@
 //! Settings that are read are checked as those that are made are.
 
-/// Implements `Serialize` and `Deserialize` for settings that derive both with `#[serde(remote = "Self")]` and have a `check` that says whether
-/// they can be used.
+/// Implements `Serialize` and `Deserialize` for settings that derive both with
+/// `#[serde(remote = "Self")]` and have a `check` that says whether they can be used.
 macro_rules! checked {
     ($type:ident) => {
         #[cfg(feature = "serde")]

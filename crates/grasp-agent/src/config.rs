@@ -13,63 +13,78 @@ use crate::{AgentError, GoalInterval, Input, JointLimits};
     serde(remote = "Self")
 )]
 pub struct AgentConfig {
-    /// Poses to look around from, at least one (section 2.2 of the paper: six). They are tried nearest first.
+    /// Poses to look around from, at least one (section 2.2 of the paper: six). They are tried
+    /// nearest first.
     pub search_poses: Vec<Joints>,
-    /// When the ball is in view from none of them: displacements with which they are tried once more, in turn
-    /// [`J1` +12.5 with `J2` +6, then `J1` +12.5 with `J2` -6 degrees\]. A ball at the border of one view is in the middle of another.
+    /// When the ball is in view from none of them: displacements with which they are tried once
+    /// more, in turn [`J1` +12.5 with `J2` +6, then `J1` +12.5 with `J2` -6 degrees\]. A ball at
+    /// the border of one view is in the middle of another.
     pub search_again: Vec<JointDelta>,
-    /// Intervals that must hold together before the gripper moves \[x 99..108, y 74..82, r 32..34\].
+    /// Intervals that must hold together before the gripper moves \[x 99..108, y 74..82, r
+    /// 32..34\].
     pub goal: Vec<GoalInterval>,
-    /// From the goal pose to the grip [`J5` by -18.01 degrees\]: the paper's "the fifth joint is activated". Where it would lead out of the
-    /// limits, and the controller has no grip of its own, the run ends with [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
+    /// From the goal pose to the grip [`J5` by -18.01 degrees\]: the paper's "the fifth joint is
+    /// activated". Where it would lead out of the limits, and the controller has no grip of its
+    /// own, the run ends with [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
     pub grip: JointDelta,
     /// Where the ball is looked for when it is lost, relative to the pose of the last sighting
-    /// \[four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with `J1` by +15 and by -15, and `J2` by
-    /// +12\]; tried in order, after that pose itself.
+    /// \[four moves: `J2` by -20 degrees, which draws the hand back and shows more, the same with
+    /// `J1` by +15 and by -15, and `J2` by +12\]; tried in order, after that pose itself.
     pub recovery: Vec<JointDelta>,
     /// The range that each joint is kept in, finite [[`JointLimits::paper`]].
     pub limits: JointLimits,
-    /// Moves after the first sighting before the run is given up \[60\]; two looks at the goal that show the ball at different places
-    /// count as one, and so does a ball there that the second look does not show. At least 1.
+    /// Moves after the first sighting before the run is given up \[60\]; two looks at the goal that
+    /// show the ball at different places count as one, and so does a ball there that the second
+    /// look does not show. At least 1.
     pub max_cycles: usize,
-    /// Viewpoints of one search before it counts as one that found nothing \[1000\]; at least 1. The search of the paper's poses has 18, another one
-    /// might never end. With `max_cycles`, which bounds the moves between two searches and their number, it bounds the run.
+    /// Viewpoints of one search before it counts as one that found nothing \[1000\]; at least 1.
+    /// The search of the paper's poses has 18, another one might never end. With `max_cycles`,
+    /// which bounds the moves between two searches and their number, it bounds the run.
     #[cfg_attr(feature = "serde", serde(default = "many_views"))]
     pub max_views: usize,
-    /// Frames to look at from one pose before the ball counts as not in view \[2\]. Sampling can miss a circle once.
+    /// Frames to look at from one pose before the ball counts as not in view \[2\]. Sampling can
+    /// miss a circle once.
     pub looks: usize,
     /// How fast the hand may come nearer to the ball.
     pub approach: ApproachLimit,
-    /// After the jaws have closed the hand goes back to where the ball was last seen from, and looks whether it is still there; then it is lifted by
-    /// this move and looks whether a ball was left behind \[`J2` by -15 degrees\]. One that keeps its place in the image as the hand goes up is
-    /// in the jaws. A ball that is not is reached for again; a hand that is stopped has not succeeded, nor has one that its limits keep from
-    /// half of this move ([`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft)). `None`: closing the jaws at the goal is success, whatever is
-    /// between them.
+    /// After the jaws have closed the hand goes back to where the ball was last seen from, and
+    /// looks whether it is still there; then it is lifted by this move and looks whether a ball was
+    /// left behind \[`J2` by -15 degrees\]. One that keeps its place in the image as the hand goes
+    /// up is in the jaws. A ball that is not is reached for again; a hand that is stopped has not
+    /// succeeded, nor has one that its limits keep from half of this move
+    /// ([`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft)). `None`: closing the jaws at the goal is
+    /// success, whatever is between them.
     ///
-    /// The check is by exclusion. The jaws lie outside the camera's view, so a ball in them is not seen: no ball where it was and none below the
-    /// lifted hand, in two looks each, counts as held. A ball that is seen where it was has been missed. A ball that left both views in another way, rolled off or knocked aside, passes for one
-    /// that is held, and so does one that the detector misses each time. Only a sensor in the jaws could tell.
+    /// The check is by exclusion. The jaws lie outside the camera's view, so a ball in them is not
+    /// seen: no ball where it was and none below the lifted hand, in two looks each, counts as
+    /// held. A ball that is seen where it was has been missed. A ball that left both views in
+    /// another way, rolled off or knocked aside, passes for one that is held, and so does one that
+    /// the detector misses each time. Only a sensor in the jaws could tell.
     pub lift: Option<JointDelta>,
-    /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]: smaller circles are something else, the
-    /// end of what the ball stood on for example.
+    /// Least radius of a ball that was left behind, seen from the lifted hand, feature units \[9\]:
+    /// smaller circles are something else, the end of what the ball stood on for example.
     pub left_behind: f64,
-    /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck \[1 degree\].
+    /// How far a joint may stand from where it was sent, radians, before the arm counts as stuck
+    /// \[1 degree\].
     pub reach_tolerance: f64,
-    /// Frames in a row, each from another pose, that may be the same as the one before, or show the ball at exactly the same place, before the
-    /// camera counts as frozen \[2\]; at least 1. Nothing is gripped
-    /// after a single one of them, and after one no grip is verified: with the jaws closed, one is enough.
+    /// Frames in a row, each from another pose, that may be the same as the one before, or show the
+    /// ball at exactly the same place, before the camera counts as frozen \[2\]; at least 1.
+    /// Nothing is gripped after a single one of them, and after one no grip is verified: with the
+    /// jaws closed, one is enough.
     pub same_frames: usize,
 }
 
-/// Of settings that were saved before they had such a number: far more than any search that ends needs.
+/// Of settings that were saved before they had such a number: far more than any search that ends
+/// needs.
 fn many_views() -> usize {
     1000
 }
 
 /// What is too rapid an approach (section 2.2 of the paper: one "that could damage the camera").
 ///
-/// Of a ball of known size the radius is a measure of the distance: the product of both is constant. A move that ends with the ball
-/// at a radius beyond `radius`, more than `growth` times what it was, is taken back.
+/// Of a ball of known size the radius is a measure of the distance: the product of both is
+/// constant. A move that ends with the ball at a radius beyond `radius`, more than `growth` times
+/// what it was, is taken back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -79,7 +94,8 @@ fn many_views() -> usize {
 pub struct ApproachLimit {
     /// Radius up to which any approach is slow enough, feature units \[62\].
     pub radius: f64,
-    /// Greatest growth of the radius in one move beyond that \[1.5\]; finite, as an infinite number cannot be saved.
+    /// Greatest growth of the radius in one move beyond that \[1.5\]; finite, as an infinite number
+    /// cannot be saved.
     pub growth: f64,
 }
 
@@ -102,8 +118,8 @@ impl ApproachLimit {
 checked!(AgentConfig);
 
 impl AgentConfig {
-    /// The paper's controller with the given search poses; where the paper gives no number, the ones in the brackets of the
-    /// fields.
+    /// The paper's controller with the given search poses; where the paper gives no number, the
+    /// ones in the brackets of the fields.
     pub fn paper(search_poses: impl Into<Vec<Joints>>) -> Self {
         let interval = |input, low, high| GoalInterval { input, low, high };
         let turn = |joint, degrees: f64| JointDelta::of(joint, degrees.to_radians());
@@ -144,7 +160,11 @@ impl AgentConfig {
             ));
         }
         self.check_numbers().map_err(AgentError::Config)?;
-        if let Some(pose) = self.search_poses.iter().find(|pose| !self.limits.admit(pose)) {
+        if let Some(pose) = self
+            .search_poses
+            .iter()
+            .find(|pose| !self.limits.admit(pose))
+        {
             return Err(AgentError::Config(format!(
                 "the search pose {pose} lies outside the working limits"
             )));
@@ -204,7 +224,10 @@ impl AgentConfig {
     fn check_numbers(&self) -> Result<(), String> {
         self.limits.check()?;
         self.goal.iter().try_for_each(GoalInterval::check)?;
-        for (name, moves) in [("search_again", &self.search_again), ("recovery", &self.recovery)] {
+        for (name, moves) in [
+            ("search_again", &self.search_again),
+            ("recovery", &self.recovery),
+        ] {
             if moves
                 .iter()
                 .flat_map(|delta| delta.0)

@@ -23,7 +23,10 @@ impl Situation {
     /// Whether every number of it is one.
     pub(crate) fn is_finite(&self) -> bool {
         let Features { x, y, r } = self.features;
-        [x, y, r].iter().chain(&self.joints.0).all(|v| v.is_finite())
+        [x, y, r]
+            .iter()
+            .chain(&self.joints.0)
+            .all(|v| v.is_finite())
     }
 
     /// The part of it that the paper's behaviours look at.
@@ -39,17 +42,19 @@ pub enum Consequence {
     Seen(Situation),
     /// The ball has left the view.
     Lost,
-    /// Supervision has taken the arm back to where it was: something was too near, or the approach too fast.
+    /// Supervision has taken the arm back to where it was: something was too near, or the approach
+    /// too fast.
     TakenBack,
-    /// It was not a move decided on: the gripper went for the ball, and was stopped or missed it. The ball may lie elsewhere now.
+    /// It was not a move decided on: the gripper went for the ball, and was stopped or missed it.
+    /// The ball may lie elsewhere now.
     Missed,
 }
 
 /// Decides, from one sighting of the ball to the next, how the arm moves.
 ///
-/// [`Agent`](crate::Agent) calls [`decide`](Controller::decide) whenever the ball is in view and not yet at the goal; searching,
-/// recovering a lost ball, gripping and supervision are the agent's. The other methods tell what happens in between and may be left
-/// out.
+/// [`Agent`](crate::Agent) calls [`decide`](Controller::decide) whenever the ball is in view and
+/// not yet at the goal; searching, recovering a lost ball, gripping and supervision are the
+/// agent's. The other methods tell what happens in between and may be left out.
 pub trait Controller {
     /// What it is called, in tables and logs.
     fn name(&self) -> &str;
@@ -65,12 +70,14 @@ pub trait Controller {
         let _ = consequence;
     }
 
-    /// The arm stands at `joints`: at the beginning of a run, and after each move, whoever ordered it.
+    /// The arm stands at `joints`: at the beginning of a run, and after each move, whoever ordered
+    /// it.
     fn arm_at(&mut self, joints: &Joints) {
         let _ = joints;
     }
 
-    /// The move that brings the gripper to the ball, seen at the goal; `None` to leave it to the agent's settings.
+    /// The move that brings the gripper to the ball, seen at the goal; `None` to leave it to the
+    /// agent's settings.
     fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
         let _ = (now, limits);
         None
@@ -125,7 +132,8 @@ pub struct JointLimits(pub [(f64, f64); 6]);
 checked!(JointLimits);
 
 impl JointLimits {
-    /// The reaching task's: -160..160, -150..-20, 120..215, -110..170, -100..100, -266..266 degrees.
+    /// The reaching task's: -160..160, -150..-20, 120..215, -110..170, -100..100, -266..266
+    /// degrees.
     pub fn paper() -> Self {
         Self(
             [
@@ -163,7 +171,8 @@ impl JointLimits {
     pub fn nearest(&self, joints: &Joints) -> Joints {
         Joints(std::array::from_fn(|i| {
             let (low, high) = self.0[i];
-            // Not `clamp`, which panics on a range that is none, nor `min` and `max`, which make a number of NaN.
+            // Not `clamp`, which panics on a range that is none, nor `min` and `max`, which make a
+            // number of NaN.
             match joints.0[i] {
                 angle if angle < low => low,
                 angle if angle > high => high,
@@ -199,9 +208,9 @@ impl StepLimits {
             .try_for_each(|(joint, most)| above_zero(&format!("the longest step of {joint}"), most))
     }
 
-    /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that, in which no joint turns farther
-    /// than it may; joints that would leave `limits` stop there. Of what is not finite, or steps that are NaN, a move that is NaN, which no limits
-    /// admit.
+    /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that,
+    /// in which no joint turns farther than it may; joints that would leave `limits` stop there. Of
+    /// what is not finite, or steps that are NaN, a move that is NaN, which no limits admit.
     pub fn apply(&self, wanted: [f64; 3], joints: &Joints, limits: &JointLimits) -> JointDelta {
         let shares = wanted
             .iter()
@@ -220,7 +229,11 @@ impl StepLimits {
         }
         let reached = limits.nearest(&target);
         JointDelta(std::array::from_fn(|i| {
-            if i < 3 { reached.0[i] - joints.0[i] } else { 0.0 }
+            if i < 3 {
+                reached.0[i] - joints.0[i]
+            } else {
+                0.0
+            }
         }))
     }
 }
@@ -238,7 +251,10 @@ mod tests {
             .degrees();
         let expected = [5.0, 6.0, -1.5, 0.0, 0.0, 0.0];
         assert!(
-            delta.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9),
+            delta
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-9),
             "{delta:?}"
         );
         assert!(JointLimits::paper().nearest(&Joints([f64::NAN; 6])).0[0].is_nan());

@@ -70,7 +70,8 @@ pub enum AgentError {
         /// How many frames.
         looks: usize,
     },
-    /// A replayed run took another course than the logged one: another controller, another configuration, or other knowledge.
+    /// A replayed run took another course than the logged one: another controller, another
+    /// configuration, or other knowledge.
     #[error("the replayed run differs from the log at event {event} (counted from 0)")]
     Replay {
         /// The first event that differs.

@@ -18,12 +18,14 @@ pub struct Event<'a> {
     pub frame: Option<&'a GrayImage>,
 }
 
-/// Where the state machine of a run stands; it is drawn on the [front page](crate#the-state-machine).
+/// Where the state machine of a run stands; it is drawn on the [front
+/// page](crate#the-state-machine).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Phase {
     /// Looking around in the workspace ([`Search`](crate::Search)).
     Search,
-    /// The ball is in view, and the controller moves the hand to it ([`Controller`](crate::Controller)).
+    /// The ball is in view, and the controller moves the hand to it
+    /// ([`Controller`](crate::Controller)).
     Reach,
     /// Looking around where the ball was in view a moment ago ([`Recovery`](crate::Recovery)).
     Recover,
@@ -52,9 +54,11 @@ pub enum Order {
 
 /// What can happen in a run.
 ///
-/// Every order to the arm, every answer of arm, sensor and camera and every transition of the state machine ([`EventKind::enters`]) makes an event,
-/// in the order in which they happen, so that the events determine the run: see [`EventLog::replay`](crate::EventLog::replay). An order that is
-/// carried out makes the event that says so, one that ends in nothing but an error makes [`EventKind::Unanswered`].
+/// Every order to the arm, every answer of arm, sensor and camera and every transition of the state
+/// machine ([`EventKind::enters`]) makes an event, in the order in which they happen, so that the
+/// events determine the run: see [`EventLog::replay`](crate::EventLog::replay). An order that is
+/// carried out makes the event that says so, one that ends in nothing but an error makes
+/// [`EventKind::Unanswered`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -65,23 +69,27 @@ pub enum EventKind {
     Searching,
     /// The ball has come into view, and the controller begins to reach for it.
     Reaching,
-    /// The arm stands at the search pose with this index and is about to look, or is on its way there if [`EventKind::TooNear`] follows. Indices go on counting when the poses are tried again
-    /// with a displacement.
+    /// The arm stands at the search pose with this index and is about to look, or is on its way
+    /// there if [`EventKind::TooNear`] follows. Indices go on counting when the poses are tried
+    /// again with a displacement.
     AtSearchPose(usize),
     /// The ball is in the frame.
     Seen(Sighting),
     /// No ball is in the frame.
     NotSeen,
-    /// What was just looked at is the same, to the last pixel, as from the pose before: the camera may have stopped.
+    /// What was just looked at is the same, to the last pixel, as from the pose before: the camera
+    /// may have stopped.
     SameFrame,
-    /// The controller chose this move and the arm has made it, or a part of it if [`EventKind::TooNear`] follows.
+    /// The controller chose this move and the arm has made it, or a part of it if
+    /// [`EventKind::TooNear`] follows.
     Moved(JointDelta),
     /// The ball has left the frame, and its recovery begins.
     Lost,
-    /// The arm has gone back to the pose from which the ball was last seen (0), or made the recovery move with this number; or it is on its way
-    /// there if [`EventKind::TooNear`] follows.
+    /// The arm has gone back to the pose from which the ball was last seen (0), or made the
+    /// recovery move with this number; or it is on its way there if [`EventKind::TooNear`] follows.
     Recovering(usize),
-    /// Something is too near to the hand; the arm has been stopped, on its way to the pose of the event before or there.
+    /// Something is too near to the hand; the arm has been stopped, on its way to the pose of the
+    /// event before or there.
     TooNear,
     /// The ball came nearer too fast.
     TooFast,
@@ -89,14 +97,16 @@ pub enum EventKind {
     TakenBack,
     /// Centre and radius are at the goal, and the activation of the gripper begins.
     AtGoal,
-    /// Moves have been taken back again and again: what is too near may be the ball itself. The activation of the gripper begins from here, for a
-    /// controller that can aim.
+    /// Moves have been taken back again and again: what is too near may be the ball itself. The
+    /// activation of the gripper begins from here, for a controller that can aim.
     Cornered,
-    /// The gripper has been brought to the ball by this move, the last one of two where the arm has to be moved first.
+    /// The gripper has been brought to the ball by this move, the last one of two where the arm has
+    /// to be moved first.
     Gripping(JointDelta),
     /// The gripper has closed.
     Gripped,
-    /// The hand, closed, has gone back by a move of the grip, the last one to where the ball was last seen from.
+    /// The hand, closed, has gone back by a move of the grip, the last one to where the ball was
+    /// last seen from.
     Withdrawn,
     /// The arm has lifted what it gripped.
     Lifted,
@@ -106,7 +116,8 @@ pub enum EventKind {
     Grasped,
     /// The run is over without a grip.
     GaveUp(GaveUp),
-    /// This order was given, and the arm has failed to say what came of it; [`EventKind::Failed`] follows.
+    /// This order was given, and the arm has failed to say what came of it; [`EventKind::Failed`]
+    /// follows.
     Unanswered(Order),
     /// Arm or camera failed, for this reason; the arm has been told to stop. The run is over.
     Failed(String),
@@ -143,7 +154,8 @@ impl EventKind {
         }
     }
 
-    /// The phase that begins with this event, if one does. Every transition of the state machine has exactly one such event.
+    /// The phase that begins with this event, if one does. Every transition of the state machine
+    /// has exactly one such event.
     pub fn enters(&self) -> Option<Phase> {
         match self {
             Self::Searching => Some(Phase::Search),
@@ -160,14 +172,17 @@ impl EventKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum GaveUp {
-    /// The ball is in view from none of the search poses, or of the first [`AgentConfig::max_views`](crate::AgentConfig::max_views) of them.
+    /// The ball is in view from none of the search poses, or of the first
+    /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) of them.
     NotFound,
     /// The goal was not reached within the allowed number of moves.
     OutOfCycles,
-    /// Every move that the controller could make leads out of the working limits, or the grip at the goal does, or the lift after it.
+    /// Every move that the controller could make leads out of the working limits, or the grip at
+    /// the goal does, or the lift after it.
     NoMoveLeft,
-    /// Something was too near to the hand on its last way to the ball, again and again, or when what it had gripped was lifted; or on the way to every
-    /// viewpoint of a search, so that there was no look at all.
+    /// Something was too near to the hand on its last way to the ball, again and again, or when
+    /// what it had gripped was lifted; or on the way to every viewpoint of a search, so that there
+    /// was no look at all.
     Obstructed,
 }
 

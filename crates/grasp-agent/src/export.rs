@@ -13,12 +13,14 @@ use crate::{Behaviour, BehaviourError, BehaviourSpec, GoalInterval};
 const MOST_ENTRIES: usize = 1 << 24;
 
 impl Behaviour {
-    /// The behaviour as JSON: its name; the units and conventions, with the frame's size and the zero of theta 3; the inputs with their edges
-    /// and goal intervals; the joints with their steps in degrees; the goal; the reward; and `q`, a row of values for every state.
+    /// The behaviour as JSON: its name; the units and conventions, with the frame's size and the
+    /// zero of theta 3; the inputs with their edges and goal intervals; the joints with their steps
+    /// in degrees; the goal; the reward; and `q`, a row of values for every state.
     ///
-    /// A state is a mixed-radix number of the intervals that the inputs lie in, the last input varying fastest, and an action one of the
-    /// joints' steps, the last joint varying fastest. An interval is closed below and open above, but for goal intervals, which are closed at
-    /// both ends. How often each pair was visited is not part of it. What else a controller needs is in
+    /// A state is a mixed-radix number of the intervals that the inputs lie in, the last input
+    /// varying fastest, and an action one of the joints' steps, the last joint varying fastest. An
+    /// interval is closed below and open above, but for goal intervals, which are closed at both
+    /// ends. How often each pair was visited is not part of it. What else a controller needs is in
     /// [`Learned::to_json`](crate::Learned::to_json).
     pub fn to_json(&self) -> String {
         text_of(&Document::of(self))
@@ -27,16 +29,18 @@ impl Behaviour {
     /// Reads what [`Behaviour::to_json`] wrote, or another program in the same form.
     ///
     /// # Errors
-    /// [`BehaviourError::Text`], with the place where there is one: no JSON, a missing part, edges that do not increase, a number that is not
-    /// finite, a wrong number of rows or values, a joint that is moved twice, no goal, another frame or zero of theta 3 than here.
+    /// [`BehaviourError::Text`], with the place where there is one: no JSON, a missing part, edges
+    /// that do not increase, a number that is not finite, a wrong number of rows or values, a joint
+    /// that is moved twice, no goal, another frame or zero of theta 3 than here.
     pub fn from_json(text: &str) -> Result<Self, BehaviourError> {
         let document: Document = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
         document.into_behaviour()
     }
 
-    /// The values as a CSV table: a column for the lower and upper end of each input's interval (empty where it has none), a column for each
-    /// action, headed by its joint steps in degrees, and `best`, the number of the best action (from 0); a row for every state. Before them
-    /// stand lines that begin with `#`: units, conventions and the goal.
+    /// The values as a CSV table: a column for the lower and upper end of each input's interval
+    /// (empty where it has none), a column for each action, headed by its joint steps in degrees,
+    /// and `best`, the number of the best action (from 0); a row for every state. Before them stand
+    /// lines that begin with `#`: units, conventions and the goal.
     pub fn to_csv(&self) -> String {
         let spec = self.spec();
         let mut csv = format!("# behaviour {}\n", spec.name.replace('\n', " "));
@@ -83,8 +87,9 @@ impl Behaviour {
     /// Reads the values of a CSV table of [`Behaviour::to_csv`] for the behaviour `spec`.
     ///
     /// # Errors
-    /// [`BehaviourError::Text`], with the line: intervals or actions that are not those of `spec`, a value that is no finite number, a wrong
-    /// number of lines or columns, remarks that state another frame, zero of theta 3 or goal; and what [`Behaviour::from_json`] refuses of `spec`.
+    /// [`BehaviourError::Text`], with the line: intervals or actions that are not those of `spec`,
+    /// a value that is no finite number, a wrong number of lines or columns, remarks that state
+    /// another frame, zero of theta 3 or goal; and what [`Behaviour::from_json`] refuses of `spec`.
     pub fn from_csv(spec: BehaviourSpec, text: &str) -> Result<Self, BehaviourError> {
         let blank = Self::new(spec, blank_table(shape_of(text)?)?)?;
         Remarks(text).check(blank.spec())?;
@@ -108,7 +113,11 @@ impl Behaviour {
                     ends + actions + 1
                 )));
             }
-            if !fields[..ends].iter().copied().eq(wanted.split(',').take(ends)) {
+            if !fields[..ends]
+                .iter()
+                .copied()
+                .eq(wanted.split(',').take(ends))
+            {
                 return Err(bad(format!(
                     "line {line}: intervals are not those of the behaviour"
                 )));
@@ -150,7 +159,8 @@ impl<'a> Remarks<'a> {
             .filter(|said| said.contains(" is from "))
     }
 
-    /// Fails if the remarks state other conventions, or another goal than that of `spec`. What they leave out is as it is here.
+    /// Fails if the remarks state other conventions, or another goal than that of `spec`. What they
+    /// leave out is as it is here.
     fn check(&self, spec: &BehaviourSpec) -> Result<(), BehaviourError> {
         if let Some(said) = self.about("frame ").next() {
             let conventions = Conventions::of_line(said);
@@ -199,17 +209,23 @@ pub(crate) fn bad(what: impl Into<String>) -> BehaviourError {
     BehaviourError::Text { what: what.into() }
 }
 
-/// States and actions that a CSV table has lines and columns for; whether they are the right ones is checked later.
+/// States and actions that a CSV table has lines and columns for; whether they are the right ones
+/// is checked later.
 fn shape_of(text: &str) -> Result<(usize, usize), BehaviourError> {
     let mut lines = table_lines(text);
     let (_, header) = lines.next().ok_or_else(|| bad("there is nothing"))?;
-    let actions = header.split(',').filter(|name| name.starts_with("JT")).count();
+    let actions = header
+        .split(',')
+        .filter(|name| name.starts_with("JT"))
+        .count();
     Ok((lines.count(), actions))
 }
 
 fn blank_table((states, actions): (usize, usize)) -> Result<QTable, BehaviourError> {
     if states.saturating_mul(actions) > MOST_ENTRIES {
-        return Err(bad(format!("{states} states x {actions} actions are too many")));
+        return Err(bad(format!(
+            "{states} states x {actions} actions are too many"
+        )));
     }
     QTable::new(states, actions).map_err(|e| bad(e.to_string()))
 }
@@ -344,7 +360,9 @@ pub(crate) fn check_format(found: &str, wanted: &str) -> Result<(), BehaviourErr
     if found == wanted {
         Ok(())
     } else {
-        Err(bad(format!("its format is {found:?}; {wanted:?} is read here")))
+        Err(bad(format!(
+            "its format is {found:?}; {wanted:?} is read here"
+        )))
     }
 }
 
@@ -369,7 +387,10 @@ mod tests {
         let behaviour = behaviour();
         assert!(Behaviour::from_json(&behaviour.to_json()).unwrap() == behaviour);
         let csv = behaviour.to_csv();
-        assert_eq!(csv.lines().filter(|line| !line.starts_with('#')).count(), 91);
+        assert_eq!(
+            csv.lines().filter(|line| !line.starts_with('#')).count(),
+            91
+        );
         assert!(csv.contains("# frame 192 x 144; theta3_zero_degrees 170\n"));
         assert!(csv.contains("# at the goal R is from 32 to 34, both ends included\n"));
         assert!(Behaviour::from_csv(BehaviourSpec::approaching(), &csv).unwrap() == behaviour);
@@ -406,7 +427,10 @@ mod tests {
             }
         });
         let refused = of(&broken.collect::<Vec<String>>().join("\n"));
-        assert!(refused.contains(&format!("line {}:", header + 7)), "{refused}");
+        assert!(
+            refused.contains(&format!("line {}:", header + 7)),
+            "{refused}"
+        );
         let cut = csv.lines().take(header + 49).collect::<Vec<_>>().join("\n");
         assert!(of(&cut).contains("49x81"));
         let other = Behaviour::from_csv(BehaviourSpec::centering(), &csv);
@@ -418,7 +442,10 @@ mod tests {
         // A change of the document, and what is said of it.
         type Change = fn(&mut serde_json::Value);
         let cases: [(Change, &str); 11] = [
-            (|d| d["moves"][1]["joint"] = "J2".into(), "JT2 is moved twice"),
+            (
+                |d| d["moves"][1]["joint"] = "J2".into(),
+                "JT2 is moved twice",
+            ),
             (
                 |d| d["moves"][0]["degrees"] = serde_json::json!([]),
                 "JT2 has no steps",

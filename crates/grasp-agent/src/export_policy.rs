@@ -1,4 +1,5 @@
-//! The paper's controller as text: both behaviours, and everything else that choosing by them takes.
+//! The paper's controller as text: both behaviours, and everything else that choosing by them
+//! takes.
 
 use std::fmt::Write as _;
 
@@ -78,11 +79,16 @@ fn assembled(
 ) -> Result<(Learned, JointLimits), BehaviourError> {
     for (joint, [low, high]) in Joint::ALL.into_iter().zip(limits_degrees) {
         if !(low.is_finite() && high.is_finite() && low <= high) {
-            return Err(bad(format!("the limits of {joint} are {low} to {high} degrees")));
+            return Err(bad(format!(
+                "the limits of {joint} are {low} to {high} degrees"
+            )));
         }
         // The ranges of both presets of the arm.
         let range = PumaParams::unimation().ranges[joint.index()];
-        let (min, max) = (rounded(range.min.to_degrees()), rounded(range.max.to_degrees()));
+        let (min, max) = (
+            rounded(range.min.to_degrees()),
+            rounded(range.max.to_degrees()),
+        );
         if low < min || high > max {
             return Err(bad(format!(
                 "the limits of {joint} are {low} to {high} degrees; its range is {min} to {max}"
@@ -91,7 +97,9 @@ fn assembled(
     }
     for kappa in [breaker.centering, breaker.approaching] {
         if !(kappa.is_finite() && kappa >= 0.0) {
-            return Err(bad(format!("a loop breaker is {kappa}; it must be 0 or above")));
+            return Err(bad(format!(
+                "a loop breaker is {kappa}; it must be 0 or above"
+            )));
         }
     }
     if breaker.lost_weight != LOST_WEIGHT {
@@ -100,39 +108,45 @@ fn assembled(
             breaker.lost_weight
         )));
     }
-    let joint_of_both = centering
-        .spec()
-        .moves
-        .iter()
-        .find(|steps| approaching.spec().moves.iter().any(|s| s.joint == steps.joint));
+    let joint_of_both = centering.spec().moves.iter().find(|steps| {
+        approaching
+            .spec()
+            .moves
+            .iter()
+            .any(|s| s.joint == steps.joint)
+    });
     if let Some(steps) = joint_of_both {
         return Err(bad(format!("both behaviours move {}", steps.joint)));
     }
-    let limits = JointLimits(limits_degrees.map(|[low, high]| (low.to_radians(), high.to_radians())));
-    let learned = Learned::new(centering, approaching).with_kappa(breaker.centering, breaker.approaching);
+    let limits =
+        JointLimits(limits_degrees.map(|[low, high]| (low.to_radians(), high.to_radians())));
+    let learned =
+        Learned::new(centering, approaching).with_kappa(breaker.centering, breaker.approaching);
     Ok((learned, limits))
 }
 
 impl Learned {
-    /// The controller as JSON, complete enough that another program can run it: both behaviours as [`Behaviour::to_json`] writes them, the
-    /// loop breakers, and `limits`, the ranges that the joints are kept in. Learning at work is not part of it.
+    /// The controller as JSON, complete enough that another program can run it: both behaviours as
+    /// [`Behaviour::to_json`] writes them, the loop breakers, and `limits`, the ranges that the
+    /// joints are kept in. Learning at work is not part of it.
     pub fn to_json(&self, limits: &JointLimits) -> String {
         text_of(&Policy::of(self, limits))
     }
 
-    /// Reads what [`Learned::to_json`] wrote, or another program in the same form: a frozen controller, and the limits, which come back to
-    /// 1e-7 degrees.
+    /// Reads what [`Learned::to_json`] wrote, or another program in the same form: a frozen
+    /// controller, and the limits, which come back to 1e-7 degrees.
     ///
     /// # Errors
-    /// [`BehaviourError::Text`] for what [`Behaviour::from_json`] refuses, two behaviours that move the same joint, limits that are no
-    /// ranges or wider than the arm's own ([`PumaParams::unimation`]), and loop breakers below zero or other than this one.
+    /// [`BehaviourError::Text`] for what [`Behaviour::from_json`] refuses, two behaviours that move
+    /// the same joint, limits that are no ranges or wider than the arm's own
+    /// ([`PumaParams::unimation`]), and loop breakers below zero or other than this one.
     pub fn from_json(text: &str) -> Result<(Self, JointLimits), BehaviourError> {
         let policy: Policy = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
         policy.into_learned()
     }
 
-    /// Centering and approaching as CSV tables, as [`Behaviour::to_csv`] writes them, with loop breakers and limits among the remarks before
-    /// them; [`Learned::from_csv`] reads both.
+    /// Centering and approaching as CSV tables, as [`Behaviour::to_csv`] writes them, with loop
+    /// breakers and limits among the remarks before them; [`Learned::from_csv`] reads both.
     pub fn to_csv(&self, limits: &JointLimits) -> [String; 2] {
         let mut remarks = String::new();
         for word in WORDS {
@@ -144,24 +158,36 @@ impl Learned {
             let _ = writeln!(remarks, "# limits_degrees of {joint}: {low} to {high}");
         }
         let (centering, approaching) = self.kappa();
-        [(self.centering(), centering), (self.approaching(), approaching)]
-            .map(|(behaviour, kappa)| format!("{remarks}# loop_breaker {kappa}\n{}", behaviour.to_csv()))
+        [
+            (self.centering(), centering),
+            (self.approaching(), approaching),
+        ]
+        .map(|(behaviour, kappa)| {
+            format!("{remarks}# loop_breaker {kappa}\n{}", behaviour.to_csv())
+        })
     }
 
-    /// Reads the two tables of [`Learned::to_csv`], or another program's in the same form, for the behaviours of `pair`: a frozen controller, and
-    /// the limits, which come back to 1e-7 degrees. The tables hold edges, goals and values, `pair` the rest: names and rewards.
+    /// Reads the two tables of [`Learned::to_csv`], or another program's in the same form, for the
+    /// behaviours of `pair`: a frozen controller, and the limits, which come back to 1e-7 degrees.
+    /// The tables hold edges, goals and values, `pair` the rest: names and rewards.
     ///
     /// # Errors
-    /// [`BehaviourError::Text`] for what [`Behaviour::from_csv`] and [`Learned::from_json`] refuse, for a remark that is missing or said twice
-    /// (frame and zero of theta 3, goal, limits, loop breaker, `lost_weight`), and for limits that are not the same in both tables.
-    pub fn from_csv(pair: BehaviourPair, tables: [&str; 2]) -> Result<(Self, JointLimits), BehaviourError> {
+    /// [`BehaviourError::Text`] for what [`Behaviour::from_csv`] and [`Learned::from_json`] refuse,
+    /// for a remark that is missing or said twice (frame and zero of theta 3, goal, limits, loop
+    /// breaker, `lost_weight`), and for limits that are not the same in both tables.
+    pub fn from_csv(
+        pair: BehaviourPair,
+        tables: [&str; 2],
+    ) -> Result<(Self, JointLimits), BehaviourError> {
         let [first, second] = tables.map(Remarks);
         let mut limits_degrees = [[0.0; 2]; 6];
         for (joint, limits) in Joint::ALL.into_iter().zip(&mut limits_degrees) {
             let what = format!("limits_degrees of {joint}: ");
             let said = first.only(&what)?;
             if second.only(&what)? != said {
-                return Err(bad(format!("the limits of {joint} differ in the two tables")));
+                return Err(bad(format!(
+                    "the limits of {joint} differ in the two tables"
+                )));
             }
             let Some((low, high)) = said.split_once(" to ") else {
                 return Err(bad(format!("the limits of {joint} are {said:?}")));
@@ -200,7 +226,9 @@ impl Learned {
 }
 
 fn number(text: &str) -> Result<f64, BehaviourError> {
-    text.trim().parse().map_err(|e| bad(format!("{text:?}: {e}")))
+    text.trim()
+        .parse()
+        .map_err(|e| bad(format!("{text:?}: {e}")))
 }
 
 #[cfg(test)]
@@ -238,7 +266,10 @@ mod tests {
     fn the_tables_say_what_choosing_by_them_takes_and_come_back_equal() {
         let learned = learned();
         let [centering, approaching] = learned.to_csv(&JointLimits::paper());
-        assert!(centering.contains("# loop_breaker 12.5\n") && approaching.contains("# loop_breaker 30\n"));
+        assert!(
+            centering.contains("# loop_breaker 12.5\n")
+                && approaching.contains("# loop_breaker 30\n")
+        );
         for table in [&centering, &approaching] {
             assert!(
                 table.contains("# limits_degrees of JT3: 120 to 215\n")
@@ -246,12 +277,18 @@ mod tests {
             );
         }
         let pair = BehaviourPair::paper_mended();
-        assert!(Behaviour::from_csv(pair.centering.clone(), &centering).unwrap() == *learned.centering());
         assert!(
-            Behaviour::from_csv(pair.approaching.clone(), &approaching).unwrap() == *learned.approaching()
+            Behaviour::from_csv(pair.centering.clone(), &centering).unwrap()
+                == *learned.centering()
+        );
+        assert!(
+            Behaviour::from_csv(pair.approaching.clone(), &approaching).unwrap()
+                == *learned.approaching()
         );
         let (now, limits) = Learned::from_csv(pair, [&centering, &approaching]).unwrap();
-        assert!(now.centering() == learned.centering() && now.approaching() == learned.approaching());
+        assert!(
+            now.centering() == learned.centering() && now.approaching() == learned.approaching()
+        );
         assert_eq!((now.kappa(), limits), ((12.5, 30.0), JointLimits::paper()));
         assert_eq!(now.to_csv(&limits), [centering, approaching]);
     }
@@ -274,16 +311,32 @@ mod tests {
                 "# limits of JT5",
                 "limits_degrees of JT5",
             ),
-            ("# loop_breaker 30", "# loop_breaker -1", "loop breaker is -1"),
-            ("# loop_breaker 30", "# loop_breaker NaN", "loop breaker is NaN"),
+            (
+                "# loop_breaker 30",
+                "# loop_breaker -1",
+                "loop breaker is -1",
+            ),
+            (
+                "# loop_breaker 30",
+                "# loop_breaker NaN",
+                "loop breaker is NaN",
+            ),
             (
                 "# loop_breaker 30",
                 "# loop_breaker 30\n# loop_breaker 31",
                 "said twice",
             ),
-            ("# lost_weight 50", "# lost_weight 51", "lost_weight differs"),
+            (
+                "# lost_weight 50",
+                "# lost_weight 51",
+                "lost_weight differs",
+            ),
             ("# frame 192 x 144", "# frame 768 x 576", "frame"),
-            ("theta3_zero_degrees 170", "theta3_zero_degrees 180", "JT3 = 180"),
+            (
+                "theta3_zero_degrees 170",
+                "theta3_zero_degrees 180",
+                "JT3 = 180",
+            ),
             ("# frame 192", "# size 192", "frame"),
             ("# at the goal ", "# in the goal ", "at the goal"),
             ("goal R is from 32 to 34", "goal R is from 32 to 35", "goal"),
@@ -300,7 +353,9 @@ mod tests {
             let read = Learned::from_csv(BehaviourPair::paper_mended(), [&changed[0], &changed[1]]);
             read.unwrap_err().to_string()
         };
-        assert!(both("JT3: 120 to 215", "JT3: 300 to 215").contains("limits of JT3 are 300 to 215"));
+        assert!(
+            both("JT3: 120 to 215", "JT3: 300 to 215").contains("limits of JT3 are 300 to 215")
+        );
         assert!(both("JT3: 120 to 215", "JT3: many").contains("limits of JT3 are \"many\""));
         assert!(both("lost_weight 50", "lost_weight 3").contains("lost_weight is 3"));
         let mut pair = BehaviourPair::paper_mended();
@@ -314,12 +369,18 @@ mod tests {
         type Change = fn(&mut serde_json::Value);
         let cases: [(Change, &str); 8] = [
             (|d| d["format"] = "grasp-agent policy 2".into(), "policy 2"),
-            (|d| d["limits_degrees"][2][0] = 300.0.into(), "limits of JT3"),
+            (
+                |d| d["limits_degrees"][2][0] = 300.0.into(),
+                "limits of JT3",
+            ),
             (
                 |d| d["limits_degrees"][1] = serde_json::json!([-1e9, 1e9]),
                 "its range is -225 to 45",
             ),
-            (|d| d["loop_breaker"]["centering"] = (-1.0).into(), "loop breaker"),
+            (
+                |d| d["loop_breaker"]["centering"] = (-1.0).into(),
+                "loop breaker",
+            ),
             (
                 |d| d["loop_breaker"]["lost_weight"] = 3.into(),
                 "lost_weight is 3",
@@ -328,7 +389,10 @@ mod tests {
                 |d| d["centering"]["moves"][0]["joint"] = "J3".into(),
                 "both behaviours move JT3",
             ),
-            (|d| d["approaching"]["goal"] = serde_json::json!([]), "no goal"),
+            (
+                |d| d["approaching"]["goal"] = serde_json::json!([]),
+                "no goal",
+            ),
             (
                 |d| {
                     d["approaching"]["q"].as_array_mut().unwrap().pop();
@@ -340,7 +404,9 @@ mod tests {
         for (change, said) in cases {
             let mut document: serde_json::Value = serde_json::from_str(&json).unwrap();
             change(&mut document);
-            let refused = Learned::from_json(&document.to_string()).unwrap_err().to_string();
+            let refused = Learned::from_json(&document.to_string())
+                .unwrap_err()
+                .to_string();
             assert!(refused.contains(said), "{refused} does not say {said}");
         }
         assert!(Learned::from_json(&json[..json.len() / 2]).is_err());

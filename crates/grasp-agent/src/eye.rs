@@ -31,7 +31,8 @@ pub struct Sighting {
     pub detection: Detection,
     /// The same in feature units.
     pub features: Features,
-    /// Where the longer axis of its outline points in the image, radians from x toward y; `None` for what is round, or where that is not known.
+    /// Where the longer axis of its outline points in the image, radians from x toward y; `None`
+    /// for what is round, or where that is not known.
     #[cfg_attr(feature = "serde", serde(default))]
     pub long_axis: Option<f64>,
 }
@@ -43,7 +44,8 @@ pub struct CameraEye<'a> {
 }
 
 impl<'a> CameraEye<'a> {
-    /// An eye that takes frames from `source` and looks for the ball with `detector`: see [`BallFeatures`].
+    /// An eye that takes frames from `source` and looks for the ball with `detector`: see
+    /// [`BallFeatures`].
     pub fn new(source: &'a mut dyn FrameSource, detector: &'a mut dyn CircleDetector) -> Self {
         Self::looking_for(source, BallFeatures::new(detector))
     }

@@ -6,11 +6,12 @@ use puma_val2::{Joint, JointDelta, Joints};
 
 use crate::{Consequence, Controller, GaveUp, JointLimits, Situation};
 
-/// A controller whose grip turns `JT6` so that the jaws close across the longer axis of what is seen ([`Situation::long_axis`]): an egg, found by
-/// [`EggFeatures`](crate::EggFeatures).
+/// A controller whose grip turns `JT6` so that the jaws close across the longer axis of what is
+/// seen ([`Situation::long_axis`]): an egg, found by [`EggFeatures`](crate::EggFeatures).
 ///
-/// With `JT6` at 0 the jaws open along the rows of the image, and a turn of `JT6` turns them from x toward y. It reaches as the controller in it
-/// does, and grips as that does what has no longer axis.
+/// With `JT6` at 0 the jaws open along the rows of the image, and a turn of `JT6` turns them from x
+/// toward y. It reaches as the controller in it does, and grips as that does what has no longer
+/// axis.
 #[derive(Clone, Debug)]
 pub struct GripAcross<C> {
     controller: C,
@@ -18,7 +19,8 @@ pub struct GripAcross<C> {
 }
 
 impl<C> GripAcross<C> {
-    /// `controller`, with `grip` in the place of an aim of its own where it has none: [`AgentConfig::grip`](crate::AgentConfig::grip), for example.
+    /// `controller`, with `grip` in the place of an aim of its own where it has none:
+    /// [`AgentConfig::grip`](crate::AgentConfig::grip), for example.
     pub fn new(controller: C, grip: JointDelta) -> Self {
         Self { controller, grip }
     }
@@ -95,7 +97,9 @@ mod tests {
                 joints: Joints::default(),
                 long_axis: long_axis.map(f64::to_radians),
             };
-            across.grip(&now, &JointLimits::paper()).map(|g| g.degrees())
+            across
+                .grip(&now, &JointLimits::paper())
+                .map(|g| g.degrees())
         };
         assert_eq!(turn(None), None);
         for (axis, expected) in [

@@ -7,7 +7,8 @@ use crate::{AgentConfig, AgentError, EventKind, GaveUp, JointLimits, Sighting};
 /// So many ways to the ball that were barred are too many.
 const OFTEN: usize = 3;
 
-/// Seen from where the ball was at the goal, what has less than this share of its radius is something smaller.
+/// Seen from where the ball was at the goal, what has less than this share of its radius is
+/// something smaller.
 const BALL_SIZED: f64 = 0.6;
 
 /// The second lift, as a share of the first.
@@ -73,7 +74,8 @@ pub enum GripEnd {
     Unseen,
     /// The ball is in view, in another place; nothing was done.
     Elsewhere(Sighting),
-    /// There is no move to the ball, neither a fixed one that the limits allow nor one of the controller's; nothing was done.
+    /// There is no move to the ball, neither a fixed one that the limits allow nor one of the
+    /// controller's; nothing was done.
     NoMove(Sighting),
     /// Something was too near on the way to the ball, and the hand has gone back.
     Barred,
@@ -81,11 +83,14 @@ pub enum GripEnd {
     BarredAgain,
 }
 
-/// The paper's activation of the gripper (section 2.2: the fifth joint, then the jaws), and whether it holds the ball.
+/// The paper's activation of the gripper (section 2.2: the fifth joint, then the jaws), and whether
+/// it holds the ball.
 ///
-/// The verification is by exclusion: the jaws lie outside the camera's view, so a ball in them is not seen. None seen where it was and none below
-/// the lifted hand, in two looks each, counts as held; a ball seen where it was counts as missed, and so does any other that is left in view, but
-/// one that goes where the hand goes. A ball that left both views in another way, rolled off or knocked aside, passes for one that is held.
+/// The verification is by exclusion: the jaws lie outside the camera's view, so a ball in them is
+/// not seen. None seen where it was and none below the lifted hand, in two looks each, counts as
+/// held; a ball seen where it was counts as missed, and so does any other that is left in view, but
+/// one that goes where the hand goes. A ball that left both views in another way, rolled off or
+/// knocked aside, passes for one that is held.
 #[derive(Clone, Debug)]
 pub struct GripperActivation {
     grip: JointDelta,
@@ -111,8 +116,9 @@ impl GripperActivation {
         }
     }
 
-    /// Goes for the ball that was just `seen`. Away from the goal only a controller that can aim from there does. `wandered` says whether the
-    /// ball has shown in more than one place of the image: what has not may be part of the camera.
+    /// Goes for the ball that was just `seen`. Away from the goal only a controller that can aim
+    /// from there does. `wandered` says whether the ball has shown in more than one place of the
+    /// image: what has not may be part of the camera.
     ///
     /// # Errors
     /// What `hand` reports.
@@ -141,7 +147,9 @@ impl GripperActivation {
         };
         let [aside, swing] = in_two(&delta);
         for part in [aside, swing] {
-            if part != JointDelta::default() && hand.go_by(part, EventKind::Gripping(part))? == Went::Back {
+            if part != JointDelta::default()
+                && hand.go_by(part, EventKind::Gripping(part))? == Went::Back
+            {
                 self.own = own.is_some();
                 self.barred += 1;
                 return Ok(if self.barred >= OFTEN {
@@ -167,7 +175,8 @@ impl GripperActivation {
         )
     }
 
-    /// Whether the jaws hold the ball that was seen from the last pose of `back`, the way back from the grip.
+    /// Whether the jaws hold the ball that was seen from the last pose of `back`, the way back from
+    /// the grip.
     fn verify(
         &self,
         hand: &mut dyn Hand,
@@ -176,7 +185,8 @@ impl GripperActivation {
         lift: JointDelta,
         wandered: bool,
     ) -> Result<Held, AgentError> {
-        // Back the way it came, which was free: nothing but a ball that is not in the jaws can be in it.
+        // Back the way it came, which was free: nothing but a ball that is not in the jaws can be
+        // in it.
         for pose in back {
             if pose != hand.joints() && hand.go_to(pose, EventKind::Withdrawn)? == Went::Back {
                 return Ok(Held::No);
@@ -184,7 +194,8 @@ impl GripperActivation {
         }
         let there = look_twice(hand)?;
         let [.., from] = back;
-        // As far as the limits let the hand go, with a third of the first lift kept for a second one.
+        // As far as the limits let the hand go, with a third of the first lift kept for a second
+        // one.
         let share = share_within(&self.limits, &from, &lift, 1.0 + AGAIN) / (1.0 + AGAIN);
         if share < LEAST_LIFT {
             return Ok(Held::Unknown(GaveUp::NoMoveLeft));
@@ -200,7 +211,8 @@ impl GripperActivation {
         let Some(ball) = there.or(below) else {
             return Ok(Held::Yes);
         };
-        // What goes where the hand goes is in the jaws, unless it has been in the camera from the beginning.
+        // What goes where the hand goes is in the jaws, unless it has been in the camera from the
+        // beginning.
         if let (Some(there), Some(below)) = (&there, &below)
             && is_same_place(there, below)
         {
@@ -246,7 +258,8 @@ fn look_twice(hand: &mut dyn Hand) -> Result<Option<Sighting>, AgentError> {
     Ok(again.filter(|again| is_same_place(&first, again)))
 }
 
-/// The largest share of `delta`, up to `most`, that leads from `from` to a pose within `limits`; 0 from a pose that is not in them.
+/// The largest share of `delta`, up to `most`, that leads from `from` to a pose within `limits`; 0
+/// from a pose that is not in them.
 fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f64) -> f64 {
     let shares = Joint::ALL.into_iter().map(|joint| {
         let (low, high) = limits.0[joint.index()];
@@ -266,12 +279,15 @@ fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f
     shares.fold(most, f64::min).max(0.0)
 }
 
-/// A grip in two parts: first the arm and `JT4`, with the fingers still beside the ball, then the hand, which brings them to both sides of it.
-/// What hardly moves need not go first.
+/// A grip in two parts: first the arm and `JT4`, with the fingers still beside the ball, then the
+/// hand, which brings them to both sides of it. What hardly moves need not go first.
 fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     const HARDLY: f64 = 0.01;
     let mut parts = [JointDelta::default(), *delta];
-    if Joint::ALL[..4].iter().any(|joint| delta[*joint].abs() > HARDLY) {
+    if Joint::ALL[..4]
+        .iter()
+        .any(|joint| delta[*joint].abs() > HARDLY)
+    {
         for i in 0..4 {
             (parts[0].0[i], parts[1].0[i]) = (delta.0[i], 0.0);
         }
@@ -279,7 +295,8 @@ fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     parts
 }
 
-/// Whether two sightings from one pose can be of one ball: the noise of any camera that can be worked with is less than this.
+/// Whether two sightings from one pose can be of one ball: the noise of any camera that can be
+/// worked with is less than this.
 pub(crate) fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
     let (a, b) = (a.features, b.features);
     (a.x - b.x).abs() < 10.0 && (a.y - b.y).abs() < 10.0 && (a.r - b.r).abs() < 6.0
@@ -339,8 +356,11 @@ mod tests {
         }
 
         fn set_jaws(&mut self, jaws: Gripper) -> Result<(), AgentError> {
-            self.done
-                .push(if jaws == Gripper::Closed { "close" } else { "open" });
+            self.done.push(if jaws == Gripper::Closed {
+                "close"
+            } else {
+                "open"
+            });
             Ok(())
         }
 
@@ -349,8 +369,12 @@ mod tests {
         }
     }
 
-    /// From the goal, with these looks, the first of them before anything is done; the move with this number is barred.
-    fn activated(looks: &[Option<Sighting>], barred: Option<usize>) -> (GripEnd, Vec<&'static str>) {
+    /// From the goal, with these looks, the first of them before anything is done; the move with
+    /// this number is barred.
+    fn activated(
+        looks: &[Option<Sighting>],
+        barred: Option<usize>,
+    ) -> (GripEnd, Vec<&'static str>) {
         let joints = Joints::from_degrees([0.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
         let mut hand = Script {
             looks: looks.into(),
@@ -361,7 +385,9 @@ mod tests {
         };
         let config = AgentConfig::paper([joints]);
         let mut activation = GripperActivation::new(&config, config.limits);
-        let end = activation.activate(&mut hand, &AT_GOAL(), true, true).unwrap();
+        let end = activation
+            .activate(&mut hand, &AT_GOAL(), true, true)
+            .unwrap();
         (end, hand.done)
     }
 
@@ -399,8 +425,14 @@ mod tests {
     #[test]
     fn the_hand_turns_aside_before_it_swings_in() {
         let [aside, swing] = in_two(&JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, -18.0, 30.0]));
-        assert_eq!(aside, JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, 0.0, 0.0]));
-        assert_eq!(swing, JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.0, 30.0]));
+        assert_eq!(
+            aside,
+            JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, 0.0, 0.0])
+        );
+        assert_eq!(
+            swing,
+            JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.0, 30.0])
+        );
         let plain = JointDelta::of(Joint::J5, -0.3);
         assert_eq!(in_two(&plain), [JointDelta::default(), plain]);
     }
@@ -428,7 +460,10 @@ mod tests {
     #[test]
     fn a_hand_that_is_stopped_grips_nothing_and_does_not_know_what_it_lifts() {
         let seen = [Some(AT_GOAL())];
-        assert_eq!(activated(&seen, Some(1)), (GripEnd::Barred, vec!["gripping"]));
+        assert_eq!(
+            activated(&seen, Some(1)),
+            (GripEnd::Barred, vec!["gripping"])
+        );
         let (end, _) = activated(&seen, Some(4));
         assert_eq!(end, GripEnd::Unknown(AT_GOAL(), GaveUp::Obstructed));
     }

@@ -1,4 +1,5 @@
-//! The paper's controller: two learned behaviours side by side, and learning that goes on while they work.
+//! The paper's controller: two learned behaviours side by side, and learning that goes on while
+//! they work.
 
 use puma_val2::{JointDelta, Joints};
 use qtable::rand::rngs::Xoshiro256PlusPlus;
@@ -6,14 +7,15 @@ use qtable::rand::{RngExt, SeedableRng};
 use qtable::{Action, QTable, State};
 
 use crate::{
-    Behaviour, BehaviourError, BehaviourSpec, Consequence, Controller, Episode, GaveUp, JointLimits, Percept,
-    Situation,
+    Behaviour, BehaviourError, BehaviourSpec, Consequence, Controller, Episode, GaveUp,
+    JointLimits, Percept, Situation,
 };
 
-/// Centering and approaching (section 3 of the paper), each choosing for its own joints in every cycle.
+/// Centering and approaching (section 3 of the paper), each choosing for its own joints in every
+/// cycle.
 ///
-/// Frozen unless [`Learned::learning`] is asked for. Learning is one-step Q-learning on what really happens, by the rewards of the
-/// specifications; moves out of the working limits are never tried.
+/// Frozen unless [`Learned::learning`] is asked for. Learning is one-step Q-learning on what really
+/// happens, by the rewards of the specifications; moves out of the working limits are never tried.
 #[derive(Clone, Debug)]
 pub struct Learned {
     centering: Half,
@@ -61,12 +63,19 @@ impl TryFrom<Untested> for OnlineLearning {
 }
 
 impl OnlineLearning {
-    /// With a discount factor, a learning rate, a Boltzmann temperature in units of Q, and the seed of what is tried.
+    /// With a discount factor, a learning rate, a Boltzmann temperature in units of Q, and the seed
+    /// of what is tried.
     ///
     /// # Errors
-    /// [`BehaviourError::Learning`] for a `gamma` that is not in 0..1 (at 1 a goal that is kept would be worth infinitely much), an `alpha` that is not
-    /// in 0..=1, a `temperature` that is not a finite number above zero.
-    pub fn new(gamma: f64, alpha: f64, temperature: f64, seed: u64) -> Result<Self, BehaviourError> {
+    /// [`BehaviourError::Learning`] for a `gamma` that is not in 0..1 (at 1 a goal that is kept
+    /// would be worth infinitely much), an `alpha` that is not in 0..=1, a `temperature` that is
+    /// not a finite number above zero.
+    pub fn new(
+        gamma: f64,
+        alpha: f64,
+        temperature: f64,
+        seed: u64,
+    ) -> Result<Self, BehaviourError> {
         let sound = [
             (
                 "gamma",
@@ -97,7 +106,8 @@ impl OnlineLearning {
         }
     }
 
-    /// Discount factor 0.9, learning rate 0.1, temperature 0.3: careful enough that what was learned in simulation is not forgotten.
+    /// Discount factor 0.9, learning rate 0.1, temperature 0.3: careful enough that what was
+    /// learned in simulation is not forgotten.
     pub fn careful(seed: u64) -> Self {
         Self {
             gamma: 0.9,
@@ -134,7 +144,8 @@ impl Learned {
     /// Loop breaker of approaching unless set otherwise, in units of Q.
     pub const APPROACHING_KAPPA: f64 = 20.0;
 
-    /// Two behaviours, frozen, with the loop breaker at [`Learned::CENTERING_KAPPA`] and [`Learned::APPROACHING_KAPPA`].
+    /// Two behaviours, frozen, with the loop breaker at [`Learned::CENTERING_KAPPA`] and
+    /// [`Learned::APPROACHING_KAPPA`].
     pub fn new(centering: Behaviour, approaching: Behaviour) -> Self {
         Self {
             centering: Half::new(centering, Self::CENTERING_KAPPA),
@@ -143,11 +154,18 @@ impl Learned {
         }
     }
 
-    /// The same with another loop breaker: what choosing an action again in the same state costs, see
-    /// [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a finite number above zero counts as 0.
+    /// The same with another loop breaker: what choosing an action again in the same state costs,
+    /// see [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a finite number above
+    /// zero counts as 0.
     #[must_use]
     pub fn with_kappa(mut self, centering: f64, approaching: f64) -> Self {
-        let sound = |kappa: f64| if kappa.is_finite() { kappa.max(0.0) } else { 0.0 };
+        let sound = |kappa: f64| {
+            if kappa.is_finite() {
+                kappa.max(0.0)
+            } else {
+                0.0
+            }
+        };
         (self.centering.kappa, self.approaching.kappa) = (sound(centering), sound(approaching));
         self
     }
@@ -278,7 +296,9 @@ impl Half {
         let state = spec.state(percept).map_err(|_| GaveUp::NoMoveLeft)?;
         let allowed = |action| admitted(spec.delta(action));
         let action = match exploring {
-            None => self.behaviour.choose(state, &self.episode, self.kappa, allowed),
+            None => self
+                .behaviour
+                .choose(state, &self.episode, self.kappa, allowed),
             Some((temperature, rng)) => self.behaviour.explore(
                 state,
                 &self.episode,
@@ -316,7 +336,8 @@ impl Half {
             .teach(state, action, old + settings.alpha * (value - old));
     }
 
-    /// The paper's Eq. 3 for a step that kept the ball in view: what it paid and what follows. `None` where that is no number.
+    /// The paper's Eq. 3 for a step that kept the ball in view: what it paid and what follows.
+    /// `None` where that is no number.
     fn worth(&self, gamma: f64, before: &Percept, after: &Percept) -> Option<f64> {
         let spec: &BehaviourSpec = self.behaviour.spec();
         if spec.at_goal(after) {

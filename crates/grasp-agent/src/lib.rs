@@ -1,22 +1,29 @@
 //! The controller of the paper: circles into joint moves.
 //!
-//! A ball of known size lies somewhere in reach of a PUMA 560 with a camera on its hand. Two behaviours, learned
-//! separately by Q-learning, bring the hand to it: **centering** turns the first joint by what it sees of the ball's x and
-//! radius, **approaching** turns the second and third by y, radius and the elbow angle. Around them stand a search from fixed
-//! poses, a recovery for when the ball leaves the image, the activation of the gripper, a look at whether it holds the ball, and a stop when
-//! something comes too near.
+//! A ball of known size lies somewhere in reach of a PUMA 560 with a camera on its hand. Two
+//! behaviours, learned separately by Q-learning, bring the hand to it: **centering** turns the
+//! first joint by what it sees of the ball's x and radius, **approaching** turns the second and
+//! third by y, radius and the elbow angle. Around them stand a search from fixed poses, a recovery
+//! for when the ball leaves the image, the activation of the gripper, a look at whether it holds
+//! the ball, and a stop when something comes too near.
 //!
-//! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. A [`BehaviourPair`] is both together:
-//!   [`paper_literal`](BehaviourPair::paper_literal), [`paper_mended`](BehaviourPair::paper_mended), [`fine`](BehaviourPair::fine).
-//! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which [`qtable`] learns it.
-//! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked what to do.
-//! * An [`Agent`] links the modules of section 2.2, each of which can be replaced or used alone, and runs them on an [`Eye`] ([`CameraEye`]: camera,
-//!   and an object described by [`ObjectFeatures`]) and a [`Manipulator`](puma_val2::Manipulator). It tells every [`Event`] as it happens; an
-//!   [`EventLog`] keeps them, and a `SavedRun` what else it takes to make the run again.
-//! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those that the paper names as alternatives,
-//!   [`PositionBased`], [`ImageBased`], [`Fuzzy`] and [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins
-//!   with such a model and learns what is wrong with it. [`Retargeted`] gives one of them a goal that was shown on the arm, [`GripAcross`] a grip that
-//!   turns the hand by how the object lies.
+//! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`]. A
+//!   [`BehaviourPair`] is both together: [`paper_literal`](BehaviourPair::paper_literal),
+//!   [`paper_mended`](BehaviourPair::paper_mended), [`fine`](BehaviourPair::fine).
+//! * A [`BehaviourTask`] turns a specification and any simulator into an environment in which
+//!   [`qtable`] learns it.
+//! * A [`Behaviour`] is a specification with its learned table; it can be saved, loaded and asked
+//!   what to do.
+//! * An [`Agent`] links the modules of section 2.2, each of which can be replaced or used alone,
+//!   and runs them on an [`Eye`] ([`CameraEye`]: camera, and an object described by
+//!   [`ObjectFeatures`]) and a [`Manipulator`](puma_val2::Manipulator). It tells every [`Event`] as
+//!   it happens; an [`EventLog`] keeps them, and a `SavedRun` what else it takes to make the run
+//!   again.
+//! * [`Learned`], the two behaviours side by side, is the paper's controller. Beside it stand those
+//!   that the paper names as alternatives, [`PositionBased`], [`ImageBased`], [`Fuzzy`] and
+//!   [`LookAhead`], which believe in a [`CameraModel`], and the [`Hybrid`], which begins with such
+//!   a model and learns what is wrong with it. [`Retargeted`] gives one of them a goal that was
+//!   shown on the arm, [`GripAcross`] a grip that turns the hand by how the object lies.
 //!
 //! # The state machine
 //!
@@ -28,7 +35,8 @@
 //! | gripper activation | [`GripperActivation`] | whether the jaws hold the ball | through a [`Hand`] |
 //! | constant control of the approach | [`Supervision`] ([`Guard`]) | whether what came of a move may go on | no |
 //!
-//! They know nothing of each other. An [`Agent`] is in one [`Phase`] at a time, and every transition is an [`Event`], named at the arrows:
+//! They know nothing of each other. An [`Agent`] is in one [`Phase`] at a time, and every
+//! transition is an [`Event`], named at the arrows:
 //!
 //! ```text
 //!              Reaching             AtGoal, Cornered            Grasped
@@ -47,12 +55,13 @@
 //!   It begins with Started and Searching. Every phase can lead to End: GaveUp, or Failed.
 //! ```
 //!
-//! Within a phase the events are the orders that were carried out ([`EventKind::AtSearchPose`], [`EventKind::Moved`], ...), what was looked at
-//! ([`EventKind::Seen`], [`EventKind::NotSeen`], [`EventKind::SameFrame`]) and what supervision did ([`EventKind::TooNear`], [`EventKind::TooFast`],
-//! [`EventKind::TakenBack`]).
+//! Within a phase the events are the orders that were carried out ([`EventKind::AtSearchPose`],
+//! [`EventKind::Moved`], ...), what was looked at ([`EventKind::Seen`], [`EventKind::NotSeen`],
+//! [`EventKind::SameFrame`]) and what supervision did ([`EventKind::TooNear`],
+//! [`EventKind::TooFast`], [`EventKind::TakenBack`]).
 //!
-//! The crate knows no simulator, no renderer and no particular detector, arm or camera: they meet it through the traits of
-//! `hough-heuristic` and `puma-val2` and through plain closures.
+//! The crate knows no simulator, no renderer and no particular detector, arm or camera: they meet
+//! it through the traits of `hough-heuristic` and `puma-val2` and through plain closures.
 //!
 //! # Learning a behaviour
 //!

@@ -40,13 +40,17 @@ impl EventLog {
         });
     }
 
-    /// Lets `agent` make the run again, with the arm, the sensors and the eye answering as they did then, and returns the log of
-    /// that. The same controller with the same knowledge makes the same log.
+    /// Lets `agent` make the run again, with the arm, the sensors and the eye answering as they did
+    /// then, and returns the log of that. The same controller with the same knowledge makes the
+    /// same log.
     ///
     /// # Errors
-    /// [`AgentError::Replay`] when the agent does something else than was done then; otherwise what the run ended with, if it ended
-    /// with an error.
-    pub fn replay<C: Controller + Clone>(&self, agent: &Agent<C>) -> Result<(Outcome, Self), AgentError> {
+    /// [`AgentError::Replay`] when the agent does something else than was done then; otherwise what
+    /// the run ended with, if it ended with an error.
+    pub fn replay<C: Controller + Clone>(
+        &self,
+        agent: &Agent<C>,
+    ) -> Result<(Outcome, Self), AgentError> {
         let Played { end, log, differs } = self.play(agent.clone());
         match (differs, end) {
             (Some(event), _) => Err(AgentError::Replay { event }),
@@ -75,8 +79,8 @@ impl EventLog {
             .iter()
             .zip(&self.events)
             .position(|(now, then)| !same(now, then));
-        let differs = differs
-            .or((log.events.len() != self.events.len()).then(|| log.events.len().min(self.events.len())));
+        let differs = differs.or((log.events.len() != self.events.len())
+            .then(|| log.events.len().min(self.events.len())));
         Played { end, log, differs }
     }
 }
@@ -89,24 +93,29 @@ pub(crate) struct Played {
     pub(crate) differs: Option<usize>,
 }
 
-/// Whether two events are the same. A failure of camera or arm comes back in the words of the replayed device, which quote those of then.
+/// Whether two events are the same. A failure of camera or arm comes back in the words of the
+/// replayed device, which quote those of then.
 fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
     match (&now.kind, &then.kind) {
         (EventKind::Failed(cause), EventKind::Failed(cause_then)) => {
-            now.cycle == then.cycle && alike(&now.joints, &then.joints) && same_cause(cause, cause_then)
+            now.cycle == then.cycle
+                && alike(&now.joints, &then.joints)
+                && same_cause(cause, cause_then)
         }
         _ => alike(now, then),
     }
 }
 
-/// Whether two values are equal, NaN being equal to NaN. In debug format every other number has a text of its own.
+/// Whether two values are equal, NaN being equal to NaN. In debug format every other number has a
+/// text of its own.
 fn alike<T: PartialEq + std::fmt::Debug>(now: &T, then: &T) -> bool {
     now == then || format!("{now:?}") == format!("{then:?}")
 }
 
 /// Whether `now` is what ended the run `then`: the same words, or the same device failing again.
 fn same_cause(now: &str, then: &str) -> bool {
-    let quoted = |by: Device| by.failed_in(then) && now == by.silence(failed_then(then)).to_string();
+    let quoted =
+        |by: Device| by.failed_in(then) && now == by.silence(failed_then(then)).to_string();
     now == then || quoted(Device::Camera) || quoted(Device::Arm)
 }
 
@@ -154,7 +163,8 @@ fn unmoved(reason: String) -> ArmError {
     }
 }
 
-/// A frame that differs from that of every other number: what there was to see is not in the log, only whether it was the same.
+/// A frame that differs from that of every other number: what there was to see is not in the log,
+/// only whether it was the same.
 pub(crate) fn numbered(number: u32) -> GrayImage {
     GrayImage::from_fn(4, 1, |x, _| Luma([number.to_le_bytes()[x as usize]]))
 }
@@ -197,15 +207,19 @@ impl Tape<'_> {
         next
     }
 
-    /// Fails if the next thing that happened was that the sensors on the arm did: their answers make no event of their own.
+    /// Fails if the next thing that happened was that the sensors on the arm did: their answers
+    /// make no event of their own.
     fn sensors_hold(&self) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
-            Some(EventKind::Failed(cause)) if Device::Arm.failed_in(cause) => Err(unmoved(self.silence())),
+            Some(EventKind::Failed(cause)) if Device::Arm.failed_in(cause) => {
+                Err(unmoved(self.silence()))
+            }
             _ => Ok(()),
         }
     }
 
-    /// Fails if the next thing that happened was that this order was not answered: of the orders that make no event when they succeed.
+    /// Fails if the next thing that happened was that this order was not answered: of the orders
+    /// that make no event when they succeed.
     fn answers(&self, order: Order) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
             Some(EventKind::Unanswered(then)) if *then == order => Err(unmoved(self.silence())),
@@ -252,7 +266,8 @@ impl Player<'_, '_> {
 
 impl Manipulator for Player<'_, '_> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        // Asked before anything happens. An arm that failed after it had told where it stands has told it all the same.
+        // Asked before anything happens. An arm that failed after it had told where it stands has
+        // told it all the same.
         let tape = self.0.borrow();
         match tape.events.first() {
             Some(LoggedEvent { kind, joints, .. })

@@ -1,6 +1,8 @@
-//! Numbers that JSON has no form for: NaN and the infinities are written as the texts `"NaN"`, `"inf"` and `"-inf"`, and read so.
+//! Numbers that JSON has no form for: NaN and the infinities are written as the texts `"NaN"`,
+//! `"inf"` and `"-inf"`, and read so.
 //!
-//! For `#[serde(with = "crate::numbers")]`. Formats that are not for people have a form for every number.
+//! For `#[serde(with = "crate::numbers")]`. Formats that are not for people have a form for every
+//! number.
 
 use serde::de::value::{MapAccessDeserializer, MapDeserializer, SeqDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Visitor};
@@ -15,7 +17,9 @@ pub(crate) fn serialize<T: Serialize, S: Serializer>(value: &T, to: S) -> Result
     }
 }
 
-pub(crate) fn deserialize<'de, T: DeserializeOwned, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+pub(crate) fn deserialize<'de, T: DeserializeOwned, D: Deserializer<'de>>(
+    from: D,
+) -> Result<T, D::Error> {
     if !from.is_human_readable() {
         return T::deserialize(from);
     }
@@ -148,7 +152,11 @@ impl<S: Serializer> Serializer for Writer<S> {
         self.0.serialize_map(len).map(Writer)
     }
 
-    fn serialize_struct(self, name: &'static str, len: usize) -> Result<Self::SerializeStruct, S::Error> {
+    fn serialize_struct(
+        self,
+        name: &'static str,
+        len: usize,
+    ) -> Result<Self::SerializeStruct, S::Error> {
         self.0.serialize_struct(name, len).map(Writer)
     }
 

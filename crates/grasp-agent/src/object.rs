@@ -1,4 +1,5 @@
-//! What is looked for in a frame: the ball by its circle, or another object by another set of features.
+//! What is looked for in a frame: the ball by its circle, or another object by another set of
+//! features.
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
@@ -8,17 +9,20 @@ use hough_heuristic::{
 use crate::Sighting;
 use crate::checked::checked;
 
-/// A set of image features that describes one kind of object: the door through which objects other than balls come in.
+/// A set of image features that describes one kind of object: the door through which objects other
+/// than balls come in.
 ///
-/// Section 2.1 of the paper: "it is possible to extend the grasping behavior to objects of different shapes, characterizing them uniquely,
-/// simply by considering a different set of features of the images". Whatever the object, what the controllers are told is a place in
-/// the image and a size that is inversely proportional to the distance.
+/// Section 2.1 of the paper: "it is possible to extend the grasping behavior to objects of
+/// different shapes, characterizing them uniquely, simply by considering a different set of
+/// features of the images". Whatever the object, what the controllers are told is a place in the
+/// image and a size that is inversely proportional to the distance.
 pub trait ObjectFeatures {
     /// The object in `frame`; `None` if it is not there.
     fn find(&mut self, frame: &GrayImage) -> Option<Sighting>;
 }
 
-/// The paper's object: a ball, by centre and radius of the best circle whose centre lies in the frame.
+/// The paper's object: a ball, by centre and radius of the best circle whose centre lies in the
+/// frame.
 pub struct BallFeatures<'a> {
     detector: &'a mut dyn CircleDetector,
     found: Vec<Detection>,
@@ -55,12 +59,14 @@ impl std::fmt::Debug for BallFeatures<'_> {
     }
 }
 
-/// An egg: a body of revolution that is longer than it is thick, by centre and *shorter* half-axis of its outline.
+/// An egg: a body of revolution that is longer than it is thick, by centre and *shorter* half-axis
+/// of its outline.
 ///
-/// The outline of such a body is (nearly) an ellipse. Its longer half-axis depends on where one looks from, its shorter one is the
-/// radius of a ball that is as thick as the egg at the same distance, from everywhere: with it in the place of the radius, behaviours
-/// learned for that ball reach the egg. Where the outline is longer than it is wide by a tenth, its direction is [`Sighting::long_axis`], by
-/// which [`GripAcross`](crate::GripAcross) turns the hand.
+/// The outline of such a body is (nearly) an ellipse. Its longer half-axis depends on where one
+/// looks from, its shorter one is the radius of a ball that is as thick as the egg at the same
+/// distance, from everywhere: with it in the place of the radius, behaviours learned for that ball
+/// reach the egg. Where the outline is longer than it is wide by a tenth, its direction is
+/// [`Sighting::long_axis`], by which [`GripAcross`](crate::GripAcross) turns the hand.
 #[derive(Clone, Debug)]
 pub struct EggFeatures<E = Canny> {
     edge_detector: E,
@@ -116,7 +122,8 @@ impl<E: EdgeDetector> EggFeatures<E> {
         }
     }
 
-    /// The outline seen last, pixels: its angle says how the object lies. `None` if nothing was found.
+    /// The outline seen last, pixels: its angle says how the object lies. `None` if nothing was
+    /// found.
     pub fn outline(&self) -> Option<Ellipse> {
         self.last
     }
@@ -140,7 +147,10 @@ impl<E: EdgeDetector> ObjectFeatures for EggFeatures<E> {
                 score: found.beta,
             };
             let Ellipse {
-                major, minor, angle, ..
+                major,
+                minor,
+                angle,
+                ..
             } = found.curve;
             let long_axis = (major > LONG * minor).then_some(angle);
             Some((found.curve, sighting(detection, long_axis, frame)?))
@@ -150,14 +160,16 @@ impl<E: EdgeDetector> ObjectFeatures for EggFeatures<E> {
     }
 }
 
-/// How many times as long as the shorter half-axis the longer one must be for its direction to be known.
+/// How many times as long as the shorter half-axis the longer one must be for its direction to be
+/// known.
 const LONG: f64 = 1.1;
 
 /// A detection in feature units, if its centre lies in the frame.
 fn sighting(detection: Detection, long_axis: Option<f64>, frame: &GrayImage) -> Option<Sighting> {
     let height = Features::WIDTH * f64::from(frame.height()) / f64::from(frame.width());
     let features = Features::from_circle(&detection.circle, frame.width());
-    let inside = (0.0..=Features::WIDTH).contains(&features.x) && (0.0..=height).contains(&features.y);
+    let inside =
+        (0.0..=Features::WIDTH).contains(&features.x) && (0.0..=height).contains(&features.y);
     (inside && features.r.is_finite()).then_some(Sighting {
         detection,
         features,

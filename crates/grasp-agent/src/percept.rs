@@ -27,8 +27,8 @@ pub(crate) const THETA3_ZERO: f64 = 170.0;
 
 /// The paper's angle theta 3 "between J2 and J3" in degrees: `JT3` - 170.
 ///
-/// The paper gives no zero. With this one the goal poses of a reachable ball fill its interval \[0 : 40\] (10th to 90th
-/// percentile: -1 to 33).
+/// The paper gives no zero. With this one the goal poses of a reachable ball fill its interval \[0
+/// : 40\] (10th to 90th percentile: -1 to 33).
 pub fn theta3(joints: &Joints) -> f64 {
     joints[Joint::J3].to_degrees() - THETA3_ZERO
 }

@@ -4,7 +4,8 @@ use qtable::DiscretiseError;
 
 use crate::{BehaviourSpec, GoalInterval, Reward};
 
-/// The two behaviours of the paper, as data: what a [`Learned`](crate::Learned) controller is taught.
+/// The two behaviours of the paper, as data: what a [`Learned`](crate::Learned) controller is
+/// taught.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BehaviourPair {
@@ -16,9 +17,10 @@ pub struct BehaviourPair {
 
 /// The two goal intervals that the paper gives for y.
 ///
-/// Everything here uses that of Eq. 6 unless told otherwise: its middle is the 78 that the reward of the same equation aims at, and from
-/// anywhere in it the paper's fixed turn of the fifth joint brings the gripper to within 6.3 mm of the ball. The other one is wider, is
-/// reached in fewer moves, and leaves the gripper up to 10.6 mm beside the ball.
+/// Everything here uses that of Eq. 6 unless told otherwise: its middle is the 78 that the reward
+/// of the same equation aims at, and from anywhere in it the paper's fixed turn of the fifth joint
+/// brings the gripper to within 6.3 mm of the ball. The other one is wider, is reached in fewer
+/// moves, and leaves the gripper up to 10.6 mm beside the ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum YGoal {
@@ -40,8 +42,8 @@ impl YGoal {
 }
 
 impl BehaviourPair {
-    /// The paper as it is printed: 42 states by 9 actions, 90 by 81, the rewards of Eq. 5 and 6. They do not teach the goal, see
-    /// [`Reward`].
+    /// The paper as it is printed: 42 states by 9 actions, 90 by 81, the rewards of Eq. 5 and 6.
+    /// They do not teach the goal, see [`Reward`].
     pub fn paper_literal() -> Self {
         Self {
             centering: BehaviourSpec::centering().with_reward(Reward::centering_literal()),
@@ -57,8 +59,8 @@ impl BehaviourPair {
         }
     }
 
-    /// [`BehaviourPair::paper_mended`] with 540 states for approaching, and a lost ball that stays lost
-    /// ([`BehaviourSpec::approaching_fine`]).
+    /// [`BehaviourPair::paper_mended`] with 540 states for approaching, and a lost ball that stays
+    /// lost ([`BehaviourSpec::approaching_fine`]).
     pub fn fine() -> Self {
         Self {
             approaching: BehaviourSpec::approaching_fine(),
@@ -78,7 +80,8 @@ impl BehaviourPair {
         })
     }
 
-    /// Where both behaviours want to be: the goal of the [`AgentConfig`](crate::AgentConfig) that they work under.
+    /// Where both behaviours want to be: the goal of the [`AgentConfig`](crate::AgentConfig) that
+    /// they work under.
     pub fn goal(&self) -> Vec<GoalInterval> {
         [&self.centering, &self.approaching]
             .into_iter()
@@ -120,7 +123,8 @@ mod tests {
         );
     }
 
-    /// From the gripper to the ball after the paper's turn of the fifth joint, at the worst place of the goal, metres.
+    /// From the gripper to the ball after the paper's turn of the fifth joint, at the worst place
+    /// of the goal, metres.
     fn worst_miss(goal: YGoal) -> f64 {
         let model = CameraModel::paper();
         let (low, high) = goal.ends();

@@ -4,9 +4,11 @@ use puma_val2::{JointDelta, Joints};
 
 use crate::{LastLook, Situation, Viewpoint};
 
-/// The paper's recovery of a lost target (section 2.2): says from where to look next, until the ball is in view again.
+/// The paper's recovery of a lost target (section 2.2): says from where to look next, until the
+/// ball is in view again.
 ///
-/// It moves nothing itself. [`Agent::recovering_by`](crate::Agent::recovering_by) puts another one in the place of [`RecoveryMoves`].
+/// It moves nothing itself. [`Agent::recovering_by`](crate::Agent::recovering_by) puts another one
+/// in the place of [`RecoveryMoves`].
 ///
 /// ```
 /// use grasp_agent::puma_val2::Joints;
@@ -32,9 +34,11 @@ use crate::{LastLook, Situation, Viewpoint};
 /// # Ok::<(), grasp_agent::AgentError>(())
 /// ```
 pub trait Recovery: std::fmt::Debug + Send + Sync {
-    /// Where to look from next for a ball that was last `seen` so, with the arm at `at`, after what came of the last viewpoint;
-    /// [`LastLook::None`] begins a new recovery. `None` to leave it to the search. Each viewpoint costs a cycle of
-    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles); it is not asked when none is left.
+    /// Where to look from next for a ball that was last `seen` so, with the arm at `at`, after what
+    /// came of the last viewpoint; [`LastLook::None`] begins a new recovery. `None` to leave it to
+    /// the search. Each viewpoint costs a cycle of
+    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles); it is not asked when none is
+    /// left.
     fn next_view(&mut self, seen: &Situation, at: &Joints, last: LastLook) -> Option<Viewpoint>;
 
     /// A copy, for the copies of an agent: `Box::new(self.clone())`.
@@ -47,7 +51,8 @@ impl Clone for Box<dyn Recovery> {
     }
 }
 
-/// The paper's recovery: back to the pose of the last sighting (viewpoint 0), then fixed moves from there.
+/// The paper's recovery: back to the pose of the last sighting (viewpoint 0), then fixed moves from
+/// there.
 #[derive(Clone, Debug)]
 pub struct RecoveryMoves {
     moves: Vec<JointDelta>,
@@ -66,7 +71,11 @@ impl RecoveryMoves {
 
 impl Recovery for RecoveryMoves {
     fn next_view(&mut self, seen: &Situation, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
-        self.tried = if last == LastLook::None { 0 } else { self.tried + 1 };
+        self.tried = if last == LastLook::None {
+            0
+        } else {
+            self.tried + 1
+        };
         let pose = match self.tried {
             0 => seen.joints,
             tried => seen.joints + *self.moves.get(tried - 1)?,
@@ -105,7 +114,8 @@ mod tests {
         for _ in 0..2 {
             // Wherever the arm has got to.
             let mut next = |last| recovery.next_view(&seen, &Joints::default(), last);
-            let poses = [LastLook::None, LastLook::Nothing, LastLook::Barred].map(|last| next(last).unwrap());
+            let poses = [LastLook::None, LastLook::Nothing, LastLook::Barred]
+                .map(|last| next(last).unwrap());
             assert_eq!(poses.map(|view| view.number), [0, 1, 2]);
             let expected = [joints, joints + turn(15.0), joints + turn(-15.0)];
             assert_eq!(poses.map(|view| view.pose), expected);

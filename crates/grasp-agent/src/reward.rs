@@ -5,9 +5,10 @@ use crate::{Input, Percept};
 
 /// A reward of the paper's form, as data.
 ///
-/// Arriving at the goal pays `goal`, losing the ball pays `lost`. Any other step pays the sum of `weight / |value - target|` over
-/// all terms when at least one of them came closer to its target, and nothing otherwise. With one term (x, 100, 103) that is
-/// Eq. 5, with the two terms (y, 20, 78) and (r, 50, 33) it is Eq. 6.
+/// Arriving at the goal pays `goal`, losing the ball pays `lost`. Any other step pays the sum of
+/// `weight / |value - target|` over all terms when at least one of them came closer to its target,
+/// and nothing otherwise. With one term (x, 100, 103) that is Eq. 5, with the two terms (y, 20, 78)
+/// and (r, 50, 33) it is Eq. 6.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -27,8 +28,9 @@ pub struct Reward {
     pub floor: f64,
     /// Whether the goal, once reached, is kept \[true; literally false\].
     ///
-    /// A goal that merely ends the episode is worth 100, and near it going away and coming back pays more than that for
-    /// ever; a goal that is kept pays 100 at every step to come, 100 / (1 - gamma) in all.
+    /// A goal that merely ends the episode is worth 100, and near it going away and coming back
+    /// pays more than that for ever; a goal that is kept pays 100 at every step to come, 100 / (1 -
+    /// gamma) in all.
     pub absorbing: bool,
 }
 
@@ -88,7 +90,8 @@ impl Reward {
         }
     }
 
-    /// The same reward with the two mends that make it teach the goal: denominators of at least 1 and an absorbing goal.
+    /// The same reward with the two mends that make it teach the goal: denominators of at least 1
+    /// and an absorbing goal.
     #[must_use]
     pub fn mended(self) -> Self {
         Self {
@@ -101,7 +104,10 @@ impl Reward {
     /// Whether it is a reward; if not, why.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
-        let of_terms = self.terms.iter().flat_map(|term| [term.weight, term.target]);
+        let of_terms = self
+            .terms
+            .iter()
+            .flat_map(|term| [term.weight, term.target]);
         if let Some(number) = of_terms
             .chain([self.goal, self.lost, self.floor])
             .find(|number| !number.is_finite())
@@ -109,7 +115,10 @@ impl Reward {
             return Err(format!("its reward has {number} in it"));
         }
         if self.floor < 0.0 {
-            return Err(format!("the floor of its reward is {}, below 0", self.floor));
+            return Err(format!(
+                "the floor of its reward is {}, below 0",
+                self.floor
+            ));
         }
         if self.terms.is_empty() {
             return Err("its reward has no terms: nothing pays for coming closer".into());

@@ -7,8 +7,8 @@ use crate::gripper::is_same_place;
 use crate::watch::Watch;
 use crate::{
     AgentConfig, AgentError, Consequence, Controller, Event, EventKind, Eye, GaveUp, GripEnd,
-    GripperActivation, Hand, LastLook, Outcome, Percept, Phase, Recovery, Search, Sighting, Situation,
-    Supervision, Viewpoint, Went,
+    GripperActivation, Hand, LastLook, Outcome, Percept, Phase, Recovery, Search, Sighting,
+    Situation, Supervision, Viewpoint, Went,
 };
 
 mod acting;
@@ -74,7 +74,9 @@ impl State {
         match *self {
             Self::Search => EventKind::Searching,
             Self::Reach(_) => EventKind::Reaching,
-            Self::Recover { why: Gone::Lost, .. } => EventKind::Lost,
+            Self::Recover {
+                why: Gone::Lost, ..
+            } => EventKind::Lost,
             Self::Recover {
                 why: Gone::Missed, ..
             } => EventKind::Missed,
@@ -187,7 +189,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Looks around until the ball is in view, there is nowhere left to look from, or it has been looked from often enough.
+    /// Looks around until the ball is in view, there is nowhere left to look from, or it has been
+    /// looked from often enough.
     fn search(&mut self) -> Result<State, AgentError> {
         (self.first_seen, self.wandered, self.barred) = (None, false, 0);
         let (mut barred, mut looked) = (false, false);
@@ -234,7 +237,12 @@ impl<'a> Run<'a> {
     fn reach(&mut self, sighting: &Sighting) -> Result<State, AgentError> {
         let now = self.situation(sighting);
         let percept = Percept::new(sighting.features, &self.joints);
-        if self.config.goal.iter().all(|interval| interval.holds(&percept)) {
+        if self
+            .config
+            .goal
+            .iter()
+            .all(|interval| interval.holds(&percept))
+        {
             // What is shown from two poses alike is not what is there: no reason to grip.
             if self.watch.same() > 0 {
                 return Err(self.frozen());
@@ -278,8 +286,9 @@ impl<'a> Run<'a> {
         Ok(State::Reach(after))
     }
 
-    /// Looks again from where the last move began. Where moves come to nothing again and again, what is too near may be the ball itself, and a
-    /// controller that can aim at it from here does; where they do so in a row and it cannot, whatever is seen is not to be had, and the search
+    /// Looks again from where the last move began. Where moves come to nothing again and again,
+    /// what is too near may be the ball itself, and a controller that can aim at it from here does;
+    /// where they do so in a row and it cannot, whatever is seen is not to be had, and the search
     /// begins anew.
     fn after_taking_back(&mut self, before: Situation) -> Result<State, AgentError> {
         self.controller.judge(&Consequence::TakenBack);
@@ -288,16 +297,22 @@ impl<'a> Run<'a> {
         let Some(seen) = self.look()? else {
             return Ok(lost(before));
         };
-        Ok(if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
-            State::Grip { seen, at_goal: false }
-        } else {
-            State::Reach(seen)
-        })
+        Ok(
+            if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
+                State::Grip {
+                    seen,
+                    at_goal: false,
+                }
+            } else {
+                State::Reach(seen)
+            },
+        )
     }
 
     /// Looks around where the ball was `seen` last, then leaves it to a new search.
     fn recover(&mut self, seen: &Situation) -> Result<State, AgentError> {
-        // A recovery that offers nothing costs no cycle, and what led to it may not have been a move.
+        // A recovery that offers nothing costs no cycle, and what led to it may not have been a
+        // move.
         if self.cycles >= self.config.max_cycles {
             return Ok(State::End(Some(GaveUp::OutOfCycles)));
         }
@@ -322,7 +337,10 @@ impl<'a> Run<'a> {
         let end = gripper.activate(self, seen, at_goal, wandered);
         self.gripper = gripper;
         let end = end?;
-        if !matches!(end, GripEnd::Unseen | GripEnd::Elsewhere(_) | GripEnd::NoMove(_)) {
+        if !matches!(
+            end,
+            GripEnd::Unseen | GripEnd::Elsewhere(_) | GripEnd::NoMove(_)
+        ) {
             self.taken_back = 0;
         }
         Ok(match end {
@@ -347,7 +365,8 @@ impl<'a> Run<'a> {
                 lost(self.situation(seen))
             }
             GripEnd::Elsewhere(ball) => {
-                // Two looks that differ cost a cycle: both can be at the goal, and no move is made between them.
+                // Two looks that differ cost a cycle: both can be at the goal, and no move is made
+                // between them.
                 self.cycles += 1;
                 if self.cycles >= self.config.max_cycles {
                     State::End(Some(GaveUp::OutOfCycles))
@@ -358,7 +377,11 @@ impl<'a> Run<'a> {
             GripEnd::NoMove(_) if at_goal => State::End(Some(GaveUp::NoMoveLeft)),
             GripEnd::NoMove(ball) => {
                 let often = std::mem::take(&mut self.taken_back) >= OFTEN;
-                if often { State::Search } else { State::Reach(ball) }
+                if often {
+                    State::Search
+                } else {
+                    State::Reach(ball)
+                }
             }
             GripEnd::Barred | GripEnd::BarredAgain => {
                 self.controller.judge(&Consequence::Missed);
@@ -374,7 +397,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// The end, with the ball as it was before the jaws closed: what was seen meanwhile was not the ball in its place.
+    /// The end, with the ball as it was before the jaws closed: what was seen meanwhile was not the
+    /// ball in its place.
     fn end_with(&mut self, ball: Sighting, gave_up: Option<GaveUp>) -> State {
         self.last_seen = Some(ball);
         State::End(gave_up)

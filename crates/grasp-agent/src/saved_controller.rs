@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::export::bad;
 use crate::export_policy::Policy;
 use crate::{
-    BehaviourError, Belief, Controller, Fuzzy, GripAcross, Hybrid, HybridSettings, ImageBased, JacobianAt,
-    JointLimits, Learned, LookAhead, OnlineLearning, PositionBased, Retargeted, ServoSettings, TaughtGoal,
+    BehaviourError, Belief, Controller, Fuzzy, GripAcross, Hybrid, HybridSettings, ImageBased,
+    JacobianAt, JointLimits, Learned, LookAhead, OnlineLearning, PositionBased, Retargeted,
+    ServoSettings, TaughtGoal,
 };
 
 /// The controller of a [`SavedRun`](crate::SavedRun), as it was before the run.
@@ -25,7 +26,8 @@ pub enum SavedController {
     Learned {
         /// The two behaviours, with their loop breakers.
         learned: Box<Learned>,
-        /// How learning went on in the run, from this seed on; `None` for behaviours that were frozen.
+        /// How learning went on in the run, from this seed on; `None` for behaviours that were
+        /// frozen.
         learning: Option<OnlineLearning>,
     },
     /// The hybrid.
@@ -82,7 +84,8 @@ impl SavedController {
         }
     }
 
-    /// A hybrid. Within a run it goes by what it believed before, whether it learns from that or not.
+    /// A hybrid. Within a run it goes by what it believed before, whether it learns from that or
+    /// not.
     pub fn of_hybrid(hybrid: &Hybrid) -> Self {
         Self::Hybrid {
             settings: Box::new(*hybrid.settings()),
@@ -198,13 +201,19 @@ impl ControllerText {
                 learning,
             },
             Self::Hybrid { settings, belief } => Saved::Hybrid { settings, belief },
-            Self::PositionBased { settings } => Saved::PositionBased { settings: *settings },
+            Self::PositionBased { settings } => Saved::PositionBased {
+                settings: *settings,
+            },
             Self::ImageBased { settings, at } => Saved::ImageBased {
                 settings: *settings,
                 at,
             },
-            Self::Fuzzy { settings } => Saved::Fuzzy { settings: *settings },
-            Self::LookAhead { settings } => Saved::LookAhead { settings: *settings },
+            Self::Fuzzy { settings } => Saved::Fuzzy {
+                settings: *settings,
+            },
+            Self::LookAhead { settings } => Saved::LookAhead {
+                settings: *settings,
+            },
             Self::Retargeted { controller, goal } => Saved::Retargeted {
                 controller: Box::new(controller.into_controller()?),
                 goal,

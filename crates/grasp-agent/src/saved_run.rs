@@ -7,8 +7,8 @@ use crate::log::{Played, numbered};
 use crate::saved_controller::ControllerText;
 use crate::watch::{Shown, Watch};
 use crate::{
-    Agent, AgentConfig, AgentError, BehaviourError, Controller, Event, EventKind, EventLog, LoggedEvent,
-    Outcome, SavedController,
+    Agent, AgentConfig, AgentError, BehaviourError, Controller, Event, EventKind, EventLog,
+    LoggedEvent, Outcome, SavedController,
 };
 
 /// A run, saved: all that it takes to make it again, and to see whether it comes out the same.
@@ -71,7 +71,8 @@ pub enum Replayed {
     },
 }
 
-/// What the camera had shown before the run: whether a look shows the same again is counted on from run to run.
+/// What the camera had shown before the run: whether a look shows the same again is counted on from
+/// run to run.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Camera {
     from: puma_val2::Joints,
@@ -80,9 +81,11 @@ struct Camera {
 }
 
 impl SavedRun {
-    /// A run that is about to be made by `agent`, with its controller as `controller` says. [`SavedRun::note`] takes down what happens then.
+    /// A run that is about to be made by `agent`, with its controller as `controller` says.
+    /// [`SavedRun::note`] takes down what happens then.
     ///
-    /// Modules that the agent has in the place of those of its settings are not part of it: such a run is replayed by [`EventLog::replay`].
+    /// Modules that the agent has in the place of those of its settings are not part of it: such a
+    /// run is replayed by [`EventLog::replay`].
     pub fn before<C: Controller>(agent: &Agent<C>, controller: SavedController) -> Self {
         let watch = agent.watch();
         Self {
@@ -127,8 +130,8 @@ impl SavedRun {
             shown: self.camera.showed.then(|| Shown::Frame(numbered(0))),
             same: self.camera.same,
         };
-        let agent =
-            Agent::with_controller(self.config.clone(), self.controller.controller())?.watching(watch);
+        let agent = Agent::with_controller(self.config.clone(), self.controller.controller())?
+            .watching(watch);
         let Played { end, log, differs } = self.log.play(agent);
         Ok(match differs {
             // The replayed devices fail in words of their own.
@@ -147,8 +150,9 @@ impl SavedRun {
         })
     }
 
-    /// The run as JSON: its format, settings, controller, what the camera had shown, and the events, one after the other. Numbers that are
-    /// not finite are written as the texts `"NaN"`, `"inf"` and `"-inf"`.
+    /// The run as JSON: its format, settings, controller, what the camera had shown, and the
+    /// events, one after the other. Numbers that are not finite are written as the texts `"NaN"`,
+    /// `"inf"` and `"-inf"`.
     pub fn to_json(&self) -> String {
         let controller = ControllerText::of(&self.controller, &self.config.limits);
         // The values of a policy in one line, an event in one line each.
@@ -166,8 +170,9 @@ impl SavedRun {
     /// Reads what [`SavedRun::to_json`] wrote.
     ///
     /// # Errors
-    /// [`AgentError::SavedRun`], with the place where there is one: no JSON, another format, a missing part, a policy that
-    /// [`Learned::from_json`](crate::Learned::from_json) refuses, a belief that is not finite, settings that cannot work.
+    /// [`AgentError::SavedRun`], with the place where there is one: no JSON, another format, a
+    /// missing part, a policy that [`Learned::from_json`](crate::Learned::from_json) refuses, a
+    /// belief that is not finite, settings that cannot work.
     pub fn from_json(text: &str) -> Result<Self, AgentError> {
         let refused = |error: BehaviourError| AgentError::SavedRun(error.to_string());
         let document: Document =

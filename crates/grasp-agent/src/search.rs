@@ -7,7 +7,8 @@ use puma_val2::{JointDelta, Joints};
 pub struct Viewpoint {
     /// Its number, for the event log.
     pub number: usize,
-    /// The pose. What lies outside the working limits is replaced by the nearest pose that does not; what is not finite ends the run with
+    /// The pose. What lies outside the working limits is replaced by the nearest pose that does
+    /// not; what is not finite ends the run with
     /// [`AgentError::Viewpoint`](crate::AgentError::Viewpoint).
     pub pose: Joints,
 }
@@ -23,9 +24,11 @@ pub enum LastLook {
     Barred,
 }
 
-/// The paper's target search module (section 2.2): says from where to look next, until the ball is in view.
+/// The paper's target search module (section 2.2): says from where to look next, until the ball is
+/// in view.
 ///
-/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) puts another one in the place of [`PoseSearch`].
+/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) puts another one in
+/// the place of [`PoseSearch`].
 ///
 /// ```
 /// use grasp_agent::puma_val2::Joints;
@@ -61,10 +64,12 @@ pub enum LastLook {
 /// # Ok::<(), grasp_agent::AgentError>(())
 /// ```
 pub trait Search: std::fmt::Debug + Send + Sync {
-    /// Where to look from next, with the arm at `at`, after what came of the last viewpoint; [`LastLook::None`] begins a new search. `None` when
-    /// there is nowhere left to look from: the run ends with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
-    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) where every viewpoint was barred. A search that never says so ends in
-    /// the same way after [`AgentConfig::max_views`](crate::AgentConfig::max_views) viewpoints.
+    /// Where to look from next, with the arm at `at`, after what came of the last viewpoint;
+    /// [`LastLook::None`] begins a new search. `None` when there is nowhere left to look from: the
+    /// run ends with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
+    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) where every viewpoint was barred. A search
+    /// that never says so ends in the same way after
+    /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) viewpoints.
     fn next_view(&mut self, at: &Joints, last: LastLook) -> Option<Viewpoint>;
 
     /// A copy, for the copies of an agent: `Box::new(self.clone())`.
@@ -77,7 +82,8 @@ impl Clone for Box<dyn Search> {
     }
 }
 
-/// The paper's search: from fixed poses, the one with the nearest pan angle first; then from beside them.
+/// The paper's search: from fixed poses, the one with the nearest pan angle first; then from beside
+/// them.
 #[derive(Clone, Debug)]
 pub struct PoseSearch {
     poses: Vec<Joints>,
@@ -88,8 +94,8 @@ pub struct PoseSearch {
 }
 
 impl PoseSearch {
-    /// A search from `poses` and then, for each displacement of `again` in turn, from all of them displaced by that. Viewpoints are numbered on
-    /// from round to round.
+    /// A search from `poses` and then, for each displacement of `again` in turn, from all of them
+    /// displaced by that. Viewpoints are numbered on from round to round.
     pub fn new(poses: impl Into<Vec<Joints>>, again: impl Into<Vec<JointDelta>>) -> Self {
         Self {
             poses: poses.into(),
@@ -142,7 +148,8 @@ mod tests {
         Joints::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0])
     }
 
-    /// The numbers of all viewpoints of a search that finds nothing, from an arm that goes where it is sent.
+    /// The numbers of all viewpoints of a search that finds nothing, from an arm that goes where it
+    /// is sent.
     fn all(search: &mut PoseSearch, mut at: Joints) -> Vec<usize> {
         let mut last = LastLook::None;
         let mut numbers = Vec::new();
@@ -156,14 +163,23 @@ mod tests {
     #[test]
     fn the_nearest_pan_angle_comes_first_in_every_round_and_in_every_search() {
         let poses = [-75.0, -50.0, -25.0, 0.0, 25.0, 50.0].map(pan);
-        let mut search = PoseSearch::new(poses, [JointDelta::from_degrees([12.5, 0.0, 0.0, 0.0, 0.0, 0.0])]);
+        let mut search = PoseSearch::new(
+            poses,
+            [JointDelta::from_degrees([12.5, 0.0, 0.0, 0.0, 0.0, 0.0])],
+        );
         // The second round begins where the first one ended, at the left.
         let expected = [4, 3, 5, 2, 1, 0, 6, 7, 8, 9, 10, 11];
         assert_eq!(all(&mut search, pan(20.0)), expected);
         assert_eq!(all(&mut search, pan(20.0)), expected);
         // One that is broken off begins anew as well.
         search.next_view(&pan(20.0), LastLook::None);
-        assert_eq!(search.next_view(&pan(-80.0), LastLook::None).unwrap().number, 0);
+        assert_eq!(
+            search
+                .next_view(&pan(-80.0), LastLook::None)
+                .unwrap()
+                .number,
+            0
+        );
     }
 
     #[test]

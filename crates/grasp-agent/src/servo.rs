@@ -1,7 +1,8 @@
-//! The rivals that the paper names, as controllers: visual servoing in its classical forms, a fuzzy controller, and a one-step look-ahead.
+//! The rivals that the paper names, as controllers: visual servoing in its classical forms, a fuzzy
+//! controller, and a one-step look-ahead.
 //!
-//! All of them believe in a [`CameraModel`] and do not learn. They share what is not theirs to decide: the goal, the
-//! longest step of a cycle, the working limits.
+//! All of them believe in a [`CameraModel`] and do not learn. They share what is not theirs to
+//! decide: the goal, the longest step of a cycle, the working limits.
 
 mod fuzzy;
 mod image_based;
@@ -32,7 +33,8 @@ pub use position_based::PositionBased;
 pub struct ServoSettings {
     /// The camera and the arm as they are believed to be.
     pub model: CameraModel,
-    /// Features of the ball where it should be \[(103.5, 78, 33), the middle of the paper's goal intervals\].
+    /// Features of the ball where it should be \[(103.5, 78, 33), the middle of the paper's goal
+    /// intervals\].
     pub goal: Features,
     /// Which part of the error is to be removed in one cycle \[1\], above 0.
     pub gain: f64,
@@ -90,8 +92,9 @@ pub(crate) fn check_goal(goal: &Features) -> Result<(), String> {
 }
 
 impl CameraModel {
-    /// The pose near `from`, differing in the first three joints, in which a ball at `ball` shows as `features`, or most nearly so, and how
-    /// far the ball is then from its place before the camera, metres. `None` for features that no ball has, and where a number is not finite.
+    /// The pose near `from`, differing in the first three joints, in which a ball at `ball` shows
+    /// as `features`, or most nearly so, and how far the ball is then from its place before the
+    /// camera, metres. `None` for features that no ball has, and where a number is not finite.
     pub fn pose_showing(
         &self,
         ball: &Point3<f64>,
@@ -102,27 +105,28 @@ impl CameraModel {
         off.is_finite().then_some((pose, off))
     }
 
-    /// The pose near `from`, differing in the first three joints, in which a ball at `ball` is at `wanted` in the camera frame, or most
-    /// nearly so, and how far off it is then, metres.
+    /// The pose near `from`, differing in the first three joints, in which a ball at `ball` is at
+    /// `wanted` in the camera frame, or most nearly so, and how far off it is then, metres.
     pub(crate) fn pose_placing(
         &self,
         ball: &Point3<f64>,
         wanted: &Point3<f64>,
         from: &Joints,
     ) -> (Joints, f64) {
-        let seen_at = |joints: &Joints| (self.arm.wrist(joints) * self.mount).inverse_transform_point(ball);
+        let seen_at =
+            |joints: &Joints| (self.arm.wrist(joints) * self.mount).inverse_transform_point(ball);
         solved(from, |joints| seen_at(joints) - wanted)
     }
 
-    /// The pose near `from`, differing in the first three joints, in which the gripper is at `ball`; `None` if there is none within a
-    /// millimetre.
+    /// The pose near `from`, differing in the first three joints, in which the gripper is at
+    /// `ball`; `None` if there is none within a millimetre.
     pub(crate) fn pose_gripping(&self, ball: &Point3<f64>, from: &Joints) -> Option<Joints> {
         let (joints, miss) = solved(from, |joints| self.tool_point(joints) - ball);
         (miss < 0.001).then_some(joints)
     }
 
-    /// How the image of a ball at `ball` changes with the first three joints: rows x, y, r (feature units) by columns JT1, JT2, JT3
-    /// (radians).
+    /// How the image of a ball at `ball` changes with the first three joints: rows x, y, r (feature
+    /// units) by columns JT1, JT2, JT3 (radians).
     pub fn image_jacobian(&self, joints: &Joints, ball: &Point3<f64>) -> Option<Matrix3<f64>> {
         const TURN: f64 = 1e-5;
         let mut jacobian = Matrix3::zeros();
@@ -140,8 +144,8 @@ impl CameraModel {
     }
 }
 
-/// The joints near `from`, differing in the first three, at which `error` is least, and how large it is there: Newton's method with
-/// damping.
+/// The joints near `from`, differing in the first three, at which `error` is least, and how large
+/// it is there: Newton's method with damping.
 fn solved(from: &Joints, error_at: impl Fn(&Joints) -> Vector3<f64>) -> (Joints, f64) {
     const TURN: f64 = 1e-6;
     let (mut joints, mut error) = (*from, error_at(from));
@@ -178,14 +182,16 @@ fn solved(from: &Joints, error_at: impl Fn(&Joints) -> Vector3<f64>) -> (Joints,
 
 /// How boldly a servo controller moves: it remembers nothing else.
 ///
-/// Without it a controller that loses the ball would, once recovery has brought it back, lose it by the same move again.
+/// Without it a controller that loses the ball would, once recovery has brought it back, lose it by
+/// the same move again.
 #[derive(Clone, Copy, Debug)]
 struct Boldness(f64);
 
 impl Boldness {
     const FULL: Self = Self(1.0);
 
-    /// Half as bold after every move that lost the ball or was taken back, half as bold again after every one that was not.
+    /// Half as bold after every move that lost the ball or was taken back, half as bold again after
+    /// every one that was not.
     fn judge(&mut self, consequence: &Consequence) {
         self.0 = match consequence {
             Consequence::Seen(_) => (1.5 * self.0).min(1.0),
@@ -195,14 +201,20 @@ impl Boldness {
     }
 
     /// `wanted` times the boldness, cut to what a cycle allows.
-    fn cut(self, wanted: [f64; 3], steps: &StepLimits, joints: &Joints, limits: &JointLimits) -> JointDelta {
+    fn cut(
+        self,
+        wanted: [f64; 3],
+        steps: &StepLimits,
+        joints: &Joints,
+        limits: &JointLimits,
+    ) -> JointDelta {
         let whole = steps.apply(wanted, joints, limits);
         JointDelta(whole.0.map(|turn| turn * self.0))
     }
 }
 
-/// The joint turns that remove `error` where the image changes by `jacobian`: damped least squares, so that near a singular pose the
-/// turns stay finite.
+/// The joint turns that remove `error` where the image changes by `jacobian`: damped least squares,
+/// so that near a singular pose the turns stay finite.
 fn turns(jacobian: &Matrix3<f64>, error: &Vector3<f64>) -> Option<Vector3<f64>> {
     const DAMPING: f64 = 1.0;
     let normal = jacobian.transpose() * jacobian + Matrix3::identity() * DAMPING;

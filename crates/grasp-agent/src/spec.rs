@@ -1,4 +1,5 @@
-//! A behaviour as data: its states, its actions, its goal and its reward, with the paper's values as presets.
+//! A behaviour as data: its states, its actions, its goal and its reward, with the paper's values
+//! as presets.
 
 use puma_val2::{Joint, JointDelta};
 use qtable::{Action, DiscretiseError, Intervals, Product, State};
@@ -8,8 +9,8 @@ use crate::{Input, Percept, Reward};
 
 /// Everything that defines a behaviour, but for what it has learned.
 ///
-/// The state is the product of intervals of some inputs; the action is the product of angle steps of some joints. Both
-/// behaviours of the paper, and finer ones, are values of this type.
+/// The state is the product of intervals of some inputs; the action is the product of angle steps
+/// of some joints. Both behaviours of the paper, and finer ones, are values of this type.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -102,9 +103,11 @@ const R_EDGES: [f64; 5] = [14.0, 22.0, 32.0, 34.0, 47.0];
 checked!(BehaviourSpec);
 
 impl BehaviourSpec {
-    /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq. 5 with both mends.
+    /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq.
+    /// 5 with both mends.
     ///
-    /// The goal interval \[99, 108\] and the steps of 5 and 1 degrees are the paper's; it does not print the others.
+    /// The goal interval \[99, 108\] and the steps of 5 and 1 degrees are the paper's; it does not
+    /// print the others.
     pub fn centering() -> Self {
         Self {
             name: "centering".into(),
@@ -123,11 +126,11 @@ impl BehaviourSpec {
         }
     }
 
-    /// The paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90 states), 9 steps of J2 by 9 of J3
-    /// (81 actions), Eq. 6 with both mends.
+    /// The paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90 states), 9
+    /// steps of J2 by 9 of J3 (81 actions), Eq. 6 with both mends.
     ///
-    /// The goal (y in \[74, 82\], r in \[32, 34\]) and the steps of 20, 6 and 16, 5 degrees are the paper's; it does not print
-    /// the others.
+    /// The goal (y in \[74, 82\], r in \[32, 34\]) and the steps of 20, 6 and 16, 5 degrees are the
+    /// paper's; it does not print the others.
     pub fn approaching() -> Self {
         Self {
             name: "approaching".into(),
@@ -163,11 +166,12 @@ impl BehaviourSpec {
         }
     }
 
-    /// Approaching on 540 states: 9 intervals of y by 10 of r by 6 of theta 3, otherwise as [`BehaviourSpec::approaching`], but that a lost
-    /// ball stays lost as the goal stays reached: it costs 100 / (1 - gamma) with the paper's gamma of 0.9.
+    /// Approaching on 540 states: 9 intervals of y by 10 of r by 6 of theta 3, otherwise as
+    /// [`BehaviourSpec::approaching`], but that a lost ball stays lost as the goal stays reached:
+    /// it costs 100 / (1 - gamma) with the paper's gamma of 0.9.
     ///
-    /// In regions as small as these the long actions lose the ball from a corner only, and one penalty of 100 is too little, on average over
-    /// the region, to keep them from it.
+    /// In regions as small as these the long actions lose the ball from a corner only, and one
+    /// penalty of 100 is too little, on average over the region, to keep them from it.
     pub fn approaching_fine() -> Self {
         let approaching = Self::approaching();
         Self {
@@ -185,10 +189,11 @@ impl BehaviourSpec {
         }
     }
 
-    /// The same behaviour with another goal interval of y: section 4 of the paper gives \[74, 92\] where its Eq. 6 has \[74, 82\].
+    /// The same behaviour with another goal interval of y: section 4 of the paper gives \[74, 92\]
+    /// where its Eq. 6 has \[74, 82\].
     ///
-    /// The interval replaces the goal bin in the state space too; edges that it swallows are dropped. Specifications without y stay as
-    /// they are.
+    /// The interval replaces the goal bin in the state space too; edges that it swallows are
+    /// dropped. Specifications without y stay as they are.
     ///
     /// # Errors
     /// Edges that do not increase: ends that are not finite or not in order.
@@ -207,12 +212,19 @@ impl BehaviourSpec {
                 let below = others.clone().filter(|edge| **edge < low).copied();
                 let above = others.filter(|edge| **edge > high).copied();
                 let edges: Vec<f64> = below.chain([low, high]).chain(above).collect();
-                let bin = edges.iter().position(|edge| *edge >= low).map_or(1, |i| i + 1);
+                let bin = edges
+                    .iter()
+                    .position(|edge| *edge >= low)
+                    .map_or(1, |i| i + 1);
                 *axis = Intervals::new(&edges)?.with_goal(bin)?;
             }
         }
         self.space = Product::new(axes)?;
-        for interval in self.goal.iter_mut().filter(|interval| interval.input == Input::Y) {
+        for interval in self
+            .goal
+            .iter_mut()
+            .filter(|interval| interval.input == Input::Y)
+        {
             (interval.low, interval.high) = (low, high);
         }
         Ok(self)
@@ -258,13 +270,19 @@ impl BehaviourSpec {
         Ok(State(state))
     }
 
-    /// The joint move that `action` stands for: a mixed-radix number, the last joint's step varying fastest.
+    /// The joint move that `action` stands for: a mixed-radix number, the last joint's step varying
+    /// fastest.
     ///
     /// An action of [`BehaviourSpec::actions`] or beyond counts from the beginning again.
     pub fn delta(&self, action: Action) -> JointDelta {
         let mut degrees = [0.0; 6];
         let mut rest = action.0;
-        for steps in self.moves.iter().rev().filter(|steps| !steps.degrees.is_empty()) {
+        for steps in self
+            .moves
+            .iter()
+            .rev()
+            .filter(|steps| !steps.degrees.is_empty())
+        {
             degrees[steps.joint.index()] = steps.degrees[rest % steps.degrees.len()];
             rest /= steps.degrees.len();
         }
@@ -285,7 +303,10 @@ impl BehaviourSpec {
             return Err("it moves no joint".into());
         }
         for (i, steps) in self.moves.iter().enumerate() {
-            if self.moves[..i].iter().any(|before| before.joint == steps.joint) {
+            if self.moves[..i]
+                .iter()
+                .any(|before| before.joint == steps.joint)
+            {
                 return Err(format!("{} is moved twice", steps.joint));
             }
             steps.check()?;
@@ -356,7 +377,12 @@ mod tests {
     fn goal_intervals_are_closed_in_state_and_test_alike() {
         let spec = BehaviourSpec::centering();
         let inside = spec.state(&percept(103.0, 0.0, 33.0, 0.0)).unwrap();
-        for (x, at_goal) in [(99.0, true), (108.0, true), (98.999, false), (108.001, false)] {
+        for (x, at_goal) in [
+            (99.0, true),
+            (108.0, true),
+            (98.999, false),
+            (108.001, false),
+        ] {
             let p = percept(x, 0.0, 33.0, 0.0);
             assert_eq!(spec.at_goal(&p), at_goal, "x = {x}");
             assert_eq!(spec.state(&p).unwrap() == inside, at_goal, "x = {x}");
@@ -365,15 +391,22 @@ mod tests {
 
     #[test]
     fn the_goal_of_y_can_be_that_of_section_4() {
-        let spec = BehaviourSpec::approaching().with_y_goal(74.0, 92.0).unwrap();
+        let spec = BehaviourSpec::approaching()
+            .with_y_goal(74.0, 92.0)
+            .unwrap();
         assert_eq!(spec.states(), 90);
         assert!(
-            spec.at_goal(&percept(0.0, 91.0, 33.0, 10.0)) && !spec.at_goal(&percept(0.0, 93.0, 33.0, 10.0))
+            spec.at_goal(&percept(0.0, 91.0, 33.0, 10.0))
+                && !spec.at_goal(&percept(0.0, 93.0, 33.0, 10.0))
         );
         let inside = spec.state(&percept(0.0, 80.0, 33.0, 10.0)).unwrap();
         assert!(spec.space.is_goal(inside));
         assert_eq!(spec.state(&percept(0.0, 92.0, 33.0, 10.0)).unwrap(), inside);
-        assert!(BehaviourSpec::approaching().with_y_goal(92.0, 74.0).is_err());
+        assert!(
+            BehaviourSpec::approaching()
+                .with_y_goal(92.0, 74.0)
+                .is_err()
+        );
     }
 
     #[test]

@@ -12,7 +12,8 @@ pub struct Arrival {
     pub target: Joints,
     /// Where it says it is.
     pub reached: Joints,
-    /// Whether something is too near to the hand: the arm has been halted by its own guard, or its sensors say so now.
+    /// Whether something is too near to the hand: the arm has been halted by its own guard, or its
+    /// sensors say so now.
     pub near: bool,
 }
 
@@ -27,12 +28,13 @@ pub enum Verdict {
     Stuck(Joint),
 }
 
-/// The paper's constant control of the approach (section 2.2: collisions with unexpected objects, "or a rapid approach that could damage the
-/// camera"): judges every move by what came back.
+/// The paper's constant control of the approach (section 2.2: collisions with unexpected objects,
+/// "or a rapid approach that could damage the camera"): judges every move by what came back.
 ///
 /// It moves nothing itself, and what it remembers it remembers from run to run.
-/// [`Agent::supervised_by`](crate::Agent::supervised_by) puts another one in the place of [`Guard`]. What a camera
-/// shows is supervised too, by the agent itself: see [`AgentConfig::same_frames`](crate::AgentConfig::same_frames).
+/// [`Agent::supervised_by`](crate::Agent::supervised_by) puts another one in the place of
+/// [`Guard`]. What a camera shows is supervised too, by the agent itself: see
+/// [`AgentConfig::same_frames`](crate::AgentConfig::same_frames).
 ///
 /// ```
 /// use grasp_agent::hough_heuristic::Features;
@@ -68,13 +70,15 @@ pub enum Verdict {
 /// # Ok::<(), grasp_agent::AgentError>(())
 /// ```
 pub trait Supervision: std::fmt::Debug + Send + Sync {
-    /// The range that each joint is kept in. A controller is told it, and what it decides against it is not done; viewpoints are cut to it.
+    /// The range that each joint is kept in. A controller is told it, and what it decides against
+    /// it is not done; viewpoints are cut to it.
     fn limits(&self) -> &JointLimits;
 
     /// What a move came to.
     fn judge_move(&mut self, arrival: &Arrival) -> Verdict;
 
-    /// Whether a move that took the ball in the image from `before` to `after` came nearer too fast; then the arm goes back.
+    /// Whether a move that took the ball in the image from `before` to `after` came nearer too
+    /// fast; then the arm goes back.
     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool;
 
     /// A copy, for the copies of an agent: `Box::new(self.clone())`.
@@ -96,7 +100,8 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// A guard of these working limits, this greatest speed of approach, and so many radians that a joint may stand from where it was sent.
+    /// A guard of these working limits, this greatest speed of approach, and so many radians that a
+    /// joint may stand from where it was sent.
     pub fn new(limits: JointLimits, approach: ApproachLimit, reach_tolerance: f64) -> Self {
         Self {
             limits,
@@ -176,7 +181,11 @@ mod tests {
 
     #[test]
     fn an_approach_is_too_fast_near_the_ball_only() {
-        let ball = |r| Features { x: 96.0, y: 72.0, r };
+        let ball = |r| Features {
+            x: 96.0,
+            y: 72.0,
+            r,
+        };
         assert!(!guard().is_too_fast(&ball(10.0), &ball(61.0)));
         assert!(guard().is_too_fast(&ball(40.0), &ball(63.0)));
         assert!(!guard().is_too_fast(&ball(50.0), &ball(63.0)));

@@ -7,10 +7,11 @@ use rand::Rng;
 
 use crate::{BehaviourSpec, Percept};
 
-/// A behaviour in a simulator: states, actions and rewards of the specification, what follows from the simulator.
+/// A behaviour in a simulator: states, actions and rewards of the specification, what follows from
+/// the simulator.
 ///
-/// The simulator is any closure that turns a percept and a joint move into the next percept, or `None` when the ball is lost; the
-/// starts are drawn by a second one.
+/// The simulator is any closure that turns a percept and a joint move into the next percept, or
+/// `None` when the ball is lost; the starts are drawn by a second one.
 pub struct BehaviourTask<'a, M, S> {
     spec: &'a BehaviourSpec,
     /// The joint move of each action.
@@ -30,7 +31,8 @@ where
     M: FnMut(&Percept, &JointDelta) -> Option<Percept>,
     S: FnMut(&mut dyn Rng) -> Percept,
 {
-    /// A task for learning `spec` with the discount factor `gamma` (an absorbing goal is worth more, the higher it is).
+    /// A task for learning `spec` with the discount factor `gamma` (an absorbing goal is worth
+    /// more, the higher it is).
     pub fn new(spec: &'a BehaviourSpec, gamma: f64, simulate: M, start: S) -> Self {
         let now = Percept {
             features: Features {
@@ -75,7 +77,8 @@ where
     }
 
     fn reset(&mut self, rng: &mut dyn Rng) -> State {
-        // A start at the goal would be an episode without a choice, so it is drawn again, but not for ever.
+        // A start at the goal would be an episode without a choice, so it is drawn again, but not
+        // for ever.
         for _ in 0..STARTS_TRIED {
             self.now = (self.start)(rng);
             if !self.spec.at_goal(&self.now) {

@@ -3,12 +3,16 @@
 use hough_heuristic::Features;
 use puma_val2::{JointDelta, Joints};
 
-use crate::{AgentConfig, Consequence, Controller, GaveUp, GoalInterval, Input, JointLimits, Situation};
+use crate::{
+    AgentConfig, Consequence, Controller, GaveUp, GoalInterval, Input, JointLimits, Situation,
+};
 
-/// What the camera shows where the gripper's turn brings the jaws around the ball, found by showing it once.
+/// What the camera shows where the gripper's turn brings the jaws around the ball, found by showing
+/// it once.
 ///
-/// The paper's goal intervals (x 99..108, y 74..82, r 32..34) do not lie in the middle of the image: they are what *its* camera shows there.
-/// Another camera, or the same one mounted otherwise, shows something else. To teach the goal, the ball is put between the open jaws, the
+/// The paper's goal intervals (x 99..108, y 74..82, r 32..34) do not lie in the middle of the
+/// image: they are what *its* camera shows there. Another camera, or the same one mounted
+/// otherwise, shows something else. To teach the goal, the ball is put between the open jaws, the
 /// gripper's turn is taken back, and the arm looks. Nothing need be known of the camera for that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
@@ -51,16 +55,23 @@ impl TryFrom<Read> for TaughtGoal {
             from,
             grip,
         };
-        goal.checked()
-            .ok_or("a taught goal with a radius that is none, or an angle or place that is not finite")
+        goal.checked().ok_or(
+            "a taught goal with a radius that is none, or an angle or place that is not finite",
+        )
     }
 }
 
 impl TaughtGoal {
-    /// The goal that shows as `seen` with the arm at `from`, from where `grip` brings the jaws around the ball, in the place of the one that
-    /// `intervals` have in their middle. `None` where they do not say what x, y and r should be, and for a radius that is none.
-    /// Nor is there one of a pose or a grip that is not finite.
-    pub fn new(intervals: &[GoalInterval], seen: Features, from: Joints, grip: JointDelta) -> Option<Self> {
+    /// The goal that shows as `seen` with the arm at `from`, from where `grip` brings the jaws
+    /// around the ball, in the place of the one that `intervals` have in their middle. `None` where
+    /// they do not say what x, y and r should be, and for a radius that is none. Nor is there one
+    /// of a pose or a grip that is not finite.
+    pub fn new(
+        intervals: &[GoalInterval],
+        seen: Features,
+        from: Joints,
+        grip: JointDelta,
+    ) -> Option<Self> {
         let middle = |input: Input| {
             let interval = intervals.iter().find(|interval| interval.input == input)?;
             Some(0.5 * (interval.low + interval.high))
@@ -86,7 +97,8 @@ impl TaughtGoal {
             from,
             grip,
         } = self;
-        let shows = |f: Features| f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0;
+        let shows =
+            |f: Features| f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0;
         let finite = from.0.iter().chain(&grip.0).all(|angle| angle.is_finite());
         (finite && shows(untaught) && shows(taught)).then_some(self)
     }
@@ -118,7 +130,9 @@ impl TaughtGoal {
 
     /// `intervals` about this goal: those of x and y moved, that of r scaled, others as they are.
     pub fn intervals(&self, intervals: &[GoalInterval]) -> Vec<GoalInterval> {
-        let Self { untaught, taught, .. } = self;
+        let Self {
+            untaught, taught, ..
+        } = self;
         let moved = |interval: &GoalInterval| {
             let at = |value: f64| match interval.input {
                 Input::X => value + taught.x - untaught.x,
@@ -137,7 +151,12 @@ impl TaughtGoal {
 
     /// What is seen, moved so that this goal is where the other one was.
     fn as_untaught(&self, situation: &Situation) -> Situation {
-        let (seen, Self { untaught, taught, .. }) = (situation.features, self);
+        let (
+            seen,
+            Self {
+                untaught, taught, ..
+            },
+        ) = (situation.features, self);
         Situation {
             features: Features {
                 x: seen.x + untaught.x - taught.x,
@@ -149,7 +168,8 @@ impl TaughtGoal {
     }
 }
 
-/// A controller whose goal is part of what it has learned, at work with a [`TaughtGoal`]: it is told what is seen as if that goal were its own.
+/// A controller whose goal is part of what it has learned, at work with a [`TaughtGoal`]: it is
+/// told what is seen as if that goal were its own.
 #[derive(Clone, Debug)]
 pub struct Retargeted<C> {
     controller: C,

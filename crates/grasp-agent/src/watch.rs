@@ -24,8 +24,10 @@ pub(crate) enum Shown {
 }
 
 impl Watch {
-    /// Takes down a look from the pose `joints`, and tells whether it showed the same as the one before from another pose. Two frames are the same when all their pixels are, which the noise of a camera prevents; of an
-    /// eye without frames, two sightings are when the ball is at exactly the same place.
+    /// Takes down a look from the pose `joints`, and tells whether it showed the same as the one
+    /// before from another pose. Two frames are the same when all their pixels are, which the noise
+    /// of a camera prevents; of an eye without frames, two sightings are when the ball is at
+    /// exactly the same place.
     pub(crate) fn looked(
         &mut self,
         joints: &Joints,
@@ -55,7 +57,8 @@ impl Watch {
         self.shown = self.shown.take().map(|_| Shown::Frame(frame));
     }
 
-    /// How many looks in a row, each from another pose than the one before, have shown the same as that.
+    /// How many looks in a row, each from another pose than the one before, have shown the same as
+    /// that.
     pub(crate) fn same(&self) -> usize {
         self.same
     }
@@ -76,7 +79,11 @@ mod tests {
     }
 
     fn ball(x: f64) -> Sighting {
-        let features = Features { x, y: 70.0, r: 20.0 };
+        let features = Features {
+            x,
+            y: 70.0,
+            r: 20.0,
+        };
         Sighting {
             long_axis: None,
             features,

@@ -1,4 +1,5 @@
-//! The heuristic against the randomized and the standard Hough transform, from simple scenes to hard ones.
+//! The heuristic against the randomized and the standard Hough transform, from simple scenes to
+//! hard ones.
 //!
 //! The edges are found beforehand: only the circle search is timed.
 
@@ -24,7 +25,8 @@ fn detectors(criterion: &mut Criterion) {
             .warm_up_time(Duration::from_millis(300))
             .measurement_time(Duration::from_secs(1));
         for name in contest::DETECTORS {
-            let mut detector = contest::detector(name, &round.scene, edges.clone()).expect("usable settings");
+            let mut detector =
+                contest::detector(name, &round.scene, edges.clone()).expect("usable settings");
             let mut found = Vec::new();
             group.bench_function(name, |bencher| {
                 bencher.iter(|| {

@@ -1,5 +1,6 @@
-//! Counts the instructions of one frame under valgrind's callgrind: unlike seconds, they do not depend on what else the
-//! machine is doing. Where valgrind is not installed it says so and succeeds.
+//! Counts the instructions of one frame under valgrind's callgrind: unlike seconds, they do not
+//! depend on what else the machine is doing. Where valgrind is not installed it says so and
+//! succeeds.
 
 #![allow(missing_docs)]
 #![allow(
@@ -23,7 +24,8 @@ const SCENES: [&str; 3] = ["1 ball", "+20 distractors", "192x144, 1 ball"];
 /// The standard transform takes minutes under callgrind on a large frame.
 const SMALL_ONLY: &str = "SHT";
 const EDGES: &str = "edges";
-/// The trusted detector, which finds edges of its own: all of its work is counted, with its default settings.
+/// The trusted detector, which finds edges of its own: all of its work is counted, with its default
+/// settings.
 const TRUSTED: &str = "trusted, edges included";
 
 fn main() -> ExitCode {
@@ -75,7 +77,9 @@ fn count(scene: &str, case: &str) -> Result<u64, String> {
         .output()
         .map_err(|error| error.to_string())?;
     let report = String::from_utf8_lossy(&output.stderr);
-    let collected = report.lines().find_map(|line| line.split_once("Collected :"));
+    let collected = report
+        .lines()
+        .find_map(|line| line.split_once("Collected :"));
     let number = collected.and_then(|(_, number)| number.trim().parse().ok());
     number
         .filter(|_| output.status.success())
@@ -84,7 +88,9 @@ fn count(scene: &str, case: &str) -> Result<u64, String> {
 
 /// One frame to fill the buffers, and a second one that counts.
 fn run(scene: &str, case: &str) {
-    let Some(contest::Round { scene, .. }) = contest::rounds().into_iter().find(|round| round.name == scene)
+    let Some(contest::Round { scene, .. }) = contest::rounds()
+        .into_iter()
+        .find(|round| round.name == scene)
     else {
         return;
     };

@@ -1,6 +1,8 @@
-//! The comparison of docs/BENCHMARKS.md: every detector on every scene, over many seeds, as CSV and as a picture.
+//! The comparison of docs/BENCHMARKS.md: every detector on every scene, over many seeds, as CSV and
+//! as a picture.
 //!
-//! cargo run --release -p hough-heuristic --example compare -- --seeds 20 --csv scenes.csv --svg scenes.svg
+//! cargo run --release -p hough-heuristic --example compare -- --seeds 20 --csv scenes.csv --svg
+//! scenes.svg
 
 #![allow(clippy::print_stdout, reason = "what an example is for")]
 
@@ -98,7 +100,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn measure(round: &contest::Round, detector_name: &'static str, seeds: u64) -> Result<Row, Box<dyn Error>> {
+fn measure(
+    round: &contest::Round,
+    detector_name: &'static str,
+    seeds: u64,
+) -> Result<Row, Box<dyn Error>> {
     let (mut times, mut errors) = (Vec::new(), Vec::new());
     let mut row = Row::new(round, detector_name, seeds);
     for seed in 0..seeds {
@@ -114,7 +120,9 @@ fn measure(round: &contest::Round, detector_name: &'static str, seeds: u64) -> R
         // Slow ones need no repetition to be timed.
         detector.detect_into(&frame, &mut found);
         let reps = if detector_name == "SHT" { 1 } else { 3 };
-        times.push(least_millis(reps, || detector.detect_into(&frame, &mut found)));
+        times.push(least_millis(reps, || {
+            detector.detect_into(&frame, &mut found)
+        }));
         row.memory = row.memory.max(detector.memory());
         row.truths += balls.len();
         row.found += found.len();
@@ -192,7 +200,10 @@ fn least_millis(reps: u32, mut work: impl FnMut()) -> f64 {
 
 /// The median time of each detector (a colour) on each scene (a column), on a logarithmic scale.
 fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
-    let names: Vec<&str> = contest::rounds().into_iter().map(|round| round.name).collect();
+    let names: Vec<&str> = contest::rounds()
+        .into_iter()
+        .map(|round| round.name)
+        .collect();
     let area = SVGBackend::new(path, (1000, 560)).into_drawing_area();
     area.fill(&WHITE)?;
     let columns = names.len() as f64;
@@ -227,7 +238,10 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         )?;
     }
     for (column, name) in names.iter().enumerate() {
-        let place = (column as f64 - 0.4, if column % 2 == 0 { 0.024 } else { 0.034 });
+        let place = (
+            column as f64 - 0.4,
+            if column % 2 == 0 { 0.024 } else { 0.034 },
+        );
         chart.draw_series([Text::new(*name, place, ("sans-serif", 12))])?;
     }
     chart

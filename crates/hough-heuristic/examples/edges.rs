@@ -1,8 +1,13 @@
 //! Writes the edge images of a folder of frames, and the CPU time of every frame as CSV.
 //!
-//! cargo run --release -p hough-heuristic --example edges -- frames/ --edges edges/ --times times.csv
+//! cargo run --release -p hough-heuristic --example edges -- frames/ --edges edges/ --times
+//! times.csv
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "what an example is for")]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "what an example is for"
+)]
 
 use std::error::Error;
 use std::fmt::Write;
@@ -25,7 +30,8 @@ struct Options {
     /// Folder, which must exist, to write the edge images to.
     #[arg(long)]
     edges: Option<PathBuf>,
-    /// Where to write file,cpu_us,low,high: the least CPU time of the repetitions, and the thresholds of the frame.
+    /// Where to write file,cpu_us,low,high: the least CPU time of the repetitions, and the
+    /// thresholds of the frame.
     #[arg(long)]
     times: Option<PathBuf>,
     #[arg(long, default_value_t = 5)]

@@ -1,11 +1,13 @@
-//! Renders the scenes on which circle detectors are compared: PNG files, the circles they show, and what kind each is of.
+//! Renders the scenes on which circle detectors are compared: PNG files, the circles they show, and
+//! what kind each is of.
 //!
 //! ```text
 //! cargo run --release -p hough-heuristic --example scenes -- --out out/scenes --frames 20 --seed 1 --size 768x576
 //! ```
 //!
-//! writes `out/scenes/KIND_NNN.png`, `truth.csv` (file,cx,cy,r; (0, 0) is the centre of the top-left pixel) and `frames.csv` (file,scene). A frame
-//! depends on its kind, its number, the seed and the size. Lengths scale with the size; the smallest radius does down to 6 px.
+//! writes `out/scenes/KIND_NNN.png`, `truth.csv` (file,cx,cy,r; (0, 0) is the centre of the
+//! top-left pixel) and `frames.csv` (file,scene). A frame depends on its kind, its number, the seed
+//! and the size. Lengths scale with the size; the smallest radius does down to 6 px.
 
 #![allow(clippy::print_stderr, reason = "what an example is for")]
 
@@ -46,7 +48,8 @@ struct Options {
     /// Kinds of scenes, separated by commas; all unless told otherwise.
     #[arg(long, value_delimiter = ',', value_parser = kind)]
     kinds: Vec<Kind>,
-    /// Instead patterns that wear out detectors, one frame each: noise, texture, stripes, rings, which hold no circle that counts.
+    /// Instead patterns that wear out detectors, one frame each: noise, texture, stripes, rings,
+    /// which hold no circle that counts.
     #[arg(long)]
     patterns: bool,
 }
@@ -109,19 +112,24 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn kind(name: &str) -> Result<Kind, String> {
-    KINDS.into_iter().find(|kind| kind.name == name).ok_or_else(|| {
-        let names = KINDS.map(|kind| kind.name).join(", ");
-        format!("no such kind; there are {names}")
-    })
+    KINDS
+        .into_iter()
+        .find(|kind| kind.name == name)
+        .ok_or_else(|| {
+            let names = KINDS.map(|kind| kind.name).join(", ");
+            format!("no such kind; there are {names}")
+        })
 }
 
-/// Writes a file as a whole or not at all; what is there and is no regular file is written to as it is.
+/// Writes a file as a whole or not at all; what is there and is no regular file is written to as it
+/// is.
 fn save(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
     let failed = |error| format!("{}: cannot be written: {error}", path.display());
     if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return Ok(std::fs::write(path, bytes).map_err(failed)?);
     }
     let unfinished = path.with_extension("part");
-    let written = std::fs::write(&unfinished, bytes).and_then(|()| std::fs::rename(&unfinished, path));
+    let written =
+        std::fs::write(&unfinished, bytes).and_then(|()| std::fs::rename(&unfinished, path));
     Ok(written.map_err(failed)?)
 }

@@ -5,7 +5,8 @@
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, EdgeDetector, EdgeMap, Heuristic,
-    HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
+    HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
+    StandardHoughConfig,
 };
 
 use crate::scenes::Scene;
@@ -113,8 +114,13 @@ pub const DETECTORS: [&str; 6] = [
     "SHT, gradient",
 ];
 
-/// A detector for a scene, which knows the radius range and how many balls to look for, on edges that are already found.
-pub fn detector(name: &str, scene: &Scene, edges: EdgeMap) -> Result<Box<dyn Contestant>, ConfigError> {
+/// A detector for a scene, which knows the radius range and how many balls to look for, on edges
+/// that are already found.
+pub fn detector(
+    name: &str,
+    scene: &Scene,
+    edges: EdgeMap,
+) -> Result<Box<dyn Contestant>, ConfigError> {
     let edges = Found(edges);
     let small = scene.width < 400;
     let accept = Acceptance {

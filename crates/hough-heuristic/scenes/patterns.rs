@@ -1,4 +1,5 @@
-//! Frames that wear out circle detectors: noise, dense texture, and patterns that are full of arcs or of mirrored edges.
+//! Frames that wear out circle detectors: noise, dense texture, and patterns that are full of arcs
+//! or of mirrored edges.
 
 #![allow(dead_code, unreachable_pub, missing_docs)]
 
@@ -21,10 +22,16 @@ pub fn patterns(width: u32, height: u32) -> Vec<(String, GrayImage)> {
     let either = |bright: bool| if bright { 220.0 } else { 30.0 };
     let odd = |at: f64, length: f64| (at / length) as u32 % 2 == 1;
     paint("white-noise".into(), &mut |_, _, random| 255.0 * random);
-    paint("black-and-white".into(), &mut |_, _, random| either(random < 0.5));
-    paint("sparse-dots".into(), &mut |_, _, random| either(random < 0.05));
+    paint("black-and-white".into(), &mut |_, _, random| {
+        either(random < 0.5)
+    });
+    paint("sparse-dots".into(), &mut |_, _, random| {
+        either(random < 0.05)
+    });
     for length in [4.0, 8.0, 16.0] {
-        paint(format!("stripes-{length}"), &mut |x, _, _| either(odd(x, length)));
+        paint(format!("stripes-{length}"), &mut |x, _, _| {
+            either(odd(x, length))
+        });
         paint(format!("checkerboard-{length}"), &mut |x, y, _| {
             either(odd(x, length) != odd(y, length))
         });
@@ -65,7 +72,11 @@ fn texture(length: f64) -> Vec<[f64; 3]> {
         .map(|_| {
             let turn = rng.random_range(0.0..TAU);
             let rate = TAU / (length * rng.random_range(0.6..2.0));
-            [rate * turn.cos(), rate * turn.sin(), rng.random_range(0.0..TAU)]
+            [
+                rate * turn.cos(),
+                rate * turn.sin(),
+                rng.random_range(0.0..TAU),
+            ]
         })
         .collect()
 }

@@ -1,4 +1,5 @@
-//! Seeded scenes for tests and benchmarks: shaded balls amid straight-edged distractors, with noise.
+//! Seeded scenes for tests and benchmarks: shaded balls amid straight-edged distractors, with
+//! noise.
 
 #![allow(dead_code, unreachable_pub, missing_docs)]
 
@@ -46,7 +47,8 @@ impl Scene {
         while balls.len() < self.balls && tries < 10_000 {
             tries += 1;
             let shrink = 1.0 - f64::from(tries) / 12_000.0;
-            let radius = self.radius.0 + (self.radius.1 - self.radius.0) * rng.random::<f64>() * shrink;
+            let radius =
+                self.radius.0 + (self.radius.1 - self.radius.0) * rng.random::<f64>() * shrink;
             let margin = radius + 2.0;
             let (w, h) = (f64::from(self.width), f64::from(self.height));
             if 2.0 * margin >= w.min(h) {
@@ -89,13 +91,19 @@ impl Canvas {
         let grey = (0..height)
             .flat_map(|y| (0..width).map(move |x| (x, y)))
             .map(|(x, y)| {
-                base + slope_x * f64::from(x) / f64::from(width) + slope_y * f64::from(y) / f64::from(height)
+                base + slope_x * f64::from(x) / f64::from(width)
+                    + slope_y * f64::from(y) / f64::from(height)
             })
             .collect();
-        Self { width, height, grey }
+        Self {
+            width,
+            height,
+            grey,
+        }
     }
 
-    /// Paints where `inside` (signed distance to the border, pixels, positive inside) says, softly over one pixel.
+    /// Paints where `inside` (signed distance to the border, pixels, positive inside) says, softly
+    /// over one pixel.
     pub fn paint(
         &mut self,
         (left, top, right, bottom): (f64, f64, f64, f64),

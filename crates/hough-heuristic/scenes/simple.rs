@@ -1,6 +1,8 @@
-//! Seeded scenes with one difficulty each, on which detectors are compared: bright matt balls before a plain ground.
+//! Seeded scenes with one difficulty each, on which detectors are compared: bright matt balls
+//! before a plain ground.
 //!
-//! Lengths are for frames of 768x576 pixels and scale with the size; noise is in grey levels and does not.
+//! Lengths are for frames of 768x576 pixels and scale with the size; noise is in grey levels and
+//! does not.
 
 #![allow(dead_code, unreachable_pub, missing_docs)]
 
@@ -84,8 +86,14 @@ const MOST_OF_MANY: f64 = 40.0;
 const LENS: f64 = 0.7;
 
 impl Kind {
-    /// Frame `number` of this kind, of at least 32x32 pixels, and the true outlines of its balls; no two seeds or kinds share frames.
-    pub fn render(&self, (width, height): (u32, u32), seed: u64, number: u64) -> (GrayImage, Vec<Circle>) {
+    /// Frame `number` of this kind, of at least 32x32 pixels, and the true outlines of its balls;
+    /// no two seeds or kinds share frames.
+    pub fn render(
+        &self,
+        (width, height): (u32, u32),
+        seed: u64,
+        number: u64,
+    ) -> (GrayImage, Vec<Circle>) {
         // FNV-1a over name, seed and number.
         let words = seed.to_le_bytes().into_iter().chain(number.to_le_bytes());
         let hash = self
@@ -166,7 +174,12 @@ impl Painter {
                 let (u, v) = self.anywhere();
                 let wide = 0.5 * self.scale * self.rng.random_range(2.0..8.0);
                 let middle = (0.5 * (x + u), 0.5 * (y + v));
-                rectangle(middle, (v - y).atan2(u - x), 0.5 * (u - x).hypot(v - y), wide)
+                rectangle(
+                    middle,
+                    (v - y).atan2(u - x),
+                    0.5 * (u - x).hypot(v - y),
+                    wide,
+                )
             }
             _ => {
                 let mut off = || self.scale * self.rng.random_range(-80.0..80.0);
@@ -186,7 +199,9 @@ impl Painter {
             if balls.len() == count {
                 break;
             }
-            let radius = self.rng.random_range(least..(most * self.scale).max(least + 1.0));
+            let radius = self
+                .rng
+                .random_range(least..(most * self.scale).max(least + 1.0));
             let mut between = |length: u32| {
                 let (low, high) = (radius + gap, f64::from(length) - 1.0 - radius - gap);
                 if low < high {
@@ -196,7 +211,8 @@ impl Painter {
                 }
             };
             let (x, y) = (between(self.canvas.width), between(self.canvas.height));
-            let apart = |other: &Circle| (x - other.x).hypot(y - other.y) > radius + other.radius + gap;
+            let apart =
+                |other: &Circle| (x - other.x).hypot(y - other.y) > radius + other.radius + gap;
             if balls.iter().all(apart) {
                 balls.push(Circle { x, y, radius });
             }
@@ -260,7 +276,8 @@ impl Painter {
     }
 }
 
-/// The corners of a rectangle, from its centre, the direction of its length, and half of its length and width.
+/// The corners of a rectangle, from its centre, the direction of its length, and half of its length
+/// and width.
 fn rectangle((x, y): (f64, f64), turn: f64, long: f64, wide: f64) -> Vec<(f64, f64)> {
     let (cos, sin) = (turn.cos(), turn.sin());
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]

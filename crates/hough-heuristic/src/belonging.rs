@@ -5,7 +5,8 @@ use crate::{Circle, Curve, EdgePixel};
 
 /// Answers for every pixel of a frame whether an edge pixel lies within the tolerance of it.
 ///
-/// Holds, per pixel, how many edge pixels are that near, so that explained ones can be taken out again one by one.
+/// Holds, per pixel, how many edge pixels are that near, so that explained ones can be taken out
+/// again one by one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NearEdges {
     width: i32,
@@ -13,7 +14,8 @@ pub(crate) struct NearEdges {
     counts: Vec<u8>,
     /// No fewer than the pixels of the frame that match.
     most_matched: usize,
-    /// The offsets at a distance of at most `tolerance`; at most 197 of them, so that a count fits in a byte.
+    /// The offsets at a distance of at most `tolerance`; at most 197 of them, so that a count fits
+    /// in a byte.
     disc: Vec<(i32, i32)>,
 }
 
@@ -62,15 +64,18 @@ impl NearEdges {
         }
     }
 
-    /// Whether an edge pixel lies within the tolerance of the pixel. Pixels outside the frame never match.
+    /// Whether an edge pixel lies within the tolerance of the pixel. Pixels outside the frame never
+    /// match.
     #[inline]
     pub(crate) fn matches(&self, x: i32, y: i32) -> bool {
         index(x, y, self.width, self.height).is_some_and(|index| self.counts[index] != 0)
     }
 
-    /// The belonging parameter β of a curve, if it is above `theta`; a curve without pixels has none.
+    /// The belonging parameter β of a curve, if it is above `theta`; a curve without pixels has
+    /// none.
     ///
-    /// Stops counting as soon as the outline is so long that all pixels that can match would not do, which changes no answer.
+    /// Stops counting as soon as the outline is so long that all pixels that can match would not
+    /// do, which changes no answer.
     pub(crate) fn belonging<C: Curve>(&self, curve: &C, theta: f64) -> Option<f64> {
         let longest = self.most_matched as f64 / theta;
         let (mut pixels, mut matched) = (0u32, 0u32);
@@ -103,11 +108,13 @@ impl NearEdges {
         self.counts.capacity()
     }
 
-    /// A first look at a few pixels of the outline: false if too few of them match for a circle with β above `theta`.
+    /// A first look at a few pixels of the outline: false if too few of them match for a circle
+    /// with β above `theta`.
     ///
-    /// After 8, 16, 24 and 32 probes the share of matches must not lie more than 1.5 standard deviations below `theta`.
-    /// A draw whose β is far above passes: were the probes independent, 97 % of those at θ + 0.1 for θ = 0.65. Of the draws
-    /// at θ itself 18 % are turned away, and have their further chances in later draws of the same curve.
+    /// After 8, 16, 24 and 32 probes the share of matches must not lie more than 1.5 standard
+    /// deviations below `theta`. A draw whose β is far above passes: were the probes independent,
+    /// 97 % of those at θ + 0.1 for θ = 0.65. Of the draws at θ itself 18 % are turned away, and
+    /// have their further chances in later draws of the same curve.
     pub(crate) fn promising(&self, circle: &Circle, probes: &Probes) -> bool {
         let mut matched = 0u32;
         for (chunk, &needed) in probes.directions.chunks_exact(8).zip(&probes.needed) {
@@ -133,7 +140,8 @@ pub(crate) struct Probes {
 
 impl Probes {
     pub(crate) fn new(theta: f64) -> Self {
-        // Rotations by 11.25 degrees, from square roots alone so that every platform has the same bits.
+        // Rotations by 11.25 degrees, from square roots alone so that every platform has the same
+        // bits.
         let half_angle = |cos: f64| (0.5 + 0.5 * cos).sqrt();
         let cos = half_angle(half_angle(half_angle(0.0)));
         let sin = (1.0 - cos * cos).sqrt();
@@ -142,7 +150,8 @@ impl Probes {
             let (x, y) = around[probe - 1];
             around[probe] = (x * cos - y * sin, x * sin + y * cos);
         }
-        // Counting by bit-reversed numbers spreads every first few of the directions around the circle.
+        // Counting by bit-reversed numbers spreads every first few of the directions around the
+        // circle.
         let directions = (0..PROBES as u32)
             .map(|probe| around[(probe.reverse_bits() >> (32 - PROBES.trailing_zeros())) as usize])
             .collect();
@@ -204,14 +213,19 @@ mod tests {
     #[test]
     fn the_first_look_turns_away_few_that_are_good() {
         let needed = Probes::new(0.65).needed;
-        // The share of draws that pass when each probe matches with this probability, independently of the others.
+        // The share of draws that pass when each probe matches with this probability, independently
+        // of the others.
         let passing = |beta: f64| {
             let mut by_matches = [0.0; PROBES + 1];
             by_matches[0] = 1.0;
             for needed in needed {
                 for _ in 0..8 {
                     for matched in (0..by_matches.len()).rev() {
-                        let before = if matched > 0 { by_matches[matched - 1] } else { 0.0 };
+                        let before = if matched > 0 {
+                            by_matches[matched - 1]
+                        } else {
+                            0.0
+                        };
                         by_matches[matched] = (1.0 - beta) * by_matches[matched] + beta * before;
                     }
                 }

@@ -14,12 +14,13 @@ pub struct Circle {
     pub radius: f64,
 }
 
-/// What the controller looks at: centre and radius of the ball's outline in units that do not depend on
-/// the resolution of the frame (section 2.1 of the paper).
+/// What the controller looks at: centre and radius of the ball's outline in units that do not
+/// depend on the resolution of the frame (section 2.1 of the paper).
 ///
-/// The whole frame is [`Features::WIDTH`] x [`Features::HEIGHT`] units with the origin at its top-left *corner*,
-/// so that the middle of the frame is (96, 72) at every resolution. The paper's grabber delivers 768x576 pixels, and its
-/// goal intervals (x in 99..108, y in 74..82, r in 32..34) are in these units: a unit is four of its pixels.
+/// The whole frame is [`Features::WIDTH`] x [`Features::HEIGHT`] units with the origin at its
+/// top-left *corner*, so that the middle of the frame is (96, 72) at every resolution. The paper's
+/// grabber delivers 768x576 pixels, and its goal intervals (x in 99..108, y in 74..82, r in 32..34)
+/// are in these units: a unit is four of its pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Features {
@@ -39,8 +40,8 @@ impl Features {
 
     /// The features of `circle`, found in a frame `frame_width` pixels wide.
     ///
-    /// Pixels are square, so one scale serves both axes. A frame of width 0 has no circles; it gives features that are not
-    /// finite.
+    /// Pixels are square, so one scale serves both axes. A frame of width 0 has no circles; it
+    /// gives features that are not finite.
     pub fn from_circle(circle: &Circle, frame_width: u32) -> Self {
         let unit = Self::WIDTH / f64::from(frame_width);
         Self {
@@ -50,7 +51,8 @@ impl Features {
         }
     }
 
-    /// The circle with these features in a frame `frame_width` pixels wide: the inverse of [`Features::from_circle`].
+    /// The circle with these features in a frame `frame_width` pixels wide: the inverse of
+    /// [`Features::from_circle`].
     pub fn to_circle(self, frame_width: u32) -> Circle {
         let pixels = f64::from(frame_width) / Self::WIDTH;
         Circle {

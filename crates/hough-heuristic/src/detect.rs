@@ -19,14 +19,15 @@ pub struct Detection {
 
 /// Finds circles in monochrome frames.
 ///
-/// A detector owns its buffers, hence `&mut self`; what it finds depends on its configuration (seed included) and on the
-/// frame, never on the frames before it. One method is the work; the others have a default.
+/// A detector owns its buffers, hence `&mut self`; what it finds depends on its configuration (seed
+/// included) and on the frame, never on the frames before it. One method is the work; the others
+/// have a default.
 pub trait CircleDetector {
     /// Replaces the content of `found` by the circles of `frame`, best first.
     ///
-    /// A frame without circles, the empty frame among them, leaves `found` empty, and so does one that
-    /// [`check_frame`](CircleDetector::check_frame) refuses; [`try_detect_into`](CircleDetector::try_detect_into) says which it
-    /// was.
+    /// A frame without circles, the empty frame among them, leaves `found` empty, and so does one
+    /// that [`check_frame`](CircleDetector::check_frame) refuses;
+    /// [`try_detect_into`](CircleDetector::try_detect_into) says which it was.
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>);
 
     /// The circles of `frame`, best first.
@@ -36,35 +37,42 @@ pub trait CircleDetector {
         found
     }
 
-    /// Whether the configuration suits frames of `width` x `height` pixels. By default every one does.
+    /// Whether the configuration suits frames of `width` x `height` pixels. By default every one
+    /// does.
     ///
     /// # Errors
-    /// [`ConfigError::Region`] if the region of interest sticks out of such a frame, [`ConfigError::Accumulator`] if the
-    /// frame needs more memory than the detector may take.
+    /// [`ConfigError::Region`] if the region of interest sticks out of such a frame,
+    /// [`ConfigError::Accumulator`] if the frame needs more memory than the detector may take.
     fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
         let _ = (width, height);
         Ok(())
     }
 
-    /// [`detect_into`](CircleDetector::detect_into), for a frame whose size is not known beforehand.
+    /// [`detect_into`](CircleDetector::detect_into), for a frame whose size is not known
+    /// beforehand.
     ///
     /// # Errors
     /// Those of [`check_frame`](CircleDetector::check_frame); `found` is then empty.
-    fn try_detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) -> Result<(), ConfigError> {
+    fn try_detect_into(
+        &mut self,
+        frame: &GrayImage,
+        found: &mut Vec<Detection>,
+    ) -> Result<(), ConfigError> {
         found.clear();
         self.check_frame(frame.width(), frame.height())?;
         self.detect_into(frame, found);
         Ok(())
     }
 
-    /// Whether to remember the candidates of each frame from now on, for [`stages`](CircleDetector::stages). Detectors do
-    /// not unless asked to.
+    /// Whether to remember the candidates of each frame from now on, for
+    /// [`stages`](CircleDetector::stages). Detectors do not unless asked to.
     fn keep_candidates(&mut self, keep: bool) {
         let _ = keep;
     }
 
-    /// What lies between the last frame and its circles; none for a detector that does not show it. A frame that
-    /// [`check_frame`](CircleDetector::check_frame) refuses is not looked at, and leaves those of the frame before.
+    /// What lies between the last frame and its circles; none for a detector that does not show it.
+    /// A frame that [`check_frame`](CircleDetector::check_frame) refuses is not looked at, and
+    /// leaves those of the frame before.
     fn stages(&self) -> Option<Stages<'_>> {
         None
     }
@@ -85,9 +93,11 @@ pub struct Stages<'a> {
 }
 
 impl Stages<'_> {
-    /// Whether the circle, once accepted, explains the edge pixel: such pixels are taken out of `D`.
+    /// Whether the circle, once accepted, explains the edge pixel: such pixels are taken out of
+    /// `D`.
     pub fn explains(&self, circle: &Circle, pixel: EdgePixel) -> bool {
-        circle.distance(pixel.x.into(), pixel.y.into()) <= explained_band(self.tolerance, circle.radius)
+        circle.distance(pixel.x.into(), pixel.y.into())
+            <= explained_band(self.tolerance, circle.radius)
     }
 }
 
@@ -111,11 +121,12 @@ impl StageTimes {
 
 /// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
 ///
-/// For one-off use: [`Trusted`] with the default settings, which reports up to 32 circles. For a stream of frames build a detector
-/// once.
+/// For one-off use: [`Trusted`] with the default settings, which reports up to 32 circles. For a
+/// stream of frames build a detector once.
 ///
 /// # Errors
-/// [`ConfigError::RadiusRange`] if the range is empty, [`ConfigError::OutOfRange`] if its lower end is below 4.
+/// [`ConfigError::RadiusRange`] if the range is empty, [`ConfigError::OutOfRange`] if its lower end
+/// is below 4.
 pub fn detect_circles(
     frame: &GrayImage,
     min_radius: f64,

@@ -71,20 +71,23 @@ impl EdgeMap {
         &self.pixels
     }
 
-    /// The grey-level gradient at each pixel of [`pixels`](EdgeMap::pixels), in the same order; empty if the detector knows
-    /// none.
+    /// The grey-level gradient at each pixel of [`pixels`](EdgeMap::pixels), in the same order;
+    /// empty if the detector knows none.
     pub fn gradients(&self) -> &[EdgeGradient] {
         &self.gradients
     }
 
-    /// Where the edge runs at the pixel of this index in [`pixels`](EdgeMap::pixels), to a fraction of a pixel where the
-    /// detector knows it, else the centre of the pixel.
+    /// Where the edge runs at the pixel of this index in [`pixels`](EdgeMap::pixels), to a fraction
+    /// of a pixel where the detector knows it, else the centre of the pixel.
     ///
     /// # Panics
     /// If there are not so many pixels.
     pub fn position(&self, index: usize) -> (f64, f64) {
         let pixel = self.pixels[index];
-        let (dx, dy) = self.gradients.get(index).map_or((0.0, 0.0), EdgeGradient::offset);
+        let (dx, dy) = self
+            .gradients
+            .get(index)
+            .map_or((0.0, 0.0), EdgeGradient::offset);
         (f64::from(pixel.x) + dx, f64::from(pixel.y) + dy)
     }
 
@@ -103,8 +106,8 @@ impl EdgeMap {
         self.repaint(width, height, |bytes, _, _| bytes.fill(0));
     }
 
-    /// Gives the map the size of a frame and lets `paint` set the image, whose old content is of no meaning, and the lists,
-    /// which come empty.
+    /// Gives the map the size of a frame and lets `paint` set the image, whose old content is of no
+    /// meaning, and the lists, which come empty.
     pub(crate) fn repaint(
         &mut self,
         width: u32,
@@ -127,8 +130,9 @@ impl EdgeMap {
 
 /// Finds the edge pixels of monochrome frames.
 ///
-/// An edge detector owns its buffers, hence `&mut self` and the borrowed result. A frame so small that the operator is
-/// undefined on it (0x0 among them) has no edges; its map still has the size of the frame.
+/// An edge detector owns its buffers, hence `&mut self` and the borrowed result. A frame so small
+/// that the operator is undefined on it (0x0 among them) has no edges; its map still has the size
+/// of the frame.
 pub trait EdgeDetector {
     /// The edges of `frame`.
     fn detect_edges<'a>(&'a mut self, frame: &GrayImage) -> &'a EdgeMap;

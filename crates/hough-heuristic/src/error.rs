@@ -15,7 +15,9 @@ pub enum ConfigError {
         expected: &'static str,
     },
     /// The radius range is empty, negative, or reaches beyond any frame.
-    #[error("the radius range {min}..={max} px is not usable: both ends must lie in 1..=100000, in order")]
+    #[error(
+        "the radius range {min}..={max} px is not usable: both ends must lie in 1..=100000, in order"
+    )]
     RadiusRange {
         /// The smallest radius, pixels.
         min: f64,
@@ -23,7 +25,9 @@ pub enum ConfigError {
         max: f64,
     },
     /// The two thresholds of an edge detector are not in order.
-    #[error("the edge thresholds low {low} and high {high} are not usable: 0 < low <= high is needed")]
+    #[error(
+        "the edge thresholds low {low} and high {high} are not usable: 0 < low <= high is needed"
+    )]
     Thresholds {
         /// The lower threshold.
         low: f64,

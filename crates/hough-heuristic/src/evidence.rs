@@ -1,4 +1,5 @@
-//! What every detector does with a candidate: count its edge pixels, fit it to them, and take them out.
+//! What every detector does with a candidate: count its edge pixels, fit it to them, and take them
+//! out.
 
 use crate::belonging::{MAX_TOLERANCE, NearEdges, Probes};
 use crate::error::{require, require_radii};
@@ -11,26 +12,28 @@ use crate::{Circle, ConfigError, Curve, Detection, EdgeMap, Region};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Acceptance {
-    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more hidden are found, and more
-    /// circles that are none.
+    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more
+    /// hidden are found, and more circles that are none.
     pub theta: f64,
-    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than
-    /// round is forgiven, and texture matches more by chance.
+    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1;
+    /// 0..=8). Larger: rounder than round is forgiven, and texture matches more by chance.
     pub tolerance: f64,
-    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1, corners and
-    /// texture begin to pass for circles.
+    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a
+    /// tolerance of 1, corners and texture begin to pass for circles.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the radius is known: two
-    /// pixels then determine a circle, and only the centre is fitted.
+    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the
+    /// radius is known: two pixels then determine a circle, and only the centre is fitted.
     pub max_radius: f64,
     /// How many circles to look for (default 1; at least 1).
     pub max_circles: usize,
-    /// The least distance between the centres of two circles found, pixels (default 8; at least 0). 0 allows concentric ones.
+    /// The least distance between the centres of two circles found, pixels (default 8; at least 0).
+    /// 0 allows concentric ones.
     pub min_distance: f64,
     /// Where the centre may lie (default None: anywhere, even outside the frame).
     pub region: Option<Region>,
-    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). The Hough transforms, whose cells
-    /// are coarse, fit a candidate once before they verify it in any case.
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). The
+    /// Hough transforms, whose cells are coarse, fit a candidate once before they verify it in any
+    /// case.
     pub refine: bool,
 }
 
@@ -79,7 +82,12 @@ impl Acceptance {
             self.max_circles > 0,
         )?;
         let usable = min_distance.is_finite() && min_distance >= 0.0;
-        require("min_distance", min_distance, "finite and at least 0 px", usable)
+        require(
+            "min_distance",
+            min_distance,
+            "finite and at least 0 px",
+            usable,
+        )
     }
 
     /// # Errors
@@ -132,9 +140,12 @@ impl Evidence {
     }
 
     pub(crate) fn fill(&mut self, edges: &EdgeMap) {
-        self.structure.fill(edges.width(), edges.height(), edges.pixels());
-        self.near.fill(edges.width(), edges.height(), edges.pixels());
-        // A circle has at most all of them around, so that what is found does not decide who allocates.
+        self.structure
+            .fill(edges.width(), edges.height(), edges.pixels());
+        self.near
+            .fill(edges.width(), edges.height(), edges.pixels());
+        // A circle has at most all of them around, so that what is found does not decide who
+        // allocates.
         self.around.clear();
         self.around.reserve(edges.pixels().len());
     }
@@ -145,13 +156,14 @@ impl Evidence {
         Some(Detection { circle, score })
     }
 
-    /// A look at a few pixels of a circle that a fit may yet improve: false if it is most likely none.
+    /// A look at a few pixels of a circle that a fit may yet improve: false if it is most likely
+    /// none.
     pub(crate) fn might_be(&self, circle: &Circle) -> bool {
         self.near.promising(circle, &self.rough)
     }
 
-    /// The circle fitted to the edge points around it, at first to those within `reach` pixels; none if the fit fails or
-    /// leads nowhere.
+    /// The circle fitted to the edge points around it, at first to those within `reach` pixels;
+    /// none if the fit fails or leads nowhere.
     pub(crate) fn fitted(&mut self, edges: &EdgeMap, circle: Circle, reach: f64) -> Option<Circle> {
         let band = self.acceptance.tolerance + 0.5;
         let Acceptance {
@@ -175,8 +187,8 @@ impl Evidence {
         fit_circle(&self.around, Circle { radius, ..fitted }, band, true)
     }
 
-    /// Reports a circle: fits it, if that is wanted and gives a circle that may be reported, and takes out of `D` the edge
-    /// pixels that it explains.
+    /// Reports a circle: fits it, if that is wanted and gives a circle that may be reported, and
+    /// takes out of `D` the edge pixels that it explains.
     pub(crate) fn accept(&mut self, edges: &EdgeMap, drawn: Detection, found: &mut Vec<Detection>) {
         let mut accepted = drawn;
         if self.acceptance.refine {
@@ -184,7 +196,9 @@ impl Evidence {
             let reach = 2.0 * self.acceptance.tolerance + 1.0;
             let fitted = self.fitted(edges, drawn.circle, reach);
             let fitted = fitted.filter(|circle| self.acceptance.admits(circle, found));
-            accepted = fitted.and_then(|circle| self.check(circle)).unwrap_or(drawn);
+            accepted = fitted
+                .and_then(|circle| self.check(circle))
+                .unwrap_or(drawn);
         }
         self.explain(&accepted.circle);
         found.push(accepted);
@@ -213,12 +227,14 @@ impl Evidence {
 
     /// The memory it holds, bytes.
     pub(crate) fn memory(&self) -> usize {
-        self.structure.memory() + self.near.memory() + size_of::<(f64, f64)>() * self.around.capacity()
+        self.structure.memory()
+            + self.near.memory()
+            + size_of::<(f64, f64)>() * self.around.capacity()
     }
 }
 
-/// How far from an accepted circle the edge pixels lie that it explains, pixels: what matches it, and what the blur of the
-/// border and a ball that is not quite round leave beside it.
+/// How far from an accepted circle the edge pixels lie that it explains, pixels: what matches it,
+/// and what the blur of the border and a ball that is not quite round leave beside it.
 pub(crate) fn explained_band(tolerance: f64, radius: f64) -> f64 {
     tolerance + 1.5 + 0.01 * radius
 }

@@ -11,8 +11,8 @@ const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "pgm"];
 
 /// A [`FrameSource`] over image files: PNG, JPEG and PGM, colour turned to luma.
 ///
-/// A file that cannot be read gives an error that names it, and the next [`grab`](FrameSource::grab) goes on with the
-/// next file.
+/// A file that cannot be read gives an error that names it, and the next
+/// [`grab`](FrameSource::grab) goes on with the next file.
 ///
 /// ```no_run
 /// use hough_heuristic::{FrameError, FrameSource, ImageFiles};
@@ -47,7 +47,8 @@ impl ImageFiles {
     /// A folder is not searched for folders inside it; a file is taken whatever its name.
     ///
     /// # Errors
-    /// [`FrameError::Failed`] if `path` does not exist, or the folder cannot be listed or holds no image file.
+    /// [`FrameError::Failed`] if `path` does not exist, or the folder cannot be listed or holds no
+    /// image file.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, FrameError> {
         let path = path.as_ref();
         let failed = |reason: String| FrameError::Failed {
@@ -75,7 +76,8 @@ impl ImageFiles {
         Ok(Self::new(paths))
     }
 
-    /// The file that the last call of [`grab`](FrameSource::grab) read, or failed to read; none before the first call.
+    /// The file that the last call of [`grab`](FrameSource::grab) read, or failed to read; none
+    /// before the first call.
     pub fn last_path(&self) -> Option<&Path> {
         let last = self.next.checked_sub(1)?;
         self.paths.get(last).map(PathBuf::as_path)

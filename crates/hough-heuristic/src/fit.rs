@@ -2,10 +2,12 @@
 
 use crate::Circle;
 
-/// Fits a circle to the points within `band` of it, starting from `start`: least squares of the distances to the curve.
+/// Fits a circle to the points within `band` of it, starting from `start`: least squares of the
+/// distances to the curve.
 ///
-/// Gauss and Newton's steps, each over the points that lie within the band of the circle so far. With `fixed_radius` only
-/// the centre moves. None if the points do not determine a circle, or the steps run away from `start`.
+/// Gauss and Newton's steps, each over the points that lie within the band of the circle so far.
+/// With `fixed_radius` only the centre moves. None if the points do not determine a circle, or the
+/// steps run away from `start`.
 pub(crate) fn fit_circle(
     points: &[(f64, f64)],
     start: Circle,
@@ -14,7 +16,8 @@ pub(crate) fn fit_circle(
 ) -> Option<Circle> {
     let mut circle = start;
     for _ in 0..8 {
-        // Normal equations of the residuals |p - c| - r; the unit vector u points from the centre to the point.
+        // Normal equations of the residuals |p - c| - r; the unit vector u points from the centre
+        // to the point.
         let (mut n, mut ux, mut uy, mut uxx, mut uxy, mut uyy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         let (mut d, mut dx, mut dy) = (0.0, 0.0, 0.0);
         for &(px, py) in points {
@@ -80,7 +83,10 @@ mod tests {
         degrees
             .map(|degree| {
                 let (sin, cos) = f64::from(degree).to_radians().sin_cos();
-                (circle.x + circle.radius * cos, circle.y + circle.radius * sin)
+                (
+                    circle.x + circle.radius * cos,
+                    circle.y + circle.radius * sin,
+                )
             })
             .collect()
     }
@@ -127,7 +133,13 @@ mod tests {
 
     #[test]
     fn too_few_points_give_none() {
-        assert_eq!(fit_circle(&[(80.5, 40.7), (20.1, 40.7)], TRUE, 1.0, false), None);
-        assert_eq!(fit_circle(&arc(TRUE, 10..11).repeat(9), TRUE, 1.0, false), None);
+        assert_eq!(
+            fit_circle(&[(80.5, 40.7), (20.1, 40.7)], TRUE, 1.0, false),
+            None
+        );
+        assert_eq!(
+            fit_circle(&arc(TRUE, 10..11).repeat(9), TRUE, 1.0, false),
+            None
+        );
     }
 }

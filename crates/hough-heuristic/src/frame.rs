@@ -13,7 +13,8 @@ pub trait FrameSource {
     /// The next frame.
     ///
     /// # Errors
-    /// [`FrameError::End`] after the last frame; otherwise what kept the source from delivering one.
+    /// [`FrameError::End`] after the last frame; otherwise what kept the source from delivering
+    /// one.
     fn grab(&mut self) -> Result<GrayImage, FrameError>;
 }
 

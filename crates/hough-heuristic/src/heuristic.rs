@@ -1,4 +1,5 @@
-//! The paper's detector: sample three edge pixels, look at the edge image itself, keep no accumulator.
+//! The paper's detector: sample three edge pixels, look at the edge image itself, keep no
+//! accumulator.
 
 use std::time::Instant;
 
@@ -9,46 +10,48 @@ use crate::error::require;
 use crate::evidence::{Evidence, rank};
 use crate::sampling::{Draw, Sampler, Sampling};
 use crate::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, Region,
-    StageTimes, Stages,
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap,
+    Region, StageTimes, Stages,
 };
 
 /// The settings of [`Heuristic`].
 ///
-/// The defaults suit the paper's frames of 768x576 pixels with one ball of radius 20 to 290 px amid moderate clutter.
+/// The defaults suit the paper's frames of 768x576 pixels with one ball of radius 20 to 290 px amid
+/// moderate clutter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct HeuristicConfig {
-    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more hidden are found, and more
-    /// circles that are none.
+    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more
+    /// hidden are found, and more circles that are none.
     pub theta: f64,
-    /// How many triples are drawn at most per frame (default 60000; at least 1). Bounds the time; more finds fainter and
-    /// smaller balls amid more clutter.
+    /// How many triples are drawn at most per frame (default 60000; at least 1). Bounds the time;
+    /// more finds fainter and smaller balls amid more clutter.
     pub iterations: u32,
-    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of 1, corners and
-    /// texture begin to pass for circles.
+    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a
+    /// tolerance of 1, corners and texture begin to pass for circles.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the radius is known: draws
-    /// are of two pixels, and only the centre is fitted.
+    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the
+    /// radius is known: draws are of two pixels, and only the centre is fitted.
     pub max_radius: f64,
-    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1; 0..=8). Larger: rounder than
-    /// round is forgiven, and texture matches more by chance.
+    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1;
+    /// 0..=8). Larger: rounder than round is forgiven, and texture matches more by chance.
     pub tolerance: f64,
-    /// How many circles to look for (default 1; at least 1). The search ends with the last one found; if there are fewer
-    /// in the frame it uses all of `iterations`.
+    /// How many circles to look for (default 1; at least 1). The search ends with the last one
+    /// found; if there are fewer in the frame it uses all of `iterations`.
     pub max_circles: usize,
-    /// The least distance between the centres of two circles found, pixels (default 8; at least 0). 0 allows concentric ones.
+    /// The least distance between the centres of two circles found, pixels (default 8; at least 0).
+    /// 0 allows concentric ones.
     pub min_distance: f64,
     /// Where the centre may lie (default None: anywhere, even outside the frame).
     pub region: Option<Region>,
-    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). Beyond the paper: three whole
-    /// pixels give the centre to about a pixel, the fit to a twentieth.
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). Beyond
+    /// the paper: three whole pixels give the centre to about a pixel, the fit to a twentieth.
     pub refine: bool,
     /// Where draws come from (default [`Sampling::Near`]).
     pub sampling: Sampling,
-    /// The seed of the draws (default 1). They begin anew with every frame, so that what is found depends on the
-    /// configuration and the frame alone.
+    /// The seed of the draws (default 1). They begin anew with every frame, so that what is found
+    /// depends on the configuration and the frame alone.
     pub seed: u64,
 }
 
@@ -97,17 +100,20 @@ impl HeuristicConfig {
 
 /// The heuristic of section 2.1 of the paper, for circles.
 ///
-/// All edge pixels form the structure `D`. Until the budget is spent: draw three of them, solve for the circle through
-/// them, and count how many pixels of that circle are edges. Their share is the *belonging* β; a circle with β above the
-/// offset θ is there. Its edge pixels are then taken out of `D`, and the search goes on for the next.
+/// All edge pixels form the structure `D`. Until the budget is spent: draw three of them, solve for
+/// the circle through them, and count how many pixels of that circle are edges. Their share is the
+/// *belonging* β; a circle with β above the offset θ is there. Its edge pixels are then taken out
+/// of `D`, and the search goes on for the next.
 ///
-/// **How β is counted.** The estimated circle is rasterised by the midpoint rule into a thin outline of about 5.7 pixels
-/// per pixel of radius. A pixel of it matches when an edge pixel lies within `tolerance`. β is the share of the matching
-/// pixels in all pixels of the outline; those that lie outside the frame count as pixels and never match, so a ball cut
-/// in half by the border has a β of at most about one half.
+/// **How β is counted.** The estimated circle is rasterised by the midpoint rule into a thin
+/// outline of about 5.7 pixels per pixel of radius. A pixel of it matches when an edge pixel lies
+/// within `tolerance`. β is the share of the matching pixels in all pixels of the outline; those
+/// that lie outside the frame count as pixels and never match, so a ball cut in half by the border
+/// has a β of at most about one half.
 ///
-/// **Beyond the paper.** A hopeless draw is mostly turned away after a look at 8 to 32 pixels of its outline, which can
-/// delay a circle whose β barely exceeds θ but never lets in one that does not; [`Sampling::Near`]; and the final fit.
+/// **Beyond the paper.** A hopeless draw is mostly turned away after a look at 8 to 32 pixels of
+/// its outline, which can delay a circle whose β barely exceeds θ but never lets in one that does
+/// not; [`Sampling::Near`]; and the final fit.
 ///
 /// The score of a [`Detection`] is β of the circle as reported. It means the same at every radius.
 #[derive(Clone, Debug)]
@@ -194,7 +200,8 @@ impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
                 Draw::Nothing => continue,
                 Draw::Circle(circle) => circle,
             };
-            if !evidence.acceptance.admits(&circle, found) || !evidence.near.promising(&circle, &self.probes)
+            if !evidence.acceptance.admits(&circle, found)
+                || !evidence.near.promising(&circle, &self.probes)
             {
                 continue;
             }

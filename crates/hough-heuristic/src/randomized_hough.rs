@@ -8,8 +8,8 @@ use crate::error::require;
 use crate::evidence::{Evidence, rank};
 use crate::sampling::{Draw, Sampler, Sampling};
 use crate::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, StageTimes,
-    Stages,
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap,
+    StageTimes, Stages,
 };
 
 /// The settings of [`RandomizedHough`].
@@ -21,11 +21,11 @@ pub struct RandomizedHoughConfig {
     pub accept: Acceptance,
     /// How many triples are drawn at most per frame (default 60000; at least 1).
     pub iterations: u32,
-    /// How many triples must agree before their circle is verified (default 2; 2..=255). More: fewer verifications, and
-    /// many more draws.
+    /// How many triples must agree before their circle is verified (default 2; 2..=255). More:
+    /// fewer verifications, and many more draws.
     pub votes: u32,
-    /// Side of a cell of the parameter space, pixels, the same for centre and radius (default 4; 0.5..=64). Smaller: cells
-    /// are more exact, and triples of one circle agree more rarely.
+    /// Side of a cell of the parameter space, pixels, the same for centre and radius (default 4;
+    /// 0.5..=64). Smaller: cells are more exact, and triples of one circle agree more rarely.
     pub cell: f64,
     /// Where draws come from (default [`Sampling::Near`]). [`Sampling::Anywhere`] is Xu and Oja's.
     pub sampling: Sampling,
@@ -48,14 +48,16 @@ impl Default for RandomizedHoughConfig {
 
 /// The randomized Hough transform (Xu, Oja and Kultanen, 1990) for circles.
 ///
-/// Draws three edge pixels, solves for their circle, and votes for one cell of the parameter space instead of a surface of
-/// it. Only cells that got a vote exist, in a hash table. When enough triples have voted for a cell, their mean circle is
-/// verified in the edge image: looked at in a few places as [`Heuristic`](crate::Heuristic) does, fitted to the
-/// edge pixels around it, and accepted if its β is above θ. Then its pixels are
-/// removed and the accumulator is emptied; a cell that fails is emptied alone. Where the radius is known, draws are of two
-/// pixels and one of their two circles, as for [`Heuristic`](crate::Heuristic).
+/// Draws three edge pixels, solves for their circle, and votes for one cell of the parameter space
+/// instead of a surface of it. Only cells that got a vote exist, in a hash table. When enough
+/// triples have voted for a cell, their mean circle is verified in the edge image: looked at in a
+/// few places as [`Heuristic`](crate::Heuristic) does, fitted to the edge pixels around it, and
+/// accepted if its β is above θ. Then its pixels are removed and the accumulator is emptied; a cell
+/// that fails is emptied alone. Where the radius is known, draws are of two pixels and one of their
+/// two circles, as for [`Heuristic`](crate::Heuristic).
 ///
-/// The score of a [`Detection`] is the β of the circle as reported, counted as [`Heuristic`](crate::Heuristic) counts it.
+/// The score of a [`Detection`] is the β of the circle as reported, counted as
+/// [`Heuristic`](crate::Heuristic) counts it.
 #[derive(Clone, Debug)]
 pub struct RandomizedHough<E = Canny> {
     config: RandomizedHoughConfig,
@@ -80,7 +82,12 @@ impl<E: EdgeDetector> RandomizedHough<E> {
             cell,
             ..
         } = config;
-        require("iterations", iterations.into(), "at least 1", iterations > 0)?;
+        require(
+            "iterations",
+            iterations.into(),
+            "at least 1",
+            iterations > 0,
+        )?;
         require("votes", votes.into(), "2..=255", (2..=255).contains(&votes))?;
         require("cell", cell, "0.5..=64 px", (0.5..=64.0).contains(&cell))?;
         Ok(Self {
@@ -101,7 +108,8 @@ impl<E: EdgeDetector> RandomizedHough<E> {
 
     /// The memory that the circle search holds, bytes, edges not included.
     pub fn memory(&self) -> usize {
-        self.evidence.memory() + size_of::<Cell>() * (self.cells.slots.len() + self.cells.moved.len())
+        self.evidence.memory()
+            + size_of::<Cell>() * (self.cells.slots.len() + self.cells.moved.len())
     }
 }
 
@@ -124,7 +132,10 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
         self.cells.clear();
         self.sampler.restart();
         let RandomizedHoughConfig {
-            accept, votes, cell, ..
+            accept,
+            votes,
+            cell,
+            ..
         } = self.config;
         for _ in 0..self.config.iterations {
             let circle = match self.sampler.draw(&evidence.structure) {
@@ -132,9 +143,12 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
                 Draw::Nothing => continue,
                 Draw::Circle(circle) => circle,
             };
-            // Triples scatter around their circle, so votes are taken from a cell beyond the range of radii.
+            // Triples scatter around their circle, so votes are taken from a cell beyond the range
+            // of radii.
             let radii = accept.min_radius - cell..=accept.max_radius + cell;
-            if !radii.contains(&circle.radius) || accept.region.is_some_and(|region| !region.holds(&circle)) {
+            if !radii.contains(&circle.radius)
+                || accept.region.is_some_and(|region| !region.holds(&circle))
+            {
                 continue;
             }
             let Some(mean) = self.cells.vote(&circle, cell, votes) else {
@@ -201,7 +215,8 @@ struct Cell {
     radius: f64,
 }
 
-/// The sparse accumulator: a hash table with open addressing that keeps its memory from frame to frame.
+/// The sparse accumulator: a hash table with open addressing that keeps its memory from frame to
+/// frame.
 #[derive(Clone, Debug, Default)]
 struct Cells {
     slots: Vec<Cell>,
@@ -217,8 +232,9 @@ const SMALLEST: usize = 1024;
 const FORESEEN: u32 = 1 << 16;
 
 impl Cells {
-    /// A table that asks for no memory until more than this many cells have a vote (or 65536, if that is less). What is set
-    /// aside is not touched, so it costs nothing, before the table grows into it.
+    /// A table that asks for no memory until more than this many cells have a vote (or 65536, if
+    /// that is less). What is set aside is not touched, so it costs nothing, before the table grows
+    /// into it.
     fn with_room_for(votes: u32) -> Self {
         let slots = (2 * (votes.min(FORESEEN) as usize + 1)).next_power_of_two();
         Self {
@@ -237,7 +253,8 @@ impl Cells {
         }
     }
 
-    /// Counts a vote; the mean of the circles in the cell, which is then emptied, if that was the last vote it needed.
+    /// Counts a vote; the mean of the circles in the cell, which is then emptied, if that was the
+    /// last vote it needed.
     fn vote(&mut self, circle: &Circle, side: f64, needed: u32) -> Option<Circle> {
         if 2 * (self.used + 1) > self.slots.len() {
             self.grow();
@@ -300,7 +317,8 @@ impl Cells {
     }
 }
 
-/// The cell of a circle, 21 bits for each parameter. Radii are bounded, and centres that overflow share a cell at worst.
+/// The cell of a circle, 21 bits for each parameter. Radii are bounded, and centres that overflow
+/// share a cell at worst.
 fn key(circle: &Circle, side: f64) -> u64 {
     let part = |value: f64| ((value / side).floor() as i64 & 0x1f_ffff) as u64;
     part(circle.x) << 42 | part(circle.y) << 21 | part(circle.radius)

@@ -2,10 +2,12 @@
 
 use crate::{Circle, ConfigError};
 
-/// A rectangle of pixels of a frame, never empty: the *region of interest* for the centre of a circle.
+/// A rectangle of pixels of a frame, never empty: the *region of interest* for the centre of a
+/// circle.
 ///
-/// Only the centre must lie inside; the outline may leave the region, and the frame. A detector refuses frames that its
-/// region sticks out of ([`CircleDetector::check_frame`](crate::CircleDetector::check_frame)).
+/// Only the centre must lie inside; the outline may leave the region, and the frame. A detector
+/// refuses frames that its region sticks out of
+/// ([`CircleDetector::check_frame`](crate::CircleDetector::check_frame)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Rectangle"))]
@@ -44,7 +46,8 @@ impl TryFrom<Rectangle> for Region {
 }
 
 impl Region {
-    /// The `width` x `height` pixels whose top-left one is `(left, top)`, in frames of `frame_width` x `frame_height`.
+    /// The `width` x `height` pixels whose top-left one is `(left, top)`, in frames of
+    /// `frame_width` x `frame_height`.
     ///
     /// # Errors
     /// [`ConfigError::Region`] if the region is empty or sticks out of the frame.
@@ -91,7 +94,8 @@ impl Region {
         }
     }
 
-    /// Whether the centre of `circle` lies on one of the region's pixels (half a pixel of border included).
+    /// Whether the centre of `circle` lies on one of the region's pixels (half a pixel of border
+    /// included).
     pub fn holds(&self, circle: &Circle) -> bool {
         let within = |value: f64, start: u32, length: u32| {
             let from_edge = value + 0.5 - f64::from(start);
@@ -132,7 +136,10 @@ mod tests {
         let stored = serde_json::to_string(&region).unwrap();
         assert_eq!(serde_json::from_str::<Region>(&stored).unwrap(), region);
         for (stored, value) in [
-            (r#"{"left":1,"top":2,"width":0,"height":5}"#, "0x5 px at (1, 2)"),
+            (
+                r#"{"left":1,"top":2,"width":0,"height":5}"#,
+                "0x5 px at (1, 2)",
+            ),
             (
                 r#"{"left":4294967295,"top":2,"width":9,"height":5}"#,
                 "4294967295",

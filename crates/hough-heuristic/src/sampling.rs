@@ -12,12 +12,13 @@ use crate::{Acceptance, Circle, Curve, EdgePixel};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Sampling {
-    /// All from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all edge pixels, one draw of
-    /// three in `p^-3` hits it.
+    /// All from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all
+    /// edge pixels, one draw of three in `p^-3` hits it.
     Anywhere,
-    /// The first from the whole of `D`; the others from a window around it that is as wide as a circle of some radius
-    /// between the smallest and the largest can reach, the radius drawn anew each time (small ones more often: its
-    /// logarithm is uniform). Beyond the paper; in clutter it hits a small ball hundreds of times as often.
+    /// The first from the whole of `D`; the others from a window around it that is as wide as a
+    /// circle of some radius between the smallest and the largest can reach, the radius drawn anew
+    /// each time (small ones more often: its logarithm is uniform). Beyond the paper; in clutter it
+    /// hits a small ball hundreds of times as often.
     #[default]
     Near,
 }
@@ -31,8 +32,8 @@ pub(crate) enum Draw {
 
 /// Draws pixels and solves for the circle: the paper's steps 3a and 3b.
 ///
-/// Three pixels determine a circle. Where only one radius is allowed, two leave the choice between two circles, of which
-/// one is drawn.
+/// Three pixels determine a circle. Where only one radius is allowed, two leave the choice between
+/// two circles, of which one is drawn.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampler {
     sampling: Sampling,
@@ -65,7 +66,9 @@ impl Sampler {
                 let side = self.rng.next_u32() as usize % 2;
                 circles_of_radius(pair, radius).map(|both| both[side])
             }),
-            None => self.pixels::<3>(structure).map(|triple| Circle::through(&triple)),
+            None => self
+                .pixels::<3>(structure)
+                .map(|triple| Circle::through(&triple)),
         };
         match circle {
             None => Draw::Exhausted,

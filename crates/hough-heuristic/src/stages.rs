@@ -18,16 +18,20 @@ pub struct StageError {
     pub reason: String,
 }
 
-/// Writes a picture of each stage of a detection into a folder, which must exist, and returns their paths.
+/// Writes a picture of each stage of a detection into a folder, which must exist, and returns their
+/// paths.
 ///
 /// * `1_edges.png`: the edge image.
-/// * `2_structure.png`: the structure `D` over the darkened frame, what the circles found explain in blue.
+/// * `2_structure.png`: the structure `D` over the darkened frame, what the circles found explain
+///   in blue.
 /// * `3_candidates.png`: the candidates that were looked at closely, over the frame.
 /// * `4_accepted.png`: the circles found, over the frame.
 ///
-/// The stages are those of any detector ([`CircleDetector::stages`](crate::CircleDetector::stages)), candidates included if
-/// they were [kept](crate::CircleDetector::keep_candidates). Each file appears complete or not at all, and replaces one of its
-/// name; what has its name and is no regular file (a device, a pipe) is written to as it is, never replaced, and a link stays a link.
+/// The stages are those of any detector
+/// ([`CircleDetector::stages`](crate::CircleDetector::stages)), candidates included if they were
+/// [kept](crate::CircleDetector::keep_candidates). Each file appears complete or not at all, and
+/// replaces one of its name; what has its name and is no regular file (a device, a pipe) is written
+/// to as it is, never replaced, and a link stays a link.
 ///
 /// # Errors
 /// The first file that cannot be written.
@@ -116,8 +120,8 @@ fn write(folder: &Path, name: &str, picture: &RgbImage) -> Result<PathBuf, Stage
     }
 }
 
-/// Writes a file beside its place and renames it. What is there and is no regular file is written to as it is, not replaced; a link stays a
-/// link.
+/// Writes a file beside its place and renames it. What is there and is no regular file is written
+/// to as it is, not replaced; a link stays a link.
 fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if fs::metadata(&target).is_ok_and(|there| !there.is_file()) {

@@ -7,8 +7,8 @@ use image::GrayImage;
 use crate::error::require;
 use crate::evidence::{Evidence, rank};
 use crate::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap, StageTimes,
-    Stages,
+    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap,
+    StageTimes, Stages,
 };
 
 /// The settings of [`StandardHough`].
@@ -18,19 +18,23 @@ use crate::{
 pub struct StandardHoughConfig {
     /// Which circles are reported.
     pub accept: Acceptance,
-    /// Side of an accumulator cell along both axes of the centre and along the radius, pixels (default 2; 1..=16). Memory
-    /// and time fall with its third and second power; cells much larger than the tolerance blur neighbouring circles.
+    /// Side of an accumulator cell along both axes of the centre and along the radius, pixels
+    /// (default 2; 1..=16). Memory and time fall with its third and second power; cells much larger
+    /// than the tolerance blur neighbouring circles.
     pub cell: f64,
-    /// Vote only along the gradient, where the edge detector knows it (default false). A pixel then votes for an arc of
-    /// `direction_error` to either side of the two directions instead of the full circle.
+    /// Vote only along the gradient, where the edge detector knows it (default false). A pixel then
+    /// votes for an arc of `direction_error` to either side of the two directions instead of the
+    /// full circle.
     pub gradient: bool,
-    /// How far the gradient's direction may be off, radians (default 0.15; 0..=1). Noise turns a gradient by
-    /// the ratio of its own deviation to the edge's strength.
+    /// How far the gradient's direction may be off, radians (default 0.15; 0..=1). Noise turns a
+    /// gradient by the ratio of its own deviation to the edge's strength.
     pub direction_error: f64,
-    /// The share of the outline's cells that must have voted before a peak is verified (default 0.4; 0..1).
+    /// The share of the outline's cells that must have voted before a peak is verified (default
+    /// 0.4; 0..1).
     pub min_votes: f64,
-    /// The most memory that the accumulator may take, bytes (default 2^29, half a gigabyte; at least 1). A frame that needs more is
-    /// refused: [`StandardHough::check_frame`](CircleDetector::check_frame).
+    /// The most memory that the accumulator may take, bytes (default 2^29, half a gigabyte; at
+    /// least 1). A frame that needs more is refused:
+    /// [`StandardHough::check_frame`](CircleDetector::check_frame).
     pub max_memory: u64,
 }
 
@@ -47,18 +51,22 @@ impl Default for StandardHoughConfig {
     }
 }
 
-/// The standard Hough transform for circles (Duda and Hart, 1972), with a three-dimensional accumulator.
+/// The standard Hough transform for circles (Duda and Hart, 1972), with a three-dimensional
+/// accumulator.
 ///
 /// Every edge pixel votes, for every radius, for the centres of the circles through it; with
-/// [`gradient`](StandardHoughConfig::gradient) only for those that its gradient points to. The local peaks, as shares of
-/// the votes that a complete circle of their radius would have, are verified best first: fitted to the edge pixels around,
-/// and accepted if their β is above θ, their pixels then no longer counting for the others.
+/// [`gradient`](StandardHoughConfig::gradient) only for those that its gradient points to. The
+/// local peaks, as shares of the votes that a complete circle of their radius would have, are
+/// verified best first: fitted to the edge pixels around, and accepted if their β is above θ, their
+/// pixels then no longer counting for the others.
 ///
-/// Centres outside the frame have no cells. The accumulator's memory is `width height radii / cell^3` counts of 16 bits:
-/// 32 MB for 768x576 pixels, radii of 15 to 300 px and cells of 2 px, and 1.1 GB for 3840x2160 pixels and radii of 15 to 1080 px, which
-/// is beyond the default of [`max_memory`](StandardHoughConfig::max_memory).
+/// Centres outside the frame have no cells. The accumulator's memory is
+/// `width height radii / cell^3` counts of 16 bits: 32 MB for 768x576 pixels, radii of 15 to 300 px
+/// and cells of 2 px, and 1.1 GB for 3840x2160 pixels and radii of 15 to 1080 px, which is beyond
+/// the default of [`max_memory`](StandardHoughConfig::max_memory).
 ///
-/// The score of a [`Detection`] is the β of the circle as reported, counted as [`Heuristic`](crate::Heuristic) counts it.
+/// The score of a [`Detection`] is the β of the circle as reported, counted as
+/// [`Heuristic`](crate::Heuristic) counts it.
 #[derive(Clone, Debug)]
 pub struct StandardHough<E = Canny> {
     config: StandardHoughConfig,
@@ -80,7 +88,8 @@ struct Ring {
     radius: f64,
     /// Around the full circle, each cell once, in the order of their direction.
     cells: Vec<(i32, i32)>,
-    /// The same, beginning `spread` cells earlier and ending as many later, so that the arc of a direction is in one piece.
+    /// The same, beginning `spread` cells earlier and ending as many later, so that the arc of a
+    /// direction is in one piece.
     around: Vec<(i32, i32)>,
     /// How many of the cells to either side of a direction its error covers.
     spread: usize,
@@ -88,7 +97,8 @@ struct Ring {
     complete: f64,
 }
 
-/// The peaks that memory is set aside for beforehand: many times as many as pictures without dense texture have.
+/// The peaks that memory is set aside for beforehand: many times as many as pictures without dense
+/// texture have.
 const FORESEEN_PEAKS: usize = 1 << 14;
 
 /// Votes by radius, then row, then column.
@@ -129,11 +139,22 @@ impl<E: EdgeDetector> StandardHough<E> {
         )?;
         let evidence = Evidence::new(accept)?;
         let layered = accept.max_radius <= 1000.0 * cell;
-        require("max_radius", accept.max_radius, "at most 1000 cells", layered)?;
+        require(
+            "max_radius",
+            accept.max_radius,
+            "at most 1000 cells",
+            layered,
+        )?;
         let layers = ((accept.max_radius - accept.min_radius) / cell).floor() as u32 + 1;
         Ok(Self {
             rings: (0..layers)
-                .map(|layer| Ring::new(accept.min_radius + cell * f64::from(layer), cell, direction_error))
+                .map(|layer| {
+                    Ring::new(
+                        accept.min_radius + cell * f64::from(layer),
+                        cell,
+                        direction_error,
+                    )
+                })
                 .collect(),
             evidence,
             edge_detector,
@@ -261,7 +282,9 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
         accept.check_frame(width, height)?;
         let layers = self.fitting(width, height) as u64;
         let side = |pixels: u32| (f64::from(pixels) / cell).ceil() as u64;
-        let cells = side(width).saturating_mul(side(height)).saturating_mul(layers);
+        let cells = side(width)
+            .saturating_mul(side(height))
+            .saturating_mul(layers);
         let needed = cells.saturating_mul(size_of::<u16>() as u64);
         if needed <= max_memory {
             return Ok(());
@@ -300,12 +323,14 @@ impl Ring {
             );
             // On the border between two cells rounding may go back and forth.
             let recent = &cells[cells.len().saturating_sub(3)..];
-            let closing = step > steps as u32 / 2 && cells.iter().take(3).any(|first| *first == cell);
+            let closing =
+                step > steps as u32 / 2 && cells.iter().take(3).any(|first| *first == cell);
             if !closing && !recent.contains(&cell) {
                 cells.push(cell);
             }
         }
-        let spread = (cells.len() as f64 * direction_error / std::f64::consts::TAU).round() as usize;
+        let spread =
+            (cells.len() as f64 * direction_error / std::f64::consts::TAU).round() as usize;
         let spread = spread.min(cells.len() / 4);
         let around = cells[cells.len() - spread..]
             .iter()
@@ -401,12 +426,14 @@ impl Accumulator {
         });
     }
 
-    /// Whether the cell's share is above that of the neighbours before it and not below that of those behind.
+    /// Whether the cell's share is above that of the neighbours before it and not below that of
+    /// those behind.
     fn is_peak(&self, layer: usize, index: usize, rings: &[Ring]) -> bool {
         let size = self.columns * self.rows;
         let (row, column) = (index / self.columns, index % self.columns);
-        let share =
-            |layer: usize, index: usize| f64::from(self.votes[layer * size + index]) / rings[layer].complete;
+        let share = |layer: usize, index: usize| {
+            f64::from(self.votes[layer * size + index]) / rings[layer].complete
+        };
         let here = share(layer, index);
         let around = |middle: usize, end: usize| middle.saturating_sub(1)..(middle + 2).min(end);
         around(layer, rings.len()).all(|l| {
@@ -427,7 +454,13 @@ mod tests {
 
     #[test]
     fn a_ring_is_a_closed_line_of_cells_each_once() {
-        for (radius, cell) in [(31.0, 2.0), (15.0, 1.0), (200.3, 2.0), (33.0, 16.0), (4.0, 2.0)] {
+        for (radius, cell) in [
+            (31.0, 2.0),
+            (15.0, 1.0),
+            (200.3, 2.0),
+            (33.0, 16.0),
+            (4.0, 2.0),
+        ] {
             let ring = Ring::new(radius, cell, 0.06);
             for (a, b) in ring.cells.iter().zip(ring.cells.iter().cycle().skip(1)) {
                 assert!(

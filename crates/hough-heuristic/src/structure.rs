@@ -1,15 +1,18 @@
-//! The paper's dynamic structure `D`, ordered so that pixels near one another can be drawn together.
+//! The paper's dynamic structure `D`, ordered so that pixels near one another can be drawn
+//! together.
 
 use rand::Rng;
 
 use crate::EdgePixel;
 
-/// Side of a cell, pixels: a window of a small ball spans a few cells, one of the whole frame a few dozen rows of cells.
+/// Side of a cell, pixels: a window of a small ball spans a few cells, one of the whole frame a few
+/// dozen rows of cells.
 const CELL: u32 = 16;
 
 /// The edge pixels not yet explained, in cells of 16x16 pixels, row by row of cells.
 ///
-/// The pixels of neighbouring cells of one row lie together, so a window of cells is one run per row.
+/// The pixels of neighbouring cells of one row lie together, so a window of cells is one run per
+/// row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Structure {
     columns: u32,
@@ -33,8 +36,11 @@ impl Structure {
         self.columns = width.div_ceil(CELL);
         self.rows = height.div_ceil(CELL);
         self.spare.clear();
-        self.spare
-            .extend((0..).zip(pixels).map(|(index, &pixel)| Entry { pixel, index }));
+        self.spare.extend(
+            (0..)
+                .zip(pixels)
+                .map(|(index, &pixel)| Entry { pixel, index }),
+        );
         self.order();
     }
 
@@ -52,16 +58,26 @@ impl Structure {
     }
 
     /// Draws pixels from the whole of `D`, the paper's step 3a; none if there are not so many.
-    pub(crate) fn draw_anywhere<const N: usize>(&self, rng: &mut impl Rng) -> Option<[EdgePixel; N]> {
+    pub(crate) fn draw_anywhere<const N: usize>(
+        &self,
+        rng: &mut impl Rng,
+    ) -> Option<[EdgePixel; N]> {
         let count = self.entries.len() as u64;
         if count < N as u64 {
             return None;
         }
-        Some(std::array::from_fn(|_| self.entries[below(count, rng)].pixel))
+        Some(std::array::from_fn(|_| {
+            self.entries[below(count, rng)].pixel
+        }))
     }
 
-    /// Draws one pixel from the whole of `D`, and the others from those within about `reach` of it along each axis.
-    pub(crate) fn draw_near<const N: usize>(&self, reach: f64, rng: &mut impl Rng) -> Option<[EdgePixel; N]> {
+    /// Draws one pixel from the whole of `D`, and the others from those within about `reach` of it
+    /// along each axis.
+    pub(crate) fn draw_near<const N: usize>(
+        &self,
+        reach: f64,
+        rng: &mut impl Rng,
+    ) -> Option<[EdgePixel; N]> {
         if self.entries.len() < N {
             return None;
         }
@@ -75,7 +91,12 @@ impl Structure {
     }
 
     /// Draws one of the pixels within about `reach` of `first`, which is in `D`, along each axis.
-    pub(crate) fn draw_around(&self, first: EdgePixel, reach: f64, rng: &mut impl Rng) -> EdgePixel {
+    pub(crate) fn draw_around(
+        &self,
+        first: EdgePixel,
+        reach: f64,
+        rng: &mut impl Rng,
+    ) -> EdgePixel {
         self.pick(&self.window(first, reach), rng)
     }
 
@@ -127,7 +148,8 @@ impl Structure {
         let cells = self.columns as usize * self.rows as usize;
         self.starts.clear();
         self.starts.resize(cells + 2, 0);
-        let cell = |entry: &Entry| ((entry.pixel.y / CELL) * self.columns + entry.pixel.x / CELL) as usize;
+        let cell =
+            |entry: &Entry| ((entry.pixel.y / CELL) * self.columns + entry.pixel.x / CELL) as usize;
         for entry in &self.spare {
             self.starts[cell(entry) + 2] += 1;
         }
@@ -174,7 +196,11 @@ mod tests {
         let pixels: Vec<_> = (0..40).map(|i| at(7 * i % 100, 11 * i % 60)).collect();
         let mut structure = Structure::default();
         structure.fill(100, 60, &pixels);
-        let mut sorted: Vec<_> = structure.entries().iter().map(|entry| entry.pixel).collect();
+        let mut sorted: Vec<_> = structure
+            .entries()
+            .iter()
+            .map(|entry| entry.pixel)
+            .collect();
         let mut expected = pixels.clone();
         sorted.sort_by_key(|p| (p.y, p.x));
         expected.sort_by_key(|p| (p.y, p.x));
@@ -185,7 +211,9 @@ mod tests {
         for _ in 0..5000 {
             let [first, second, third] = structure.draw_near(10.0, &mut rng).unwrap();
             for other in [second, third] {
-                assert!(first.x.abs_diff(other.x) < 10 + CELL && first.y.abs_diff(other.y) < 10 + CELL);
+                assert!(
+                    first.x.abs_diff(other.x) < 10 + CELL && first.y.abs_diff(other.y) < 10 + CELL
+                );
                 seen.insert(other);
             }
         }

@@ -36,25 +36,34 @@ use search::{Outline, Search};
 
 /// Finds an unknown number of circles, and says of each how sure it is and how exact.
 ///
-/// It keeps the paper's idea: draw edge points, solve for the circle, look at the image itself; no accumulator. What is drawn
-/// are *pairs* on one row or column whose gradients mirror one another, at a half, a quarter and further halves of the frame, the
-/// smallest first; where no circle explains an edge, it is followed for a few pixels, and the *arc* has a circle too. A circle whose
-/// outline runs along edges is fitted and becomes a candidate.
+/// It keeps the paper's idea: draw edge points, solve for the circle, look at the image itself; no
+/// accumulator. What is drawn are *pairs* on one row or column whose gradients mirror one another,
+/// at a half, a quarter and further halves of the frame, the smallest first; where no circle
+/// explains an edge, it is followed for a few pixels, and the *arc* has a circle too. A circle
+/// whose outline runs along edges is fitted and becomes a candidate.
 ///
-/// **Proof.** A candidate is looked at where its radius is 12 to 24 px (smaller ones at the full size; in noise from 4.5 px on), at
-/// twice that size if the frame has it (in noise also at four times) and, in doubt, at half of it; what says most counts. On 64 rays across its outline the strongest edge that runs along it
-/// is sought within a third of the radius (3 to 8 px) on either side. If there were no circle, that edge would lie anywhere: within a
-/// tolerance of a quarter or half a pixel (in noise up to 1.2 px) by a known chance, be the picture as textured as it may. The number
-/// of false alarms is the number of circles that differ noticeably in the frame, times the probability that chance alone puts so many
-/// of the edges on the outline (Hoeffding's bound of the binomial tail, over samples that do not overlap; a ray without any
-/// edge counts as a quarter of a sample), and a thousand times as much if more than a tenth of the circle lies outside of the frame. The score is `c / (c + 1)` with `c` minus its decimal logarithm, 0
-/// where that is negative: 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in 100, 0.8 for one in
-/// 10000. The bound is far from tight: of 500 rendered frames without a circle, half of them noisy, 3 gave one with a score of 0.5 or
-/// more. Chance is not all there is: wheels, holes, fingertips and letters are round, and score high. Lamps do not: an edge whose
-/// bright side is as bright as can be counts for nothing where the light falls off around it, for it is where the exposure ends.
+/// **Proof.** A candidate is looked at where its radius is 12 to 24 px (smaller ones at the full
+/// size; in noise from 4.5 px on), at twice that size if the frame has it (in noise also at four
+/// times) and, in doubt, at half of it; what says most counts. On 64 rays across its outline the
+/// strongest edge that runs along it is sought within a third of the radius (3 to 8 px) on either
+/// side. If there were no circle, that edge would lie anywhere: within a tolerance of a quarter or
+/// half a pixel (in noise up to 1.2 px) by a known chance, be the picture as textured as it may.
+/// The number of false alarms is the number of circles that differ noticeably in the frame, times
+/// the probability that chance alone puts so many of the edges on the outline (Hoeffding's bound of
+/// the binomial tail, over samples that do not overlap; a ray without any edge counts as a quarter
+/// of a sample), and a thousand times as much if more than a tenth of the circle lies outside of
+/// the frame. The score is `c / (c + 1)` with `c` minus its decimal logarithm, 0 where that is
+/// negative: 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in
+/// 100, 0.8 for one in
+/// 10000. The bound is far from tight: of 500 rendered frames without a circle, half of them noisy,
+///        3 gave one with a score of 0.5 or more. Chance is not all there is: wheels, holes,
+///        fingertips and letters are round, and score high. Lamps do not: an edge whose bright side
+///        is as bright as can be counts for nothing where the light falls off around it, for it is
+///        where the exposure ends.
 ///
-/// **Measurement.** The circle is then followed down to the full size (in strong noise to half of it) and fitted there, weighted by the
-/// slope; the inward bias that blur gives a ball that darkens towards its limb is taken out.
+/// **Measurement.** The circle is then followed down to the full size (in strong noise to half of
+/// it) and fitted there, weighted by the slope; the inward bias that blur gives a ball that darkens
+/// towards its limb is taken out.
 ///
 /// ```
 /// use hough_heuristic::image::{GrayImage, Luma};
@@ -166,7 +175,8 @@ impl Trusted {
         }
     }
 
-    /// Finds the circles of a frame with radii in this range, or about the one radius, into `measurements`.
+    /// Finds the circles of a frame with radii in this range, or about the one radius, into
+    /// `measurements`.
     fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
         self.proofs.clear();
         self.measurements.clear();
@@ -203,7 +213,8 @@ impl Trusted {
             side /= 2;
         }
         self.depth = depth;
-        self.sizes.resize(depth.max(self.sizes.len()), Size::default());
+        self.sizes
+            .resize(depth.max(self.sizes.len()), Size::default());
         for index in 0..depth {
             let (before, rest) = self.sizes.split_at_mut(index);
             let (grey, width) = before
@@ -238,7 +249,12 @@ impl Trusted {
             let pixels = grey.width * grey.height;
             let noise = noise / (1 << depth) as f32 + ROUNDING;
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
-            let points = maxima.find(grey.pixels, grey.width, threshold, pixels / PIXELS_PER_POINT);
+            let points = maxima.find(
+                grey.pixels,
+                grey.width,
+                threshold,
+                pixels / PIXELS_PER_POINT,
+            );
             level.fill(grey.width, grey.height, points);
         };
         let mut search = |depth: usize, level: &mut Level| {
@@ -249,7 +265,8 @@ impl Trusted {
                     .explain(&self.circle, level, &ring, &mut self.budget.looks);
             }
             let least = if depth == finest { 3.2 } else { 8.0 };
-            // Smaller sizes have the larger circles; but short arcs of them are exact in the larger ones only.
+            // Smaller sizes have the larger circles; but short arcs of them are exact in the larger
+            // ones only.
             let (most, most_of_arcs) = if depth == smallest {
                 (f32::MAX, f32::MAX)
             } else {
@@ -490,9 +507,12 @@ impl Vectorized for Measuring<'_> {
         let pyramid = self.pyramid;
         // The slope over one pixel is lost in noise: over two it is found.
         let finest = usize::from(self.noise > NOISY).min(self.proof.depth);
-        let frames = (finest..=self.proof.depth).rev().map(|depth| pyramid.grey(depth));
+        let frames = (finest..=self.proof.depth)
+            .rev()
+            .map(|depth| pyramid.grey(depth));
         let scale = (1 << finest) as f32;
         let (start, noise) = (self.proof.ring, self.noise / scale);
-        measure::measure(frames, self.circle, self.polar, start, noise).map(|measured| measured.grown(scale))
+        measure::measure(frames, self.circle, self.polar, start, noise)
+            .map(|measured| measured.grown(scale))
     }
 }

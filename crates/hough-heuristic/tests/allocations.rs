@@ -25,7 +25,8 @@ thread_local! {
 /// Counts what this thread asks for.
 struct Counting;
 
-// SAFETY: every call goes on to the system's allocator unchanged; counting touches a thread-local number without a destructor.
+// SAFETY: every call goes on to the system's allocator unchanged; counting touches a thread-local
+// number without a destructor.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
@@ -110,7 +111,11 @@ fn frame(width: u32, height: u32, balls: usize, distractors: usize, seed: u64) -
     scene.render().0
 }
 
-fn allocations(detector: &mut dyn CircleDetector, frame: &GrayImage, found: &mut Vec<Detection>) -> usize {
+fn allocations(
+    detector: &mut dyn CircleDetector,
+    frame: &GrayImage,
+    found: &mut Vec<Detection>,
+) -> usize {
     let before = ALLOCATIONS.with(Cell::get);
     detector.detect_into(frame, found);
     ALLOCATIONS.with(Cell::get) - before
@@ -144,8 +149,8 @@ fn the_trusted_detector_allocates_nothing_after_the_first_frame_either() {
     assert_eq!(ALLOCATIONS.with(Cell::get), before);
 }
 
-/// The first frames are the busiest: one has the most edges, one takes all draws. Those after them are new to the detector,
-/// differ in size, and come back in another order.
+/// The first frames are the busiest: one has the most edges, one takes all draws. Those after them
+/// are new to the detector, differ in size, and come back in another order.
 #[test]
 fn a_frame_after_the_first_allocates_nothing() {
     let (crowded, futile) = (frame(500, 400, 8, 25, 1), frame(400, 300, 0, 8, 1));

@@ -1,15 +1,16 @@
 //! What a rendered frame costs, and what the shortcut past it.
 //!
-//! Wall time: on a busy machine compare within one run. Frames: the laboratory from a search pose and from a goal pose. Steps: a move of
-//! `JT2` and `JT3` with a check of the limits and the features after it; and the same through [`SimulatedArm`] and [`FeatureCamera`].
+//! Wall time: on a busy machine compare within one run. Frames: the laboratory from a search pose
+//! and from a goal pose. Steps: a move of `JT2` and `JT3` with a check of the limits and the
+//! features after it; and the same through [`SimulatedArm`] and [`FeatureCamera`].
 #![allow(missing_docs)] // The macros of criterion.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pipeline_sim::{
-    Ball, Cell, FeatureCamera, Renderer, Scene, SceneKind, SharedCell, SimulatedArm, Snapshot, Workspace,
-    exploring_start,
+    Ball, Cell, FeatureCamera, Renderer, Scene, SceneKind, SharedCell, SimulatedArm, Snapshot,
+    Workspace, exploring_start,
 };
 use puma_val2::{JointDelta, Manipulator};
 use rand::SeedableRng;
@@ -18,7 +19,9 @@ use rand::rngs::Xoshiro256PlusPlus;
 fn frames(c: &mut Criterion) {
     let cell = Cell::paper(Ball::at(0.60, 0.15, -0.10));
     let search = Workspace::paper().search_poses()[3];
-    let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES).expect("within reach");
+    let goal = cell
+        .goal_pose(Cell::REACHING_JT5_DEGREES)
+        .expect("within reach");
     let mut renderer = Renderer::new(&Scene::laboratory(), 1);
     let mut group = c.benchmark_group("frame");
     group.bench_function("laboratory, search pose", |b| {

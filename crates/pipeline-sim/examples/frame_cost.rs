@@ -1,12 +1,13 @@
-//! CPU time of rendered frames, kind by kind, of frames drawn from seeds: median and best, and the median once each frame has been taken
-//! several times and only the least of its times counts.
+//! CPU time of rendered frames, kind by kind, of frames drawn from seeds: median and best, and the
+//! median once each frame has been taken several times and only the least of its times counts.
 //!
 //! ```text
 //! cargo run --release -p pipeline-sim --example frame_cost [-- KIND [FRAMES]]
 //! ```
 //!
-//! Milliseconds for 768x576 pixels. On a busy machine the last column is the figure to compare: it leaves out what other programs took from
-//! the processor and its caches, but not that some frames show more than others.
+//! Milliseconds for 768x576 pixels. On a busy machine the last column is the figure to compare: it
+//! leaves out what other programs took from the processor and its caches, but not that some frames
+//! show more than others.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 use std::error::Error;
@@ -33,7 +34,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let kinds = SceneKind::ALL.iter().map(ToString::to_string);
         kinds.chain(BenchmarkKind::ALL.iter().map(ToString::to_string))
     };
-    if let Some(kind) = only.as_ref().filter(|only| names().all(|name| name != **only)) {
+    if let Some(kind) = only
+        .as_ref()
+        .filter(|only| names().all(|name| name != **only))
+    {
         let names: Vec<String> = names().collect();
         return Err(format!("no kind {kind:?}: all, or one of {}", names.join(", ")).into());
     }
@@ -108,6 +112,10 @@ fn cpu() -> f64 {
     #[cfg(not(unix))]
     {
         static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64() * 1e3
+        BEGIN
+            .get_or_init(std::time::Instant::now)
+            .elapsed()
+            .as_secs_f64()
+            * 1e3
     }
 }

@@ -25,7 +25,8 @@ impl Ball {
     }
 }
 
-/// An upright rod on the table that carries the ball, so that the fingers find room below the ball's centre.
+/// An upright rod on the table that carries the ball, so that the fingers find room below the
+/// ball's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Holder {
@@ -42,7 +43,10 @@ impl Holder {
     pub fn under(ball: &Ball) -> Self {
         let radius = 0.008_f64.min(0.8 * ball.radius);
         // The ball sinks a little into the open end of the rod.
-        let top = ball.centre.z - (ball.radius * ball.radius - radius * radius).max(0.0).sqrt();
+        let top = ball.centre.z
+            - (ball.radius * ball.radius - radius * radius)
+                .max(0.0)
+                .sqrt();
         Self {
             foot: ball.centre.xy(),
             top,
@@ -55,6 +59,7 @@ impl Holder {
         let sunk = (ball.radius * ball.radius - self.radius * self.radius)
             .max(0.0)
             .sqrt();
-        (ball.centre.xy() - self.foot).norm() < 0.001 && (ball.centre.z - sunk - self.top).abs() < 0.001
+        (ball.centre.xy() - self.foot).norm() < 0.001
+            && (ball.centre.z - sunk - self.top).abs() < 0.001
     }
 }

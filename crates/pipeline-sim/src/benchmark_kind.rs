@@ -1,4 +1,5 @@
-//! Frames to compare circle detectors on: one difficulty at a time, and balls whose size in the frame is known beforehand.
+//! Frames to compare circle detectors on: one difficulty at a time, and balls whose size in the
+//! frame is known beforehand.
 
 use std::fmt;
 use std::str::FromStr;
@@ -16,10 +17,11 @@ use crate::{
 
 /// One difficulty for a circle detector.
 ///
-/// The camera looks down on balls that lie on a table. Unless said otherwise there is one, lighter than the table, wholly in the frame, and its
-/// radius is spread evenly, on a logarithmic scale, over 12..145 pixels of a frame of 768x576; in other frames it scales
-/// ([`Camera::resized`]). What is no ball has straight edges only. Deviations of noise are those of the grey levels before they are cut
-/// off at 0 and 255.
+/// The camera looks down on balls that lie on a table. Unless said otherwise there is one, lighter
+/// than the table, wholly in the frame, and its radius is spread evenly, on a logarithmic scale,
+/// over 12..145 pixels of a frame of 768x576; in other frames it scales ([`Camera::resized`]). What
+/// is no ball has straight edges only. Deviations of noise are those of the grey levels before they
+/// are cut off at 0 and 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -50,7 +52,8 @@ pub enum BenchmarkKind {
     DistractorsNoise10,
     /// With five distractors and noise of 25 grey levels.
     DistractorsNoise25,
-    /// Four balls of any brightness that is not quite the table's, on strong grain among forty boxes, tapes and sheets of print.
+    /// Four balls of any brightness that is not quite the table's, on strong grain among forty
+    /// boxes, tapes and sheets of print.
     Textured,
 }
 
@@ -130,7 +133,11 @@ impl BenchmarkKind {
         rng: &mut R,
     ) -> Result<(Scene, Snapshot), CameraError> {
         let mut stage = Stage::new(Camera::paper().resized(size.0, size.1)?, rng);
-        let radii = if self == Self::Many { SMALL_RADII } else { RADII };
+        let radii = if self == Self::Many {
+            SMALL_RADII
+        } else {
+            RADII
+        };
         stage.put_balls(self.balls(), radii, rng);
         let mut scene = self.surfaces(rng);
         scene.things = stage.other_balls(scene.table.albedo, rng);
@@ -262,7 +269,10 @@ impl Stage {
             let aside = [0.0; 6].map(|_: f64| rng.random_range(-4.0_f64..4.0).to_radians());
             let turn = rng.random_range(-1.0..1.0);
             if let Some(mut pose) = over.goal_pose(Cell::REACHING_JT5_DEGREES) {
-                pose.0.iter_mut().zip(aside).for_each(|(angle, by)| *angle += by);
+                pose.0
+                    .iter_mut()
+                    .zip(aside)
+                    .for_each(|(angle, by)| *angle += by);
                 pose.0[5] = turn;
                 break pose;
             }
@@ -275,7 +285,8 @@ impl Stage {
         }
     }
 
-    /// Puts up to `count` balls on the table, clear of each other and of the frame's border; the first is the one to be grasped.
+    /// Puts up to `count` balls on the table, clear of each other and of the frame's border; the
+    /// first is the one to be grasped.
     fn put_balls<R: Rng + ?Sized>(&mut self, count: usize, (least, most): (f64, f64), rng: &mut R) {
         let (width, height) = self.cell.camera.size();
         let (width, height) = (f64::from(width), f64::from(height));
@@ -330,7 +341,9 @@ impl Stage {
         let others = self.balls.iter().skip(1);
         others
             .map(|(_, ball)| Thing {
-                shape: Shape::Ball { radius: ball.radius },
+                shape: Shape::Ball {
+                    radius: ball.radius,
+                },
                 x: ball.centre.x,
                 y: ball.centre.y,
                 turn: 0.0,
@@ -359,10 +372,12 @@ impl Stage {
             );
             let ray = pose.rotation * self.cell.camera.ray(pixel);
             let depth = (self.cell.table - eye.z) / ray.z;
-            // Metres on the table for a pixel of a frame of 768x576; where there is little room, things get smaller.
+            // Metres on the table for a pixel of a frame of 768x576; where there is little room,
+            // things get smaller.
             let pixel_size = depth / Camera::paper().focal_px();
             let shrink = 1.0 - 0.8 * attempt as f64 / (400 * count) as f64;
-            let mut size = |least: f64, most: f64| pixel_size * shrink * rng.random_range(least..most);
+            let mut size =
+                |least: f64, most: f64| pixel_size * shrink * rng.random_range(least..most);
             let (long, wide, high) = (size(40.0, 200.0), size(25.0, 100.0), size(4.0, 40.0));
             let shape = match rng.random_range(0..4) {
                 0 | 1 => Shape::Box {
@@ -388,8 +403,16 @@ impl Stage {
                 y: place.y,
                 turn: rng.random_range(0.0..std::f64::consts::TAU),
                 look: Look {
-                    albedo: if paper { 0.85 } else { rng.random_range(0.05..0.9) },
-                    texture: if paper { 0.0 } else { rng.random_range(0.0..0.5) },
+                    albedo: if paper {
+                        0.85
+                    } else {
+                        rng.random_range(0.05..0.9)
+                    },
+                    texture: if paper {
+                        0.0
+                    } else {
+                        rng.random_range(0.0..0.5)
+                    },
                     gloss: 0.0,
                 },
             };
@@ -419,7 +442,10 @@ impl Stage {
         let (sin, cos) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();
         // The chord that cuts off this share lies so far from the centre; the strip begins there.
         let (chord, width) = (r * (std::f64::consts::PI * share).cos(), 1.2 * r);
-        let middle = Point2::new(x + (chord + 0.5 * width) * cos, y + (chord + 0.5 * width) * sin);
+        let middle = Point2::new(
+            x + (chord + 0.5 * width) * cos,
+            y + (chord + 0.5 * width) * sin,
+        );
         let along = nalgebra::Vector2::new(-sin, cos) * (1.5 * r);
         Some(Occluder {
             from: middle - along,
@@ -430,7 +456,8 @@ impl Stage {
         })
     }
 
-    /// Joint speeds, radians per second, at which the first ball moves by `pixels` (of 768) during `exposure` seconds.
+    /// Joint speeds, radians per second, at which the first ball moves by `pixels` (of 768) during
+    /// `exposure` seconds.
     fn speed<R: Rng + ?Sized>(&self, pixels: f64, exposure: f64, rng: &mut R) -> JointDelta {
         let mut speed = JointDelta::default();
         for i in 0..3 {

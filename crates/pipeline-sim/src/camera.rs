@@ -7,8 +7,8 @@ use crate::{CameraError, Distortion, Ellipse, ProjectionError};
 
 /// A monochrome camera: a pinhole with square pixels, and the distortion of its lens.
 ///
-/// Camera frame: origin at the centre of projection, z along the optical axis, x to the right of the image, y downward.
-/// Valid by construction.
+/// Camera frame: origin at the centre of projection, z along the optical axis, x to the right of
+/// the image, y downward. Valid by construction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     focal_px: f64,
@@ -22,8 +22,8 @@ impl Camera {
     /// The greatest width and height of a frame, pixels.
     pub const LARGEST_SIDE: u32 = 16_384;
 
-    /// The paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3" CCD, whose image is
-    /// 8.8 mm wide; principal point in the middle of the frame, no distortion.
+    /// The paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3"
+    /// CCD, whose image is 8.8 mm wide; principal point in the middle of the frame, no distortion.
     ///
     /// ```
     /// let camera = pipeline_sim::Camera::paper();
@@ -40,12 +40,12 @@ impl Camera {
         }
     }
 
-    /// A pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width` metres wide and a frame of
-    /// `width` x `height` pixels, principal point in the middle of the frame.
+    /// A pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width` metres wide
+    /// and a frame of `width` x `height` pixels, principal point in the middle of the frame.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] names the quantity that is not above zero; [`CameraError::TooLarge`] for more than
-    /// [`Camera::LARGEST_SIDE`].
+    /// [`CameraError::NotPositive`] names the quantity that is not above zero;
+    /// [`CameraError::TooLarge`] for more than [`Camera::LARGEST_SIDE`].
     pub fn pinhole(
         focal_length: f64,
         sensor_width: f64,
@@ -59,7 +59,10 @@ impl Camera {
         positive("focal length (px)", focal_px)?;
         Ok(Self {
             focal_px,
-            principal: Point2::new((f64::from(width) - 1.0) / 2.0, (f64::from(height) - 1.0) / 2.0),
+            principal: Point2::new(
+                (f64::from(width) - 1.0) / 2.0,
+                (f64::from(height) - 1.0) / 2.0,
+            ),
             width,
             height,
             distortion: Distortion::default(),
@@ -80,7 +83,8 @@ impl Camera {
     /// The same camera with its focal length multiplied by `factor`.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] if the factor is not above zero; [`CameraError::Folds`] if a distorted image would fold.
+    /// [`CameraError::NotPositive`] if the factor is not above zero; [`CameraError::Folds`] if a
+    /// distorted image would fold.
     pub fn with_focal_factor(self, factor: f64) -> Result<Self, CameraError> {
         positive("focal factor", factor)?;
         let focal_px = self.focal_px * factor;
@@ -98,17 +102,19 @@ impl Camera {
         Self { principal, ..self }.unfolded()
     }
 
-    /// The same lens before a sensor of `width` x `height` pixels: what the frame showed, the new one shows as large as it can hold all of it;
-    /// a frame of another shape shows more on two sides.
+    /// The same lens before a sensor of `width` x `height` pixels: what the frame showed, the new
+    /// one shows as large as it can hold all of it; a frame of another shape shows more on two
+    /// sides.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::TooLarge`] for more than [`Camera::LARGEST_SIDE`];
-    /// [`CameraError::Folds`] if a distorted image would fold.
+    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::TooLarge`] for more
+    /// than [`Camera::LARGEST_SIDE`]; [`CameraError::Folds`] if a distorted image would fold.
     pub fn resized(self, width: u32, height: u32) -> Result<Self, CameraError> {
         frame_size(width, height)?;
-        let scale =
-            (f64::from(width) / f64::from(self.width)).min(f64::from(height) / f64::from(self.height));
-        let middle = |w: u32, h: u32| Point2::new((f64::from(w) - 1.0) / 2.0, (f64::from(h) - 1.0) / 2.0);
+        let scale = (f64::from(width) / f64::from(self.width))
+            .min(f64::from(height) / f64::from(self.height));
+        let middle =
+            |w: u32, h: u32| Point2::new((f64::from(w) - 1.0) / 2.0, (f64::from(h) - 1.0) / 2.0);
         let off_middle = self.principal - middle(self.width, self.height);
         Self {
             focal_px: self.focal_px * scale,
@@ -152,24 +158,28 @@ impl Camera {
         &self.distortion
     }
 
-    /// The pixel that shows a point given in the camera frame; `None` for a point that is not in front of the camera, or so far off the axis
-    /// that the lens would have folded the image over before.
+    /// The pixel that shows a point given in the camera frame; `None` for a point that is not in
+    /// front of the camera, or so far off the axis that the lens would have folded the image over
+    /// before.
     pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
         (point.z > 0.0)
             .then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
             .flatten()
     }
 
-    /// The direction, in the camera frame and with z = 1, that is seen at a pixel. Within the frame there always is one; for
-    /// a pixel outside it where the lens shows nothing, the direction is not a number ([`Camera::try_ray`] says so).
+    /// The direction, in the camera frame and with z = 1, that is seen at a pixel. Within the frame
+    /// there always is one; for a pixel outside it where the lens shows nothing, the direction is
+    /// not a number ([`Camera::try_ray`] says so).
     pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
-        self.try_ray(pixel).unwrap_or_else(|_| Vector3::repeat(f64::NAN))
+        self.try_ray(pixel)
+            .unwrap_or_else(|_| Vector3::repeat(f64::NAN))
     }
 
     /// As [`Camera::ray`].
     ///
     /// # Errors
-    /// [`CameraError::NoRay`] for a pixel where the lens shows nothing, which can only be one outside the frame, or one that is not finite.
+    /// [`CameraError::NoRay`] for a pixel where the lens shows nothing, which can only be one
+    /// outside the frame, or one that is not finite.
     pub fn try_ray(&self, pixel: Point2<f64>) -> Result<Vector3<f64>, CameraError> {
         let image = (pixel - self.principal.coords) / self.focal_px;
         let ideal = self.distortion.undistort(image);
@@ -184,14 +194,20 @@ impl Camera {
 
     /// The outline of a sphere whose centre is given in the camera frame.
     ///
-    /// Without distortion the outline *is* an ellipse, and this one is exact: the section of the image plane with the cone
-    /// of half-angle asin(radius / distance) about the direction of the centre. With distortion it is the ellipse with the
-    /// area and the second moments of the distorted outline.
+    /// Without distortion the outline *is* an ellipse, and this one is exact: the section of the
+    /// image plane with the cone of half-angle asin(radius / distance) about the direction of the
+    /// centre. With distortion it is the ellipse with the area and the second moments of the
+    /// distorted outline.
     ///
     /// # Errors
-    /// [`ProjectionError`]: a radius that is not above zero, a camera inside the sphere, a sphere not wholly in front of the
-    /// camera, or one that reaches beyond the directions that the lens shows.
-    pub fn project_sphere(&self, centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
+    /// [`ProjectionError`]: a radius that is not above zero, a camera inside the sphere, a sphere
+    /// not wholly in front of the camera, or one that reaches beyond the directions that the lens
+    /// shows.
+    pub fn project_sphere(
+        &self,
+        centre: &Point3<f64>,
+        radius: f64,
+    ) -> Result<Ellipse, ProjectionError> {
         let outline = unit_outline(centre, radius)?;
         if self.distortion.is_none() {
             return Ok(Ellipse {
@@ -201,13 +217,15 @@ impl Camera {
                 angle: outline.angle,
             });
         }
-        Ellipse::of_outline(|t| self.to_pixel(outline.point(t))).ok_or_else(|| ProjectionError::BeyondLens {
-            angle: centre.xy().coords.norm().atan2(centre.z),
+        Ellipse::of_outline(|t| self.to_pixel(outline.point(t))).ok_or_else(|| {
+            ProjectionError::BeyondLens {
+                angle: centre.xy().coords.norm().atan2(centre.z),
+            }
         })
     }
 
-    /// The circle of equal mean radius for a sphere: the centre of [`Camera::project_sphere`]'s ellipse and the mean of its
-    /// semi-axes, in pixels of this camera's frame.
+    /// The circle of equal mean radius for a sphere: the centre of [`Camera::project_sphere`]'s
+    /// ellipse and the mean of its semi-axes, in pixels of this camera's frame.
     ///
     /// # Errors
     /// As for [`Camera::project_sphere`].
@@ -219,15 +237,18 @@ impl Camera {
         Ok(self.project_sphere(centre, radius)?.circle())
     }
 
-    /// The centre of the sphere of `radius` metres whose outline has the circle `circle`, in the camera frame: the inverse of
-    /// [`Camera::project_sphere_to_circle`] for a camera without distortion, and close to it (the distortion at the circle's
-    /// centre is undone) for others.
+    /// The centre of the sphere of `radius` metres whose outline has the circle `circle`, in the
+    /// camera frame: the inverse of [`Camera::project_sphere_to_circle`] for a camera without
+    /// distortion, and close to it (the distortion at the circle's centre is undone) for others.
     ///
-    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at the circle's centre, or numbers do not
-    /// suffice (a circle that fills all but the whole half-space).
+    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at
+    /// the circle's centre, or numbers do not suffice (a circle that fills all but the whole
+    /// half-space).
     pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
         let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
-            && [circle.radius, radius].iter().all(|v| v.is_finite() && *v > 0.0);
+            && [circle.radius, radius]
+                .iter()
+                .all(|v| v.is_finite() && *v > 0.0);
         if !usable {
             return None;
         }
@@ -242,7 +263,8 @@ impl Camera {
         let direction = Vector3::new(ray.x / outer, ray.y / outer, 1.0).normalize();
         let centre = Point3::from(direction * (radius / sin));
         let shown = unit_outline(&centre, radius).ok()?;
-        let off = (shown.centre - ray.xy()).coords.norm() + (0.5 * (shown.major + shown.minor) - r).abs();
+        let off =
+            (shown.centre - ray.xy()).coords.norm() + (0.5 * (shown.major + shown.minor) - r).abs();
         (off <= 1e-6 * (m + r)).then_some(centre)
     }
 
@@ -268,7 +290,8 @@ impl Camera {
             .into_iter()
             .map(|(x, y)| (Point2::new(x, y) - self.principal).norm())
             .fold(0.0, f64::max);
-        // March outward until the image of the ray leaves the frame; there and before, the lens must not have folded the image over.
+        // March outward until the image of the ray leaves the frame; there and before, the lens
+        // must not have folded the image over.
         for direction in 0..32 {
             let (sin, cos) = (f64::from(direction) * std::f64::consts::TAU / 32.0).sin_cos();
             let at = |u: f64| Point2::new(u * cos, u * sin);
@@ -282,7 +305,9 @@ impl Camera {
             while last < reach && !folds {
                 u += step;
                 let now = out(u);
-                folds = now.is_nan() || now <= last || self.distortion.jacobian(at(u)).determinant() <= 0.0;
+                folds = now.is_nan()
+                    || now <= last
+                    || self.distortion.jacobian(at(u)).determinant() <= 0.0;
                 last = now;
             }
             // The steps may be wider than the fold.

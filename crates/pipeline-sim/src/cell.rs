@@ -19,7 +19,8 @@ pub struct SightRule {
 }
 
 impl Default for SightRule {
-    /// Radius 5 to 68 units, at least 60 % of the outline inside the frame (and, always, the centre inside the frame).
+    /// Radius 5 to 68 units, at least 60 % of the outline inside the frame (and, always, the centre
+    /// inside the frame).
     fn default() -> Self {
         Self {
             min_radius: 5.0,
@@ -38,13 +39,17 @@ impl SightRule {
     /// As [`SightRule::sees`], with the reason.
     ///
     /// # Errors
-    /// What keeps the ball from being seen: [`SightError::LargerThanView`], [`SightError::Radius`], [`SightError::CentreOutside`],
-    /// [`SightError::CutOff`]. [`SightError::NotFinite`] for a rule that is NaN.
+    /// What keeps the ball from being seen: [`SightError::LargerThanView`], [`SightError::Radius`],
+    /// [`SightError::CentreOutside`], [`SightError::CutOff`]. [`SightError::NotFinite`] for a rule
+    /// that is NaN.
     pub fn check(&self, outline: &Ellipse, size: (u32, u32)) -> Result<(), SightError> {
         for (quantity, value) in [
             ("the smallest radius seen (units)", self.min_radius),
             ("the greatest radius seen (units)", self.max_radius),
-            ("the least share of the outline inside the frame", self.min_share),
+            (
+                "the least share of the outline inside the frame",
+                self.min_share,
+            ),
         ] {
             if value.is_nan() {
                 return Err(SightError::NotFinite { quantity, value });
@@ -74,7 +79,8 @@ impl SightRule {
                 greatest: self.max_radius,
             }));
         }
-        let inside = (-0.5..=width - 0.5).contains(&circle.x) && (-0.5..=height - 0.5).contains(&circle.y);
+        let inside =
+            (-0.5..=width - 0.5).contains(&circle.x) && (-0.5..=height - 0.5).contains(&circle.y);
         if !inside {
             return Err(why(SightError::CentreOutside {
                 x: circle.x,
@@ -92,7 +98,8 @@ impl SightRule {
         }
     }
 
-    /// Whether a round outline with these features counts as seen in the paper's frame of 192x144 units.
+    /// Whether a round outline with these features counts as seen in the paper's frame of 192x144
+    /// units.
     pub fn sees_features(&self, features: &Features) -> bool {
         let Circle { x, y, radius } = features.to_circle(768);
         let finite = [x, y, radius].iter().all(|v| v.is_finite());
@@ -117,8 +124,8 @@ pub struct WorkingLimits {
 }
 
 impl WorkingLimits {
-    /// The limits of the reaching task: `JT1` -160..160, `JT2` -150..-20, `JT3` 120..215 degrees, and the arm's own ranges for the
-    /// wrist.
+    /// The limits of the reaching task: `JT1` -160..160, `JT2` -150..-20, `JT3` 120..215 degrees,
+    /// and the arm's own ranges for the wrist.
     pub fn paper() -> Self {
         Self {
             min: [-160.0_f64, -150.0, 120.0, -110.0, -100.0, -266.0].map(f64::to_radians),
@@ -142,8 +149,8 @@ impl WorkingLimits {
 
 /// Arm, camera on the hand, ball on its holder, table.
 ///
-/// Everything is in VAL's world frame: metres, origin at the shoulder, z up. The methods are pure geometry: the same joints
-/// always give the same answer.
+/// Everything is in VAL's world frame: metres, origin at the shoulder, z up. The methods are pure
+/// geometry: the same joints always give the same answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Link lengths and joint ranges.
@@ -171,7 +178,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Features of the ball in the middle of the paper's goal intervals (x 99..108, y 74..82, r 32..34).
+    /// Features of the ball in the middle of the paper's goal intervals (x 99..108, y 74..82, r
+    /// 32..34).
     pub const GOAL: Features = Features {
         x: 103.5,
         y: 78.0,
@@ -210,8 +218,8 @@ impl Cell {
         self.params.wrist(joints) * self.mount.0
     }
 
-    /// The outline of the ball in the image, whether or not it lies in the frame; `None` where it has none (behind the camera,
-    /// camera inside the ball, joints or ball not finite).
+    /// The outline of the ball in the image, whether or not it lies in the frame; `None` where it
+    /// has none (behind the camera, camera inside the ball, joints or ball not finite).
     pub fn outline(&self, joints: &Joints) -> Option<Ellipse> {
         let centre = self
             .camera_pose(joints)
@@ -220,14 +228,16 @@ impl Cell {
     }
 
     /// The ball as the image shows it, in pixels of the camera's frame; `None` if it counts as lost
-    /// ([`Cell::sight`]: centre outside the frame, less than 60 % of the outline inside, radius below 5 or above 68 units).
+    /// ([`Cell::sight`]: centre outside the frame, less than 60 % of the outline inside, radius
+    /// below 5 or above 68 units).
     pub fn circle(&self, joints: &Joints) -> Option<Circle> {
         self.outline(joints)
             .filter(|outline| self.sight.sees(outline, self.camera.size()))
             .map(|outline| outline.circle())
     }
 
-    /// The paper's image features of the ball, without rendering or detection; `None` if it counts as lost.
+    /// The paper's image features of the ball, without rendering or detection; `None` if it counts
+    /// as lost.
     pub fn features(&self, joints: &Joints) -> Option<Features> {
         self.circle(joints)
             .map(|circle| Features::from_circle(&circle, self.camera.size().0))
@@ -236,8 +246,9 @@ impl Cell {
     /// As [`Cell::features`], with the reason why there are none.
     ///
     /// # Errors
-    /// [`SightError`]: joints, or a measure of arm or mount, that are not finite; a ball without an outline (behind the camera, around it, nowhere); an outline larger than the
-    /// view; otherwise what [`Cell::sight`] asks for and does not get.
+    /// [`SightError`]: joints, or a measure of arm or mount, that are not finite; a ball without an
+    /// outline (behind the camera, around it, nowhere); an outline larger than the view; otherwise
+    /// what [`Cell::sight`] asks for and does not get.
     pub fn try_features(&self, joints: &Joints) -> Result<Features, SightError> {
         if let Some(joint) = joints.non_finite() {
             return Err(SightError::JointNotFinite { joint });
@@ -250,7 +261,10 @@ impl Cell {
             .inverse_transform_point(&self.ball.centre);
         let outline = self.camera.project_sphere(&centre, self.ball.radius)?;
         self.sight.check(&outline, self.camera.size())?;
-        Ok(Features::from_circle(&outline.circle(), self.camera.size().0))
+        Ok(Features::from_circle(
+            &outline.circle(),
+            self.camera.size().0,
+        ))
     }
 
     /// The first measure that the camera's pose rests on and that is not finite.
@@ -280,10 +294,12 @@ impl Cell {
         (self.tool_point(joints) - self.ball.centre).norm()
     }
 
-    /// The angle of `JT5`, radians, that brings the tool point nearest to the ball when all other joints stay where they are.
+    /// The angle of `JT5`, radians, that brings the tool point nearest to the ball when all other
+    /// joints stay where they are.
     pub fn grip_angle(&self, joints: &Joints) -> f64 {
-        // Frame that JT5 turns in: the hand frame turned back by JT5 about the wrist's bending axis. At JT5 = 0 the tool axis is
-        // the forearm's axis, and +JT5 turns z toward +x of the hand at JT5 = 0.
+        // Frame that JT5 turns in: the hand frame turned back by JT5 about the wrist's bending
+        // axis. At JT5 = 0 the tool axis is the forearm's axis, and +JT5 turns z toward +x of the
+        // hand at JT5 = 0.
         let mut straight = *joints;
         straight.0[Joint::J5.index()] = 0.0;
         straight.0[Joint::J6.index()] = 0.0;
@@ -299,16 +315,18 @@ impl Cell {
         self.limits.contain(joints)
     }
 
-    /// Where a ball must be so that the image shows it with these features; `None` if no place does.
+    /// Where a ball must be so that the image shows it with these features; `None` if no place
+    /// does.
     pub fn ball_showing(&self, joints: &Joints, features: &Features) -> Option<Point3<f64>> {
         let circle = features.to_circle(self.camera.size().0);
         let centre = self.camera.sphere_of_circle(&circle, self.ball.radius)?;
         Some(self.camera_pose(joints) * centre)
     }
 
-    /// The pose, with the hand at `jt5_degrees` and `JT4` = `JT6` = 0, in which the ball shows the middle of the goal in y and
-    /// r and lies in the middle between the jaws; elbow up. `None` if the ball is out of reach or the pose out of the working limits
-    /// ([`Cell::try_goal_pose`] says which).
+    /// The pose, with the hand at `jt5_degrees` and `JT4` = `JT6` = 0, in which the ball shows the
+    /// middle of the goal in y and r and lies in the middle between the jaws; elbow up. `None` if
+    /// the ball is out of reach or the pose out of the working limits ([`Cell::try_goal_pose`] says
+    /// which).
     pub fn goal_pose(&self, jt5_degrees: f64) -> Option<Joints> {
         self.try_goal_pose(jt5_degrees).ok()
     }
@@ -316,7 +334,8 @@ impl Cell {
     /// As [`Cell::goal_pose`], with the reason why there is none.
     ///
     /// # Errors
-    /// [`ReachError`]: a ball, an angle, or a measure of arm or mount that is not finite; a ball without size; a camera that cannot show the ball as the goal has it; a ball out of the arm's
+    /// [`ReachError`]: a ball, an angle, or a measure of arm or mount that is not finite; a ball
+    /// without size; a camera that cannot show the ball as the goal has it; a ball out of the arm's
     /// reach; a pose out of the working limits.
     pub fn try_goal_pose(&self, jt5_degrees: f64) -> Result<Joints, ReachError> {
         let ball = self.ball.centre;
@@ -337,9 +356,12 @@ impl Cell {
         if !(radius.is_finite() && radius > 0.0) {
             return Err(ReachError::BallRadius { radius });
         }
-        // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a two-link arm in the plane.
+        // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a
+        // two-link arm in the plane.
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
-        let goal = self.ball_showing(&hand, &Self::GOAL).ok_or(ReachError::NoView)?;
+        let goal = self
+            .ball_showing(&hand, &Self::GOAL)
+            .ok_or(ReachError::NoView)?;
         let wrist = self.params.wrist(&hand);
         let mut in_hand = wrist.inverse_transform_point(&goal);
         in_hand.y = 0.0;
@@ -392,16 +414,18 @@ impl Cell {
         }
     }
 
-    /// Whether the goal can be reached with the hand as it stands while reaching ([`Cell::REACHING_JT5_DEGREES`]).
+    /// Whether the goal can be reached with the hand as it stands while reaching
+    /// ([`Cell::REACHING_JT5_DEGREES`]).
     pub fn reachable(&self) -> bool {
         self.goal_pose(Self::REACHING_JT5_DEGREES).is_some()
     }
 
     /// Whether fingers, palm or camera are about to touch table, holder or ball.
     ///
-    /// The ball may be between the open fingers, that is what they are for: it counts when a finger, the palm or the camera comes
-    /// nearer to its surface than the sensors' range, which does not happen in a correct reach and grip. A held ball does not count.
-    /// Joints, ball or table that are NaN count as near: nothing says that the way is free.
+    /// The ball may be between the open fingers, that is what they are for: it counts when a
+    /// finger, the palm or the camera comes nearer to its surface than the sensors' range, which
+    /// does not happen in a correct reach and grip. A held ball does not count. Joints, ball or
+    /// table that are NaN count as near: nothing says that the way is free.
     pub fn proximity(&self, joints: &Joints) -> bool {
         let range = self.hand.sensor_range;
         self.hand_bodies(joints)
@@ -409,8 +433,9 @@ impl Cell {
             .any(|body| self.is_within(range, body))
     }
 
-    /// Whether fingers, palm or camera overlap table, holder or ball (a held ball does not count): what no hand of metal can do, and what a
-    /// simulated one that got there has run into. Joints, ball or table that are NaN count as overlapping.
+    /// Whether fingers, palm or camera overlap table, holder or ball (a held ball does not count):
+    /// what no hand of metal can do, and what a simulated one that got there has run into. Joints,
+    /// ball or table that are NaN count as overlapping.
     pub fn collides(&self, joints: &Joints) -> bool {
         /// Bodies that [`Cell::follow`] has pushed apart touch, to rounding.
         const TOUCH: f64 = -1e-6;
@@ -419,14 +444,16 @@ impl Cell {
             .any(|body| self.is_within(TOUCH, body))
     }
 
-    /// What each of the pair of sensors says, the one on the left finger (the hand's +y) first: whether its finger is about to touch
-    /// table, holder or ball, as [`Cell::proximity`] has it for the whole hand.
+    /// What each of the pair of sensors says, the one on the left finger (the hand's +y) first:
+    /// whether its finger is about to touch table, holder or ball, as [`Cell::proximity`] has it
+    /// for the whole hand.
     pub fn proximity_pair(&self, joints: &Joints) -> [bool; 2] {
         let [left, right, ..] = self.hand_bodies(joints);
         [left, right].map(|finger| self.is_within(self.hand.sensor_range, &finger))
     }
 
-    /// Whether a part of the hand is nearer to something than `range`, or cannot be told not to be (a place that is NaN).
+    /// Whether a part of the hand is nearer to something than `range`, or cannot be told not to be
+    /// (a place that is NaN).
     fn is_within(&self, range: f64, body: &Capsule) -> bool {
         let holder = self.holder.map(|h| Capsule {
             from: Point3::new(h.foot.x, h.foot.y, self.table),
@@ -435,11 +462,13 @@ impl Cell {
         });
         let near = |gap: f64| gap.is_nan() || gap < range;
         near(body.gap_to_plane(self.table))
-            || (self.held.is_none() && near(body.gap_to_sphere(&self.ball.centre, self.ball.radius)))
+            || (self.held.is_none()
+                && near(body.gap_to_sphere(&self.ball.centre, self.ball.radius)))
             || holder.is_some_and(|h| near(body.gap_to(&h)))
     }
 
-    /// Fingers, palm and camera, in the world frame. Closed fingers stand as far apart as the ball is wide if they hold it.
+    /// Fingers, palm and camera, in the world frame. Closed fingers stand as far apart as the ball
+    /// is wide if they hold it.
     pub fn hand_bodies(&self, joints: &Joints) -> [Capsule; 4] {
         let wrist = self.params.wrist(joints);
         let apart = match self.jaws {

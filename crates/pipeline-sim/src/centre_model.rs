@@ -7,13 +7,14 @@ use crate::reach_noise::{Misfit, Noise, Shares, widening};
 use crate::stored::{Reader, Writer};
 use crate::{CentreSample, FitError, Quality, QuantityError, SightRule, StoredModelError};
 
-/// Terms 1, d1, r d1 of the longest move of the list at the goal's radius: what one unit of a ridge is measured in.
+/// Terms 1, d1, r d1 of the longest move of the list at the goal's radius: what one unit of a ridge
+/// is measured in.
 const SCALES: [f64; 3] = [1.0, 5.0, 5.0 * 33.0];
 
 /// The change of x on 1, d1 and r d1, with d1 the move of `JT1` in degrees.
 ///
-/// The paper's linear regression has no product with r; without it a fifth of the variance stays unexplained, because a near ball moves
-/// farther in the image.
+/// The paper's linear regression has no product with r; without it a fifth of the variance stays
+/// unexplained, because a near ball moves farther in the image.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -32,7 +33,8 @@ impl CentreModel {
     /// Fits dx on 1, d1, r d1.
     ///
     /// # Errors
-    /// [`FitError`]: fewer than three samples, samples that do not determine the three coefficients, a sample that is not finite.
+    /// [`FitError`]: fewer than three samples, samples that do not determine the three
+    /// coefficients, a sample that is not finite.
     pub fn fit(samples: &[CentreSample]) -> Result<Self, FitError> {
         Self::fit_terms(samples, true)
     }
@@ -53,14 +55,17 @@ impl CentreModel {
         Ok(Self::with(with_radius, fit, samples, None))
     }
 
-    /// The model fitted anew to samples of another plant, held toward this one, as [`ReachModel::refit`](crate::ReachModel::refit) does it for
-    /// the approach: the coefficients c minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with c0 this model's
-    /// coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest move of the list at the goal). Without samples the model
-    /// stays as it is. [`CentreModel::uncertainty`] is found as there.
+    /// The model fitted anew to samples of another plant, held toward this one, as
+    /// [`ReachModel::refit`](crate::ReachModel::refit) does it for the approach: the coefficients c
+    /// minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with c0 this model's
+    /// coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest move of the
+    /// list at the goal). Without samples the model stays as it is. [`CentreModel::uncertainty`] is
+    /// found as there.
     ///
     /// # Errors
-    /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or above 1e100; otherwise as for
-    /// [`CentreModel::fit`] (with a ridge of 1e-12 or above neither too few samples nor a lack of rank is an error).
+    /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or above
+    /// 1e100; otherwise as for [`CentreModel::fit`] (with a ridge of 1e-12 or above neither too few
+    /// samples nor a lack of rank is an error).
     pub fn refit(&self, samples: &[CentreSample], ridge: f64) -> Result<Self, FitError> {
         let strength = ridge_strength(ridge, samples.len())?;
         let needed = self.fit.terms();
@@ -75,11 +80,22 @@ impl CentreModel {
         }
         let fit = rows.solve(PLACE, samples.len())?;
         let hold = Hold::new(strength, &SCALES, samples.len());
-        Ok(Self::with(self.with_radius, fit, samples, Some((self, hold))))
+        Ok(Self::with(
+            self.with_radius,
+            fit,
+            samples,
+            Some((self, hold)),
+        ))
     }
 
-    /// The model with these coefficients, judged on the samples they were fitted to; of a refit, with the prior.
-    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample], prior: Option<(&Self, Hold)>) -> Self {
+    /// The model with these coefficients, judged on the samples they were fitted to; of a refit,
+    /// with the prior.
+    fn with(
+        with_radius: bool,
+        fit: Fit,
+        samples: &[CentreSample],
+        prior: Option<(&Self, Hold)>,
+    ) -> Self {
         let mut model = Self {
             with_radius,
             fit,
@@ -111,8 +127,8 @@ impl CentreModel {
         model
     }
 
-    /// By how much more, or less, than this model expects its refit errs: each sample is predicted by what the others and the prior
-    /// say of it, `fit` without it.
+    /// By how much more, or less, than this model expects its refit errs: each sample is predicted
+    /// by what the others and the prior say of it, `fit` without it.
     fn misfit(&self, samples: &[CentreSample], fit: &Fit, hold: &Hold) -> Misfit {
         let mut misfit = Misfit::default();
         for s in samples {
@@ -121,14 +137,16 @@ impl CentreModel {
                 continue;
             };
             let missed = (s.after.x - s.before.x - fit.value(0, terms)) / left;
-            let noise = self.noise.variance(shares(&s.before, s.d1, self.with_radius));
+            let noise = self
+                .noise
+                .variance(shares(&s.before, s.d1, self.with_radius));
             misfit.add(missed * missed / (noise + self.fit.residual[0].powi(2) * leverage));
         }
         misfit
     }
 
-    /// What the image shows after `JT1` turned by `d1` degrees; y and r stay. `None` if the ball is lost
-    /// ([`SightRule::sees_features`]) or an argument is not finite.
+    /// What the image shows after `JT1` turned by `d1` degrees; y and r stay. `None` if the ball is
+    /// lost ([`SightRule::sees_features`]) or an argument is not finite.
     pub fn predict(&self, before: &Features, d1: f64) -> Option<Features> {
         let after = Features {
             x: before.x + self.change(before, d1),
@@ -137,8 +155,9 @@ impl CentreModel {
         SightRule::default().sees_features(&after).then_some(after)
     }
 
-    /// The standard deviation of x, feature units, that the fit expects around what a new observation would show: noise, what the terms
-    /// leave out (which grows with the move), and the uncertainty of the coefficients. `None` if an argument is not finite, or `before` shows a
+    /// The standard deviation of x, feature units, that the fit expects around what a new
+    /// observation would show: noise, what the terms leave out (which grows with the move), and the
+    /// uncertainty of the coefficients. `None` if an argument is not finite, or `before` shows a
     /// radius that is not above zero.
     pub fn uncertainty(&self, before: &Features, d1: f64) -> Option<f64> {
         let finite = before.x.is_finite() && before.y.is_finite();
@@ -152,8 +171,8 @@ impl CentreModel {
         sd.is_finite().then_some(sd)
     }
 
-    /// What the fit leaves of the changes of x on its samples: standard deviation in feature units, with the degrees of freedom that
-    /// are left; of a refit, together with those of its prior.
+    /// What the fit leaves of the changes of x on its samples: standard deviation in feature units,
+    /// with the degrees of freedom that are left; of a refit, together with those of its prior.
     pub fn residual_noise(&self) -> f64 {
         self.fit.residual[0]
     }
@@ -166,7 +185,8 @@ impl CentreModel {
     /// How well dx is reproduced on other samples.
     ///
     /// # Errors
-    /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not above zero.
+    /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not
+    /// above zero.
     pub fn quality_on(&self, samples: &[CentreSample]) -> Result<Vec<Quality>, QuantityError> {
         Quality::some(samples.len())?;
         rows(samples, self.fit.terms()).map_err(FitError::into_quantity)?;
@@ -195,8 +215,8 @@ fn terms(before: &Features, d1: f64) -> [f64; 3] {
     [1.0, d1, before.r * d1]
 }
 
-/// By how much noise, and what the terms leave out, show in x. Without r d1 they leave out how near the ball is; with it, how far it is from
-/// the waist's axis, which says how far a turn carries it.
+/// By how much noise, and what the terms leave out, show in x. Without r d1 they leave out how near
+/// the ball is; with it, how far it is from the waist's axis, which says how far a turn carries it.
 fn shares(before: &Features, d1: f64, with_radius: bool) -> Shares {
     let [_, turned, near] = terms(before, d1);
     let left_out = if with_radius {
@@ -233,14 +253,18 @@ fn rows(samples: &[CentreSample], needed: usize) -> Result<Rows, FitError> {
                 return Err(not_finite(quantity, value));
             }
         }
-        rows.push(&terms(&s.before, s.d1)[..needed], &[s.after.x - s.before.x], 1.0)
-            .map_err(|(entry, value)| {
-                let quantity = match entry {
-                    Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
-                    Entry::Target(_) => "the change of x",
-                };
-                not_finite(quantity, value)
-            })?;
+        rows.push(
+            &terms(&s.before, s.d1)[..needed],
+            &[s.after.x - s.before.x],
+            1.0,
+        )
+        .map_err(|(entry, value)| {
+            let quantity = match entry {
+                Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
+                Entry::Target(_) => "the change of x",
+            };
+            not_finite(quantity, value)
+        })?;
     }
     Ok(rows)
 }
@@ -272,7 +296,8 @@ impl CentreModel {
     /// The model that was stored as text.
     ///
     /// # Errors
-    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged one.
+    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged
+    /// one.
     pub fn from_text(text: &str) -> Result<Self, StoredModelError> {
         let mut stored = Reader::new(Self::KIND, text)?;
         let with_radius: bool = stored.one("with-radius")?;

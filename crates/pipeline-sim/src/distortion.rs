@@ -4,9 +4,9 @@ use nalgebra::{Matrix2, Point2};
 
 /// Lens distortion after Brown and Conrady, in coordinates on the plane at unit depth.
 ///
-/// A point (x, y) at squared distance s from the axis moves to
-/// x (1 + `k1` s + `k2` s² + `k3` s³) + 2 `p1` x y + `p2` (s + 2 x²), and likewise in y with `p1`, `p2` exchanged: the
-/// convention of OpenCV's five coefficients. All zero is the ideal pinhole.
+/// A point (x, y) at squared distance s from the axis moves to x (1 + `k1` s + `k2` s² + `k3` s³) +
+/// 2 `p1` x y + `p2` (s + 2 x²), and likewise in y with `p1`, `p2` exchanged: the convention of
+/// OpenCV's five coefficients. All zero is the ideal pinhole.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Distortion {
@@ -39,10 +39,11 @@ impl Distortion {
         )
     }
 
-    /// The inverse of [`Distortion::distort`]: what a pinhole would show where the lens shows `p`, to about 1e-13 of its size.
+    /// The inverse of [`Distortion::distort`]: what a pinhole would show where the lens shows `p`,
+    /// to about 1e-13 of its size.
     ///
-    /// By Newton's method; where that hesitates, followed outward from the axis, so that of several answers it is the one
-    /// before the lens folds. `None` if there is none, or `p` is not finite.
+    /// By Newton's method; where that hesitates, followed outward from the axis, so that of several
+    /// answers it is the one before the lens folds. `None` if there is none, or `p` is not finite.
     pub fn undistort(&self, p: Point2<f64>) -> Option<Point2<f64>> {
         if self.is_none() {
             return Some(p);
@@ -65,8 +66,8 @@ impl Distortion {
             .or_else(|| self.undistort(p))
     }
 
-    /// Newton's method from `start`. It must come nearer with every step; where it does not, the step is halved if `patient`, else that is
-    /// the end of it.
+    /// Newton's method from `start`. It must come nearer with every step; where it does not, the
+    /// step is halved if `patient`, else that is the end of it.
     fn newton(&self, p: Point2<f64>, start: Point2<f64>, patient: bool) -> Option<Point2<f64>> {
         let (mut q, mut error) = (start, self.distort(start) - p);
         let enough = 1e-14 * (1.0 + p.coords.norm());
@@ -96,10 +97,12 @@ impl Distortion {
         sound.then_some(q)
     }
 
-    /// Whether the lens has not folded the image over on the way from the axis to `p`: only such directions are shown.
+    /// Whether the lens has not folded the image over on the way from the axis to `p`: only such
+    /// directions are shown.
     pub(crate) fn shows(&self, p: Point2<f64>) -> bool {
         let s = p.coords.norm_squared();
-        // How fast the radial part grows with the distance from the axis: never slower than at either end or where this itself turns.
+        // How fast the radial part grows with the distance from the axis: never slower than at
+        // either end or where this itself turns.
         let growth = |s: f64| 1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3));
         let last = growth(s);
         if last.is_nan() || last <= 0.0 {
@@ -116,7 +119,11 @@ impl Distortion {
             return slowest > 0.0;
         }
         const STEPS: i32 = 128;
-        (1..=STEPS).all(|k| self.jacobian(p * (f64::from(k) / f64::from(STEPS))).determinant() > 0.0)
+        (1..=STEPS).all(|k| {
+            self.jacobian(p * (f64::from(k) / f64::from(STEPS)))
+                .determinant()
+                > 0.0
+        })
     }
 
     /// Derivatives of [`Distortion::distort`].

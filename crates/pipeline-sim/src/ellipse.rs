@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use hough_heuristic::Circle;
 use nalgebra::Point2;
 
-/// An ellipse in the image, pixels ((0, 0) is the centre of the top-left pixel, x to the right, y downward).
+/// An ellipse in the image, pixels ((0, 0) is the centre of the top-left pixel, x to the right, y
+/// downward).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ellipse {
@@ -51,9 +52,9 @@ impl Ellipse {
         )
     }
 
-    /// The share of the outline, 0..=1, that lies inside a frame of `width` x `height` pixels, whose border runs half a pixel
-    /// outside the outer pixel centres; measured in the eccentric angle, which for the nearly round outlines of balls is as good as the
-    /// length.
+    /// The share of the outline, 0..=1, that lies inside a frame of `width` x `height` pixels,
+    /// whose border runs half a pixel outside the outer pixel centres; measured in the eccentric
+    /// angle, which for the nearly round outlines of balls is as good as the length.
     pub fn share_inside(&self, width: u32, height: u32) -> f64 {
         let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
         let (w, h) = self.half_extent();
@@ -64,7 +65,8 @@ impl Ellipse {
         if x + w < -0.5 || x - w > right || y + h < -0.5 || y - h > bottom {
             return 0.0;
         }
-        // With t the eccentric angle, x runs as w cos(t - s) about its middle and y as h cos(t - u): each border cuts off one arc of t.
+        // With t the eccentric angle, x runs as w cos(t - s) about its middle and y as h cos(t -
+        // u): each border cuts off one arc of t.
         let (sin, cos) = self.angle.sin_cos();
         let (s, u) = (
             (-self.minor * sin).atan2(self.major * cos),
@@ -85,7 +87,8 @@ impl Ellipse {
             (u + PI, beyond(y + 0.5, h)),
         ];
         let mut outside: f64 = arcs.iter().map(|arc| 2.0 * arc.1).sum();
-        // Only neighbouring borders have points of the outline in common: those beyond a corner of the frame.
+        // Only neighbouring borders have points of the outline in common: those beyond a corner of
+        // the frame.
         for i in 0..4 {
             let (a, b) = (arcs[i], arcs[(i + 1) % 4]);
             if a.1 > 0.0 && b.1 > 0.0 {
@@ -99,14 +102,15 @@ impl Ellipse {
         (1.0 - outside / TAU).clamp(0.0, 1.0)
     }
 
-    /// The ellipse with the area and second moments of a closed outline, given as a function of an angle 0..2 pi. `None` if a point of
-    /// it has no place in the image.
+    /// The ellipse with the area and second moments of a closed outline, given as a function of an
+    /// angle 0..2 pi. `None` if a point of it has no place in the image.
     pub(crate) fn of_outline(point: impl Fn(f64) -> Option<Point2<f64>>) -> Option<Self> {
         let mut points = [Point2::origin(); OUTLINE];
         for (i, place) in points.iter_mut().enumerate() {
             *place = point(i as f64 * TAU / OUTLINE as f64)?;
         }
-        // Moments about the first point, by Green's theorem over the polygon, then about the centroid.
+        // Moments about the first point, by Green's theorem over the polygon, then about the
+        // centroid.
         let origin = points[0];
         let (mut area, mut mx, mut my, mut mxx, mut mxy, mut myy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for i in 0..OUTLINE {
@@ -120,9 +124,14 @@ impl Ellipse {
             mxy += cross * (p.x * (2.0 * p.y + q.y) + q.x * (p.y + 2.0 * q.y)) / 24.0;
         }
         let (cx, cy) = (mx / area, my / area);
-        let (xx, xy, yy) = (mxx / area - cx * cx, mxy / area - cx * cy, myy / area - cy * cy);
+        let (xx, xy, yy) = (
+            mxx / area - cx * cx,
+            mxy / area - cx * cy,
+            myy / area - cy * cy,
+        );
         let (mean, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
-        // A regular polygon has a little less spread than its circle; this makes an ellipse come out exactly.
+        // A regular polygon has a little less spread than its circle; this makes an ellipse come
+        // out exactly.
         let polygon = 3.0 / (2.0 + (TAU / OUTLINE as f64).cos());
         Some(Self {
             centre: Point2::new(origin.x + cx, origin.y + cy),
@@ -141,7 +150,8 @@ mod tests {
     fn counted(e: &Ellipse, width: u32, height: u32) -> f64 {
         let n = 20_000;
         let inside = |p: Point2<f64>| {
-            (-0.5..=f64::from(width) - 0.5).contains(&p.x) && (-0.5..=f64::from(height) - 0.5).contains(&p.y)
+            (-0.5..=f64::from(width) - 0.5).contains(&p.x)
+                && (-0.5..=f64::from(height) - 0.5).contains(&p.y)
         };
         (0..n)
             .filter(|i| inside(e.point(f64::from(*i) * TAU / f64::from(n))))
@@ -161,7 +171,10 @@ mod tests {
                 angle: TAU * f(13),
             };
             let (share, count) = (e.share_inside(100, 70), counted(&e, 100, 70));
-            assert!((share - count).abs() < 1e-3, "{e:?}: {share} against {count}");
+            assert!(
+                (share - count).abs() < 1e-3,
+                "{e:?}: {share} against {count}"
+            );
         }
     }
 }

@@ -30,7 +30,8 @@ pub enum CameraError {
         /// Height asked for, pixels.
         height: u32,
     },
-    /// The distortion folds the image over within the frame: two directions would meet in one pixel.
+    /// The distortion folds the image over within the frame: two directions would meet in one
+    /// pixel.
     #[error(
         "the lens distortion folds the image over {radius_px:.0} px from the principal point, inside the frame"
     )]
@@ -38,7 +39,8 @@ pub enum CameraError {
         /// Distance from the principal point at which the image turns back, pixels.
         radius_px: f64,
     },
-    /// The lens shows nothing at this pixel: it lies outside the frame, beyond where the distortion folds the image over.
+    /// The lens shows nothing at this pixel: it lies outside the frame, beyond where the distortion
+    /// folds the image over.
     #[error("no ray leads to the pixel ({x:.1}, {y:.1}): the lens shows nothing there")]
     NoRay {
         /// Column asked for, pixels.
@@ -62,7 +64,9 @@ pub enum ProjectionError {
     #[error("the centre of the ball is not finite")]
     CentreNotFinite,
     /// The camera's centre of projection lies inside the sphere.
-    #[error("the camera is inside the ball: its centre is {distance:.4} m away, its radius is {radius:.4} m")]
+    #[error(
+        "the camera is inside the ball: its centre is {distance:.4} m away, its radius is {radius:.4} m"
+    )]
     Inside {
         /// Distance of the centre, metres.
         distance: f64,
@@ -70,14 +74,17 @@ pub enum ProjectionError {
         radius: f64,
     },
     /// The sphere lies behind the camera, or reaches behind it, so that its outline is no ellipse.
-    #[error("the ball is behind the camera or reaches behind it: depth {depth:.4} m, radius {radius:.4} m")]
+    #[error(
+        "the ball is behind the camera or reaches behind it: depth {depth:.4} m, radius {radius:.4} m"
+    )]
     Behind {
         /// Depth of the centre along the optical axis, metres.
         depth: f64,
         /// Radius, metres.
         radius: f64,
     },
-    /// The sphere lies so far off the optical axis, wholly or in part, that the lens would have folded the image over before: it is not shown.
+    /// The sphere lies so far off the optical axis, wholly or in part, that the lens would have
+    /// folded the image over before: it is not shown.
     #[error(
         "the ball is beyond what the lens shows: its centre is {:.1} degrees off the optical axis, and the distortion folds the image over nearer to it",
         angle.to_degrees()
@@ -299,10 +306,17 @@ pub(crate) fn at_most(quantity: &str, value: f64, greatest: f64) -> Result<(), Q
 }
 
 /// Refuses a range that is not finite and ascending.
-pub(crate) fn ascending(quantity: &'static str, (low, high): (f64, f64)) -> Result<(), QuantityError> {
+pub(crate) fn ascending(
+    quantity: &'static str,
+    (low, high): (f64, f64),
+) -> Result<(), QuantityError> {
     if low.is_finite() && high.is_finite() && low <= high {
         Ok(())
     } else {
-        Err(QuantityError::Range { quantity, low, high })
+        Err(QuantityError::Range {
+            quantity,
+            low,
+            high,
+        })
     }
 }

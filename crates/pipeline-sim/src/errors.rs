@@ -36,7 +36,8 @@ pub struct Errors {
 
 impl Errors {
     /// Angles of one count of the PUMA 560's encoders, degrees.
-    pub const PUMA_ENCODER_DEGREES: [f64; 6] = [0.00575, 0.00417, 0.00670, 0.00474, 0.00501, 0.00939];
+    pub const PUMA_ENCODER_DEGREES: [f64; 6] =
+        [0.00575, 0.00417, 0.00670, 0.00474, 0.00501, 0.00939];
 
     /// A cell as it is believed to be.
     pub fn none() -> Self {
@@ -54,11 +55,13 @@ impl Errors {
         }
     }
 
-    /// The true cell where `nominal` is the believed one. Backlash, encoder steps and noise belong to the arm and the observation
-    /// ([`crate::SimulatedArm::with_errors`], [`crate::FeatureCamera`]).
+    /// The true cell where `nominal` is the believed one. Backlash, encoder steps and noise belong
+    /// to the arm and the observation ([`crate::SimulatedArm::with_errors`],
+    /// [`crate::FeatureCamera`]).
     ///
     /// # Errors
-    /// [`CameraError`] names the factor that is not above zero, or the angle or shift that is not finite.
+    /// [`CameraError`] names the factor that is not above zero, or the angle or shift that is not
+    /// finite.
     pub fn apply(&self, nominal: &Cell) -> Result<Cell, CameraError> {
         let [x, y, z] = self.camera_shift;
         for (quantity, value) in [
@@ -88,9 +91,18 @@ impl Errors {
             .camera
             .with_focal_factor(self.focal_factor)?
             .with_principal_point(principal)?;
-        cell.mount = Mount::displaced(&nominal.mount, self.camera_shift, self.roll, self.pitch, self.yaw);
+        cell.mount = Mount::displaced(
+            &nominal.mount,
+            self.camera_shift,
+            self.roll,
+            self.pitch,
+            self.yaw,
+        );
         cell.ball.radius = radius;
-        if nominal.holder.is_some_and(|holder| holder.carries(&nominal.ball)) {
+        if nominal
+            .holder
+            .is_some_and(|holder| holder.carries(&nominal.ball))
+        {
             cell.holder = Some(Holder::under(&cell.ball));
         }
         Ok(cell)
@@ -141,7 +153,8 @@ impl Default for Errors {
 /// | heavy | 25 % | 8 deg | 0.6 deg | 1 unit | 10 % | 20 mm each axis | 5 units |
 /// | extreme | 40 % | 15 deg | 1 deg | 1.5 units | 20 % | 20 mm each axis | 5 units |
 ///
-/// Each quantity is off by the full amount, with a sign drawn at random. All levels but `none` have the encoder steps of a PUMA 560.
+/// Each quantity is off by the full amount, with a sign drawn at random. All levels but `none` have
+/// the encoder steps of a PUMA 560.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ErrorLevel {
@@ -252,7 +265,8 @@ impl Drive {
         self.links
     }
 
-    /// Turns the motors to the counts nearest to `target`; the links follow as soon as the play is used up.
+    /// Turns the motors to the counts nearest to `target`; the links follow as soon as the play is
+    /// used up.
     pub(crate) fn send(&mut self, target: Joints) {
         let half = 0.5 * self.backlash;
         for i in 0..6 {

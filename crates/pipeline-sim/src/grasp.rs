@@ -39,10 +39,12 @@ pub enum Contact {
 impl Cell {
     /// Closes the jaws with the arm at `joints`.
     ///
-    /// The jaws open along the hand's y axis. Held: the ball's middle lies between the jaws and within [`crate::Hand::pad_tolerance`] of the
-    /// pads' middle across them; the jaws then pull it to the middle. Pushed: it lies between the jaws but farther out than that, so
-    /// that the pads slide off and press it away along the table until they miss it. Missed: otherwise, and always for a ball that is wider than the
-    /// jaws open and for jaws that were closed before; the ball stays.
+    /// The jaws open along the hand's y axis. Held: the ball's middle lies between the jaws and
+    /// within [`crate::Hand::pad_tolerance`] of the pads' middle across them; the jaws then pull it
+    /// to the middle. Pushed: it lies between the jaws but farther out than that, so that the pads
+    /// slide off and press it away along the table until they miss it. Missed: otherwise, and
+    /// always for a ball that is wider than the jaws open and for jaws that were closed before; the
+    /// ball stays.
     pub fn close_gripper(&mut self, joints: &Joints) -> Grasp {
         if self.held.is_some() {
             self.jaws = Gripper::Closed;
@@ -74,7 +76,8 @@ impl Cell {
         Grasp::Pushed { by }
     }
 
-    /// Opens the jaws. A ball that they held falls straight down, onto its holder if that is below, else onto the table, beside the holder if need be.
+    /// Opens the jaws. A ball that they held falls straight down, onto its holder if that is below,
+    /// else onto the table, beside the holder if need be.
     pub fn open_gripper(&mut self) {
         self.jaws = Gripper::Open;
         if self.held.take().is_none() {
@@ -83,7 +86,9 @@ impl Cell {
         let ball = &mut self.ball;
         match self.holder {
             Some(h) if (ball.centre.xy() - h.foot).norm() <= h.radius => {
-                let sunk = (ball.radius * ball.radius - h.radius * h.radius).max(0.0).sqrt();
+                let sunk = (ball.radius * ball.radius - h.radius * h.radius)
+                    .max(0.0)
+                    .sqrt();
                 ball.centre = Point3::new(h.foot.x, h.foot.y, h.top + sunk);
             }
             holder => {
@@ -99,10 +104,11 @@ impl Cell {
         }
     }
 
-    /// Lets the ball follow the hand, now at `joints`: a held ball comes along; one that finger, palm or camera overlap is pushed aside,
-    /// holder and all, until they only touch.
+    /// Lets the ball follow the hand, now at `joints`: a held ball comes along; one that finger,
+    /// palm or camera overlap is pushed aside, holder and all, until they only touch.
     ///
-    /// Call it after every move (and along the way for long moves, which [`Cell::sweep`] does); [`crate::SimulatedArm`] does.
+    /// Call it after every move (and along the way for long moves, which [`Cell::sweep`] does);
+    /// [`crate::SimulatedArm`] does.
     pub fn follow(&mut self, joints: &Joints) -> Contact {
         if let Some(place) = self.held {
             self.ball.centre = self.params.wrist(joints) * place;
@@ -130,7 +136,9 @@ impl Cell {
                 .try_normalize(1e-9)
                 .unwrap_or_else(Vector3::x);
             // Sideways along the table, far enough to clear a gap that opens obliquely.
-            let slant = aside.dot(&away.try_normalize(1e-9).unwrap_or(aside)).max(0.25);
+            let slant = aside
+                .dot(&away.try_normalize(1e-9).unwrap_or(aside))
+                .max(0.25);
             self.slide_ball(aside * (-gap / slant));
         }
         let by = (self.ball.centre - start).norm();
@@ -141,36 +149,48 @@ impl Cell {
         }
     }
 
-    /// As [`Cell::follow`], for a hand that goes from one pose to another with all joints in step: the ball follows along the way, at most
-    /// 0.02 rad of a joint at a time.
+    /// As [`Cell::follow`], for a hand that goes from one pose to another with all joints in step:
+    /// the ball follows along the way, at most 0.02 rad of a joint at a time.
     pub fn sweep(&mut self, from: &Joints, to: &Joints) -> Contact {
         /// Greatest joint step between two looks for contact on the way, radians.
         const STEP: f64 = 0.02;
         if self.held.is_some() {
             return self.follow(to);
         }
-        // Too far away to meet: no point of the wrist's way is farther from the nearer of its ends than half the way is long, and no part of
-        // the hand farther from the wrist than it reaches.
+        // Too far away to meet: no point of the wrist's way is farther from the nearer of its ends
+        // than half the way is long, and no part of the hand farther from the wrist than it
+        // reaches.
         let wrist_at = |joints: &Joints| self.params.wrist(joints).translation.vector;
         let (start, end) = (wrist_at(from), wrist_at(to));
         let bodies = self.hand_bodies(from);
         let hand = bodies
             .iter()
-            .map(|b| (b.from.coords - start).norm().max((b.to.coords - start).norm()) + b.radius)
+            .map(|b| {
+                (b.from.coords - start)
+                    .norm()
+                    .max((b.to.coords - start).norm())
+                    + b.radius
+            })
             .fold(0.0, f64::max);
         let PumaParams { a2, a3, d2, d4, .. } = self.params;
         let arm = a2.abs() + d2.abs() + a3.hypot(d4);
-        let turned = (0..6).map(|i| (to.0[i] - from.0[i]).abs()).fold(0.0, f64::max);
+        let turned = (0..6)
+            .map(|i| (to.0[i] - from.0[i]).abs())
+            .fold(0.0, f64::max);
         let way: f64 = (0..3).map(|i| (to.0[i] - from.0[i]).abs()).sum();
         let ball = self.ball.centre.coords;
-        if (ball - start).norm().min((ball - end).norm()) > hand + self.ball.radius + 0.5 * arm * way {
+        if (ball - start).norm().min((ball - end).norm())
+            > hand + self.ball.radius + 0.5 * arm * way
+        {
             return Contact::Free;
         }
         let steps = (turned / STEP).ceil().clamp(1.0, 1000.0) as usize;
         let (before, mut pushed) = (self.ball.centre, false);
         for i in 1..=steps {
             let t = i as f64 / steps as f64;
-            let pose = Joints(std::array::from_fn(|j| from.0[j] + t * (to.0[j] - from.0[j])));
+            let pose = Joints(std::array::from_fn(|j| {
+                from.0[j] + t * (to.0[j] - from.0[j])
+            }));
             pushed |= matches!(self.follow(&pose), Contact::Pushed { .. });
         }
         if pushed {
@@ -191,8 +211,9 @@ impl Cell {
         }
     }
 
-    /// Pushes the ball along the camera's line of sight until it shows with radius `r` units: nearer for a greater r. The holder comes
-    /// along. Returns whether such a place exists above the table.
+    /// Pushes the ball along the camera's line of sight until it shows with radius `r` units:
+    /// nearer for a greater r. The holder comes along. Returns whether such a place exists above
+    /// the table.
     pub fn push_to_radius(&mut self, joints: &Joints, r: f64) -> bool {
         let Some(outline) = self.outline(joints) else {
             return false;
@@ -208,11 +229,16 @@ impl Cell {
     }
 }
 
-/// The horizontal direction, and how far along it, a ball must go to be `reach` away from the pads' middle; `across` is how it lies to it now
-/// in the hand's frame, without the part along the jaws.
-fn way_out(wrist: &Isometry3<f64>, across: &Vector3<f64>, reach: f64) -> Option<(Vector3<f64>, f64)> {
+/// The horizontal direction, and how far along it, a ball must go to be `reach` away from the pads'
+/// middle; `across` is how it lies to it now in the hand's frame, without the part along the jaws.
+fn way_out(
+    wrist: &Isometry3<f64>,
+    across: &Vector3<f64>,
+    reach: f64,
+) -> Option<(Vector3<f64>, f64)> {
     let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0);
-    // Straight away if that is not straight down or up; else along whichever axis of the hand is the more level.
+    // Straight away if that is not straight down or up; else along whichever axis of the hand is
+    // the more level.
     let axes = [Vector3::x(), Vector3::z()].map(|axis| level(wrist * axis));
     let away = level(wrist * across);
     let aside = if away.norm() > 0.1 * across.norm() {

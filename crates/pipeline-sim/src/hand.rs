@@ -43,15 +43,20 @@ impl Capsule {
 
     /// Gap between the surfaces of two capsules, metres; below zero if they overlap.
     pub fn gap_to(&self, other: &Self) -> f64 {
-        // Axes as p(s) = from + s u and q(t) = from' + t v with s, t in 0..1. The squared distance is a convex quadratic: its
-        // minimum is where both lines are nearest to each other, if that is on both segments, else on one of the four ends.
+        // Axes as p(s) = from + s u and q(t) = from' + t v with s, t in 0..1. The squared distance
+        // is a convex quadratic: its minimum is where both lines are nearest to each other, if that
+        // is on both segments, else on one of the four ends.
         let ends = [
             (self.from - other.nearest_axis_point(&self.from)).norm(),
             (self.to - other.nearest_axis_point(&self.to)).norm(),
             (other.from - self.nearest_axis_point(&other.from)).norm(),
             (other.to - self.nearest_axis_point(&other.to)).norm(),
         ];
-        let (u, v, w) = (self.to - self.from, other.to - other.from, self.from - other.from);
+        let (u, v, w) = (
+            self.to - self.from,
+            other.to - other.from,
+            self.from - other.from,
+        );
         let (uu, uv, vv, uw, vw) = (u.dot(&u), u.dot(&v), v.dot(&v), u.dot(&w), v.dot(&w));
         // Zero for parallel axes, where one of the ends is as near as any other place.
         let determinant = uu * vv - uv * uv;
@@ -74,7 +79,8 @@ impl Capsule {
     }
 }
 
-/// The hand: a gripper with two parallel jaws that open along the hand's y axis, and the camera beside it.
+/// The hand: a gripper with two parallel jaws that open along the hand's y axis, and the camera
+/// beside it.
 ///
 /// Lengths in metres, in the hand frame (origin at the wrist centre, z along the tool axis).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,8 +125,8 @@ impl Hand {
         }
     }
 
-    /// The two fingers in the hand frame, jaws `half_opening` metres off the tool axis; `flange` is the distance from the wrist
-    /// centre to the flange.
+    /// The two fingers in the hand frame, jaws `half_opening` metres off the tool axis; `flange` is
+    /// the distance from the wrist centre to the flange.
     pub fn fingers(&self, flange: f64, half_opening: f64) -> [Capsule; 2] {
         let tip = flange + self.tool + self.beyond_tool;
         [half_opening, -half_opening].map(|y| Capsule {
@@ -162,7 +168,8 @@ mod tests {
     use rand::rngs::Xoshiro256PlusPlus;
     use rand::{RngExt, SeedableRng};
 
-    /// The gap by trying places on both axes, finer and finer about the best: the distance is convex.
+    /// The gap by trying places on both axes, finer and finer about the best: the distance is
+    /// convex.
     fn tried(a: &Capsule, b: &Capsule) -> f64 {
         let at = |c: &Capsule, t: f64| c.from + (c.to - c.from) * t;
         let ((mut s, mut t), mut width) = ((0.5, 0.5), 0.5);
@@ -209,7 +216,10 @@ mod tests {
                 radius: 0.008,
             };
             let (gap, expected) = (a.gap_to(&b), tried(&a, &b));
-            assert!((gap - expected).abs() < 1e-6, "{a:?} {b:?}: {gap} {expected}");
+            assert!(
+                (gap - expected).abs() < 1e-6,
+                "{a:?} {b:?}: {gap} {expected}"
+            );
             assert!((gap - b.gap_to(&a)).abs() < 1e-12);
         }
     }

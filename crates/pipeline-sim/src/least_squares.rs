@@ -19,7 +19,8 @@ pub enum FitError {
         /// Least number.
         needed: usize,
     },
-    /// The samples do not tell all coefficients apart: moves all along one line, one elbow angle only, ...
+    /// The samples do not tell all coefficients apart: moves all along one line, one elbow angle
+    /// only, ...
     #[error(
         "{place}: the samples determine only {rank} of {terms} coefficients; vary the moves and the poses more"
     )]
@@ -87,7 +88,8 @@ pub(crate) struct Fit {
     pub(crate) coefficients: Vec<Vec<f64>>,
     /// Residual standard deviation of each target, with the degrees of freedom that are left.
     pub(crate) residual: Vec<f64>,
-    /// Ratio of the greatest to the least singular value of the design matrix, columns scaled to unit length.
+    /// Ratio of the greatest to the least singular value of the design matrix, columns scaled to
+    /// unit length.
     pub(crate) condition: f64,
     /// (X'X)^-1, row after row.
     pub(crate) inverse_gram: Vec<f64>,
@@ -101,13 +103,17 @@ impl Fit {
         self.coefficients.first().map_or(0, Vec::len)
     }
 
-    /// Whether this is a fit of `targets` targets over `terms` terms, all numbers in their ranges: a stored one may be anything.
+    /// Whether this is a fit of `targets` targets over `terms` terms, all numbers in their ranges:
+    /// a stored one may be anything.
     pub(crate) fn fits(&self, targets: usize, terms: usize) -> bool {
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         self.coefficients.len() == targets
             && self.residual.len() == targets
             && self.inverse_gram.len() == terms * terms
-            && self.coefficients.iter().all(|c| c.len() == terms && finite(c))
+            && self
+                .coefficients
+                .iter()
+                .all(|c| c.len() == terms && finite(c))
             && finite(&self.residual)
             && self.residual.iter().all(|sd| *sd >= 0.0)
             && finite(&self.inverse_gram)
@@ -117,16 +123,19 @@ impl Fit {
             && self.samples > 0
     }
 
-    /// Whether the inverse Gram matrix is symmetric, but for rounding, with nothing below zero on its diagonal.
+    /// Whether the inverse Gram matrix is symmetric, but for rounding, with nothing below zero on
+    /// its diagonal.
     fn gram_is_symmetric(&self, terms: usize) -> bool {
         let of = |i: usize, j: usize| self.inverse_gram[i * terms + j];
         let length = |i: usize| of(i, i).sqrt();
         (0..terms).all(|i| {
-            of(i, i) >= 0.0 && (0..i).all(|j| (of(i, j) - of(j, i)).abs() <= 1e-6 * length(i) * length(j))
+            of(i, i) >= 0.0
+                && (0..i).all(|j| (of(i, j) - of(j, i)).abs() <= 1e-6 * length(i) * length(j))
         })
     }
 
-    /// Adds to the residual variances of a refit those of its prior; `freedom` is what the refit has left.
+    /// Adds to the residual variances of a refit those of its prior; `freedom` is what the refit
+    /// has left.
     pub(crate) fn pool<'a>(
         &mut self,
         prior: &Self,
@@ -141,24 +150,33 @@ impl Fit {
 
     /// The value of target `i` for these terms.
     pub(crate) fn value(&self, i: usize, terms: &[f64]) -> f64 {
-        self.coefficients[i].iter().zip(terms).map(|(c, t)| c * t).sum()
+        self.coefficients[i]
+            .iter()
+            .zip(terms)
+            .map(|(c, t)| c * t)
+            .sum()
     }
 
-    /// x' (X'X)^-1 x: how far these terms lie from those the fit has seen; the variance of a prediction is the residual
-    /// variance times one plus this.
+    /// x' (X'X)^-1 x: how far these terms lie from those the fit has seen; the variance of a
+    /// prediction is the residual variance times one plus this.
     pub(crate) fn leverage(&self, terms: &[f64]) -> f64 {
         let n = terms.len();
         let rows = self.inverse_gram.chunks_exact(n.max(1));
-        let sum: f64 = terms.iter().zip(rows).map(|(t, row)| t * dot(row, terms)).sum();
+        let sum: f64 = terms
+            .iter()
+            .zip(rows)
+            .map(|(t, row)| t * dot(row, terms))
+            .sum();
         sum.max(0.0)
     }
 }
 
 /// How a refit's coefficients are held toward those of its prior.
 ///
-/// A ridge of k on the mean of the squared errors weighs n k against n samples, and is right where the prior's coefficients are off by one residual
-/// variance over n k each. How far another plant's coefficients are off does not depend on how many samples one has of it: what is expected
-/// is one over k, as for a single sample.
+/// A ridge of k on the mean of the squared errors weighs n k against n samples, and is right where
+/// the prior's coefficients are off by one residual variance over n k each. How far another plant's
+/// coefficients are off does not depend on how many samples one has of it: what is expected is one
+/// over k, as for a single sample.
 pub(crate) struct Hold {
     strength: f64,
     scales: Vec<f64>,
@@ -180,15 +198,17 @@ impl Hold {
         (self.strength * self.scales.get(k).copied().unwrap_or(1.0)).powi(2)
     }
 
-    /// How much farther the prior's coefficients are off, in variance, than holding them so strongly supposes.
+    /// How much farther the prior's coefficients are off, in variance, than holding them so
+    /// strongly supposes.
     fn farther(&self) -> f64 {
         self.samples.saturating_sub(1) as f64
     }
 }
 
 impl Fit {
-    /// What a sample of these terms and this weight leaves to the others (1 less its leverage), and how uncertain they are of it: their
-    /// leverage of it. `None` for a sample that alone decides a coefficient: nothing is left to predict it by.
+    /// What a sample of these terms and this weight leaves to the others (1 less its leverage), and
+    /// how uncertain they are of it: their leverage of it. `None` for a sample that alone decides a
+    /// coefficient: nothing is left to predict it by.
     pub(crate) fn without(&self, terms: &[f64], weight: f64, hold: &Hold) -> Option<(f64, f64)> {
         let leverage = self.leverage(terms);
         let left = 1.0 - weight * leverage;
@@ -201,7 +221,8 @@ impl Fit {
         (left > 1e-9).then_some((left, of_others))
     }
 
-    /// Makes the leverages of a refit say how far its coefficients are off, whose prior is off by as much as `hold` says.
+    /// Makes the leverages of a refit say how far its coefficients are off, whose prior is off by
+    /// as much as `hold` says.
     pub(crate) fn hold(&mut self, hold: &Hold) {
         let n = self.terms();
         let gram = self.inverse_gram.clone();
@@ -237,17 +258,29 @@ pub(crate) enum Entry {
     Target(usize),
 }
 
-/// Greatest number in a row: squares of it can be summed. Columns shorter than its reciprocal count as zero.
+/// Greatest number in a row: squares of it can be summed. Columns shorter than its reciprocal count
+/// as zero.
 const GREATEST: f64 = 1e120;
 
 impl Rows {
-    /// One more observation; `weight` multiplies the row (the square root of its statistical weight).
+    /// One more observation; `weight` multiplies the row (the square root of its statistical
+    /// weight).
     ///
     /// # Errors
-    /// The first number that is not finite, or is too large to be squared; nothing has been added then.
-    pub(crate) fn push(&mut self, terms: &[f64], targets: &[f64], weight: f64) -> Result<(), (Entry, f64)> {
-        let entries = (terms.iter().enumerate().map(|(i, t)| (Entry::Term(i), t)))
-            .chain(targets.iter().enumerate().map(|(i, t)| (Entry::Target(i), t)));
+    /// The first number that is not finite, or is too large to be squared; nothing has been added
+    /// then.
+    pub(crate) fn push(
+        &mut self,
+        terms: &[f64],
+        targets: &[f64],
+        weight: f64,
+    ) -> Result<(), (Entry, f64)> {
+        let entries = (terms.iter().enumerate().map(|(i, t)| (Entry::Term(i), t))).chain(
+            targets
+                .iter()
+                .enumerate()
+                .map(|(i, t)| (Entry::Target(i), t)),
+        );
         for (entry, value) in entries {
             let usable = |v: f64| v.abs() <= GREATEST;
             if !usable(*value) || !usable(value * weight) {
@@ -267,7 +300,12 @@ impl Rows {
     ///
     /// # Errors
     /// [`FitError::Prior`] if the prior is too strong to be reckoned with.
-    pub(crate) fn pull(&mut self, prior: &Fit, scales: &[f64], strength: f64) -> Result<(), FitError> {
+    pub(crate) fn pull(
+        &mut self,
+        prior: &Fit,
+        scales: &[f64],
+        strength: f64,
+    ) -> Result<(), FitError> {
         let mut unit = vec![0.0; prior.terms()];
         for k in 0..unit.len() {
             let scale = scales.get(k).copied().unwrap_or(1.0);
@@ -282,7 +320,8 @@ impl Rows {
         Ok(())
     }
 
-    /// Solves by QR of the column-scaled design matrix and a singular value decomposition of its triangle.
+    /// Solves by QR of the column-scaled design matrix and a singular value decomposition of its
+    /// triangle.
     ///
     /// The first `observations` rows are real ones; a prior adds rows that are not.
     pub(crate) fn solve(&self, place: &str, observations: usize) -> Result<Fit, FitError> {
@@ -327,7 +366,8 @@ impl Rows {
         // R^-1 of the scaled system, from its singular vectors.
         let inverse = v_t.transpose() * DMatrix::from_diagonal(&inverse_singular) * u.transpose();
         let gram = &inverse * inverse.transpose();
-        // What the coefficients take from the real rows: their number, or less where a prior holds them.
+        // What the coefficients take from the real rows: their number, or less where a prior holds
+        // them.
         let real = design.rows(0, observations.min(self.count));
         let taken = (real * &gram).component_mul(&real).sum();
         let freedom = (observations as f64 - taken).max(1.0);
@@ -352,7 +392,8 @@ impl Rows {
     }
 }
 
-/// What the rows of a prior are multiplied with, so that `ridge` counts against the mean over `count` samples.
+/// What the rows of a prior are multiplied with, so that `ridge` counts against the mean over
+/// `count` samples.
 ///
 /// # Errors
 /// [`FitError::Prior`] for a ridge that is not a number from 0 to 1e100.
@@ -370,16 +411,16 @@ pub(crate) fn ridge_strength(ridge: f64, count: usize) -> Result<f64, FitError> 
 pub struct Quality {
     /// The output: `dx`, `dy` or `dr`, feature units.
     pub output: String,
-    /// Coefficient of determination: the share of the output's variance that the model explains, at most 1; 0 where the output does not
-    /// vary.
+    /// Coefficient of determination: the share of the output's variance that the model explains, at
+    /// most 1; 0 where the output does not vary.
     pub r2: f64,
     /// Root of the mean squared error, feature units.
     pub rmse: f64,
     /// Number of samples.
     #[cfg_attr(feature = "serde", serde(default))]
     pub samples: usize,
-    /// How many of them the model has no prediction for (it places the ball behind the camera). They count with all of their change
-    /// as error.
+    /// How many of them the model has no prediction for (it places the ball behind the camera).
+    /// They count with all of their change as error.
     #[cfg_attr(feature = "serde", serde(default))]
     pub unpredicted: usize,
 }
@@ -396,11 +437,13 @@ impl Quality {
         Ok(())
     }
 
-    /// Whether these are judgements of `outputs`, in that order, with all numbers in their ranges: stored ones may be anything.
+    /// Whether these are judgements of `outputs`, in that order, with all numbers in their ranges:
+    /// stored ones may be anything.
     pub(crate) fn are_sound(all: &[Self], outputs: &[&str]) -> bool {
         all.len() == outputs.len()
             && all.iter().zip(outputs).all(|(q, output)| {
-                let numbers = q.r2.is_finite() && q.r2 <= 1.0 && q.rmse.is_finite() && q.rmse >= 0.0;
+                let numbers =
+                    q.r2.is_finite() && q.r2 <= 1.0 && q.rmse.is_finite() && q.rmse >= 0.0;
                 q.output == *output && numbers && q.samples > 0 && q.unpredicted <= q.samples
             })
     }
@@ -410,11 +453,18 @@ impl Quality {
         let n = pairs.len() as f64;
         let mean = pairs.iter().map(|p| p.0).sum::<f64>() / n;
         let spread: f64 = pairs.iter().map(|p| (p.0 - mean).powi(2)).sum();
-        let error: f64 = pairs.iter().map(|p| (p.0 - p.1.unwrap_or(0.0)).powi(2)).sum();
+        let error: f64 = pairs
+            .iter()
+            .map(|p| (p.0 - p.1.unwrap_or(0.0)).powi(2))
+            .sum();
         Self {
             output: output.to_owned(),
             // Where nothing varies there is nothing to explain.
-            r2: if spread > 0.0 { 1.0 - error / spread } else { 0.0 },
+            r2: if spread > 0.0 {
+                1.0 - error / spread
+            } else {
+                0.0
+            },
             rmse: (error / n).sqrt(),
             samples: pairs.len(),
             unpredicted: pairs.iter().filter(|p| p.1.is_none()).count(),

@@ -2,18 +2,21 @@
 //!
 //! # How the parts meet
 //!
-//! A [`Cell`] is pure geometry: from the joint angles it tells what the camera would see ([`Cell::features`]), where the fingers are
-//! ([`Cell::grip_miss`]) and whether they are about to touch something ([`Cell::proximity`]). A [`Renderer`] draws the frame that belongs to
-//! it. [`CellCamera`] and [`SimulatedArm`] put a [`SharedCell`] behind the doors of `hough-heuristic` and `puma-val2`
-//! ([`FrameSource`](hough_heuristic::FrameSource), [`Manipulator`](puma_val2::Manipulator),
-//! [`ProximitySensor`](puma_val2::ProximitySensor)). [`sample_moves`] draws samples of moves, and [`ReachModel`] and
-//! [`CentreModel`] fit the paper's regression simulator, and better ones, to them.
+//! A [`Cell`] is pure geometry: from the joint angles it tells what the camera would see
+//! ([`Cell::features`]), where the fingers are ([`Cell::grip_miss`]) and whether they are about to
+//! touch something ([`Cell::proximity`]). A [`Renderer`] draws the frame that belongs to it.
+//! [`CellCamera`] and [`SimulatedArm`] put a [`SharedCell`] behind the doors of `hough-heuristic`
+//! and `puma-val2` ([`FrameSource`](hough_heuristic::FrameSource),
+//! [`Manipulator`](puma_val2::Manipulator), [`ProximitySensor`](puma_val2::ProximitySensor)).
+//! [`sample_moves`] draws samples of moves, and [`ReachModel`] and [`CentreModel`] fit the paper's
+//! regression simulator, and better ones, to them.
 //!
 //! # Conventions
 //!
-//! Metres and radians, VAL's world frame (origin at the shoulder, z up); names ending in `degrees`, and the moves `d1`, `d2`, `d3` of
-//! samples and models, are degrees of VAL's joints. Pixels have (0, 0) at the centre of the top-left pixel; *units* are the paper's
-//! 192x144 ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
+//! Metres and radians, VAL's world frame (origin at the shoulder, z up); names ending in `degrees`,
+//! and the moves `d1`, `d2`, `d3` of samples and models, are degrees of VAL's joints. Pixels have
+//! (0, 0) at the centre of the top-left pixel; *units* are the paper's 192x144
+//! ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
 
 mod ball;
 mod benchmark_kind;
@@ -66,8 +69,8 @@ pub use reach_form::ReachForm;
 pub use reach_model::ReachModel;
 pub use render::{Renderer, Round, Shot, Sighting};
 pub use samples::{
-    CentreSample, MOST_SAMPLES, MoveLists, ReachSample, exploring_start, sample_moves, try_sample_moves,
-    with_noise,
+    CentreSample, MOST_SAMPLES, MoveLists, ReachSample, exploring_start, sample_moves,
+    try_sample_moves, with_noise,
 };
 pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
 pub use scene_kind::{SceneKind, Snapshot};

@@ -29,13 +29,14 @@ pub enum BallPath {
         /// Seconds per round; below zero turns clockwise seen from above.
         period: f64,
     },
-    /// At rest from each time on until the next: (seconds, place), ascending in time. Before the first time, at the first place.
+    /// At rest from each time on until the next: (seconds, place), ascending in time. Before the
+    /// first time, at the first place.
     Jumps(Vec<(f64, Point3<f64>)>),
 }
 
 impl BallPath {
-    /// Where the ball is after `seconds`; `None` for jumps to nowhere (an empty list), a circle without a period, and a place that
-    /// is not finite.
+    /// Where the ball is after `seconds`; `None` for jumps to nowhere (an empty list), a circle
+    /// without a period, and a place that is not finite.
     pub fn at(&self, seconds: f64) -> Option<Point3<f64>> {
         let place = match self {
             Self::Drift { from, velocity } => Some(from + velocity * seconds),
@@ -49,7 +50,10 @@ impl BallPath {
                     .then(|| middle + Vector3::new(turn.cos(), turn.sin(), 0.0) * *radius)
             }
             Self::Jumps(places) => {
-                let reached = places.iter().take_while(|(time, _)| *time <= seconds).last();
+                let reached = places
+                    .iter()
+                    .take_while(|(time, _)| *time <= seconds)
+                    .last();
                 reached.or(places.first()).map(|(_, place)| *place)
             }
         };
@@ -63,7 +67,8 @@ impl BallPath {
 pub struct Motion {
     /// Speeds of the joints, `JT1` first, radians per second.
     pub joints: [f64; 6],
-    /// Velocity of the ball, metres per second, and of its holder if it stands on it. A ball in the jaws goes with the hand instead.
+    /// Velocity of the ball, metres per second, and of its holder if it stands on it. A ball in the
+    /// jaws goes with the hand instead.
     pub ball: Vector3<f64>,
 }
 
@@ -86,7 +91,9 @@ impl Motion {
 
     /// Cell and joints `seconds` after (or, below zero, before) they are `cell` and `joints`.
     pub fn moved(&self, cell: &Cell, joints: &Joints, seconds: f64) -> (Cell, Joints) {
-        let then = Joints(std::array::from_fn(|i| joints.0[i] + self.joints[i] * seconds));
+        let then = Joints(std::array::from_fn(|i| {
+            joints.0[i] + self.joints[i] * seconds
+        }));
         let mut moved = *cell;
         if let Some(place) = cell.held {
             moved.ball.centre = cell.params.wrist(&then) * place;
@@ -131,7 +138,8 @@ impl Workspace {
             && within(self.height, place.z)
     }
 
-    /// A place `distance` metres from `from` in a random direction, inside the workspace; `None` if 1000 directions lead out of it.
+    /// A place `distance` metres from `from` in a random direction, inside the workspace; `None` if
+    /// 1000 directions lead out of it.
     pub fn sample_jump<R: Rng + ?Sized>(
         &self,
         from: &Point3<f64>,
@@ -147,9 +155,15 @@ impl Workspace {
     }
 
     /// A drift of `speed` metres per second from `from`, in a random horizontal direction.
-    pub fn sample_drift<R: Rng + ?Sized>(&self, from: &Point3<f64>, speed: f64, rng: &mut R) -> BallPath {
+    pub fn sample_drift<R: Rng + ?Sized>(
+        &self,
+        from: &Point3<f64>,
+        speed: f64,
+        rng: &mut R,
+    ) -> BallPath {
         let heading = rng.random_range(0.0..std::f64::consts::TAU);
-        let velocity = Rotation3::from_axis_angle(&Vector3::z_axis(), heading) * Vector3::x() * speed;
+        let velocity =
+            Rotation3::from_axis_angle(&Vector3::z_axis(), heading) * Vector3::x() * speed;
         BallPath::Drift {
             from: *from,
             velocity,

@@ -14,7 +14,8 @@ pub struct OpenLoopError {
     pub moves: usize,
     /// Runs that were counted.
     pub runs: usize,
-    /// Runs that ended before because the model had no prediction (it placed the ball behind the camera).
+    /// Runs that ended before because the model had no prediction (it placed the ball behind the
+    /// camera).
     pub lost: usize,
     /// Mean absolute error of y.
     pub y_mean: f64,
@@ -35,8 +36,8 @@ impl ReachModel {
     /// As [`ReachModel::open_loop_error`].
     ///
     /// # Errors
-    /// [`QuantityError::TooLarge`] for more than [`ReachModel::MOST_MOVES`] moves, or a hundred million in all runs;
-    /// [`QuantityError::NotPositive`] without a run.
+    /// [`QuantityError::TooLarge`] for more than [`ReachModel::MOST_MOVES`] moves, or a hundred
+    /// million in all runs; [`QuantityError::NotPositive`] without a run.
     pub fn try_open_loop_error<R: Rng + ?Sized>(
         &self,
         cell: &Cell,
@@ -60,12 +61,13 @@ impl ReachModel {
         Ok(self.open_loop_error(cell, moves, runs, rng))
     }
 
-    /// Compares model and plant over runs of up to `moves` random moves from the paper's lists, starting from [`exploring_start`]s; entry
-    /// k holds the errors after k + 1 moves.
+    /// Compares model and plant over runs of up to `moves` random moves from the paper's lists,
+    /// starting from [`exploring_start`]s; entry k holds the errors after k + 1 moves.
     ///
-    /// A run goes on while the plant keeps the ball in sight and the arm within its limits (moves that do not are not taken); the
-    /// model gets its own last prediction as its next input. More than [`ReachModel::MOST_MOVES`] count as that many
-    /// ([`ReachModel::try_open_loop_error`] refuses them).
+    /// A run goes on while the plant keeps the ball in sight and the arm within its limits (moves
+    /// that do not are not taken); the model gets its own last prediction as its next input. More
+    /// than [`ReachModel::MOST_MOVES`] count as that many ([`ReachModel::try_open_loop_error`]
+    /// refuses them).
     pub fn open_loop_error<R: Rng + ?Sized>(
         &self,
         cell: &Cell,
@@ -99,7 +101,8 @@ impl ReachModel {
                 }) else {
                     break;
                 };
-                let Some(after) = self.predict_onward(&believed, joints[Joint::J3].to_degrees(), d2, d3)
+                let Some(after) =
+                    self.predict_onward(&believed, joints[Joint::J3].to_degrees(), d2, d3)
                 else {
                     lost[k..].iter_mut().for_each(|runs| *runs += 1);
                     break;

@@ -58,9 +58,11 @@ enum Place {
 }
 
 impl Cell {
-    /// The fewest moves of `JT2` and `JT3` together, from the lists of `moves`, that lead from `start` to the goal in y and r, by
-    /// breadth-first search ([`Cell::fewest_moves`]); 0 if `start` is there already. `JT1` is first turned so that the ball lies between
-    /// the jaws: turning the arm about its waist changes neither y nor r of the task, so this is the optimum of the approach alone.
+    /// The fewest moves of `JT2` and `JT3` together, from the lists of `moves`, that lead from
+    /// `start` to the goal in y and r, by breadth-first search ([`Cell::fewest_moves`]); 0 if
+    /// `start` is there already. `JT1` is first turned so that the ball lies between the jaws:
+    /// turning the arm about its waist changes neither y nor r of the task, so this is the optimum
+    /// of the approach alone.
     ///
     /// `None` as for [`Cell::fewest_moves`].
     ///
@@ -77,7 +79,10 @@ impl Cell {
         if let Some(pose) = self.goal_pose(start[Joint::J5].to_degrees()) {
             turned.0[0] = pose.0[0];
         }
-        let pairs = moves.jt2.iter().flat_map(|d2| moves.jt3.map(|d3| (*d2, d3)));
+        let pairs = moves
+            .jt2
+            .iter()
+            .flat_map(|d2| moves.jt3.map(|d3| (*d2, d3)));
         let deltas: Vec<JointDelta> = pairs
             .map(|(d2, d3)| JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]))
             .collect();
@@ -88,8 +93,8 @@ impl Cell {
         self.breadth_first(&turned, &deltas, |f, _| goal.approached(f), most)
     }
 
-    /// The fewest moves of `JT1` from the list of `moves` that bring the ball into the goal's interval of x, as
-    /// [`Cell::fewest_reaching_moves`] does for y and r.
+    /// The fewest moves of `JT1` from the list of `moves` that bring the ball into the goal's
+    /// interval of x, as [`Cell::fewest_reaching_moves`] does for y and r.
     ///
     /// # Errors
     /// As for [`Cell::fewest_moves`].
@@ -106,15 +111,18 @@ impl Cell {
         self.fewest_moves(start, &deltas, |f, _| goal.centred(f), most)
     }
 
-    /// The fewest of the given moves that lead from `start` to a pose that `reached` calls the goal, by breadth-first search; 0 if `start` is one.
-    /// The ball is kept in sight and the arm within its working limits after every move. Moves are taken to the nearest tenth of a degree,
-    /// and may turn one or two joints.
+    /// The fewest of the given moves that lead from `start` to a pose that `reached` calls the
+    /// goal, by breadth-first search; 0 if `start` is one. The ball is kept in sight and the arm
+    /// within its working limits after every move. Moves are taken to the nearest tenth of a
+    /// degree, and may turn one or two joints.
     ///
-    /// `None` if the ball is out of sight at `start` or the arm out of its limits, no way leads to the goal, or it takes more than `most` moves.
+    /// `None` if the ball is out of sight at `start` or the arm out of its limits, no way leads to
+    /// the goal, or it takes more than `most` moves.
     ///
     /// # Errors
-    /// [`QuantityError`]: a ball's place, angles of `start`, of a move, or of the working limits that are not finite; limits the wrong way round or more than
-    /// three turns apart; moves that turn more than two joints.
+    /// [`QuantityError`]: a ball's place, angles of `start`, of a move, or of the working limits
+    /// that are not finite; limits the wrong way round or more than three turns apart; moves that
+    /// turn more than two joints.
     pub fn fewest_moves(
         &self,
         start: &Joints,
@@ -221,7 +229,9 @@ impl Grid {
             }
         }
         if moving.len() > 2 {
-            return Err(QuantityError::Joints { count: moving.len() });
+            return Err(QuantityError::Joints {
+                count: moving.len(),
+            });
         }
         let step = GRID_DEGREES.to_radians();
         let mut spans = [(0, 0); 2];
@@ -253,7 +263,10 @@ impl Grid {
                 (m.0[joint] / step).round().clamp(-1e6, 1e6) as i64
             })
         };
-        let mut moves: Vec<(i64, i64)> = moves.iter().map(|m| (in_steps(m, 0), in_steps(m, 1))).collect();
+        let mut moves: Vec<(i64, i64)> = moves
+            .iter()
+            .map(|m| (in_steps(m, 0), in_steps(m, 1)))
+            .collect();
         moves.sort_unstable();
         moves.dedup();
         Ok(Self {

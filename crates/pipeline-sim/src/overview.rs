@@ -88,7 +88,10 @@ impl Page<'_> {
 
     /// A line through places of the page.
     fn stroke(&mut self, points: &[(f64, f64)], class: &str) {
-        let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+        let points: Vec<String> = points
+            .iter()
+            .map(|(x, y)| format!("{x:.1},{y:.1}"))
+            .collect();
         let _ = writeln!(
             self.text,
             r#"<polyline class="{class}" points="{}"/>"#,
@@ -144,14 +147,21 @@ impl Cell {
     ///
     /// # Errors
     /// What is to be drawn and not finite, farther than 100 m away, or the wrong way round.
-    pub fn try_overview_svg(&self, workspace: &Workspace, path: &[Joints]) -> Result<String, QuantityError> {
+    pub fn try_overview_svg(
+        &self,
+        workspace: &Workspace,
+        path: &[Joints],
+    ) -> Result<String, QuantityError> {
         let holder = self.holder.map(|h| [h.foot.x, h.foot.y, h.top]);
         let ball = self.ball.centre;
         let drawn = [
             ("the table's height (m)", vec![self.table]),
             ("the ball's place (m)", vec![ball.x, ball.y, ball.z]),
             ("the ball's radius (m)", vec![self.ball.radius]),
-            ("the holder's place (m)", holder.into_iter().flatten().collect()),
+            (
+                "the holder's place (m)",
+                holder.into_iter().flatten().collect(),
+            ),
         ];
         let ranges = [
             ("the workspace's distance (m)", workspace.rho),
@@ -171,11 +181,13 @@ impl Cell {
         Ok(self.overview_svg(workspace, path))
     }
 
-    /// Draws the cell as SVG: the arm from the side (in its own vertical plane) and from above, the camera's field of view, the workspace, the
-    /// ball, and the way of the tool point through `path`, whose last pose is the one drawn; with scale bars and a legend.
+    /// Draws the cell as SVG: the arm from the side (in its own vertical plane) and from above, the
+    /// camera's field of view, the workspace, the ball, and the way of the tool point through
+    /// `path`, whose last pose is the one drawn; with scale bars and a legend.
     ///
-    /// An empty path, or one with angles that are not finite, gives a drawing without the arm. What lies at places that are not finite spoils
-    /// the drawing; [`Cell::try_overview_svg`] refuses it.
+    /// An empty path, or one with angles that are not finite, gives a drawing without the arm. What
+    /// lies at places that are not finite spoils the drawing; [`Cell::try_overview_svg`] refuses
+    /// it.
     pub fn overview_svg(&self, workspace: &Workspace, path: &[Joints]) -> String {
         let pose = path.last().filter(|joints| joints.non_finite().is_none());
         let pan = pose.map_or(0.0, |joints| joints.0[0]);
@@ -194,13 +206,21 @@ impl Cell {
         let foot = Point3::new(0.0, 0.0, self.table);
         let places = || shown.places().chain([self.ball.centre]);
         let extents = [
-            Extent::of(places().chain(shown.from_side).chain([foot]).map(|p| side(&p))),
+            Extent::of(
+                places()
+                    .chain(shown.from_side)
+                    .chain([foot])
+                    .map(|p| side(&p)),
+            ),
             Extent::of(places().chain(shown.from_above.clone()).map(|p| above(&p))),
         ];
         // Both views to the same scale, side by side in the width.
         let scale = (WIDTH - 4.0 * MARGIN) / (extents[0].width + extents[1].width);
         let inner = scale * extents[0].height.max(extents[1].height);
-        let (view, height) = (inner + 2.0 * MARGIN, inner + 2.0 * MARGIN + CAPTION + LEGEND);
+        let (view, height) = (
+            inner + 2.0 * MARGIN,
+            inner + 2.0 * MARGIN + CAPTION + LEGEND,
+        );
         let mut text = format!(
             r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height:.0}" viewBox="0 0 {WIDTH} {height:.0}">
 <style>
@@ -261,7 +281,9 @@ rect{{fill:#fff}} text{{font:13px sans-serif;fill:#333}} polyline{{fill:none;str
     fn draw_view(&self, page: &mut Page<'_>, from_side: bool, shown: &Shown) {
         if from_side {
             page.line(&shown.from_side, "space");
-            let at = |along: f64| Point3::new(along * shown.pan.cos(), along * shown.pan.sin(), self.table);
+            let at = |along: f64| {
+                Point3::new(along * shown.pan.cos(), along * shown.pan.sin(), self.table)
+            };
             page.line(&[at(-FAR), at(FAR)], "table");
             page.line(&[at(0.0), Point3::origin()], "arm");
         } else {
@@ -271,7 +293,9 @@ rect{{fill:#fff}} text{{font:13px sans-serif;fill:#333}} polyline{{fill:none;str
             let foot = Point3::new(holder.foot.x, holder.foot.y, self.table);
             page.line(&[foot, Point3::new(foot.x, foot.y, holder.top)], "holder");
         }
-        if let (Some([eye, upper, lower, corners @ ..]), Some(skeleton)) = (shown.sight, shown.skeleton) {
+        if let (Some([eye, upper, lower, corners @ ..]), Some(skeleton)) =
+            (shown.sight, shown.skeleton)
+        {
             if from_side {
                 page.line(&[eye, upper, lower, eye], "cone");
             } else {
@@ -338,15 +362,27 @@ fn workspace_ring(workspace: &Workspace) -> Vec<Point3<f64>> {
 }
 
 impl Cell {
-    /// The workspace's section with the arm's plane, which passes the waist axis at the shoulder's offset; turned by `pan`.
+    /// The workspace's section with the arm's plane, which passes the waist axis at the shoulder's
+    /// offset; turned by `pan`.
     fn workspace_side(&self, workspace: &Workspace, pan: f64) -> [Point3<f64>; 5] {
         let (low, high) = workspace.height;
-        let along = |rho: f64| (rho * rho - self.params.d2 * self.params.d2).max(0.0).sqrt();
+        let along = |rho: f64| {
+            (rho * rho - self.params.d2 * self.params.d2)
+                .max(0.0)
+                .sqrt()
+        };
         let (near, far) = (along(workspace.rho.0), along(workspace.rho.1));
         let place = |(along, z): (f64, f64)| {
             Isometry3::rotation(Vector3::z() * pan) * Point3::new(along, self.params.d2, z)
         };
-        [(near, low), (far, low), (far, high), (near, high), (near, low)].map(place)
+        [
+            (near, low),
+            (far, low),
+            (far, high),
+            (near, high),
+            (near, low),
+        ]
+        .map(place)
     }
 
     /// The way of the tool point.
@@ -355,7 +391,8 @@ impl Cell {
         finite.map(|joints| self.tool_point(joints)).collect()
     }
 
-    /// Shoulder on the waist axis, shoulder in the arm's plane, elbow, wrist and tool point, world frame.
+    /// Shoulder on the waist axis, shoulder in the arm's plane, elbow, wrist and tool point, world
+    /// frame.
     fn skeleton(&self, joints: &Joints) -> [Point3<f64>; 5] {
         let waist = Isometry3::rotation(Vector3::z() * joints.0[0]);
         let shoulder = waist * Point3::new(0.0, self.params.d2, 0.0);
@@ -374,8 +411,8 @@ impl Cell {
         ]
     }
 
-    /// The camera, and where its sight meets the table above and below the middle of the image and in its corners, in turn; far away
-    /// where it does not.
+    /// The camera, and where its sight meets the table above and below the middle of the image and
+    /// in its corners, in turn; far away where it does not.
     fn sight_lines(&self, joints: &Joints) -> [Point3<f64>; 7] {
         let pose = self.camera_pose(joints);
         let eye = Point3::from(pose.translation.vector);

@@ -4,23 +4,26 @@ use hough_heuristic::Features;
 
 /// Which terms a [`ReachModel`](crate::ReachModel) is made of.
 ///
-/// With d2, d3 the moves in degrees, a = d2 / 20, b = d3 / 16, Z = 33 / r, V = (y - 72) / r, E = (`JT3` - 140) / 40 before the move. In
-/// the arm's plane (Z, V) is, up to a scale, the ball's place as the camera sees it, and a move of the arm turns and
-/// shifts it rigidly; that is why the `Rigid` forms, which fit the changes of Z and V, need far fewer terms than the image's own
+/// With d2, d3 the moves in degrees, a = d2 / 20, b = d3 / 16, Z = 33 / r, V = (y - 72) / r, E =
+/// (`JT3` - 140) / 40 before the move. In the arm's plane (Z, V) is, up to a scale, the ball's
+/// place as the camera sees it, and a move of the arm turns and shifts it rigidly; that is why the
+/// `Rigid` forms, which fit the changes of Z and V, need far fewer terms than the image's own
 /// coordinates would.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ReachForm {
-    /// Changes of y and r on 1, d2, d3: the paper's own reading of linear regression, per elbow interval.
+    /// Changes of y and r on 1, d2, d3: the paper's own reading of linear regression, per elbow
+    /// interval.
     Linear,
     /// Changes of Z and V on 1, a, b, Za, Zb, Va, Vb, Ea.
     Rigid8,
     /// Changes of Z and V on 1, and a, b, a², ab, b² each times 1, Z, V, E, and E²a.
     Rigid22,
-    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists of: with c, s cosine and sine
-    /// of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`: (c23 - 1) and s23 times Z and V; (c3 - c23) and (s3 - s23) times 1, cos e,
-    /// sin e; 1 - c3; s3. No further terms exist: what is left is the outline's slight ellipticity.
+    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists
+    /// of: with c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`: (c23 -
+    /// 1) and s23 times Z and V; (c3 - c23) and (s3 - s23) times 1, cos e, sin e; 1 - c3; s3. No
+    /// further terms exist: what is left is the outline's slight ellipticity.
     RigidBody,
 }
 
@@ -115,7 +118,9 @@ impl ReachForm {
         );
         match self {
             Self::Linear => buffer[..3].copy_from_slice(&[1.0, d2, d3]),
-            Self::Rigid8 => buffer[..8].copy_from_slice(&[1.0, a, b, z * a, z * b, v * a, v * b, e * a]),
+            Self::Rigid8 => {
+                buffer[..8].copy_from_slice(&[1.0, a, b, z * a, z * b, v * a, v * b, e * a])
+            }
             Self::Rigid22 => {
                 buffer[0] = 1.0;
                 for (i, moved) in [a, b, a * a, a * b, b * b].into_iter().enumerate() {
@@ -126,7 +131,8 @@ impl ReachForm {
                 buffer[21] = e * e * a;
             }
             Self::RigidBody => {
-                let ((s3, c3), (s23, c23)) = (d3.to_radians().sin_cos(), (d2 + d3).to_radians().sin_cos());
+                let ((s3, c3), (s23, c23)) =
+                    (d3.to_radians().sin_cos(), (d2 + d3).to_radians().sin_cos());
                 let (sin_e, cos_e) = jt3_degrees.to_radians().sin_cos();
                 let (c, s) = (c3 - c23, s3 - s23);
                 let turned = c23 - 1.0;
@@ -157,11 +163,13 @@ impl ReachForm {
         }
     }
 
-    /// (y, r) from the fitted quantities; `None` where they belong to no ball in front of the camera.
+    /// (y, r) from the fitted quantities; `None` where they belong to no ball in front of the
+    /// camera.
     pub(crate) fn image(self, outputs: [f64; 2]) -> Option<(f64, f64)> {
         match self {
             Self::Linear => Some((outputs[0], outputs[1])),
-            _ => (outputs[0] > 0.0).then(|| (72.0 + 33.0 * outputs[1] / outputs[0], 33.0 / outputs[0])),
+            _ => (outputs[0] > 0.0)
+                .then(|| (72.0 + 33.0 * outputs[1] / outputs[0], 33.0 / outputs[0])),
         }
     }
 }

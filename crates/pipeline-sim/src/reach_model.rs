@@ -1,4 +1,5 @@
-//! The regression simulator of the approaching behaviour: what a move of `JT2` and `JT3` does to y and r.
+//! The regression simulator of the approaching behaviour: what a move of `JT2` and `JT3` does to y
+//! and r.
 
 use hough_heuristic::Features;
 
@@ -6,9 +7,12 @@ use crate::least_squares::{Entry, Fit, Rows};
 use crate::reach_noise::{Noise, widening};
 use crate::samples;
 use crate::stored::{Reader, Writer};
-use crate::{FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule, StoredModelError};
+use crate::{
+    FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule, StoredModelError,
+};
 
-/// A regression simulator of the approaching behaviour, fitted to samples of real or simulated moves.
+/// A regression simulator of the approaching behaviour, fitted to samples of real or simulated
+/// moves.
 ///
 /// ```
 /// use pipeline_sim::{Ball, Cell, ReachForm, ReachModel, sample_moves};
@@ -40,12 +44,12 @@ impl ReachModel {
     /// The paper's elbow edges (its theta3 at 5 and 20 degrees) as `JT3`, degrees.
     pub const PAPER_ELBOW_EDGES: [f64; 2] = [175.0, 190.0];
 
-    /// Fits a model of the given form, one set of coefficients for each interval between `elbow_edges_degrees` (`JT3` before the
-    /// move); without edges, one for all.
+    /// Fits a model of the given form, one set of coefficients for each interval between
+    /// `elbow_edges_degrees` (`JT3` before the move); without edges, one for all.
     ///
     /// # Errors
-    /// [`FitError`]: edges that do not ascend; a sample that is not finite; an interval with too few samples, or with samples that do not
-    /// determine all coefficients.
+    /// [`FitError`]: edges that do not ascend; a sample that is not finite; an interval with too
+    /// few samples, or with samples that do not determine all coefficients.
     pub fn fit(
         samples: &[ReachSample],
         form: ReachForm,
@@ -96,7 +100,8 @@ impl ReachModel {
         Ok(groups)
     }
 
-    /// How far the samples of piece `i` lie from what it predicts for them, and the degrees of freedom that are left.
+    /// How far the samples of piece `i` lie from what it predicts for them, and the degrees of
+    /// freedom that are left.
     pub(crate) fn noise_of(
         &self,
         i: usize,
@@ -106,7 +111,9 @@ impl ReachModel {
         let mut buffer = [0.0; 22];
         let (mut y, mut r, mut fitted) = (Vec::new(), Vec::new(), 0.0);
         for (_, s) in group {
-            let terms = self.form.fill(&s.before, s.jt3_degrees, s.d2, s.d3, &mut buffer);
+            let terms = self
+                .form
+                .fill(&s.before, s.jt3_degrees, s.d2, s.d3, &mut buffer);
             fitted += weight(s) * self.pieces[i].leverage(terms);
             if let Some(after) = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3) {
                 let [of_y, of_r] = self.form.shares(&s.before, &after, s.d2, s.d3);
@@ -130,15 +137,22 @@ impl ReachModel {
         &self.edges
     }
 
-    /// What the image shows after `JT2` and `JT3` turned by `d2` and `d3` degrees; x stays. `None` if the ball is lost
-    /// ([`SightRule::sees_features`]) or an argument is not finite.
-    pub fn predict(&self, before: &Features, jt3_degrees: f64, d2: f64, d3: f64) -> Option<Features> {
+    /// What the image shows after `JT2` and `JT3` turned by `d2` and `d3` degrees; x stays. `None`
+    /// if the ball is lost ([`SightRule::sees_features`]) or an argument is not finite.
+    pub fn predict(
+        &self,
+        before: &Features,
+        jt3_degrees: f64,
+        d2: f64,
+        d3: f64,
+    ) -> Option<Features> {
         self.predict_unbounded(before, jt3_degrees, d2, d3)
             .filter(|features| SightRule::default().sees_features(features))
     }
 
-    /// As [`ReachModel::predict`], but also where the ball would count as lost. `None` only where the model places the ball behind
-    /// the camera, an argument is not finite, or `before` shows a radius that is not above zero.
+    /// As [`ReachModel::predict`], but also where the ball would count as lost. `None` only where
+    /// the model places the ball behind the camera, an argument is not finite, or `before` shows a
+    /// radius that is not above zero.
     pub fn predict_unbounded(
         &self,
         before: &Features,
@@ -151,7 +165,8 @@ impl ReachModel {
             .flatten()
     }
 
-    /// As [`ReachModel::predict_unbounded`], also from a prediction of `Linear` whose radius is not above zero.
+    /// As [`ReachModel::predict_unbounded`], also from a prediction of `Linear` whose radius is not
+    /// above zero.
     pub(crate) fn predict_onward(
         &self,
         before: &Features,
@@ -173,12 +188,21 @@ impl ReachModel {
         (y.is_finite() && r.is_finite()).then_some(Features { x: before.x, y, r })
     }
 
-    /// The standard deviations of y and r, feature units, that the fit expects of [`ReachModel::predict_unbounded`] around what a
-    /// new observation would show: noise of both observations, what the form cannot express, and the uncertainty of the coefficients
-    /// together, widened for models of few samples so that 95 % lie within 1.96 of them. `None` as there, and where they are no finite numbers.
+    /// The standard deviations of y and r, feature units, that the fit expects of
+    /// [`ReachModel::predict_unbounded`] around what a new observation would show: noise of both
+    /// observations, what the form cannot express, and the uncertainty of the coefficients
+    /// together, widened for models of few samples so that 95 % lie within 1.96 of them. `None` as
+    /// there, and where they are no finite numbers.
     ///
-    /// Noise of `before` is carried along: what comes four times as near shows it four times (in y) and sixteen times (in r) as large.
-    pub fn uncertainty(&self, before: &Features, jt3_degrees: f64, d2: f64, d3: f64) -> Option<(f64, f64)> {
+    /// Noise of `before` is carried along: what comes four times as near shows it four times (in y)
+    /// and sixteen times (in r) as large.
+    pub fn uncertainty(
+        &self,
+        before: &Features,
+        jt3_degrees: f64,
+        d2: f64,
+        d3: f64,
+    ) -> Option<(f64, f64)> {
         let after = self.predict_unbounded(before, jt3_degrees, d2, d3)?;
         let mut buffer = [0.0; 22];
         let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
@@ -215,13 +239,20 @@ impl ReachModel {
                 )
             }
         };
-        [noise_y.variance(of_y) + from_y, noise_r.variance(of_r) + from_r]
+        [
+            noise_y.variance(of_y) + from_y,
+            noise_r.variance(of_r) + from_r,
+        ]
     }
 
-    /// What the fit leaves of the changes of y and r on its samples, a pair for each elbow interval: standard deviations in feature
-    /// units, with the degrees of freedom that are left; of a refit, together with those of its prior.
+    /// What the fit leaves of the changes of y and r on its samples, a pair for each elbow
+    /// interval: standard deviations in feature units, with the degrees of freedom that are left;
+    /// of a refit, together with those of its prior.
     pub fn residual_noise(&self) -> Vec<(f64, f64)> {
-        self.noise.iter().map(|[y, r]| (y.residual, r.residual)).collect()
+        self.noise
+            .iter()
+            .map(|[y, r]| (y.residual, r.residual))
+            .collect()
     }
 
     /// How well the changes of y and r are reproduced on the samples the model was fitted to.
@@ -229,11 +260,13 @@ impl ReachModel {
         self.quality.clone()
     }
 
-    /// How well the changes of y and r are reproduced on other samples. A sample for which the model has no prediction counts as one
-    /// for which it predicts no change, and in [`Quality::unpredicted`].
+    /// How well the changes of y and r are reproduced on other samples. A sample for which the
+    /// model has no prediction counts as one for which it predicts no change, and in
+    /// [`Quality::unpredicted`].
     ///
     /// # Errors
-    /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not above zero.
+    /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not
+    /// above zero.
     pub fn quality_on(&self, samples: &[ReachSample]) -> Result<Vec<Quality>, QuantityError> {
         Quality::some(samples.len())?;
         for (index, sample) in samples.iter().enumerate() {
@@ -264,7 +297,10 @@ impl ReachModel {
     }
 
     fn piece(&self, jt3_degrees: f64) -> usize {
-        self.edges.iter().filter(|edge| jt3_degrees >= **edge).count()
+        self.edges
+            .iter()
+            .filter(|edge| jt3_degrees >= **edge)
+            .count()
     }
 
     pub(crate) fn place(&self, piece: usize) -> String {
@@ -342,7 +378,8 @@ impl ReachModel {
     /// The model that was stored as text.
     ///
     /// # Errors
-    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged one.
+    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged
+    /// one.
     pub fn from_text(text: &str) -> Result<Self, StoredModelError> {
         let mut stored = Reader::new(Self::KIND, text)?;
         let form = stored.form()?;
@@ -377,7 +414,9 @@ impl ReachModel {
                 "it has the wrong number of coefficients, or a number of its fit is out of range",
             );
         }
-        if self.noise.len() != self.pieces.len() || !self.noise.iter().flatten().all(Noise::is_sound) {
+        if self.noise.len() != self.pieces.len()
+            || !self.noise.iter().flatten().all(Noise::is_sound)
+        {
             return damaged("its noise is not a finite number of zero or above for each piece");
         }
         if !Quality::are_sound(&self.quality, &["dy", "dr"]) {

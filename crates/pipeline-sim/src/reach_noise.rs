@@ -1,4 +1,5 @@
-//! How far observations lie from a regression simulator's predictions, and how that depends on where the ball is.
+//! How far observations lie from a regression simulator's predictions, and how that depends on
+//! where the ball is.
 
 use hough_heuristic::Features;
 
@@ -14,9 +15,17 @@ pub(crate) struct Shares {
 }
 
 impl ReachForm {
-    /// The shares for y and for r of a move by `d2` and `d3` degrees that leads from `before` to `after`.
-    pub(crate) fn shares(self, before: &Features, after: &Features, d2: f64, d3: f64) -> [Shares; 2] {
-        // What a form leaves out is, of the terms that turn (Z, V), those of the next higher order in the move.
+    /// The shares for y and for r of a move by `d2` and `d3` degrees that leads from `before` to
+    /// `after`.
+    pub(crate) fn shares(
+        self,
+        before: &Features,
+        after: &Features,
+        d2: f64,
+        d3: f64,
+    ) -> [Shares; 2] {
+        // What a form leaves out is, of the terms that turn (Z, V), those of the next higher order
+        // in the move.
         let moved = (d2 / 20.0).powi(2) + (d3 / 16.0).powi(2);
         let left_out = match self {
             // All that its coefficients stand for grows with r, that of r with its square.
@@ -31,7 +40,8 @@ impl ReachForm {
             Self::Rigid22 => moved.powi(3),
             Self::RigidBody => moved,
         };
-        // With r = 33 / Z and y = 72 + r V, noise of `before` is carried along in Z and V; that of `after` comes on top.
+        // With r = 33 / Z and y = 72 + r V, noise of `before` is carried along in Z and V; that of
+        // `after` comes on top.
         let nearer = after.r / before.r;
         let (v0, v1) = ((before.y - 72.0) / before.r, (after.y - 72.0) / after.r);
         let r_of_z = after.r * after.r / 33.0;
@@ -69,7 +79,8 @@ const SHAPE_FREEDOM: f64 = 10.0;
 /// Degrees of freedom for which a prior says how large they are.
 const SCALE_FREEDOM: f64 = 1.0;
 
-/// By how much more than expected a refit errs, from squared errors over the variances that its prior expects.
+/// By how much more than expected a refit errs, from squared errors over the variances that its
+/// prior expects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Misfit {
     sum: f64,
@@ -91,33 +102,40 @@ impl Misfit {
     }
 }
 
-/// By how much the middle 95 % of Student's distribution are wider than those of the normal one: a variance found from few errors is
-/// itself uncertain, here from those of `samples` and of the prior. (Cornish and Fisher's expansion.)
+/// By how much the middle 95 % of Student's distribution are wider than those of the normal one: a
+/// variance found from few errors is itself uncertain, here from those of `samples` and of the
+/// prior. (Cornish and Fisher's expansion.)
 pub(crate) fn widening(samples: usize) -> f64 {
     let n = SCALE_FREEDOM + samples as f64;
     1.0 + 1.2107 / n + 1.4408 / (n * n) + 1.3401 / (n * n * n)
 }
 
-/// A variance found with `freedom` degrees of freedom (one, if less), together with that of a prior.
+/// A variance found with `freedom` degrees of freedom (one, if less), together with that of a
+/// prior.
 pub(crate) fn pooled(variance: f64, prior: f64, freedom: f64, misfit: &Misfit) -> f64 {
     let sum = variance * freedom.max(1.0);
     (sum + SHAPE_FREEDOM * prior * misfit.scale()) / (SHAPE_FREEDOM + freedom.max(0.0))
 }
 
 impl Noise {
-    /// From squared residuals with their shares, `left` being the ratio of the degrees of freedom that are left to the samples.
+    /// From squared residuals with their shares, `left` being the ratio of the degrees of freedom
+    /// that are left to the samples.
     pub(crate) fn of(residuals: &[(Shares, f64)], left: f64) -> Self {
         let n = residuals.len() as f64;
         if residuals.is_empty() {
             return Self::default();
         }
-        // Squared residuals on both shares, relative to the first, by least squares, neither below zero; then again and again with each weighed
-        // as a squared residual of the variance found deserves, or the greatest would decide alone.
+        // Squared residuals on both shares, relative to the first, by least squares, neither below
+        // zero; then again and again with each weighed as a squared residual of the variance found
+        // deserves, or the greatest would decide alone.
         let relative: Vec<(f64, f64)> = residuals
             .iter()
             .map(|(shares, squared)| (shares.fitted / shares.observed, squared / shares.observed))
             .collect();
-        let total = residuals.iter().map(|(_, squared)| squared / n).sum::<f64>();
+        let total = residuals
+            .iter()
+            .map(|(_, squared)| squared / n)
+            .sum::<f64>();
         let least = 1e-3 * relative.iter().map(|(_, squared)| squared / n).sum::<f64>();
         let (mut observed, mut fitted) = (1.0, 0.0);
         for _ in 0..ROUNDS {
@@ -133,7 +151,10 @@ impl Noise {
             let determinant = w * sq - q * q;
             let even = (e / w, 0.0);
             (observed, fitted) = if determinant > 1e-12 * w * sq {
-                ((e * sq - eq * q) / determinant, (w * eq - e * q) / determinant)
+                (
+                    (e * sq - eq * q) / determinant,
+                    (w * eq - e * q) / determinant,
+                )
             } else {
                 even
             };
@@ -153,7 +174,13 @@ impl Noise {
     /// This noise, found with `freedom` degrees of freedom, together with that of a prior.
     pub(crate) fn pooled(self, prior: &Self, freedom: f64, misfit: &Misfit) -> Self {
         Self {
-            residual: pooled(self.residual.powi(2), prior.residual.powi(2), freedom, misfit).sqrt(),
+            residual: pooled(
+                self.residual.powi(2),
+                prior.residual.powi(2),
+                freedom,
+                misfit,
+            )
+            .sqrt(),
             observed: pooled(self.observed, prior.observed, freedom, misfit),
             fitted: pooled(self.fitted, prior.fitted, freedom, misfit),
         }

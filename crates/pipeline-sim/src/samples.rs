@@ -80,8 +80,8 @@ pub struct MoveLists {
 }
 
 impl MoveLists {
-    /// The lists used throughout. The paper gives their first members (-5, -1 for `JT1`; -20, -6 for `JT2`; -16, -5 for `JT3`) and their
-    /// length; the rest continues them symmetrically.
+    /// The lists used throughout. The paper gives their first members (-5, -1 for `JT1`; -20, -6
+    /// for `JT2`; -16, -5 for `JT3`) and their length; the rest continues them symmetrically.
     pub fn paper() -> Self {
         Self {
             jt1: [-5.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 5.0],
@@ -97,11 +97,13 @@ impl Default for MoveLists {
     }
 }
 
-/// A ball in sight and an arm that can reach it, anywhere in the image: `cell` with the ball put there, and the joints.
+/// A ball in sight and an arm that can reach it, anywhere in the image: `cell` with the ball put
+/// there, and the joints.
 ///
-/// Distribution: y uniform in 4..140, r log-uniform in 6..60, x uniform in 4..188, `JT3` - 170 uniform in -20..44 and `JT2` uniform in
-/// -125..-30 degrees, `JT1` = 0; kept if the ball counts as seen, can be reached, and does not lie below the table.
-/// `None` if 100 000 tries bring nothing: a cell in which nothing can be seen or reached.
+/// Distribution: y uniform in 4..140, r log-uniform in 6..60, x uniform in 4..188, `JT3` - 170
+/// uniform in -20..44 and `JT2` uniform in -125..-30 degrees, `JT1` = 0; kept if the ball counts as
+/// seen, can be reached, and does not lie below the table. `None` if 100 000 tries bring nothing: a
+/// cell in which nothing can be seen or reached.
 pub fn exploring_start<R: Rng + ?Sized>(cell: &Cell, rng: &mut R) -> Option<(Cell, Joints)> {
     (0..100_000).find_map(|_| {
         let features = Features {
@@ -125,12 +127,14 @@ pub fn exploring_start<R: Rng + ?Sized>(cell: &Cell, rng: &mut R) -> Option<(Cel
     })
 }
 
-/// Draws `count` samples of each kind in `cell`, each from an [`exploring_start`] of its own and with a move from the
-/// [`MoveLists`] of the paper; kept if the arm stays within its working limits and the ball in sight.
+/// Draws `count` samples of each kind in `cell`, each from an [`exploring_start`] of its own and
+/// with a move from the [`MoveLists`] of the paper; kept if the arm stays within its working limits
+/// and the ball in sight.
 ///
-/// Features carry normal noise of standard deviation `noise` units ([`with_noise`]). In a cell in which nothing can be seen or reached the
-/// vectors come back short; with noise that is no finite number they come back empty. A hundred thousand samples of each kind take about a
-/// second and 13 MB; any number is drawn that is asked for. [`try_sample_moves`] refuses what makes no sense.
+/// Features carry normal noise of standard deviation `noise` units ([`with_noise`]). In a cell in
+/// which nothing can be seen or reached the vectors come back short; with noise that is no finite
+/// number they come back empty. A hundred thousand samples of each kind take about a second and 13
+/// MB; any number is drawn that is asked for. [`try_sample_moves`] refuses what makes no sense.
 pub fn sample_moves<R: Rng + ?Sized>(
     cell: &Cell,
     count: usize,
@@ -156,7 +160,10 @@ pub fn sample_moves<R: Rng + ?Sized>(
                     moves.jt2[rng.random_range(0..9)],
                     moves.jt3[rng.random_range(0..9)],
                 );
-                (JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]), (d2, d3))
+                (
+                    JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]),
+                    (d2, d3),
+                )
             })
             .map(|(before, joints, (d2, d3), after)| ReachSample {
                 before,
@@ -176,8 +183,9 @@ pub fn sample_moves<R: Rng + ?Sized>(
 /// As [`sample_moves`].
 ///
 /// # Errors
-/// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of zero or above;
-/// [`QuantityError::TooLarge`] for more than ten million samples of each kind, which would fill 1.3 GB.
+/// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of
+/// zero or above; [`QuantityError::TooLarge`] for more than ten million samples of each kind, which
+/// would fill 1.3 GB.
 pub fn try_sample_moves<R: Rng + ?Sized>(
     cell: &Cell,
     count: usize,
@@ -216,8 +224,9 @@ fn tried_sample<R: Rng + ?Sized, M>(
     None
 }
 
-/// `features` with normal noise of standard deviation `sigma` units on each, whose sign does not count; the radius stays above a tenth of a
-/// unit. With a `sigma` that is no finite number, none of the three is a number.
+/// `features` with normal noise of standard deviation `sigma` units on each, whose sign does not
+/// count; the radius stays above a tenth of a unit. With a `sigma` that is no finite number, none
+/// of the three is a number.
 pub fn with_noise<R: Rng + ?Sized>(features: Features, sigma: f64, rng: &mut R) -> Features {
     if sigma == 0.0 {
         return features;

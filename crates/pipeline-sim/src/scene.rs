@@ -8,7 +8,8 @@ use nalgebra::{Point2, Vector3};
 pub struct Light {
     /// Direction *toward* the lamp, world frame; its length does not matter. Must point upward.
     pub toward: Vector3<f64>,
-    /// Irradiance on a surface that faces the lamp; a white surface under 1 is just white in the image.
+    /// Irradiance on a surface that faces the lamp; a white surface under 1 is just white in the
+    /// image.
     pub intensity: f64,
     /// Half the angle under which the lamp is seen, radians: the softness of its shadows.
     pub half_angle: f64,
@@ -20,7 +21,8 @@ pub struct Light {
 pub struct Look {
     /// Mean reflectance, 0 (black) to 1 (white).
     pub albedo: f64,
-    /// Strength of the surface's texture relative to the reflectance, 0 (even) to about 1. Flat surfaces only.
+    /// Strength of the surface's texture relative to the reflectance, 0 (even) to about 1. Flat
+    /// surfaces only.
     pub texture: f64,
     /// Strength of the highlight, 0 (dull) to about 1. Balls and cylinders only.
     pub gloss: f64,
@@ -78,9 +80,13 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Whether the shape lies flat on the table, so that nothing can stand in front of it by accident.
+    /// Whether the shape lies flat on the table, so that nothing can stand in front of it by
+    /// accident.
     pub fn is_flat(&self) -> bool {
-        matches!(self, Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. })
+        matches!(
+            self,
+            Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. }
+        )
     }
 
     /// Height above the table, metres; 0 for what lies flat.
@@ -98,7 +104,9 @@ impl Shape {
             Self::Box { length, width, .. }
             | Self::Print { length, width, .. }
             | Self::Tape { length, width } => 0.5 * length.hypot(width),
-            Self::Cylinder { radius, .. } | Self::Disc { radius, .. } | Self::Ball { radius } => radius,
+            Self::Cylinder { radius, .. } | Self::Disc { radius, .. } | Self::Ball { radius } => {
+                radius
+            }
         }
     }
 }
@@ -119,7 +127,8 @@ pub struct Thing {
     pub look: Look,
 }
 
-/// A strip right before the lens, a cable or the edge of a finger: it hides whatever is behind it. Lengths in feature units.
+/// A strip right before the lens, a cable or the edge of a finger: it hides whatever is behind it.
+/// Lengths in feature units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Occluder {
@@ -141,8 +150,8 @@ pub struct Occluder {
 pub struct Sensor {
     /// Standard deviation of the noise in the dark, grey levels of 255 before gamma.
     pub read_noise: f64,
-    /// Standard deviation of the photon noise at full white, grey levels of 255 before gamma; it falls with the root of the
-    /// light.
+    /// Standard deviation of the photon noise at full white, grey levels of 255 before gamma; it
+    /// falls with the root of the light.
     pub shot_noise: f64,
     /// Standard deviation of the blur of lens and video electronics, pixels, 0 to about 1.2.
     pub blur: f64,
@@ -218,7 +227,8 @@ impl Scene {
         }
     }
 
-    /// The scene used throughout: a wooden table under two lamps, with boxes, cylinders, discs, another ball, print and tape.
+    /// The scene used throughout: a wooden table under two lamps, with boxes, cylinders, discs,
+    /// another ball, print and tape.
     pub fn laboratory() -> Self {
         let thing = |shape, x, y, degrees: f64, albedo, texture| Thing {
             shape,

@@ -4,11 +4,12 @@ use crate::error::{amount, at_most, finite};
 use crate::{Look, QuantityError, Scene, Sensor, Shape, Shot};
 
 impl Scene {
-    /// Whether every quantity is one that a scene can have. [`crate::Renderer`] does not ask: it draws of a senseless scene what makes
-    /// sense, and takes a gamma that is not above zero for 1.
+    /// Whether every quantity is one that a scene can have. [`crate::Renderer`] does not ask: it
+    /// draws of a senseless scene what makes sense, and takes a gamma that is not above zero for 1.
     ///
     /// # Errors
-    /// [`QuantityError`] names the first quantity that is not finite, below zero, or, for gamma and a lamp's height, not above zero.
+    /// [`QuantityError`] names the first quantity that is not finite, below zero, or, for gamma and
+    /// a lamp's height, not above zero.
     pub fn check(&self) -> Result<(), QuantityError> {
         amount("ambient light", self.ambient)?;
         for (i, light) in self.lights.iter().enumerate() {
@@ -35,7 +36,10 @@ impl Scene {
                 finite(format!("an end of occluder {i} (units)"), *value)?;
             }
             amount(format!("width of occluder {i} (units)"), occluder.width)?;
-            amount(format!("softness of occluder {i} (units)"), occluder.softness)?;
+            amount(
+                format!("softness of occluder {i} (units)"),
+                occluder.softness,
+            )?;
             amount(format!("albedo of occluder {i}"), occluder.albedo)?;
         }
         self.sensor.check()
@@ -46,7 +50,8 @@ impl Sensor {
     /// Whether a sensor can be like this.
     ///
     /// # Errors
-    /// [`QuantityError`] names the first quantity that is not finite or below zero; gamma must be above zero.
+    /// [`QuantityError`] names the first quantity that is not finite or below zero; gamma must be
+    /// above zero.
     pub fn check(&self) -> Result<(), QuantityError> {
         amount("read noise (grey levels)", self.read_noise)?;
         amount("shot noise (grey levels)", self.shot_noise)?;
@@ -63,8 +68,8 @@ impl Shot {
     /// Whether a frame can be taken like this. [`crate::Renderer::take`] does not ask.
     ///
     /// # Errors
-    /// [`QuantityError`] names the time that is not finite, below zero or above [`Shot::LONGEST`], or the number of moments that is
-    /// zero or above [`Shot::MOST_MOMENTS`].
+    /// [`QuantityError`] names the time that is not finite, below zero or above [`Shot::LONGEST`],
+    /// or the number of moments that is zero or above [`Shot::MOST_MOMENTS`].
     pub fn check(&self) -> Result<(), QuantityError> {
         for (quantity, time) in [
             ("exposure time (s)", self.exposure),
@@ -136,7 +141,11 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         for kind in SceneKind::ALL {
             assert_eq!(Scene::generate(kind, &mut rng).check(), Ok(()), "{kind}");
-            assert_eq!(Snapshot::draw(kind, &mut rng).shot.check(), Ok(()), "{kind}");
+            assert_eq!(
+                Snapshot::draw(kind, &mut rng).shot.check(),
+                Ok(()),
+                "{kind}"
+            );
         }
         for kind in BenchmarkKind::ALL {
             let (scene, snapshot) = kind.draw((768, 576), &mut rng).expect("a frame of pixels");
@@ -192,9 +201,18 @@ mod tests {
                 .expect_err("no number of moments");
             assert!(error.to_string().contains("moments"), "{error}");
         }
-        let error = Shot::pal(1e300, 3).check().expect_err("for ever").to_string();
-        assert!(error.contains("exposure time") && error.contains("60"), "{error}");
-        let shot = Shot::pal(f64::NAN, 3).check().expect_err("no time").to_string();
+        let error = Shot::pal(1e300, 3)
+            .check()
+            .expect_err("for ever")
+            .to_string();
+        assert!(
+            error.contains("exposure time") && error.contains("60"),
+            "{error}"
+        );
+        let shot = Shot::pal(f64::NAN, 3)
+            .check()
+            .expect_err("no time")
+            .to_string();
         assert!(shot.starts_with("exposure time"), "{shot}");
     }
 }

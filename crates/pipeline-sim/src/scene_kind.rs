@@ -10,8 +10,8 @@ use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 
 use crate::{
-    Ball, Camera, CameraError, Cell, Distortion, Light, Look, Occluder, Renderer, Scene, Sensor, Shape, Shot,
-    Sighting, Thing, UnknownName, Workspace,
+    Ball, Camera, CameraError, Cell, Distortion, Light, Look, Occluder, Renderer, Scene, Sensor,
+    Shape, Shot, Sighting, Thing, UnknownName, Workspace,
 };
 
 /// What makes a frame difficult.
@@ -132,7 +132,9 @@ impl Scene {
         scene.things = things(crowd, kind == SceneKind::Occluded, rng);
         match kind {
             SceneKind::Plain => scene.table.texture = 0.15,
-            SceneKind::Clutter | SceneKind::Empty => scene.table.texture = rng.random_range(0.7..1.0),
+            SceneKind::Clutter | SceneKind::Empty => {
+                scene.table.texture = rng.random_range(0.7..1.0)
+            }
             SceneKind::Occluded => scene.occluders = cables(rng),
             SceneKind::Noise => {
                 scene.sensor.exposure = rng.random_range(0.35..0.6);
@@ -152,7 +154,10 @@ impl Scene {
                 scene.lights[0].toward = Vector3::new(1.6 * angle.cos(), 1.6 * angle.sin(), 1.0);
             }
             SceneKind::Defocus => scene.sensor.defocus = rng.random_range(1.0..3.5),
-            SceneKind::Things | SceneKind::Motion | SceneKind::Interlaced | SceneKind::Distorted => {}
+            SceneKind::Things
+            | SceneKind::Motion
+            | SceneKind::Interlaced
+            | SceneKind::Distorted => {}
         }
         scene
     }
@@ -246,7 +251,8 @@ fn things<R: Rng + ?Sized>(count: usize, tall: bool, rng: &mut R) -> Vec<Thing> 
             },
         };
         let apart = |other: &Thing| {
-            (thing.x - other.x).hypot(thing.y - other.y) > shape.footprint() + other.shape.footprint() + 0.002
+            (thing.x - other.x).hypot(thing.y - other.y)
+                > shape.footprint() + other.shape.footprint() + 0.002
         };
         if things.iter().all(apart) {
             things.push(thing);
@@ -288,10 +294,12 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// A random ball and a random pose of the arm on its way from a search pose to the ball, such that the ball is in sight (out of sight for
-    /// [`SceneKind::Empty`]), with the lens, the motion and the shot that belong to the kind.
+    /// A random ball and a random pose of the arm on its way from a search pose to the ball, such
+    /// that the ball is in sight (out of sight for [`SceneKind::Empty`]), with the lens, the motion
+    /// and the shot that belong to the kind.
     ///
-    /// The radius of the ball in the image is spread evenly, on a logarithmic scale, over what such ways offer.
+    /// The radius of the ball in the image is spread evenly, on a logarithmic scale, over what such
+    /// ways offer.
     pub fn draw<R: Rng + ?Sized>(kind: SceneKind, rng: &mut R) -> Self {
         let workspace = Workspace::paper();
         let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
@@ -332,7 +340,9 @@ impl Snapshot {
             let gone = cell
                 .outline(&joints)
                 .is_none_or(|o| o.share_inside(768, 576) == 0.0);
-            if cell.params.check(&joints).is_err() || !(if kind == SceneKind::Empty { gone } else { seen }) {
+            if cell.params.check(&joints).is_err()
+                || !(if kind == SceneKind::Empty { gone } else { seen })
+            {
                 continue;
             }
             let mut speed = JointDelta::default();
@@ -386,7 +396,8 @@ impl Snapshot {
         renderer.take(&self.shot, |seconds| self.moment(seconds))
     }
 
-    /// The round outlines that the frame shows ([`Renderer::truth`]), in the middle of its exposure.
+    /// The round outlines that the frame shows ([`Renderer::truth`]), in the middle of its
+    /// exposure.
     pub fn truth(&self, renderer: &Renderer) -> Vec<Sighting> {
         let (cell, joints) = self.middle();
         renderer.truth(&cell, &joints)

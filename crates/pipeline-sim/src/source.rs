@@ -50,10 +50,12 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The camera on the hand as a [`FrameSource`]: every grab renders the cell as it is, with the joints where they are.
+/// The camera on the hand as a [`FrameSource`]: every grab renders the cell as it is, with the
+/// joints where they are.
 ///
-/// The joints come from a closure, so that any arm will do: [`SimulatedArm::pose`], or an emulated controller asked where it stands.
-/// Frames are taken in an instant unless [`CellCamera::exposed`] says how long they take, and how things move meanwhile.
+/// The joints come from a closure, so that any arm will do: [`SimulatedArm::pose`], or an emulated
+/// controller asked where it stands. Frames are taken in an instant unless [`CellCamera::exposed`]
+/// says how long they take, and how things move meanwhile.
 pub struct CellCamera<P> {
     cell: SharedCell,
     renderer: Renderer,
@@ -77,11 +79,13 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
         }
     }
 
-    /// The camera with exposures that take time ([`Shot`]), of one field or two: `motion` is asked at every grab how fast arm and ball
-    /// move. An arm that moves at once and a cell have no speeds of their own; whoever moves them knows, or takes what has moved since
-    /// the last frame for it ([`Motion::between`]).
+    /// The camera with exposures that take time ([`Shot`]), of one field or two: `motion` is asked
+    /// at every grab how fast arm and ball move. An arm that moves at once and a cell have no
+    /// speeds of their own; whoever moves them knows, or takes what has moved since the last frame
+    /// for it ([`Motion::between`]).
     ///
-    /// Cell and joints are as they are in the middle of the exposure, so that its truth, and [`Cell::features`], hold for the frame.
+    /// Cell and joints are as they are in the middle of the exposure, so that its truth, and
+    /// [`Cell::features`], hold for the frame.
     ///
     /// ```
     /// use hough_heuristic::FrameSource;
@@ -124,7 +128,9 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
         };
         let joints = (self.pose)();
         if let Some(joint) = joints.non_finite() {
-            return Err(failed(format!("the angle of {joint} is not a finite number")));
+            return Err(failed(format!(
+                "the angle of {joint} is not a finite number"
+            )));
         }
         let cell = self.cell.get();
         let Some(motion) = &mut self.motion else {
@@ -154,7 +160,8 @@ impl<P> std::fmt::Debug for CellCamera<P> {
     }
 }
 
-/// The camera and the detector in one: the ball's features straight from the geometry, with noise, without a frame.
+/// The camera and the detector in one: the ball's features straight from the geometry, with noise,
+/// without a frame.
 pub struct FeatureCamera<P> {
     cell: SharedCell,
     pose: P,
@@ -163,9 +170,9 @@ pub struct FeatureCamera<P> {
 }
 
 impl<P: FnMut() -> Joints> FeatureCamera<P> {
-    /// A camera in `cell` that looks from wherever `pose` says the joints are; its features carry normal noise of standard deviation
-    /// `noise` units, drawn from `seed`. With noise that is no finite number, or below zero, it finds nothing
-    /// ([`FeatureCamera::try_new`] refuses it).
+    /// A camera in `cell` that looks from wherever `pose` says the joints are; its features carry
+    /// normal noise of standard deviation `noise` units, drawn from `seed`. With noise that is no
+    /// finite number, or below zero, it finds nothing ([`FeatureCamera::try_new`] refuses it).
     pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Self {
         Self {
             cell,
@@ -178,13 +185,20 @@ impl<P: FnMut() -> Joints> FeatureCamera<P> {
     /// As [`FeatureCamera::new`].
     ///
     /// # Errors
-    /// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number of zero or above.
-    pub fn try_new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Result<Self, QuantityError> {
+    /// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is no finite number
+    /// of zero or above.
+    pub fn try_new(
+        cell: SharedCell,
+        pose: P,
+        noise: f64,
+        seed: u64,
+    ) -> Result<Self, QuantityError> {
         amount(NOISE, noise)?;
         Ok(Self::new(cell, pose, noise, seed))
     }
 
-    /// What a detector would find; `None` if the ball counts as lost, or the noise is no finite number of zero or above.
+    /// What a detector would find; `None` if the ball counts as lost, or the noise is no finite
+    /// number of zero or above.
     pub fn look(&mut self) -> Option<Features> {
         if amount(NOISE, self.noise).is_err() {
             return None;
@@ -204,10 +218,12 @@ impl<P> std::fmt::Debug for FeatureCamera<P> {
     }
 }
 
-/// An arm that moves at once, without a controller in between: a [`Manipulator`] and a [`ProximitySensor`].
+/// An arm that moves at once, without a controller in between: a [`Manipulator`] and a
+/// [`ProximitySensor`].
 ///
-/// On its way it pushes the ball if it runs into it, and carries it if it holds it. With [`Errors`] its gears have play and its encoders
-/// count in steps: what it reports is where the motors are, and [`SimulatedArm::pose`] tells where the links are.
+/// On its way it pushes the ball if it runs into it, and carries it if it holds it. With [`Errors`]
+/// its gears have play and its encoders count in steps: what it reports is where the motors are,
+/// and [`SimulatedArm::pose`] tells where the links are.
 #[derive(Clone, Debug)]
 pub struct SimulatedArm {
     cell: SharedCell,
@@ -226,12 +242,17 @@ impl SimulatedArm {
         Self::with_errors(cell, joints, &Errors::none())
     }
 
-    /// An arm with the backlash and the encoder steps of `errors`, sent to `joints` to begin with. (The other errors are the cell's:
-    /// [`Errors::apply`].)
+    /// An arm with the backlash and the encoder steps of `errors`, sent to `joints` to begin with.
+    /// (The other errors are the cell's: [`Errors::apply`].)
     ///
     /// # Errors
-    /// As for [`SimulatedArm::new`]; [`ArmError::Setting`] for backlash or an encoder step that no arm can have (not finite, below zero).
-    pub fn with_errors(cell: SharedCell, joints: Joints, errors: &Errors) -> Result<Self, ArmError> {
+    /// As for [`SimulatedArm::new`]; [`ArmError::Setting`] for backlash or an encoder step that no
+    /// arm can have (not finite, below zero).
+    pub fn with_errors(
+        cell: SharedCell,
+        joints: Joints,
+        errors: &Errors,
+    ) -> Result<Self, ArmError> {
         errors.check_drive()?;
         cell.with(|cell| cell.params.check(&joints))?;
         let drive = Arc::new(Mutex::new(Drive::new(joints, errors)));
@@ -244,7 +265,8 @@ impl SimulatedArm {
         })
     }
 
-    /// A closure that tells where the links are, now and later: what [`CellCamera::new`] and [`FeatureCamera::new`] want.
+    /// A closure that tells where the links are, now and later: what [`CellCamera::new`] and
+    /// [`FeatureCamera::new`] want.
     pub fn pose(&self) -> impl FnMut() -> Joints + Send + use<> {
         let drive = Arc::clone(&self.drive);
         move || locked(&drive).links()

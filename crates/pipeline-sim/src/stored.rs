@@ -23,9 +23,11 @@ pub enum StoredModelError {
         /// What was to be read.
         kind: &'static str,
     },
-    /// Stored in another version of the form. A newer one needs a newer version of this crate; after an older one the model has to be
-    /// fitted again.
-    #[error("the model is stored in version {found} of the form, and only version {known} is read here")]
+    /// Stored in another version of the form. A newer one needs a newer version of this crate;
+    /// after an older one the model has to be fitted again.
+    #[error(
+        "the model is stored in version {found} of the form, and only version {known} is read here"
+    )]
     Version {
         /// Version of the stored model; 0 if it has none.
         found: u32,
@@ -113,14 +115,15 @@ pub(crate) struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub(crate) fn new(kind: &'static str, text: &'a str) -> Result<Self, StoredModelError> {
         let mut lines = text.lines();
-        let version = lines
-            .next()
-            .and_then(|line| match line.split_whitespace().collect::<Vec<_>>()[..] {
-                [signature, found, version] if signature == SIGNATURE && found == kind => {
-                    version.parse().ok()
-                }
-                _ => None,
-            });
+        let version =
+            lines.next().and_then(
+                |line| match line.split_whitespace().collect::<Vec<_>>()[..] {
+                    [signature, found, version] if signature == SIGNATURE && found == kind => {
+                        version.parse().ok()
+                    }
+                    _ => None,
+                },
+            );
         known(version.ok_or(StoredModelError::Kind { kind })?)?;
         Ok(Self { lines, line: 1 })
     }

@@ -23,8 +23,9 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// The workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70 degrees, 200 mm below to 50 mm above the
-    /// shoulder; search poses (p, -110, 210, 0, 45, 0) with p from -75 to 50 in steps of 25 degrees.
+    /// The workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70 degrees, 200
+    /// mm below to 50 mm above the shoulder; search poses (p, -110, 210, 0, 45, 0) with p from -75
+    /// to 50 in steps of 25 degrees.
     pub fn paper() -> Self {
         Self {
             rho: (0.500, 0.800),
@@ -45,15 +46,23 @@ impl Workspace {
     /// Whether balls can lie in this workspace.
     ///
     /// # Errors
-    /// [`QuantityError`] names the range that is not finite and ascending (a distance from the waist must not be below zero either), or
-    /// the angle of the search poses that is not finite.
+    /// [`QuantityError`] names the range that is not finite and ascending (a distance from the
+    /// waist must not be below zero either), or the angle of the search poses that is not finite.
     pub fn check(&self) -> Result<(), QuantityError> {
         ascending("the distance from the waist (m)", self.rho)?;
-        ascending("the distance from the waist (m), from zero,", (0.0, self.rho.0))?;
+        ascending(
+            "the distance from the waist (m), from zero,",
+            (0.0, self.rho.0),
+        )?;
         ascending("the azimuth (rad)", self.azimuth)?;
         ascending("the height (m)", self.height)?;
         let elbow = [self.search_elbow.0, self.search_elbow.1];
-        match self.search_pans.into_iter().chain(elbow).find(|a| !a.is_finite()) {
+        match self
+            .search_pans
+            .into_iter()
+            .chain(elbow)
+            .find(|a| !a.is_finite())
+        {
             Some(value) => Err(QuantityError::NotFinite {
                 quantity: "an angle of the search poses (rad)".to_owned(),
                 value,
@@ -62,23 +71,31 @@ impl Workspace {
         }
     }
 
-    /// A ball somewhere in the workspace, uniform in volume. In a workspace that [`Workspace::check`] refuses, a ball nowhere: its
-    /// coordinates are not numbers, and no camera sees it.
+    /// A ball somewhere in the workspace, uniform in volume. In a workspace that
+    /// [`Workspace::check`] refuses, a ball nowhere: its coordinates are not numbers, and no camera
+    /// sees it.
     pub fn sample_ball<R: Rng + ?Sized>(&self, rng: &mut R) -> Ball {
         if self.check().is_err() {
             return Ball::at(f64::NAN, f64::NAN, f64::NAN);
         }
-        let rho = rng.random_range(self.rho.0.powi(2)..=self.rho.1.powi(2)).sqrt();
+        let rho = rng
+            .random_range(self.rho.0.powi(2)..=self.rho.1.powi(2))
+            .sqrt();
         let azimuth = rng.random_range(self.azimuth.0..=self.azimuth.1);
         let z = rng.random_range(self.height.0..=self.height.1);
         Ball::at(rho * azimuth.cos(), rho * azimuth.sin(), z)
     }
 
-    /// A ball that at least one of the search poses sees in `cell` (93 % of all balls are), and the first such pose.
+    /// A ball that at least one of the search poses sees in `cell` (93 % of all balls are), and the
+    /// first such pose.
     ///
-    /// `None` if 10 000 balls in a row cannot be seen (a camera that does not see the workspace), and in a workspace that
-    /// [`Workspace::check`] refuses.
-    pub fn sample_seen_ball<R: Rng + ?Sized>(&self, cell: &Cell, rng: &mut R) -> Option<(Ball, Joints)> {
+    /// `None` if 10 000 balls in a row cannot be seen (a camera that does not see the workspace),
+    /// and in a workspace that [`Workspace::check`] refuses.
+    pub fn sample_seen_ball<R: Rng + ?Sized>(
+        &self,
+        cell: &Cell,
+        rng: &mut R,
+    ) -> Option<(Ball, Joints)> {
         let poses = self.search_poses();
         self.check().ok()?;
         (0..10_000).find_map(|_| {
@@ -89,7 +106,8 @@ impl Workspace {
         })
     }
 
-    /// Which share of the workspace the search poses see, and which share of that can be reached, from `samples` random balls.
+    /// Which share of the workspace the search poses see, and which share of that can be reached,
+    /// from `samples` random balls.
     pub fn coverage<R: Rng + ?Sized>(&self, cell: &Cell, samples: usize, rng: &mut R) -> Coverage {
         let poses = self.search_poses();
         let mut coverage = Coverage {

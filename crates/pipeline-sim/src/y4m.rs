@@ -41,8 +41,8 @@ impl<W: Write> Y4mWriter<W> {
         })
     }
 
-    /// Says in the header that every frame consists of two fields, the even rows (the top field) taken first, as [`crate::Shot::pal`] takes
-    /// them. Without it the stream says progressive.
+    /// Says in the header that every frame consists of two fields, the even rows (the top field)
+    /// taken first, as [`crate::Shot::pal`] takes them. Without it the stream says progressive.
     #[must_use]
     pub fn interlaced(mut self) -> Self {
         self.interlaced = true;
@@ -52,7 +52,8 @@ impl<W: Write> Y4mWriter<W> {
     /// Appends a frame. The first one decides the size.
     ///
     /// # Errors
-    /// [`io::ErrorKind::InvalidInput`] for a frame of another size, or an empty one; whatever the output says.
+    /// [`io::ErrorKind::InvalidInput`] for a frame of another size, or an empty one; whatever the
+    /// output says.
     pub fn write(&mut self, frame: &GrayImage) -> io::Result<()> {
         let size = frame.dimensions();
         match self.size {
@@ -68,7 +69,10 @@ impl<W: Write> Y4mWriter<W> {
             }
             Some(first) if first == size => {}
             first => {
-                let what = format!("a frame of {}x{} pixels in a stream of {first:?}", size.0, size.1);
+                let what = format!(
+                    "a frame of {}x{} pixels in a stream of {first:?}",
+                    size.0, size.1
+                );
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
             }
         }

@@ -1,7 +1,9 @@
 //! Frames for comparing detectors show what their kind says.
 
 use pipeline_sim::image::GrayImage;
-use pipeline_sim::{BenchmarkKind, Camera, CameraError, Renderer, Round, Sensor, Sighting, Snapshot};
+use pipeline_sim::{
+    BenchmarkKind, Camera, CameraError, Renderer, Round, Sensor, Sighting, Snapshot,
+};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -30,7 +32,10 @@ fn every_kind_has_a_name_and_repeats_with_its_seed() {
             .parse::<BenchmarkKind>()
             .expect_err("no such kind")
             .known;
-        assert!(known.split(", ").any(|name| name == kind.to_string()), "{kind}");
+        assert!(
+            known.split(", ").any(|name| name == kind.to_string()),
+            "{kind}"
+        );
         let frame = |seed| -> GrayImage {
             let (mut renderer, snapshot) = drawn(kind, (192, 144), seed);
             snapshot.take(&mut renderer).clone()
@@ -55,7 +60,11 @@ fn balls_are_as_many_as_large_and_as_visible_as_the_kind_says() {
                 assert_eq!(balls.len(), kind.balls(), "{kind} {size:?} {seed}");
                 for ball in &balls {
                     let radius = ball.ellipse.circle().radius / scale;
-                    let most = if kind == BenchmarkKind::Many { 60.0 } else { 145.0 };
+                    let most = if kind == BenchmarkKind::Many {
+                        60.0
+                    } else {
+                        145.0
+                    };
                     // In motion the truth is half a motion away from where the ball was put.
                     let slack = if kind == BenchmarkKind::MotionBlur {
                         0.5
@@ -128,9 +137,14 @@ fn noise_is_as_strong_as_the_name_says() {
             .filter(|(sum, _)| (160.0..320.0).contains(sum))
             .map(|(_, difference)| difference)
             .collect();
-        let variance = differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64 / 2.0;
+        let variance =
+            differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64 / 2.0;
         let deviation = variance.sqrt();
-        let shot = if kind == BenchmarkKind::Clean { 1.3 } else { 0.0 };
+        let shot = if kind == BenchmarkKind::Clean {
+            1.3
+        } else {
+            0.0
+        };
         assert!(
             (deviation - expected - shot).abs() < 0.12 * expected + 0.6,
             "{kind}: {deviation}, {} pixels",

@@ -1,7 +1,9 @@
 //! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
 
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, Contact, Grasp, ProjectionError, ReachError, SightError, Workspace};
+use pipeline_sim::{
+    Ball, Cell, Contact, Grasp, ProjectionError, ReachError, SightError, Workspace,
+};
 use puma_val2::{Joint, JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -58,7 +60,10 @@ fn goal_poses_show_the_goal_and_agree_with_known_ones() {
             (x - 103.5).abs() < 0.2,
             "the arm's plane is 7.5 units right of the axis: {x}"
         );
-        assert!((y - 78.0).abs() < 1e-3 && (r - 33.0).abs() < 1e-3, "{y} {r}");
+        assert!(
+            (y - 78.0).abs() < 1e-3 && (r - 33.0).abs() < 1e-3,
+            "{y} {r}"
+        );
     }
     // Planar balls (u, w) in millimetres and their goal poses.
     for (u, w, jt2, jt3) in [
@@ -84,17 +89,23 @@ fn turning_jt5_alone_brings_the_gripper_to_the_ball() {
         worst = worst.max(cell.grip_miss(&grip));
     }
     assert!(worst < 0.0002, "{worst}");
-    assert!(angles.iter().all(|a| (a - 26.99).abs() < 0.03), "{angles:?}");
+    assert!(
+        angles.iter().all(|a| (a - 26.99).abs() < 0.03),
+        "{angles:?}"
+    );
 }
 
 #[test]
 fn a_correct_reach_and_grip_leaves_the_proximity_sensors_quiet() {
     for (cell, goal) in goals(300) {
-        // Straight in joint space from the pose that sees the ball, turned to it, to the goal; then the swing of JT5.
+        // Straight in joint space from the pose that sees the ball, turned to it, to the goal; then
+        // the swing of JT5.
         let start = Joints::from_degrees([goal.degrees()[0], -110.0, 210.0, 0.0, 45.0, 0.0]);
         for i in 0..=20 {
             let t = f64::from(i) / 20.0;
-            let pose = Joints(std::array::from_fn(|j| start.0[j] + t * (goal.0[j] - start.0[j])));
+            let pose = Joints(std::array::from_fn(|j| {
+                start.0[j] + t * (goal.0[j] - start.0[j])
+            }));
             assert!(!cell.proximity(&pose), "{t} at {pose} of {cell:?}");
             let swing = goal + JointDelta::of(Joint::J5, -18.01_f64.to_radians() * t);
             assert!(!cell.proximity(&swing), "swing {t} at {swing}");
@@ -106,8 +117,9 @@ fn a_correct_reach_and_grip_leaves_the_proximity_sensors_quiet() {
 fn the_proximity_sensors_warn_of_table_ball_and_holder() {
     for (cell, goal) in goals(50) {
         // Past the goal, onto the ball: the elbow opens further and further.
-        let onto =
-            (0..60).map(|i| goal + JointDelta::from_degrees([0.0, 0.5 * f64::from(i), 0.0, 0.0, 0.0, 0.0]));
+        let onto = (0..60).map(|i| {
+            goal + JointDelta::from_degrees([0.0, 0.5 * f64::from(i), 0.0, 0.0, 0.0, 0.0])
+        });
         assert!(onto.into_iter().any(|pose| cell.proximity(&pose)));
         let aside = goal + JointDelta::from_degrees([2.5, 0.0, 0.0, 0.0, -18.01, 0.0]);
         assert!(cell.proximity(&aside), "a finger on the ball");
@@ -124,7 +136,8 @@ fn the_proximity_sensors_warn_of_table_ball_and_holder() {
 fn the_ball_follows_along_the_way_and_not_only_at_its_end() {
     for (cell, goal) in goals(20) {
         // From one side of the ball to the other: at neither end is it touched.
-        let beside = |degrees: f64| goal + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, -18.01, 0.0]);
+        let beside =
+            |degrees: f64| goal + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, -18.01, 0.0]);
         let (from, to) = (beside(12.0), beside(-12.0));
         let (mut swept, mut looked) = (cell, cell);
         assert_eq!(
@@ -173,7 +186,9 @@ fn features_and_places_invert_each_other() {
         (103.5, 78.0, 33.0),
     ] {
         let wanted = Features { x, y, r };
-        let ball = cell.ball_showing(&pose, &wanted).expect("some place shows it");
+        let ball = cell
+            .ball_showing(&pose, &wanted)
+            .expect("some place shows it");
         let shown = Cell {
             ball: Ball {
                 centre: ball,
@@ -199,7 +214,9 @@ fn what_keeps_a_ball_from_being_seen_is_named() {
     let shown = |x: f64, y: f64, r: f64| -> SightError {
         let mut shown = cell;
         let wanted = Features { x, y, r };
-        shown.ball.centre = cell.ball_showing(&goal, &wanted).expect("some place shows it");
+        shown.ball.centre = cell
+            .ball_showing(&goal, &wanted)
+            .expect("some place shows it");
         assert_eq!(shown.features(&goal), None);
         shown.try_features(&goal).expect_err("out of sight")
     };
@@ -220,7 +237,8 @@ fn what_keeps_a_ball_from_being_seen_is_named() {
         SightError::CentreOutside { .. }
     ));
     assert!(matches!(shown(1.0, 72.0, 30.0), SightError::CutOff { .. }));
-    // Whatever the rule asks for, what is larger than the view is called that; a rule that is content with part of it sees it.
+    // Whatever the rule asks for, what is larger than the view is called that; a rule that is
+    // content with part of it sees it.
     let mut rule = cell;
     rule.sight.max_radius = 300.0;
     rule.ball.centre = cell
@@ -264,7 +282,10 @@ fn what_keeps_a_ball_from_being_seen_is_named() {
     ));
     let mut nowhere = goal;
     nowhere.0[2] = f64::INFINITY;
-    let refused = cell.try_features(&nowhere).expect_err("nowhere").to_string();
+    let refused = cell
+        .try_features(&nowhere)
+        .expect_err("nowhere")
+        .to_string();
     assert!(refused.contains("JT3"), "{refused}");
 }
 
@@ -293,14 +314,21 @@ fn why_there_is_no_goal_pose_is_told() {
         assert_eq!(cell.goal_pose(45.0), None);
         cell.try_goal_pose(45.0).expect_err("no pose")
     };
-    let at = |x: f64, y: f64, z: f64| refused(&|cell| cell.ball.centre = nalgebra::Point3::new(x, y, z));
+    let at =
+        |x: f64, y: f64, z: f64| refused(&|cell| cell.ball.centre = nalgebra::Point3::new(x, y, z));
     assert!(
         matches!(at(3.0, 0.0, 0.0), ReachError::OutOfReach { distance, greatest, .. } if distance > greatest)
     );
     assert!(matches!(at(0.1, 0.0, 0.0), ReachError::BesideWaist { .. }));
     let back = at(-0.6, 0.0, -0.1);
     assert!(
-        matches!(back, ReachError::OutOfLimits { joint: Joint::J1, .. }),
+        matches!(
+            back,
+            ReachError::OutOfLimits {
+                joint: Joint::J1,
+                ..
+            }
+        ),
         "{back}"
     );
     assert!(
@@ -331,11 +359,17 @@ fn measures_that_are_no_numbers_are_named() {
     arm.params.a2 = f64::NAN;
     rule.sight.min_share = f64::NAN;
     for (wrong, named) in [(mount, "mount"), (arm, "a2"), (rule, "share")] {
-        let error = wrong.try_features(&pose).expect_err("no number").to_string();
+        let error = wrong
+            .try_features(&pose)
+            .expect_err("no number")
+            .to_string();
         assert!(error.contains(named), "{error}");
     }
     for (wrong, named) in [(mount, "mount"), (arm, "a2")] {
-        let error = wrong.try_goal_pose(45.0).expect_err("no number").to_string();
+        let error = wrong
+            .try_goal_pose(45.0)
+            .expect_err("no number")
+            .to_string();
         assert!(error.contains(named), "{error}");
     }
     for radius in [f64::NAN, -0.02, 0.0] {

@@ -1,7 +1,10 @@
-//! The two ways to the ball's features agree: straight from the geometry, and by rendering a frame and detecting the ball in it.
+//! The two ways to the ball's features agree: straight from the geometry, and by rendering a frame
+//! and detecting the ball in it.
 #![allow(clippy::print_stdout)] // Measured differences, shown with --nocapture.
 
-use hough_heuristic::{CircleDetector, Features, FrameSource, Heuristic, HeuristicConfig, Y4mFrames};
+use hough_heuristic::{
+    CircleDetector, Features, FrameSource, Heuristic, HeuristicConfig, Y4mFrames,
+};
 use pipeline_sim::{Ball, Cell, Renderer, Scene, SceneKind, Snapshot, Workspace, Y4mWriter};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -10,7 +13,8 @@ use rand::rngs::Xoshiro256PlusPlus;
 fn the_shortcut_agrees_with_rendering_and_detection() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut renderer = Renderer::new(&Scene::laboratory(), 1);
-    // The laboratory has other round things, and outlines off the axis are ellipses: several circles, some tolerance.
+    // The laboratory has other round things, and outlines off the axis are ellipses: several
+    // circles, some tolerance.
     let config = HeuristicConfig {
         min_radius: 18.0,
         max_circles: 8,
@@ -22,7 +26,12 @@ fn the_shortcut_agrees_with_rendering_and_detection() {
     while frames < 60 {
         let Snapshot { cell, joints, .. } = Snapshot::draw(SceneKind::Things, &mut rng);
         let shortcut = cell.features(&joints).expect("snapshots show the ball");
-        if cell.outline(&joints).expect("in sight").share_inside(768, 576) < 1.0 {
+        if cell
+            .outline(&joints)
+            .expect("in sight")
+            .share_inside(768, 576)
+            < 1.0
+        {
             continue;
         }
         frames += 1;
@@ -33,8 +42,9 @@ fn the_shortcut_agrees_with_rendering_and_detection() {
             .iter()
             .map(|d| Features::from_circle(&d.circle, 768))
             .min_by(|a, b| {
-                let distance =
-                    |f: &Features| (f.x - shortcut.x).hypot(f.y - shortcut.y) + (f.r - shortcut.r).abs();
+                let distance = |f: &Features| {
+                    (f.x - shortcut.x).hypot(f.y - shortcut.y) + (f.r - shortcut.r).abs()
+                };
                 distance(a).total_cmp(&distance(b))
             });
         let Some(seen) = seen else { continue };
@@ -58,9 +68,16 @@ fn the_shortcut_agrees_with_rendering_and_detection() {
         at(&radii, 0.5),
         at(&radii, 0.9)
     );
-    assert!(centres.len() * 10 >= frames * 9, "{} of {frames}", centres.len());
+    assert!(
+        centres.len() * 10 >= frames * 9,
+        "{} of {frames}",
+        centres.len()
+    );
     // A unit is four pixels of the frame.
-    assert!(at(&centres, 0.5) < 0.15 && at(&centres, 0.9) < 0.5, "{centres:?}");
+    assert!(
+        at(&centres, 0.5) < 0.15 && at(&centres, 0.9) < 0.5,
+        "{centres:?}"
+    );
     assert!(at(&radii, 0.5) < 0.20 && at(&radii, 0.9) < 0.5, "{radii:?}");
 }
 
@@ -72,7 +89,9 @@ fn a_written_run_is_read_back_frame_by_frame() {
     let mut frames = Vec::new();
     for pose in Workspace::paper().search_poses() {
         frames.push(renderer.render(&cell, &pose).clone());
-        video.write(frames.last().expect("just pushed")).expect("memory");
+        video
+            .write(frames.last().expect("just pushed"))
+            .expect("memory");
     }
     let wrong = image::GrayImage::new(4, 4);
     assert!(video.write(&wrong).is_err(), "another size");

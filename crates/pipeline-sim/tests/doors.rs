@@ -4,8 +4,8 @@ use hough_heuristic::image::GrayImage;
 use hough_heuristic::{FrameError, FrameSource};
 use nalgebra::Vector3;
 use pipeline_sim::{
-    Ball, Cell, CellCamera, FeatureCamera, Motion, Renderer, Scene, Sensor, SharedCell, Shot, SimulatedArm,
-    Workspace, Y4mWriter,
+    Ball, Cell, CellCamera, FeatureCamera, Motion, Renderer, Scene, Sensor, SharedCell, Shot,
+    SimulatedArm, Workspace, Y4mWriter,
 };
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 
@@ -17,8 +17,8 @@ fn cell() -> SharedCell {
 fn frames_follow_the_arm_and_repeat_with_the_seed() {
     let run = || {
         let cell = cell();
-        let mut arm =
-            SimulatedArm::new(cell.clone(), Workspace::paper().search_poses()[3]).expect("a search pose");
+        let mut arm = SimulatedArm::new(cell.clone(), Workspace::paper().search_poses()[3])
+            .expect("a search pose");
         let mut camera = CellCamera::new(cell, Renderer::new(&Scene::laboratory(), 5), arm.pose());
         let first = camera.grab().expect("a frame");
         let again = camera.grab().expect("a frame");
@@ -42,13 +42,20 @@ fn frames_follow_the_arm_and_repeat_with_the_seed() {
 
 #[test]
 fn impossible_moves_are_refused_and_nothing_moves() {
-    let mut arm = SimulatedArm::new(cell(), Workspace::paper().search_poses()[3]).expect("a search pose");
+    let mut arm =
+        SimulatedArm::new(cell(), Workspace::paper().search_poses()[3]).expect("a search pose");
     let before = arm.joints().expect("always");
     let too_far = JointDelta::from_degrees([0.0, 0.0, 30.0, 0.0, 0.0, 0.0]);
-    assert!(matches!(arm.move_by(too_far), Err(ArmError::JointLimit { .. })));
+    assert!(matches!(
+        arm.move_by(too_far),
+        Err(ArmError::JointLimit { .. })
+    ));
     let mut nowhere = before;
     nowhere.0[1] = f64::NAN;
-    assert!(matches!(arm.move_to(nowhere), Err(ArmError::NotFinite { .. })));
+    assert!(matches!(
+        arm.move_to(nowhere),
+        Err(ArmError::NotFinite { .. })
+    ));
     assert_eq!(arm.joints().expect("always"), before);
     arm.set_gripper(Gripper::Closed).expect("always");
     assert_eq!(arm.gripper(), Gripper::Closed);
@@ -63,13 +70,15 @@ fn impossible_moves_are_refused_and_nothing_moves() {
 fn camera_and_arm_can_be_sent_to_another_thread() {
     fn sent<T: Send>(_: &T) {}
     let cell = cell();
-    let arm = SimulatedArm::new(cell.clone(), Workspace::paper().search_poses()[0]).expect("a search pose");
+    let arm = SimulatedArm::new(cell.clone(), Workspace::paper().search_poses()[0])
+        .expect("a search pose");
     let camera = CellCamera::new(cell, Renderer::new(&Scene::plain(), 1), arm.pose());
     sent(&camera);
     sent(&arm);
 }
 
-/// A frame, without noise, of a camera that is exposed while the waist turns at `speed` degrees a second.
+/// A frame, without noise, of a camera that is exposed while the waist turns at `speed` degrees a
+/// second.
 fn exposed(shot: Shot, speed: f64) -> GrayImage {
     let mut scene = Scene::laboratory();
     scene.sensor = Sensor {
@@ -88,7 +97,8 @@ fn exposed(shot: Shot, speed: f64) -> GrayImage {
     camera.grab().expect("a frame")
 }
 
-/// Mean difference of neighbours along rows and along columns: what motion along x takes from the first, and fields add to the second.
+/// Mean difference of neighbours along rows and along columns: what motion along x takes from the
+/// first, and fields add to the second.
 fn detail(frame: &GrayImage) -> (f64, f64) {
     let (w, h) = frame.dimensions();
     let at = |x: u32, y: u32| f64::from(frame.get_pixel(x, y).0[0]);
@@ -154,7 +164,8 @@ fn the_ball_of_an_exposure_is_where_the_cell_has_it() {
         (rows.sum::<f64>() / sum, detail(&frame).0)
     };
     let (sharp, blurred) = (middle(false), middle(true));
-    // The ball moves by 10 mm, 65 pixels; from one end of the exposure to its middle would be half of that.
+    // The ball moves by 10 mm, 65 pixels; from one end of the exposure to its middle would be half
+    // of that.
     assert!(
         (sharp.0 - blurred.0).abs() < 6.0 && blurred.1 < sharp.1,
         "{sharp:?} {blurred:?}"
@@ -169,7 +180,9 @@ fn exposures_that_make_no_sense_are_refused() {
         exposure: -1.0,
         ..Shot::still()
     };
-    let refused = camera().exposed(shot, Motion::still).expect_err("no exposure");
+    let refused = camera()
+        .exposed(shot, Motion::still)
+        .expect_err("no exposure");
     assert!(refused.to_string().contains("exposure time"), "{refused}");
     let nowhere = || Motion {
         joints: [0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0],
@@ -194,7 +207,9 @@ fn speeds_are_those_between_two_moments_and_a_held_ball_goes_with_the_hand() {
     let motion = Motion::between((&before, &joints), (&later, &turned), 0.04);
     let (then, there) = motion.moved(&before, &joints, 0.04);
     assert!((then.ball.centre - later.ball.centre).norm() < 1e-12);
-    assert!((then.holder.expect("a holder").foot - later.holder.expect("a holder").foot).norm() < 1e-12);
+    assert!(
+        (then.holder.expect("a holder").foot - later.holder.expect("a holder").foot).norm() < 1e-12
+    );
     assert!((0..6).all(|i| (there.0[i] - turned.0[i]).abs() < 1e-12));
     let mut grip = joints;
     grip.0[4] = before.grip_angle(&joints);

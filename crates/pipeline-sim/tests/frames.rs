@@ -4,14 +4,15 @@
 use hough_heuristic::image::GrayImage;
 use nalgebra::Point2;
 use pipeline_sim::{
-    Ball, Cell, Distortion, Light, Look, Renderer, Round, Scene, SceneKind, Sensor, Shape, Shot, Snapshot,
-    Workspace,
+    Ball, Cell, Distortion, Light, Look, Renderer, Round, Scene, SceneKind, Sensor, Shape, Shot,
+    Snapshot, Workspace,
 };
 use puma_val2::{JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-/// A grey ball in perfectly even light over a white table, no noise, no blur: its edge is where the geometry says, or nowhere.
+/// A grey ball in perfectly even light over a white table, no noise, no blur: its edge is where the
+/// geometry says, or nowhere.
 fn silhouette() -> Scene {
     Scene {
         lights: Vec::new(),
@@ -43,14 +44,18 @@ fn cell_at_goal() -> (Cell, Joints) {
     (cell, goal)
 }
 
-/// A minimal detector for such a ball: the half-level crossing along rays from a place inside, then centroid and radius of equal area.
-/// `None` where something else than the table surrounds the ball.
+/// A minimal detector for such a ball: the half-level crossing along rays from a place inside, then
+/// centroid and radius of equal area. `None` where something else than the table surrounds the
+/// ball.
 fn detect(frame: &GrayImage, inside: Point2<f64>, reach: f64) -> Option<(f64, f64, f64)> {
     let value = |x: f64, y: f64| -> Option<f64> {
         let (i, j) = (x.floor(), y.floor());
-        let inside =
-            x >= 0.0 && y >= 0.0 && i + 1.0 < f64::from(frame.width()) && j + 1.0 < f64::from(frame.height());
-        let at = |di: f64, dj: f64| f64::from(frame.get_pixel((i + di) as u32, (j + dj) as u32).0[0]);
+        let inside = x >= 0.0
+            && y >= 0.0
+            && i + 1.0 < f64::from(frame.width())
+            && j + 1.0 < f64::from(frame.height());
+        let at =
+            |di: f64, dj: f64| f64::from(frame.get_pixel((i + di) as u32, (j + dj) as u32).0[0]);
         inside.then(|| {
             let (fx, fy) = (x - i, y - j);
             (1.0 - fy) * ((1.0 - fx) * at(0.0, 0.0) + fx * at(1.0, 0.0))
@@ -92,7 +97,8 @@ fn detect(frame: &GrayImage, inside: Point2<f64>, reach: f64) -> Option<(f64, f6
     Some((x, y, (area / std::f64::consts::PI).sqrt()))
 }
 
-/// The largest error of centre and of radius over many poses, the mean error of the radius, and how many were measured.
+/// The largest error of centre and of radius over many poses, the mean error of the radius, and how
+/// many were measured.
 fn errors(camera: pipeline_sim::Camera, seed: u64) -> (f64, f64, f64, usize) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut renderer = Renderer::new(&silhouette(), 1);
@@ -217,7 +223,9 @@ fn defocus_motion_and_fields_leave_their_marks() {
         let rows = (first..576).step_by(2).skip(2).take(280);
         let difference: f64 = rows
             .flat_map(|y| (0..768).map(move |x| (x, y)))
-            .map(|(x, y)| f64::from(frame.get_pixel(x, y).0[0].abs_diff(whole.get_pixel(x, y).0[0])))
+            .map(|(x, y)| {
+                f64::from(frame.get_pixel(x, y).0[0].abs_diff(whole.get_pixel(x, y).0[0]))
+            })
             .sum::<f64>()
             / (280.0 * 768.0);
         assert!(difference < 0.1, "{difference}");
@@ -253,7 +261,8 @@ fn noise_has_the_strength_asked_for() {
     let differences: Vec<f64> = region
         .map(|(x, y)| f64::from(a.get_pixel(x, y).0[0]) - f64::from(b.get_pixel(x, y).0[0]))
         .collect();
-    let deviation = (differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64 / 2.0).sqrt();
+    let deviation =
+        (differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64 / 2.0).sqrt();
     let expected = (9.0_f64 + 0.3 * 64.0).sqrt();
     assert!(
         (deviation - expected).abs() < 0.08 * expected,
@@ -281,7 +290,9 @@ fn every_kind_of_scene_can_be_drawn_and_repeats_with_its_seed() {
         let (frame, ball) = draw();
         assert!(draw() == (frame.clone(), ball), "{kind}");
         assert_eq!(ball.is_some(), kind != SceneKind::Empty, "{kind}");
-        let (least, greatest) = frame.iter().fold((255, 0), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (least, greatest) = frame
+            .iter()
+            .fold((255, 0), |(a, b), v| (a.min(*v), b.max(*v)));
         assert!(greatest - least > 40, "{kind}: {least}..{greatest}");
     }
 }
@@ -318,8 +329,14 @@ fn senseless_scenes_and_poses_draw_something_or_nothing_but_do_not_fail() {
     renderer.render(&cell, &goal);
     renderer.render(&cell, &Joints([f64::NAN; 6]));
     // Under the table, upside down, inside the ball.
-    renderer.render(&cell, &Joints::from_degrees([0.0, 40.0, 180.0, 0.0, 0.0, 0.0]));
-    renderer.render(&cell, &Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]));
+    renderer.render(
+        &cell,
+        &Joints::from_degrees([0.0, 40.0, 180.0, 0.0, 0.0, 0.0]),
+    );
+    renderer.render(
+        &cell,
+        &Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+    );
     cell.ball.centre = nalgebra::Point3::from(cell.camera_pose(&goal).translation.vector);
     renderer.render(&cell, &goal);
     assert!(
@@ -337,7 +354,10 @@ fn senseless_scenes_and_poses_draw_something_or_nothing_but_do_not_fail() {
 #[test]
 fn the_overview_shows_arm_ball_and_workspace() {
     let (cell, goal) = cell_at_goal();
-    let svg = cell.overview_svg(&Workspace::paper(), &[Workspace::paper().search_poses()[3], goal]);
+    let svg = cell.overview_svg(
+        &Workspace::paper(),
+        &[Workspace::paper().search_poses()[3], goal],
+    );
     for class in ["arm", "cone", "ball", "space", "path", "table", "holder"] {
         assert!(svg.contains(&format!("class=\"{class}\"")), "{class}");
     }

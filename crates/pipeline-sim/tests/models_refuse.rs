@@ -2,8 +2,8 @@
 
 use hough_heuristic::Features;
 use pipeline_sim::{
-    Ball, Cell, CentreModel, CentreSample, MOST_SAMPLES, QuantityError, ReachForm, ReachModel, ReachSample,
-    StoredModelError, sample_moves, try_sample_moves, with_noise,
+    Ball, Cell, CentreModel, CentreSample, MOST_SAMPLES, QuantityError, ReachForm, ReachModel,
+    ReachSample, StoredModelError, sample_moves, try_sample_moves, with_noise,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -13,7 +13,12 @@ fn rng(seed: u64) -> Xoshiro256PlusPlus {
 }
 
 fn samples(count: usize) -> (Vec<CentreSample>, Vec<ReachSample>) {
-    sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), count, 0.125, &mut rng(1))
+    sample_moves(
+        &Cell::paper(Ball::at(0.6, 0.0, -0.1)),
+        count,
+        0.125,
+        &mut rng(1),
+    )
 }
 
 #[test]
@@ -22,7 +27,9 @@ fn damaged_numbers_of_a_stored_model_are_refused() {
     let reach = ReachModel::fit(&reaching, ReachForm::Linear, &[])
         .expect("enough samples")
         .to_text();
-    let centre = CentreModel::fit(&centring).expect("enough samples").to_text();
+    let centre = CentreModel::fit(&centring)
+        .expect("enough samples")
+        .to_text();
     let damaged = |text: &str, line: &str| {
         let name = line.split(' ').next().expect("a name");
         let put = |old: &str| {
@@ -101,7 +108,11 @@ fn there_is_no_prediction_from_what_is_no_ball_or_no_number() {
             (with_radius(f64::NAN), 180.0, 2.0),
         ] {
             let place = (form, before, jt3, d2);
-            assert_eq!(model.predict_unbounded(&before, jt3, d2, 2.0), None, "{place:?}");
+            assert_eq!(
+                model.predict_unbounded(&before, jt3, d2, 2.0),
+                None,
+                "{place:?}"
+            );
             assert_eq!(model.uncertainty(&before, jt3, d2, 2.0), None, "{place:?}");
         }
         let speck = model.uncertainty(&with_radius(1e-300), 180.0, 2.0, 2.0);
@@ -110,7 +121,16 @@ fn there_is_no_prediction_from_what_is_no_ball_or_no_number() {
     let centre = CentreModel::fit(&centring).expect("enough samples");
     assert!(centre.uncertainty(&goal, 2.0).is_some());
     assert_eq!(centre.uncertainty(&goal, f64::NAN), None);
-    assert_eq!(centre.uncertainty(&Features { r: f64::NAN, ..goal }, 2.0), None);
+    assert_eq!(
+        centre.uncertainty(
+            &Features {
+                r: f64::NAN,
+                ..goal
+            },
+            2.0
+        ),
+        None
+    );
 }
 
 #[test]
@@ -131,10 +151,13 @@ fn numbers_that_can_only_be_mistakes_are_refused() {
     let (_, reaching) = samples(300);
     let model = ReachModel::fit(&reaching, ReachForm::Rigid8, &[]).expect("enough samples");
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let too_many = |refused: Option<QuantityError>| matches!(refused, Some(QuantityError::TooLarge { .. }));
+    let too_many =
+        |refused: Option<QuantityError>| matches!(refused, Some(QuantityError::TooLarge { .. }));
     let moves = ReachModel::MOST_MOVES + 1;
     assert!(too_many(
-        model.try_open_loop_error(&cell, moves, 1, &mut rng(1)).err()
+        model
+            .try_open_loop_error(&cell, moves, 1, &mut rng(1))
+            .err()
     ));
     let (told, refused) = (
         model.try_open_loop_error(&cell, 2, 5, &mut rng(1)),
@@ -143,7 +166,9 @@ fn numbers_that_can_only_be_mistakes_are_refused() {
     assert_eq!(told, Ok(model.open_loop_error(&cell, 2, 5, &mut rng(1))));
     assert!(too_many(refused.err()));
     assert!(too_many(
-        model.try_open_loop_error(&cell, 1, usize::MAX, &mut rng(1)).err()
+        model
+            .try_open_loop_error(&cell, 1, usize::MAX, &mut rng(1))
+            .err()
     ));
     let none = model.try_open_loop_error(&cell, 1, 0, &mut rng(1));
     assert!(matches!(none, Err(QuantityError::NotPositive { .. })));

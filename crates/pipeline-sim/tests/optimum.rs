@@ -34,9 +34,16 @@ fn at_the_goal_nothing_is_left_to_do_and_nowhere_there_is_no_way() {
     let cell = Cell::paper(Ball::at(0.62, 0.2, -0.1));
     let (moves, goal) = (MoveLists::paper(), GoalBox::paper());
     let there = cell.goal_pose(45.0).expect("within reach");
-    assert_eq!(cell.fewest_reaching_moves(&there, &moves, &goal, 5), Ok(Some(0)));
-    assert_eq!(cell.fewest_centring_moves(&there, &moves, &goal, 5), Ok(Some(0)));
-    // At a radius of 33 a degree of JT1 moves the ball by twenty units: 2.4 degrees off are two or three moves.
+    assert_eq!(
+        cell.fewest_reaching_moves(&there, &moves, &goal, 5),
+        Ok(Some(0))
+    );
+    assert_eq!(
+        cell.fewest_centring_moves(&there, &moves, &goal, 5),
+        Ok(Some(0))
+    );
+    // At a radius of 33 a degree of JT1 moves the ball by twenty units: 2.4 degrees off are two or
+    // three moves.
     let mut aside = there;
     aside.0[0] += 2.4_f64.to_radians();
     let steps = cell
@@ -48,7 +55,10 @@ fn at_the_goal_nothing_is_left_to_do_and_nowhere_there_is_no_way() {
         Joints::from_degrees([0.0, -110.0, 210.0, 0.0, -45.0, 0.0]),
         Joints::from_degrees([0.0, 20.0, 210.0, 0.0, 45.0, 0.0]),
     ] {
-        assert_eq!(cell.fewest_reaching_moves(&nowhere, &moves, &goal, 5), Ok(None));
+        assert_eq!(
+            cell.fewest_reaching_moves(&nowhere, &moves, &goal, 5),
+            Ok(None)
+        );
     }
 }
 
@@ -90,7 +100,10 @@ fn a_search_without_bounds_is_refused_by_name() {
     );
     // Without any move there is only the start.
     assert_eq!(cell.fewest_moves(&there, &[], |_, _| true, 5), Ok(Some(0)));
-    assert_eq!(cell.fewest_moves(&there, &[], |_, _| false, u32::MAX), Ok(None));
+    assert_eq!(
+        cell.fewest_moves(&there, &[], |_, _| false, u32::MAX),
+        Ok(None)
+    );
     // A single move that leads out of the limits at once, however long.
     let leap = [JointDelta::from_degrees([0.0, 1e30, 0.0, 0.0, 0.0, 0.0])];
     assert_eq!(cell.fewest_moves(&there, &leap, |_, _| false, 5), Ok(None));

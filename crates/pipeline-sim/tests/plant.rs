@@ -3,8 +3,8 @@
 use hough_heuristic::Features;
 use nalgebra::{Point3, Vector3};
 use pipeline_sim::{
-    Ball, BallPath, Cell, Contact, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell, SimulatedArm,
-    Workspace, sample_moves, try_sample_moves, with_noise,
+    Ball, BallPath, Cell, Contact, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell,
+    SimulatedArm, Workspace, sample_moves, try_sample_moves, with_noise,
 };
 use puma_val2::{Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::SeedableRng;
@@ -26,14 +26,21 @@ fn a_ball_at_the_pads_is_held_carried_and_put_down() {
     let shared = SharedCell::new(cell);
     let mut arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
     arm.move_by(swing()).expect("within limits");
-    assert_eq!(arm.contact(), Contact::Free, "the open jaws straddle the ball");
+    assert_eq!(
+        arm.contact(),
+        Contact::Free,
+        "the open jaws straddle the ball"
+    );
     arm.set_gripper(Gripper::Closed).expect("always");
     assert_eq!(arm.grasp(), Some(Grasp::Held));
     let joints = arm
         .move_by(JointDelta::from_degrees([10.0, -15.0, 0.0, 0.0, 0.0, 0.0]))
         .expect("within limits");
     assert_eq!(arm.contact(), Contact::Carried);
-    assert!(shared.get().ball.centre.z > cell.ball.centre.z + 0.05, "lifted");
+    assert!(
+        shared.get().ball.centre.z > cell.ball.centre.z + 0.05,
+        "lifted"
+    );
     assert!(shared.get().grip_miss(&joints) < 0.001);
     assert!(
         !arm.object_near().expect("always"),
@@ -64,7 +71,8 @@ fn a_grasp_beside_the_ball_pushes_it_or_misses() {
     let grip = goal + swing();
     let mut outcomes = [0; 3];
     for mm in 0..=40 {
-        // The hand stands short of the ball or beyond it, along the tool axis: by construction the ball is between the jaws.
+        // The hand stands short of the ball or beyond it, along the tool axis: by construction the
+        // ball is between the jaws.
         let mut off = cell;
         let axis = off.params.wrist(&grip) * Vector3::z();
         off.ball.centre += axis * (f64::from(mm) / 1000.0);
@@ -109,8 +117,14 @@ fn pads_that_slide_off_leave_the_ball_where_they_miss_it() {
             panic!("{up} {ahead}: not pushed");
         };
         assert!(((off.ball.centre - before).norm() - by).abs() < 1e-12);
-        assert!((off.ball.centre.z - before.z).abs() < 1e-12, "along the table");
-        let ball = off.params.wrist(&grip).inverse_transform_point(&off.ball.centre);
+        assert!(
+            (off.ball.centre.z - before.z).abs() < 1e-12,
+            "along the table"
+        );
+        let ball = off
+            .params
+            .wrist(&grip)
+            .inverse_transform_point(&off.ball.centre);
         let miss = ball.x.hypot(ball.z - off.params.d6 - off.hand.tool);
         let touching = off.ball.radius + off.hand.finger_radius;
         assert!((miss - touching).abs() < 1e-9, "{up} {ahead}: {miss}");
@@ -123,7 +137,11 @@ fn jaws_hold_only_what_they_straddle_and_only_when_they_close() {
     let grip = goal + swing();
     let mut closed = cell;
     closed.jaws = Gripper::Closed;
-    assert_eq!(closed.close_gripper(&grip), Grasp::Missed, "they were closed");
+    assert_eq!(
+        closed.close_gripper(&grip),
+        Grasp::Missed,
+        "they were closed"
+    );
     assert_eq!(closed.ball, cell.ball);
     let mut wide = cell;
     wide.ball.radius = 0.031;
@@ -159,7 +177,8 @@ fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
         );
         // A finger meets it from the side.
         let [finger, ..] = aside.hand_bodies(&there);
-        aside.ball.centre = nalgebra::center(&finger.from, &finger.to) + Vector3::new(0.01, 0.0, 0.0);
+        aside.ball.centre =
+            nalgebra::center(&finger.from, &finger.to) + Vector3::new(0.01, 0.0, 0.0);
         assert!(matches!(aside.follow(&there), Contact::Pushed { by } if by > 0.005));
         assert_eq!(aside.holder, Some(holder), "the holder stays where it is");
     }
@@ -175,7 +194,8 @@ fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
 #[test]
 fn play_and_encoders_that_cannot_be_are_refused_by_name() {
     let start = Workspace::paper().search_poses()[2];
-    let arm = |errors: Errors| SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors);
+    let arm =
+        |errors: Errors| SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors);
     for bad in [f64::INFINITY, f64::NAN, -0.001, 4.0] {
         let mut errors = Errors::none();
         errors.encoder_step[3] = bad;
@@ -277,8 +297,8 @@ fn play_and_counts_lie_between_what_is_reported_and_what_is() {
         ..ErrorLevel::Moderate.draw(&mut rng(1))
     };
     let start = Workspace::paper().search_poses()[2];
-    let mut arm =
-        SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors).expect("within limits");
+    let mut arm = SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors)
+        .expect("within limits");
     let mut pose = arm.pose();
     let step = |arm: &mut SimulatedArm, degrees: f64| {
         let delta = JointDelta::from_degrees([0.0, degrees, 0.0, 0.0, 0.0, 0.0]);
@@ -296,7 +316,10 @@ fn play_and_counts_lie_between_what_is_reported_and_what_is() {
         "inside the play nothing moves"
     );
     let counts = back / Errors::PUMA_ENCODER_DEGREES[1];
-    assert!((counts - counts.round()).abs() < 1e-6, "whole counts: {counts}");
+    assert!(
+        (counts - counts.round()).abs() < 1e-6,
+        "whole counts: {counts}"
+    );
 }
 
 fn rng(seed: u64) -> Xoshiro256PlusPlus {
@@ -311,9 +334,14 @@ fn error_levels_are_drawn_from_a_seed_and_make_the_cell_wrong() {
         assert_eq!(level.to_string().parse::<ErrorLevel>(), Ok(level));
         let mut worst: f64 = 0.0;
         for seed in 0..20 {
-            let wrong = level.draw(&mut rng(seed)).apply(&cell).expect("sound errors");
+            let wrong = level
+                .draw(&mut rng(seed))
+                .apply(&cell)
+                .expect("sound errors");
             if let Some(f) = wrong.features(&goal) {
-                worst = worst.max((f.x - 103.5).hypot(f.y - 78.0)).max((f.r - 33.0).abs());
+                worst = worst
+                    .max((f.x - 103.5).hypot(f.y - 78.0))
+                    .max((f.r - 33.0).abs());
             }
         }
         match level {
@@ -364,7 +392,9 @@ fn balls_are_pushed_jump_and_drift() {
     let to = workspace
         .sample_jump(&Point3::new(0.65, 0.1, -0.1), 0.15, &mut rng(5))
         .expect("there is room");
-    assert!(workspace.contains(&to) && ((to - Point3::new(0.65, 0.1, -0.1)).norm() - 0.15).abs() < 1e-9);
+    assert!(
+        workspace.contains(&to) && ((to - Point3::new(0.65, 0.1, -0.1)).norm() - 0.15).abs() < 1e-9
+    );
     let drift = workspace.sample_drift(&from, 0.02, &mut rng(6));
     let drifted = (drift.at(3.0).expect("always") - from).norm();
     assert!((drifted - 0.06).abs() < 1e-12, "{drifted}");
@@ -379,7 +409,9 @@ fn balls_are_pushed_jump_and_drift() {
         radius: 0.05,
         period: 4.0,
     };
-    assert!((circle.at(1.0).expect("a period") - (from + Vector3::new(0.0, 0.05, 0.0))).norm() < 1e-12);
+    assert!(
+        (circle.at(1.0).expect("a period") - (from + Vector3::new(0.0, 0.05, 0.0))).norm() < 1e-12
+    );
     assert_eq!(
         BallPath::Circle {
             middle: from,
@@ -416,7 +448,9 @@ fn each_error_of_the_mount_is_named() {
         ("yaw", |e| e.yaw = f64::NAN),
         ("along its x axis", |e| e.camera_shift[0] = f64::NAN),
         ("along its y axis", |e| e.camera_shift[1] = f64::NAN),
-        ("along its z axis", |e| e.camera_shift[2] = f64::NEG_INFINITY),
+        ("along its z axis", |e| {
+            e.camera_shift[2] = f64::NEG_INFINITY
+        }),
     ];
     for (named, spoil) in spoil {
         let mut errors = Errors::none();
@@ -433,7 +467,8 @@ fn noise_that_is_no_number_is_refused_and_leads_to_no_features() {
     let arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     for noise in [f64::NAN, f64::INFINITY, -0.5] {
-        let refused = FeatureCamera::try_new(shared.clone(), arm.pose(), noise, 1).expect_err("no noise");
+        let refused =
+            FeatureCamera::try_new(shared.clone(), arm.pose(), noise, 1).expect_err("no noise");
         assert!(refused.to_string().contains("noise"), "{refused}");
         assert_eq!(
             try_sample_moves(&cell, 5, noise, &mut rng)
@@ -453,7 +488,10 @@ fn noise_that_is_no_number_is_refused_and_leads_to_no_features() {
     let mut sound = FeatureCamera::try_new(shared, arm.pose(), 0.0, 1).expect("no noise at all");
     assert_eq!(sound.look(), cell.features(&goal));
     assert_eq!(
-        try_sample_moves(&cell, 5, 0.5, &mut rng).expect("sound").0.len(),
+        try_sample_moves(&cell, 5, 0.5, &mut rng)
+            .expect("sound")
+            .0
+            .len(),
         5
     );
 }
@@ -462,7 +500,9 @@ fn noise_that_is_no_number_is_refused_and_leads_to_no_features() {
 fn a_hand_of_any_length_meets_the_ball_on_its_way() {
     // Fingers half a metre long: they reach the ball where the wrist stays far from it.
     let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
-    let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES).expect("within reach");
+    let goal = cell
+        .goal_pose(Cell::REACHING_JT5_DEGREES)
+        .expect("within reach");
     cell.hand.tool = 0.5;
     let wrist = cell.params.wrist(&goal);
     let turned = |degrees: f64| goal + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 use pipeline_sim::{Camera, CameraError, Distortion, ProjectionError};
 
-/// The lens as the literature has it, written down anew: a pinhole's image of unit focal length to the distorted one.
+/// The lens as the literature has it, written down anew: a pinhole's image of unit focal length to
+/// the distorted one.
 fn distorted(lens: &Distortion, x: f64, y: f64) -> (f64, f64) {
     let r2 = x * x + y * y;
     let radial = 1.0 + lens.k1 * r2 + lens.k2 * r2.powi(2) + lens.k3 * r2.powi(3);
@@ -31,10 +32,14 @@ fn hits(camera: &Camera, pixel: Point2<f64>, centre: &Point3<f64>, radius: f64) 
     along > 0.0 && centre.coords.norm_squared() - along * along <= radius * radius
 }
 
-/// The outline found by bisection along rays from a pixel inside: centroid, and mean of the semi-axes of the ellipse with the same second
-/// moments.
+/// The outline found by bisection along rays from a pixel inside: centroid, and mean of the
+/// semi-axes of the ellipse with the same second moments.
 fn brute_force(camera: &Camera, centre: &Point3<f64>, radius: f64) -> (f64, f64, f64) {
-    let (u, v) = distorted(camera.distortion(), centre.x / centre.z, centre.y / centre.z);
+    let (u, v) = distorted(
+        camera.distortion(),
+        centre.x / centre.z,
+        centre.y / centre.z,
+    );
     let inside = camera.principal_point() + Vector2::new(u, v) * camera.focal_px();
     let n = 2048;
     let outline: Vec<Vector2<f64>> = (0..n)
@@ -43,7 +48,12 @@ fn brute_force(camera: &Camera, centre: &Point3<f64>, radius: f64) -> (f64, f64,
             let (mut near, mut far) = (0.0, 400.0);
             for _ in 0..50 {
                 let middle = 0.5 * (near + far);
-                if hits(camera, inside + Vector2::new(cos, sin) * middle, centre, radius) {
+                if hits(
+                    camera,
+                    inside + Vector2::new(cos, sin) * middle,
+                    centre,
+                    radius,
+                ) {
                     near = middle;
                 } else {
                     far = middle;
@@ -59,7 +69,8 @@ fn brute_force(camera: &Camera, centre: &Point3<f64>, radius: f64) -> (f64, f64,
         area += triangle;
         first += (p + q) * (triangle / 3.0);
         let sum = p + q;
-        second += (p * p.transpose() + q * q.transpose() + sum * sum.transpose()) * (triangle / 12.0);
+        second +=
+            (p * p.transpose() + q * q.transpose() + sum * sum.transpose()) * (triangle / 12.0);
     }
     let middle = first / area;
     let spread = (second / area - middle * middle.transpose()).symmetric_eigenvalues();
@@ -81,7 +92,9 @@ fn the_projected_circle_agrees_with_a_ray_cast_to_a_hundredth_of_a_pixel() {
     let camera = Camera::paper();
     for (x, y, z) in PLACES {
         let centre = Point3::new(x, y, z);
-        let circle = camera.project_sphere_to_circle(&centre, 0.020).expect("in view");
+        let circle = camera
+            .project_sphere_to_circle(&centre, 0.020)
+            .expect("in view");
         let (cx, cy, r) = brute_force(&camera, &centre, 0.020);
         let error = (circle.x - cx)
             .abs()
@@ -100,10 +113,14 @@ fn with_distortion_too() {
         p1: 0.002,
         p2: -0.001,
     };
-    let camera = Camera::paper().with_distortion(lens).expect("does not fold");
+    let camera = Camera::paper()
+        .with_distortion(lens)
+        .expect("does not fold");
     for (x, y, z) in PLACES {
         let centre = Point3::new(x, y, z);
-        let circle = camera.project_sphere_to_circle(&centre, 0.020).expect("in view");
+        let circle = camera
+            .project_sphere_to_circle(&centre, 0.020)
+            .expect("in view");
         let (cx, cy, r) = brute_force(&camera, &centre, 0.020);
         let error = (circle.x - cx).abs().max((circle.y - cy).abs());
         assert!(error < 0.01, "{centre}: {circle:?} against {cx} {cy} {r}");
@@ -224,7 +241,10 @@ fn strong_lenses_are_undone_or_refused() {
         .with_distortion(lens(-0.6, 0.0, 0.0))
         .expect("does not fold inside the frame");
     for pixel in [Point2::new(3000.0, 288.0), Point2::new(f64::NAN, 0.0)] {
-        assert!(matches!(barrel.try_ray(pixel), Err(CameraError::NoRay { .. })));
+        assert!(matches!(
+            barrel.try_ray(pixel),
+            Err(CameraError::NoRay { .. })
+        ));
         assert!(barrel.ray(pixel).x.is_nan());
     }
 }
@@ -233,11 +253,15 @@ fn strong_lenses_are_undone_or_refused() {
 fn a_camera_with_another_frame_shows_the_same_and_more() {
     let camera = Camera::paper();
     let centre = Point3::new(0.03, -0.02, 0.4);
-    let circle = camera.project_sphere_to_circle(&centre, 0.02).expect("in view");
+    let circle = camera
+        .project_sphere_to_circle(&centre, 0.02)
+        .expect("in view");
     for (size, scale, beside) in [((192, 144), 0.25, 0.0), ((1920, 1080), 1.875, 240.0)] {
         let other = camera.resized(size.0, size.1).expect("a usable size");
         assert_eq!(other.size(), size);
-        let shown = other.project_sphere_to_circle(&centre, 0.02).expect("in view");
+        let shown = other
+            .project_sphere_to_circle(&centre, 0.02)
+            .expect("in view");
         assert!((shown.radius - scale * circle.radius).abs() < 1e-9);
         assert!((shown.x + 0.5 - beside - scale * (circle.x + 0.5)).abs() < 1e-9);
         assert!((shown.y + 0.5 - scale * (circle.y + 0.5)).abs() < 1e-9);
@@ -303,7 +327,9 @@ fn directions_beyond_the_fold_are_not_shown() {
         .expect("does not fold in the frame");
     for (x, y) in (0..=48).flat_map(|i| (0..=36).map(move |j| (i, j))) {
         let pixel = Point2::new(16.0 * f64::from(x) - 0.5, 16.0 * f64::from(y) - 0.5);
-        let back = camera.project(&Point3::from(camera.ray(pixel))).expect("shown");
+        let back = camera
+            .project(&Point3::from(camera.ray(pixel)))
+            .expect("shown");
         assert!((back - pixel).norm() < 1e-6, "{pixel} {back}");
     }
 }
@@ -311,19 +337,26 @@ fn directions_beyond_the_fold_are_not_shown() {
 #[test]
 fn a_circle_leads_back_to_its_sphere_whatever_the_lens() {
     for millimetres in 2..=12 {
-        let camera = Camera::pinhole(f64::from(millimetres) * 1e-3, 0.0088, 768, 576).expect("a camera");
+        let camera =
+            Camera::pinhole(f64::from(millimetres) * 1e-3, 0.0088, 768, 576).expect("a camera");
         for k in 0..400 {
             let circle = hough_heuristic::Circle {
                 x: f64::from(k % 20) * 40.0,
                 y: f64::from(k / 20) * 30.0,
                 radius: [2.0, 40.0, 132.0, 260.0][k as usize % 4],
             };
-            let centre = camera.sphere_of_circle(&circle, 0.02).expect("there is one");
+            let centre = camera
+                .sphere_of_circle(&circle, 0.02)
+                .expect("there is one");
             let back = camera
                 .project_sphere_to_circle(&centre, 0.02)
                 .expect("before the camera");
-            let off = (back.x - circle.x).hypot(back.y - circle.y) + (back.radius - circle.radius).abs();
-            assert!(off < 1e-6, "{millimetres} mm: {circle:?} comes back as {back:?}");
+            let off =
+                (back.x - circle.x).hypot(back.y - circle.y) + (back.radius - circle.radius).abs();
+            assert!(
+                off < 1e-6,
+                "{millimetres} mm: {circle:?} comes back as {back:?}"
+            );
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What a refit with few samples expects of itself.
 
 use pipeline_sim::{
-    Ball, Cell, CentreModel, CentreSample, ErrorLevel, ReachForm, ReachModel, ReachSample, sample_moves,
+    Ball, Cell, CentreModel, CentreSample, ErrorLevel, ReachForm, ReachModel, ReachSample,
+    sample_moves,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -27,14 +28,18 @@ fn drawn(level: ErrorLevel) -> Vec<Drawn> {
     cells.collect()
 }
 
-/// What models expect, and what occurs, of y and r on the samples to judge on: pairs of expected standard deviation and error.
-fn expectations<'a>(models: impl Iterator<Item = (ReachModel, &'a [ReachSample])>) -> [Vec<(f64, f64)>; 2] {
+/// What models expect, and what occurs, of y and r on the samples to judge on: pairs of expected
+/// standard deviation and error.
+fn expectations<'a>(
+    models: impl Iterator<Item = (ReachModel, &'a [ReachSample])>,
+) -> [Vec<(f64, f64)>; 2] {
     let mut pairs = [Vec::new(), Vec::new()];
     for (model, fresh) in models {
         for s in fresh {
             let at = (&s.before, s.jt3_degrees, s.d2, s.d3);
             let after = model.predict_unbounded(at.0, at.1, at.2, at.3);
-            if let (Some(after), Some((y, r))) = (after, model.uncertainty(at.0, at.1, at.2, at.3)) {
+            if let (Some(after), Some((y, r))) = (after, model.uncertainty(at.0, at.1, at.2, at.3))
+            {
                 pairs[0].push((y, (after.y - s.after.y).abs()));
                 pairs[1].push((r, (after.r - s.after.r).abs()));
             }
@@ -49,7 +54,8 @@ fn covered(pairs: &[(f64, f64)]) -> f64 {
     within.count() as f64 / pairs.len() as f64
 }
 
-/// The median expected standard deviation, by the standard deviation that the median error speaks of.
+/// The median expected standard deviation, by the standard deviation that the median error speaks
+/// of.
 fn excess(pairs: &[(f64, f64)]) -> f64 {
     let median = |pick: fn(&(f64, f64)) -> f64| {
         let mut values: Vec<f64> = pairs.iter().map(pick).collect();
@@ -85,7 +91,11 @@ fn priors(samples: &[ReachSample]) -> impl Iterator<Item = (ReachForm, ReachMode
     ];
     forms.into_iter().map(|form| {
         let model = ReachModel::fit(samples, form, &[]).expect("enough samples");
-        (form, model, if form == ReachForm::Linear { 0.0 } else { 3.0 })
+        (
+            form,
+            model,
+            if form == ReachForm::Linear { 0.0 } else { 3.0 },
+        )
     })
 }
 
@@ -97,7 +107,10 @@ fn a_refit_to_few_samples_expects_what_occurs() {
     let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (centring, reaching) = sample_moves(&nominal, 1000, 0.125, &mut rng(1));
     let turns = [
-        ("with r", CentreModel::fit(&centring).expect("enough samples")),
+        (
+            "with r",
+            CentreModel::fit(&centring).expect("enough samples"),
+        ),
         (
             "without r",
             CentreModel::fit_without_radius(&centring).expect("enough samples"),
@@ -140,19 +153,26 @@ fn a_refit_to_few_samples_expects_what_occurs() {
                         10 => 30.0,
                         _ => 10.0,
                     };
-                    assert!(y <= most && r <= most, "{level} {form:?} {ridge} {n}: {y} {r}");
+                    assert!(
+                        y <= most && r <= most,
+                        "{level} {form:?} {ridge} {n}: {y} {r}"
+                    );
                 }
             }
         }
         for (name, centre) in &turns {
             let shares = COUNTS.map(|n| covered_turns(centre, &cells, n));
             println!("{level} centring {name}, x: {shares:.3?}");
-            assert!(shares.iter().all(|x| *x >= 0.93), "{level} {name}: {shares:?}");
+            assert!(
+                shares.iter().all(|x| *x >= 0.93),
+                "{level} {name}: {shares:?}"
+            );
         }
     }
 }
 
-/// Refitting move by move, the usual way on an arm, must neither blow the expected errors up nor let them vanish.
+/// Refitting move by move, the usual way on an arm, must neither blow the expected errors up nor
+/// let them vanish.
 #[test]
 fn refits_to_one_sample_after_another_keep_their_measure() {
     let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));

@@ -1,13 +1,24 @@
 //! The regression simulators against the geometry they imitate.
 #![allow(clippy::print_stdout)] // Measured qualities, shown with --nocapture.
 
-use pipeline_sim::{Ball, Cell, CentreModel, FitError, ReachForm, ReachModel, ReachSample, sample_moves};
+use pipeline_sim::{
+    Ball, Cell, CentreModel, FitError, ReachForm, ReachModel, ReachSample, sample_moves,
+};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-fn samples(seed: u64, count: usize, noise: f64) -> (Vec<pipeline_sim::CentreSample>, Vec<ReachSample>) {
+fn samples(
+    seed: u64,
+    count: usize,
+    noise: f64,
+) -> (Vec<pipeline_sim::CentreSample>, Vec<ReachSample>) {
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    sample_moves(&cell, count, noise, &mut Xoshiro256PlusPlus::seed_from_u64(seed))
+    sample_moves(
+        &cell,
+        count,
+        noise,
+        &mut Xoshiro256PlusPlus::seed_from_u64(seed),
+    )
 }
 
 #[test]
@@ -59,7 +70,10 @@ fn samples_that_do_not_determine_a_model_are_refused() {
     ));
     let line: Vec<ReachSample> = reaching
         .iter()
-        .map(|s| ReachSample { d3: 0.5 * s.d2, ..*s })
+        .map(|s| ReachSample {
+            d3: 0.5 * s.d2,
+            ..*s
+        })
         .collect();
     assert!(matches!(
         ReachModel::fit(&line, ReachForm::Linear, &[]),
@@ -110,10 +124,14 @@ fn the_expected_error_of_a_prediction_is_the_one_that_occurs() {
         y += ((after.y - s.after.y) / sy).powi(2) / fresh.len() as f64;
         r += ((after.r - s.after.r) / sr).powi(2) / fresh.len() as f64;
     }
-    assert!((0.8..1.25).contains(&y) && (0.7..1.4).contains(&r), "{y} {r}");
+    assert!(
+        (0.8..1.25).contains(&y) && (0.7..1.4).contains(&r),
+        "{y} {r}"
+    );
 }
 
-/// Mean squared errors of y and of r over the expected variance, for each third of `samples` ordered by `key`.
+/// Mean squared errors of y and of r over the expected variance, for each third of `samples`
+/// ordered by `key`.
 fn calibration(
     model: &ReachModel,
     samples: &[ReachSample],
@@ -148,7 +166,8 @@ fn it_is_so_near_and_far_whatever_the_form() {
         let edges = ReachModel::PAPER_ELBOW_EDGES;
         for (form, edges, least, most) in [
             (ReachForm::Linear, &edges[..], 0.3, 3.0),
-            // What this form cannot express is not noise; its size is told, its pattern only roughly.
+            // What this form cannot express is not noise; its size is told, its pattern only
+            // roughly.
             (ReachForm::Rigid8, &edges[..], 0.15, 2.5),
             (ReachForm::Rigid22, &edges[..], 0.5, 2.0),
             (ReachForm::RigidBody, &[][..], 0.5, 2.0),
@@ -175,9 +194,19 @@ fn what_a_fit_leaves_is_reported() {
     };
     let q = linear.quality();
     // The same residuals, but for three degrees of freedom out of two thousand.
-    assert!((y / q[0].rmse - 1.0).abs() < 0.002 && y > q[0].rmse, "{y} {q:?}");
-    assert!((r / q[1].rmse - 1.0).abs() < 0.002 && r > q[1].rmse, "{r} {q:?}");
-    let by_elbow = ReachModel::fit(&reaching, ReachForm::Rigid22, &ReachModel::PAPER_ELBOW_EDGES);
+    assert!(
+        (y / q[0].rmse - 1.0).abs() < 0.002 && y > q[0].rmse,
+        "{y} {q:?}"
+    );
+    assert!(
+        (r / q[1].rmse - 1.0).abs() < 0.002 && r > q[1].rmse,
+        "{r} {q:?}"
+    );
+    let by_elbow = ReachModel::fit(
+        &reaching,
+        ReachForm::Rigid22,
+        &ReachModel::PAPER_ELBOW_EDGES,
+    );
     assert_eq!(by_elbow.expect("enough samples").residual_noise().len(), 3);
     let centre = CentreModel::fit(&centring).expect("enough samples");
     let rmse = centre.quality()[0].rmse;
@@ -203,8 +232,14 @@ fn numbers_too_large_or_too_small_are_named() {
         quantity(&|s| s.before.r = 1e-310, ReachForm::Rigid8),
         "the term Za"
     );
-    assert_eq!(quantity(&|s| s.d2 = 1e200, ReachForm::Linear), "the term d2");
-    assert_eq!(quantity(&|s| s.d3 = -1e80, ReachForm::Rigid22), "the term b²");
+    assert_eq!(
+        quantity(&|s| s.d2 = 1e200, ReachForm::Linear),
+        "the term d2"
+    );
+    assert_eq!(
+        quantity(&|s| s.d3 = -1e80, ReachForm::Rigid22),
+        "the term b²"
+    );
     assert_eq!(
         quantity(&|s| s.after.y = 1e300, ReachForm::Linear),
         "the change of y"
@@ -265,10 +300,14 @@ fn no_power_of_the_radius_and_no_ridge_is_too_much_for_a_refit() {
         let (sy, sr) = refitted
             .uncertainty(&s.before, s.jt3_degrees, s.d2, s.d3)
             .expect("finite");
-        assert!(sy.is_finite() && sr.is_finite() && sy > 0.0, "{power}: {sy} {sr}");
+        assert!(
+            sy.is_finite() && sr.is_finite() && sy > 0.0,
+            "{power}: {sy} {sr}"
+        );
     }
     // Powers only tell samples apart: a thousandfold radius throughout would change nothing.
-    let [a, b] = [1.0, 8.0].map(|power| y(&model.refit(&few, 0.01, power).expect("a prior helps out")));
+    let [a, b] =
+        [1.0, 8.0].map(|power| y(&model.refit(&few, 0.01, power).expect("a prior helps out")));
     assert!((a - b).abs() > 1e-6, "weights do count");
     for (ridge, power) in [
         (f64::INFINITY, 2.0),
@@ -341,7 +380,8 @@ fn a_model_believed_for_several_moves_drifts_as_its_form_lets_expect() {
             _ => &ReachModel::PAPER_ELBOW_EDGES[..],
         };
         let model = ReachModel::fit(&training, form, edges).expect("enough samples");
-        let errors = model.open_loop_error(&cell, 5, 400, &mut Xoshiro256PlusPlus::seed_from_u64(8));
+        let errors =
+            model.open_loop_error(&cell, 5, 400, &mut Xoshiro256PlusPlus::seed_from_u64(8));
         for e in [errors[0], errors[2], errors[4]] {
             println!("{form:?}: {e:?}");
         }
@@ -421,7 +461,8 @@ fn a_refit_of_centring_learns_a_wrong_arm_from_few_moves() {
     );
     println!("{before} {after}");
     assert!(after < 0.8 * before, "{before} {after}");
-    // A single move leaves most as it was, where a fit of its own has no answer; so strong a prior leaves all.
+    // A single move leaves most as it was, where a fit of its own has no answer; so strong a prior
+    // leaves all.
     assert!(model.refit(&few[..1], 0.0).is_err() && CentreModel::fit(&few[..1]).is_err());
     let one = rmse(&model.refit(&few[..1], 0.5).expect("a prior helps out"));
     assert!(one < 1.5 * before, "{before} {one}");
@@ -430,7 +471,10 @@ fn a_refit_of_centring_learns_a_wrong_arm_from_few_moves() {
     // Without a prior to speak of it is a fit.
     let (loose, fitted) = (model.refit(&few, 0.0), CentreModel::fit(&few));
     assert!((rmse(&loose.expect("enough")) - rmse(&fitted.expect("enough"))).abs() < 1e-9);
-    assert_eq!(model.refit(&[], 0.01).expect("nothing to learn from"), model);
+    assert_eq!(
+        model.refit(&[], 0.01).expect("nothing to learn from"),
+        model
+    );
     for ridge in [f64::NAN, -1.0, f64::INFINITY, 1e200] {
         assert!(
             matches!(model.refit(&few, ridge), Err(FitError::Prior { .. })),
@@ -460,7 +504,8 @@ fn the_expected_error_of_centring_is_the_one_that_occurs_near_and_far() {
                 fresh.sort_by(|a, b| key(a).total_cmp(&key(b)));
                 let squared = |s: &pipeline_sim::CentreSample| {
                     let change = s.after.x - s.before.x;
-                    let predicted = model.quality_on(std::slice::from_ref(s)).expect("a sample")[0].rmse;
+                    let predicted =
+                        model.quality_on(std::slice::from_ref(s)).expect("a sample")[0].rmse;
                     assert!(predicted.is_finite() && change.is_finite());
                     (predicted / model.uncertainty(&s.before, s.d1).expect("finite")).powi(2)
                 };
@@ -472,7 +517,8 @@ fn the_expected_error_of_centring_is_the_one_that_occurs_near_and_far() {
             let (near, far) = (by(&|s| s.before.r), by(&|s| s.d1.abs()));
             println!("{name} {noise}: by r {near:.2?} by d1 {far:.2?}");
             for ratio in near.into_iter().chain(far) {
-                // What the form without r cannot express is not noise, and least where r is near its mean.
+                // What the form without r cannot express is not noise, and least where r is near
+                // its mean.
                 let (least, most) = if name.contains('r') {
                     (0.5, 2.0)
                 } else {

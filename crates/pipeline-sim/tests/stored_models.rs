@@ -1,14 +1,20 @@
 //! Fitted models on their way to a file and back.
 
 use pipeline_sim::{
-    Ball, Cell, CentreModel, CentreSample, ReachForm, ReachModel, ReachSample, StoredModelError, sample_moves,
+    Ball, Cell, CentreModel, CentreSample, ReachForm, ReachModel, ReachSample, StoredModelError,
+    sample_moves,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 fn samples(seed: u64, count: usize, noise: f64) -> (Vec<CentreSample>, Vec<ReachSample>) {
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    sample_moves(&cell, count, noise, &mut Xoshiro256PlusPlus::seed_from_u64(seed))
+    sample_moves(
+        &cell,
+        count,
+        noise,
+        &mut Xoshiro256PlusPlus::seed_from_u64(seed),
+    )
 }
 
 #[cfg(feature = "serde")]
@@ -82,8 +88,18 @@ fn models_as_text_come_back_as_they_were_or_not_at_all() {
         refused(&text.replacen("reach-model 1", "reach-model 2", 1)),
         StoredModelError::Version { found: 2, known: 1 }
     );
-    for other in ["", "reach-model 1", "{}", &text.replacen("reach", "centre", 1)] {
-        assert_eq!(refused(other), StoredModelError::Kind { kind: "reach-model" });
+    for other in [
+        "",
+        "reach-model 1",
+        "{}",
+        &text.replacen("reach", "centre", 1),
+    ] {
+        assert_eq!(
+            refused(other),
+            StoredModelError::Kind {
+                kind: "reach-model"
+            }
+        );
     }
     assert!(CentreModel::from_text(&text).is_err());
     // Every line is needed, and nothing more.

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 use pipeline_sim::{
-    Ball, Cell, Distortion, Ellipse, Look, Occluder, Renderer, Round, Scene, SceneKind, Shape, Snapshot,
-    Thing, Workspace,
+    Ball, Cell, Distortion, Ellipse, Look, Occluder, Renderer, Round, Scene, SceneKind, Shape,
+    Snapshot, Thing, Workspace,
 };
 use puma_val2::{JointDelta, Joints};
 use rand::SeedableRng;
@@ -86,7 +86,10 @@ fn nearer_things_hide_farther_ones() {
             1,
         )
         .truth(&cell, &pose);
-        truth.iter().find(|s| s.what == Round::Ball).map(|s| s.visible)
+        truth
+            .iter()
+            .find(|s| s.what == Round::Ball)
+            .map(|s| s.visible)
     };
     assert!(visible(vec![ball]).expect("in the frame") > 0.95);
     let camera = cell.camera_pose(&pose).translation.vector;
@@ -172,7 +175,8 @@ fn a_ball_carried_over_a_box_hides_the_box_and_one_behind_it_is_hidden() {
 
 #[test]
 fn a_holder_without_its_ball_stands_where_it_stands() {
-    // The ball has been put down near the camera; between its holder and the camera stands a cylinder.
+    // The ball has been put down near the camera; between its holder and the camera stands a
+    // cylinder.
     let pose = Workspace::paper().search_poses()[3];
     let mut cell = Cell::paper(Ball::at(0.75, 0.15, -0.24));
     let eye = cell.camera_pose(&pose).translation.vector;
@@ -227,7 +231,11 @@ fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
         cell.holder = None;
         let (width, height) = (f64::from(camera.size().0), f64::from(camera.size().1));
         // What is large and bent is no ellipse any more.
-        let most = if camera.distortion().is_none() { 0.2 } else { 0.06 };
+        let most = if camera.distortion().is_none() {
+            0.2
+        } else {
+            0.06
+        };
         for radius in [0.012, 0.02, 0.06, most] {
             // The centre on the right border, in a corner, and a little above the bottom.
             for (x, y) in [

@@ -7,11 +7,13 @@ use crate::{Joint, Joints};
 
 /// Why an arm did not do what it was asked to.
 ///
-/// `port` names the line as the caller gave it: a device path, a socket address, or a word for an arm in memory.
+/// `port` names the line as the caller gave it: a device path, a socket address, or a word for an
+/// arm in memory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArmError {
-    /// The device or socket could not be opened: no such port, no permission, held by another program.
+    /// The device or socket could not be opened: no such port, no permission, held by another
+    /// program.
     #[error("{port}: cannot be opened: {source}")]
     Open {
         /// The line.
@@ -30,7 +32,9 @@ pub enum ArmError {
         source: io::Error,
     },
     /// Nothing, or not enough, came back in time.
-    #[error("{port}: no complete answer to `{sent}` within {waited:?}: expected {expected}, heard {heard:?}")]
+    #[error(
+        "{port}: no complete answer to `{sent}` within {waited:?}: expected {expected}, heard {heard:?}"
+    )]
     Silence {
         /// The line.
         port: String,
@@ -66,7 +70,9 @@ pub enum ArmError {
         message: String,
     },
     /// The arm stands, but not where it was sent.
-    #[error("{port}: {joint} was sent to {wanted_degrees:.3} degrees but reports {reported_degrees:.3}")]
+    #[error(
+        "{port}: {joint} was sent to {wanted_degrees:.3} degrees but reports {reported_degrees:.3}"
+    )]
     NotReached {
         /// The line.
         port: String,
@@ -97,15 +103,19 @@ pub enum ArmError {
         /// The joint.
         joint: Joint,
     },
-    /// The controller has been started again in mid-session: it asks its start-up questions. It must be connected to and calibrated anew.
-    #[error("{port}: the controller has been restarted: it says {heard:?}; connect and calibrate again")]
+    /// The controller has been started again in mid-session: it asks its start-up questions. It
+    /// must be connected to and calibrated anew.
+    #[error(
+        "{port}: the controller has been restarted: it says {heard:?}; connect and calibrate again"
+    )]
     Restarted {
         /// The line.
         port: String,
         /// What it said.
         heard: String,
     },
-    /// A motion was commanded and it can no longer be found out where the arm is. The words that stop it have been sent if the line took them.
+    /// A motion was commanded and it can no longer be found out where the arm is. The words that
+    /// stop it have been sent if the line took them.
     #[error("{port}: the outcome of a motion is not known: {cause}")]
     Unconfirmed {
         /// The line.

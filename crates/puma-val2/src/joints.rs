@@ -37,7 +37,8 @@ impl fmt::Display for Joint {
     }
 }
 
-/// Six joint angles in radians, `JT1` first, in VAL's own convention (what `WHERE` prints, there in degrees).
+/// Six joint angles in radians, `JT1` first, in VAL's own convention (what `WHERE` prints, there in
+/// degrees).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Joints(pub [f64; 6]);
@@ -133,7 +134,11 @@ mod tests {
         let from = Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
         let to = Joints::from_degrees([5.0, -90.0, 194.0, 0.0, 45.0, 0.0]);
         let back = from + (to - from);
-        assert!(Joint::ALL.into_iter().all(|j| (back[j] - to[j]).abs() < 1e-15));
+        assert!(
+            Joint::ALL
+                .into_iter()
+                .all(|j| (back[j] - to[j]).abs() < 1e-15)
+        );
     }
 
     #[test]

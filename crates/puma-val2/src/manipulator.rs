@@ -4,9 +4,10 @@ use crate::{ArmError, JointDelta, Joints};
 
 /// An arm that moves by joint angles.
 ///
-/// Every call waits until the arm stands. A move either ends where it was asked to, as the arm itself reports, or is an
-/// error; after an error [`Manipulator::joints`] says where the arm stands. Only [`ArmError::Unconfirmed`] and [`ArmError::Line`] leave open
-/// whether it does: the arm has been told to stop, if it could still hear.
+/// Every call waits until the arm stands. A move either ends where it was asked to, as the arm
+/// itself reports, or is an error; after an error [`Manipulator::joints`] says where the arm
+/// stands. Only [`ArmError::Unconfirmed`] and [`ArmError::Line`] leave open whether it does: the
+/// arm has been told to stop, if it could still hear.
 pub trait Manipulator {
     /// The joint angles that the arm reports.
     ///
@@ -14,10 +15,12 @@ pub trait Manipulator {
     /// What kept the arm from answering.
     fn joints(&mut self) -> Result<Joints, ArmError>;
 
-    /// Turns every joint by its part of `delta` and returns the joint angles that the arm reports afterwards.
+    /// Turns every joint by its part of `delta` and returns the joint angles that the arm reports
+    /// afterwards.
     ///
     /// # Errors
-    /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] before anything moves; otherwise what went wrong on the way.
+    /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] before anything moves; otherwise what
+    /// went wrong on the way.
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError>;
 
     /// Turns the joints to `target` and returns the joint angles that the arm reports afterwards.

@@ -1,11 +1,12 @@
-//! What a move costs on a 9600-baud line: characters, and moves per second when the motion itself takes no time.
+//! What a move costs on a 9600-baud line: characters, and moves per second when the motion itself
+//! takes no time.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::time::Duration;
 
 use puma_val2::{
-    ClientConfig, Emulator, JointDelta, Manipulator, MemoryLine, MoveWay, Profile, PumaParams, Transport,
-    Val2Client, char_time,
+    ClientConfig, Emulator, JointDelta, Manipulator, MemoryLine, MoveWay, Profile, PumaParams,
+    Transport, Val2Client, char_time,
 };
 
 /// A calibrated client of an arm that is everywhere at once, on a paced line.
@@ -95,9 +96,22 @@ fn the_ways_to_move_by_their_cost() {
         client.joints().unwrap();
         cost
     };
-    row("three joints, resident program", resident(30), resident(5).2);
+    row(
+        "three joints, resident program",
+        resident(30),
+        resident(5).2,
+    );
     // What the automatic choice rests on.
-    let [_, two_drives, three_drives, point, ppoint, guarded, resident] = rates[..] else {
+    let [
+        _,
+        two_drives,
+        three_drives,
+        point,
+        ppoint,
+        guarded,
+        resident,
+    ] = rates[..]
+    else {
         panic!("seven ways")
     };
     assert!(

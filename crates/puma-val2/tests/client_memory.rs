@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MemoryLine, MoveWay,
-    Profile, PumaParams, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MemoryLine,
+    MoveWay, Profile, PumaParams, Val2Client,
 };
 
 fn emulator(profile: Profile) -> Emulator {
@@ -49,7 +49,9 @@ fn every_profile_and_every_way_moves_the_arm_where_it_was_sent() {
                 .unwrap_or_else(|e| panic!("{} {way:?}: {e}", profile.name));
             assert_at(&client, [10.0, -85.0, 95.0, 0.0, 0.0, 0.0]);
             client
-                .move_to(Joints::from_degrees([-20.0, -100.0, 100.0, 10.0, 45.0, -30.0]))
+                .move_to(Joints::from_degrees([
+                    -20.0, -100.0, 100.0, 10.0, 45.0, -30.0,
+                ]))
                 .unwrap();
             assert_at(&client, [-20.0, -100.0, 100.0, 10.0, 45.0, -30.0]);
             client.drive(Joint::J3, -0.1, 100.0).unwrap();
@@ -149,7 +151,11 @@ fn silence_and_garbage_are_told_apart_in_time() {
         fn send(&mut self, _: &[u8]) -> std::io::Result<()> {
             Ok(())
         }
-        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> std::io::Result<Option<usize>> {
+        fn receive(
+            &mut self,
+            buffer: &mut [u8],
+            timeout: Duration,
+        ) -> std::io::Result<Option<usize>> {
             self.0 += timeout.min(Duration::from_millis(10));
             let count = self.1.len().min(buffer.len());
             buffer[..count].copy_from_slice(&self.1[..count]);
@@ -171,7 +177,8 @@ fn silence_and_garbage_are_told_apart_in_time() {
         "{silent:?}"
     );
     for noise in [&b"\xff\x00\x81"[..], b"login: ", b"42 "] {
-        let garbled = Val2Client::connect(Dead(Duration::ZERO, noise), ClientConfig::default()).map(drop);
+        let garbled =
+            Val2Client::connect(Dead(Duration::ZERO, noise), ClientConfig::default()).map(drop);
         assert!(
             matches!(garbled, Err(ArmError::Garbled { .. })),
             "{noise:?}: {garbled:?}"
@@ -233,11 +240,17 @@ fn programs_are_stored_run_and_aborted() {
         said.contains(" 1") && said.contains(" 2") && said.contains("completed"),
         "{said}"
     );
-    assert!(matches!(client.execute("NOTHING"), Err(ArmError::Refused { .. })));
+    assert!(matches!(
+        client.execute("NOTHING"),
+        Err(ArmError::Refused { .. })
+    ));
     client
         .store_program("COUNT", &["WAIT SIG(1001)".to_owned()])
         .unwrap();
-    assert!(matches!(client.execute("COUNT"), Err(ArmError::Silence { .. })));
+    assert!(matches!(
+        client.execute("COUNT"),
+        Err(ArmError::Silence { .. })
+    ));
     client.joints().unwrap();
 }
 
@@ -281,20 +294,23 @@ fn any_dialogue_is_left_at_connection() {
     }
 }
 
-/// A program of somebody else's that asks for numbers is not fed with zeros, which it might move by.
+/// A program of somebody else's that asks for numbers is not fed with zeros, which it might move
+/// by.
 #[test]
 fn a_program_that_asks_for_values_is_aborted_and_not_answered() {
     for words in ["angles? ", "angles "] {
         let asking = || {
             let mut emulator = emulator(Profile::val2());
-            let text = format!(".PROGRAM ASK\n PROMPT \"{words}\",A,B,C\n MOVE #PPOINT(A,B,C)\n.END");
+            let text =
+                format!(".PROGRAM ASK\n PROMPT \"{words}\",A,B,C\n MOVE #PPOINT(A,B,C)\n.END");
             emulator.load_text(&text).unwrap();
             emulator
         };
         let mut waiting = asking();
         waiting.feed(b"N\rN\rCAL\rY\r", Duration::ZERO);
         waiting.feed(b"EXECUTE ASK\r", Duration::from_secs(10));
-        let mut client = Val2Client::connect(MemoryLine::new(waiting), ClientConfig::default()).unwrap();
+        let mut client =
+            Val2Client::connect(MemoryLine::new(waiting), ClientConfig::default()).unwrap();
         client.joints().unwrap();
         assert_at(&client, [0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
 
@@ -303,7 +319,10 @@ fn a_program_that_asks_for_values_is_aborted_and_not_answered() {
         client.calibrate().unwrap();
         let outcome = client.execute("ASK");
         assert!(
-            matches!(outcome, Err(ArmError::Garbled { .. } | ArmError::Silence { .. })),
+            matches!(
+                outcome,
+                Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
+            ),
             "{outcome:?}"
         );
         assert!(client.last_known().is_none());
@@ -324,7 +343,10 @@ fn a_program_without_end_is_aborted_in_time() {
     for name in ["CHAT", "QUIET"] {
         let outcome = client.execute(name);
         assert!(
-            matches!(outcome, Err(ArmError::Garbled { .. } | ArmError::Silence { .. })),
+            matches!(
+                outcome,
+                Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
+            ),
             "{name}: {outcome:?}"
         );
         client.joints().unwrap();
@@ -411,7 +433,8 @@ impl puma_val2::Transport for Interrupted {
     }
 }
 
-/// What somebody else says while the client finds out whether there is an echo is not taken for one.
+/// What somebody else says while the client finds out whether there is an echo is not taken for
+/// one.
 #[test]
 fn a_message_at_connection_is_no_echo() {
     for echo in [true, false] {

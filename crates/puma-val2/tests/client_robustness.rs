@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use puma_val2::{
-    ClientConfig, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MemoryLine, MoveWay, Profile,
-    PumaParams, Transport, Val2Client, Xyzoat,
+    ClientConfig, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MemoryLine, MoveWay,
+    Profile, PumaParams, Transport, Val2Client, Xyzoat,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// A line to an emulated controller on which, once let loose, what comes has nothing to do with what is sent: a piece each time, over and over,
-/// with pauses.
+/// A line to an emulated controller on which, once let loose, what comes has nothing to do with
+/// what is sent: a piece each time, over and over, with pauses.
 struct Scripted {
     sound: Option<MemoryLine>,
     pieces: Vec<(u16, Vec<u8>)>,
@@ -70,7 +70,11 @@ impl Transport for Scripted {
     }
 
     fn clock(&self) -> Duration {
-        self.now + self.sound.as_ref().map_or(Duration::ZERO, MemoryLine::clock)
+        self.now
+            + self
+                .sound
+                .as_ref()
+                .map_or(Duration::ZERO, MemoryLine::clock)
     }
 
     fn name(&self) -> &str {
@@ -148,8 +152,8 @@ fn config() -> ClientConfig {
     }
 }
 
-/// Longest that any one call may take on the clock of its line with this configuration, whatever comes: a bound on bounds, tries and time-outs
-/// multiplied.
+/// Longest that any one call may take on the clock of its line with this configuration, whatever
+/// comes: a bound on bounds, tries and time-outs multiplied.
 const LONGEST: Duration = Duration::from_secs(1200);
 
 fn connected<T: Transport>(line: T, config: ClientConfig) -> Option<Val2Client<T>> {
@@ -159,7 +163,8 @@ fn connected<T: Transport>(line: T, config: ClientConfig) -> Option<Val2Client<T
     Some(client)
 }
 
-/// Every call there is, each ending in time, whatever it ends in; before each, the line is made as it is to be.
+/// Every call there is, each ending in time, whatever it ends in; before each, the line is made as
+/// it is to be.
 fn everything<T: Transport>(mut client: Val2Client<T>, mut before: impl FnMut(&mut Val2Client<T>)) {
     type Call<T> = fn(&mut Val2Client<T>);
     let calls: [(&str, Call<T>); 16] = [
@@ -207,7 +212,10 @@ fn everything<T: Transport>(mut client: Val2Client<T>, mut before: impl FnMut(&m
         assert!(took < LONGEST, "{name} took {took:?}");
         assert!(client.take_notices().len() <= 100);
         if let Some(joints) = client.last_known() {
-            assert!(joints.0.iter().all(|angle| angle.is_finite()), "{name}: {joints}");
+            assert!(
+                joints.0.iter().all(|angle| angle.is_finite()),
+                "{name}: {joints}"
+            );
         }
     }
 }
@@ -271,7 +279,8 @@ proptest! {
         let mut calls = 0;
         everything(client, |client| {
             let line = client.line_mut();
-            // A closed line stays closed; each call but the first begins with its own place in the script.
+            // A closed line stays closed; each call but the first begins with its own place in the
+            // script.
             line.now = line.clock();
             line.sound = None;
             line.left = line.left.max(left / 2);

@@ -1,6 +1,8 @@
-//! Agreement with tables computed elsewhere: the Robotics Toolbox for Python, and an independent inverse.
+//! Agreement with tables computed elsewhere: the Robotics Toolbox for Python, and an independent
+//! inverse.
 //!
-//! The tables are looked for in the folder `oracles` of `PUMA_GRASP_SHARED`; without them these tests print that they are skipped.
+//! The tables are looked for in the folder `oracles` of `PUMA_GRASP_SHARED`; without them these
+//! tests print that they are skipped.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::f64::consts::{PI, TAU};
@@ -17,7 +19,11 @@ fn table(name: &str) -> Option<Vec<Vec<f64>>> {
         println!("skipped: {name} is not there (PUMA_GRASP_SHARED)");
         return None;
     };
-    let row = |line: &str| line.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect();
+    let row = |line: &str| {
+        line.split(',')
+            .map(|v| v.parse().unwrap_or(f64::NAN))
+            .collect()
+    };
     Some(text.lines().skip(1).map(row).collect())
 }
 
@@ -30,7 +36,8 @@ fn val(q: &[f64]) -> Joints {
     Joints([q[0], q[1] - PI, q[2] + PI, q[3], q[4], q[5]])
 }
 
-/// The toolbox's pose of our flange: world and tool turned by half a turn, counted from the mounting face.
+/// The toolbox's pose of our flange: world and tool turned by half a turn, counted from the
+/// mounting face.
 fn toolbox_pose(pose: &Isometry3<f64>) -> Matrix4<f64> {
     let half_turn = Matrix4::from_diagonal(&[-1.0, -1.0, 1.0, 1.0].into());
     let mut matrix = half_turn * pose.to_homogeneous() * half_turn;
@@ -58,7 +65,8 @@ fn apart(a: &Joints, b: &Joints) -> f64 {
     (0..6).fold(0.0, |most, i| greater(most, angle_between(a.0[i], b.0[i])))
 }
 
-/// The greater of two differences. What is no number is as far off as can be: `f64::max` would overlook it.
+/// The greater of two differences. What is no number is as far off as can be: `f64::max` would
+/// overlook it.
 fn greater(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() {
         f64::INFINITY
@@ -95,7 +103,9 @@ fn forward_kinematics_agree_with_the_toolbox() {
     let arm = PumaParams::corke();
     let worst = rows
         .iter()
-        .map(|row| amax(&(toolbox_pose(&arm.forward(&val(row))) - Matrix4::from_row_slice(&row[6..22]))))
+        .map(|row| {
+            amax(&(toolbox_pose(&arm.forward(&val(row))) - Matrix4::from_row_slice(&row[6..22])))
+        })
         .fold(0.0, greater);
     println!(
         "forward kinematics: {} rows, greatest difference {worst:.1e}",
@@ -145,7 +155,10 @@ fn jacobians_agree_with_the_toolbox() {
             worst = greater(worst, amax(&difference));
         }
     }
-    println!("Jacobians: {} rows, greatest difference {worst:.1e}", rows.len());
+    println!(
+        "Jacobians: {} rows, greatest difference {worst:.1e}",
+        rows.len()
+    );
     assert!(rows.len() > 40 && worst < 1e-9);
 }
 
@@ -180,7 +193,10 @@ fn torques_agree_with_the_toolbox() {
         worst[2],
         worst[3]
     );
-    assert!(rows.len() > 40 && worst.iter().all(|w| *w < 1e-6), "{worst:?}");
+    assert!(
+        rows.len() > 40 && worst.iter().all(|w| *w < 1e-6),
+        "{worst:?}"
+    );
 }
 
 #[test]
@@ -194,12 +210,17 @@ fn oat_angles_agree_with_the_table() {
         let joints = Joints::from_degrees(six(row));
         let pose = arm.forward(&joints);
         let rotation = Matrix3::from_row_slice(&row[12..21]);
-        // The joint angles of the table are rounded to thousandths; its rotation is exact, and so are the angles made of it.
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        // The joint angles of the table are rounded to thousandths; its rotation is exact, and so
+        // are the angles made of it.
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         let exact = Isometry3::from_parts(pose.translation, rotation);
         let shown = Xyzoat::from_pose(&exact).val();
         for (i, angle) in shown.iter().enumerate().skip(3) {
-            worst = greater(worst, angle_between(angle.to_radians(), row[6 + i].to_radians()));
+            worst = greater(
+                worst,
+                angle_between(angle.to_radians(), row[6 + i].to_radians()),
+            );
         }
         for (i, length) in shown.iter().enumerate().take(3) {
             table_error = greater(table_error, (length - row[6 + i]).abs());

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use puma_val2::{
-    BootQuestion, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, MemoryLine, Message,
-    Profile, PumaParams, StartPower, Val2Client, WhereLayout, char_time,
+    BootQuestion, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, MemoryLine,
+    Message, Profile, PumaParams, StartPower, Val2Client, WhereLayout, char_time,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
@@ -63,8 +63,9 @@ fn random_profile(random: &mut Xoshiro256PlusPlus) -> Profile {
         },
         joint_heading: if yes(0.7) { "JT" } else { "J" },
         hand_column: yes(0.3),
-        change_text: ["Change?", "CHANGES?", "Change (Y/N)?"][usize::from(yes(0.5)) + usize::from(yes(0.3))]
-            .into(),
+        change_text: ["Change?", "CHANGES?", "Change (Y/N)?"]
+            [usize::from(yes(0.5)) + usize::from(yes(0.3))]
+        .into(),
         do_blocks: yes(0.7),
         stop_while_busy: yes(0.7),
         ppoint: yes(0.6),
@@ -97,14 +98,16 @@ fn a_session_with_three_hundred_controllers() {
         let profile = random_profile(&mut random);
         let context = format!("seed {seed}: {profile:?}");
         let line = MemoryLine::new(Emulator::new(PumaParams::unimation(), profile));
-        let mut client =
-            Val2Client::connect(line, ClientConfig::default()).unwrap_or_else(|e| panic!("{context}: {e}"));
+        let mut client = Val2Client::connect(line, ClientConfig::default())
+            .unwrap_or_else(|e| panic!("{context}: {e}"));
         assert_eq!(
             client.echoes(),
             client.line().emulator().profile().echo,
             "{context}"
         );
-        client.calibrate().unwrap_or_else(|e| panic!("{context}: {e}"));
+        client
+            .calibrate()
+            .unwrap_or_else(|e| panic!("{context}: {e}"));
         let mut at = client.joints().unwrap_or_else(|e| panic!("{context}: {e}"));
         for _ in 0..4 {
             let mut delta = JointDelta::default();
@@ -113,7 +116,9 @@ fn a_session_with_three_hundred_controllers() {
                     delta.0[i] = random.random_range(-0.15..0.15);
                 }
             }
-            let reached = client.move_by(delta).unwrap_or_else(|e| panic!("{context}: {e}"));
+            let reached = client
+                .move_by(delta)
+                .unwrap_or_else(|e| panic!("{context}: {e}"));
             let truth = client.line().emulator().joints();
             for error in [(at + delta) - truth, reached - truth] {
                 assert!(
@@ -124,7 +129,9 @@ fn a_session_with_three_hundred_controllers() {
             at = reached;
         }
         let home = Joints::from_degrees([10.0, -80.0, 100.0, 5.0, 30.0, -5.0]);
-        client.move_to(home).unwrap_or_else(|e| panic!("{context}: {e}"));
+        client
+            .move_to(home)
+            .unwrap_or_else(|e| panic!("{context}: {e}"));
         client
             .set_gripper(Gripper::Closed)
             .unwrap_or_else(|e| panic!("{context}: {e}"));

@@ -3,8 +3,8 @@
 #![cfg(all(unix, feature = "serial"))]
 
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Manipulator, Profile, PtyServer, PumaParams,
-    SerialLine, ServeConfig, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Manipulator, Profile, PtyServer,
+    PumaParams, SerialLine, ServeConfig, Val2Client,
 };
 
 fn emulator() -> Emulator {
@@ -72,8 +72,13 @@ fn the_link_leads_to_the_terminal_and_goes_with_the_server() {
         link: Some(folder.join("no such folder/arm")),
         ..ServeConfig::default()
     };
-    let problem = PtyServer::spawn(emulator(), astray).unwrap_err().to_string();
-    assert!(problem.contains("no such folder/arm cannot be made"), "{problem}");
+    let problem = PtyServer::spawn(emulator(), astray)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        problem.contains("no such folder/arm cannot be made"),
+        "{problem}"
+    );
     std::fs::remove_dir_all(&folder).unwrap();
 }
 

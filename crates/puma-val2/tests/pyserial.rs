@@ -1,4 +1,5 @@
-//! A session held by Python and pyserial on a real pseudo-terminal. Without Python or pyserial it is skipped, and says so.
+//! A session held by Python and pyserial on a real pseudo-terminal. Without Python or pyserial it
+//! is skipped, and says so.
 #![cfg(unix)]
 
 use std::path::Path;

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use puma_val2::{
-    ClientConfig, Emulator, JointDelta, Manipulator, Profile, PumaParams, ServeConfig, TcpLine, TcpServer,
-    Val2Client,
+    ClientConfig, Emulator, JointDelta, Manipulator, Profile, PumaParams, ServeConfig, TcpLine,
+    TcpServer, Val2Client,
 };
 
 #[test]

@@ -1,7 +1,7 @@
 //! Updates per second on the paper's 90 states by 81 actions, and the cost of files and plans.
 //!
-//! `cargo bench -p qtable`. The comparison with other crates, with all optimisation across crates, is in
-//! `benches/peers` of the repository.
+//! `cargo bench -p qtable`. The comparison with other crates, with all optimisation across crates,
+//! is in `benches/peers` of the repository.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -13,8 +13,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use qtable::{
-    Action, Boltzmann, CachedBoltzmann, EpsilonGreedy, Policy, QLearning, QTable, Schedule, State, Status,
-    Step, Value, toys,
+    Action, Boltzmann, CachedBoltzmann, EpsilonGreedy, Policy, QLearning, QTable, Schedule, State,
+    Status, Step, Value, toys,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -69,7 +69,11 @@ fn updates(c: &mut Criterion) {
         "epsilon-greedy f64",
         EpsilonGreedy::new(constant(0.1)).unwrap(),
     );
-    follow::<f64>(c, "Boltzmann plain f64", Boltzmann::new(constant(1.0)).unwrap());
+    follow::<f64>(
+        c,
+        "Boltzmann plain f64",
+        Boltzmann::new(constant(1.0)).unwrap(),
+    );
 
     let table = QTable::<f32>::filled(STATES, ACTIONS, 0.0).unwrap();
     let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();

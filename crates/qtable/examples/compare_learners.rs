@@ -1,5 +1,5 @@
-//! All learners of the crate on one problem with several seeds: what each has learned beside the optimum, and a picture
-//! of how they got there.
+//! All learners of the crate on one problem with several seeds: what each has learned beside the
+//! optimum, and a picture of how they got there.
 //!
 //! `cargo run --release -p qtable --features parallel --example compare_learners -- --problem cliff --seeds 10`
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
@@ -11,9 +11,9 @@ use clap::{Parser, ValueEnum};
 use indicatif::ProgressBar;
 use plotters::prelude::*;
 use qtable::{
-    DoubleQLearning, DynaQ, EpsilonGreedy, Estimate, ExpectedSarsa, Learner, ModelEnvironment, NStepQ,
-    PrioritizedSweeping, QLambda, QLearning, QTable, Record, Sarsa, SarsaLambda, Schedule, Ties, Training,
-    Until, over_seeds, toys,
+    DoubleQLearning, DynaQ, EpsilonGreedy, Estimate, ExpectedSarsa, Learner, ModelEnvironment,
+    NStepQ, PrioritizedSweeping, QLambda, QLearning, QTable, Record, Sarsa, SarsaLambda, Schedule,
+    Ties, Training, Until, over_seeds, toys,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -44,7 +44,8 @@ enum Problem {
     Taxi,
 }
 
-/// What a problem asks for: the world, actions to learn from, time limit, whether it is left to chance.
+/// What a problem asks for: the world, actions to learn from, time limit, whether it is left to
+/// chance.
 struct Task {
     world: ModelEnvironment,
     actions: u64,
@@ -170,8 +171,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Table and learning curve of one learner with one seed. Exploration fades away. What a learner of the policy that
-/// acts has learned of it while it explored, the safe way past the cliff for example, it may keep after that.
+/// Table and learning curve of one learner with one seed. Exploration fades away. What a learner of
+/// the policy that acts has learned of it while it explored, the safe way past the cliff for
+/// example, it may keep after that.
 fn learn(task: &Task, index: usize, seed: u64) -> Result<(QTable, Vec<Record>), qtable::Error> {
     let n = task.actions;
     let epsilon = Schedule::piecewise(&[(0, 1.0), (n / 4, 0.3), (n / 2, 0.1), (n * 3 / 4, 0.0)])?;
@@ -190,13 +192,17 @@ fn learn(task: &Task, index: usize, seed: u64) -> Result<(QTable, Vec<Record>), 
     Ok((training.into_table(), curve))
 }
 
-/// Mean return of an episode over the actions, one panel for each learner, Q-learning in gray behind the others.
+/// Mean return of an episode over the actions, one panel for each learner, Q-learning in gray
+/// behind the others.
 fn draw(path: &Path, curves: &[Vec<Vec<Record>>]) -> Result<(), Box<dyn Error>> {
     let estimates: Vec<Vec<Estimate>> = curves
         .iter()
         .map(|runs| Estimate::of_curves(runs, |record| record.mean_return))
         .collect();
-    let at: Vec<f64> = curves[0][0].iter().map(|record| record.actions as f64).collect();
+    let at: Vec<f64> = curves[0][0]
+        .iter()
+        .map(|record| record.actions as f64)
+        .collect();
     // Without the lowest fifth, so that the first wild records do not press all else together.
     let mut means: Vec<f64> = estimates
         .iter()
@@ -230,7 +236,8 @@ fn draw(path: &Path, curves: &[Vec<Vec<Record>>]) -> Result<(), Box<dyn Error>> 
             .y_labels(6)
             .light_line_style(WHITE)
             .draw()?;
-        let point = |(&x, e): (&f64, &Estimate)| e.mean.is_finite().then(|| (x, e.mean.clamp(low, high)));
+        let point =
+            |(&x, e): (&f64, &Estimate)| e.mean.is_finite().then(|| (x, e.mean.clamp(low, high)));
         let gray = at.iter().zip(&estimates[0]).filter_map(point);
         chart.draw_series(LineSeries::new(gray, BLACK.mix(0.35).stroke_width(1)))?;
         let known = || {

@@ -1,5 +1,5 @@
-//! Learns FrozenLake with several seeds, prints what was learned beside the optimum, and draws the learning curve and
-//! the policy as arrows on the ice.
+//! Learns FrozenLake with several seeds, prints what was learned beside the optimum, and draws the
+//! learning curve and the policy as arrows on the ice.
 //!
 //! `cargo run --release -p qtable --example frozen_lake -- --map 8x8 --slippery`
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
@@ -12,8 +12,8 @@ use indicatif::ProgressBar;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use qtable::{
-    Action, EpsilonGreedy, Estimate, ModelEnvironment, QLearning, QTable, Record, Schedule, State, Training,
-    Until, over_seeds, toys,
+    Action, EpsilonGreedy, Estimate, ModelEnvironment, QLearning, QTable, Record, Schedule, State,
+    Training, Until, over_seeds, toys,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -72,7 +72,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         Ok(Estimate::of(&each?))
     };
     let optimal = lake.compare(&runs[0].0, GAMMA, limit)?.optimal;
-    println!("of {} seeds, ± is the 95 % interval of the mean", arguments.seeds);
+    println!(
+        "of {} seeds, ± is the 95 % interval of the mean",
+        arguments.seeds
+    );
     println!(
         "success within {limit} steps: {}  (optimal {:.3})",
         learned(|a| a.success)?,
@@ -108,7 +111,8 @@ fn learn(
     seed: u64,
 ) -> Result<(QTable, Vec<Record>), qtable::Error> {
     let learner = QLearning::new(Schedule::inverse_visits(1.0, 50.0)?, GAMMA)?;
-    let epsilon = Schedule::piecewise(&[(0, 1.0), ((actions / 2).max(1), 0.2), (actions.max(2), 0.0)])?;
+    let epsilon =
+        Schedule::piecewise(&[(0, 1.0), ((actions / 2).max(1), 0.2), (actions.max(2), 0.0)])?;
     // The values start above all that can be earned, so that what was not tried looks good.
     let table = QTable::filled(lake.model().states(), lake.model().actions(), 1.0)?;
     let mut training = Training::new(lake, table, learner, EpsilonGreedy::new(epsilon)?)?
@@ -145,10 +149,17 @@ fn draw(
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-fn draw_curve(area: &Area, runs: &[(QTable, Vec<Record>)], optimum: f64) -> Result<(), Box<dyn Error>> {
+fn draw_curve(
+    area: &Area,
+    runs: &[(QTable, Vec<Record>)],
+    optimum: f64,
+) -> Result<(), Box<dyn Error>> {
     let curves: Vec<Vec<Record>> = runs.iter().map(|(_, curve)| curve.clone()).collect();
     let success = Estimate::of_curves(&curves, |record| record.success_share);
-    let at: Vec<f64> = curves[0].iter().map(|record| record.actions as f64).collect();
+    let at: Vec<f64> = curves[0]
+        .iter()
+        .map(|record| record.actions as f64)
+        .collect();
     let end = at.last().copied().unwrap_or(1.0);
     let mut chart = ChartBuilder::on(area)
         .caption(
@@ -163,12 +174,17 @@ fn draw_curve(area: &Area, runs: &[(QTable, Vec<Record>)], optimum: f64) -> Resu
     let whole = |x: &f64| format!("{x:.0}");
     let mut mesh = chart.configure_mesh();
     mesh.x_desc("actions").x_labels(6).x_label_formatter(&whole);
-    mesh.y_desc("share of episodes").light_line_style(WHITE).draw()?;
+    mesh.y_desc("share of episodes")
+        .light_line_style(WHITE)
+        .draw()?;
     let low = |e: &Estimate| (e.mean - e.half_width).clamp(0.0, 1.0);
     let high = |e: &Estimate| (e.mean + e.half_width).clamp(0.0, 1.0);
     let band = at.iter().copied().zip(success.iter().map(low));
     let back = at.iter().copied().zip(success.iter().map(high)).rev();
-    chart.draw_series([Polygon::new(band.chain(back).collect::<Vec<_>>(), BLUE.mix(0.2))])?;
+    chart.draw_series([Polygon::new(
+        band.chain(back).collect::<Vec<_>>(),
+        BLUE.mix(0.2),
+    )])?;
     let means = at.iter().copied().zip(success.iter().map(|e| e.mean));
     chart.draw_series(LineSeries::new(means, BLUE.stroke_width(2)))?;
     chart.draw_series(LineSeries::new(
@@ -212,7 +228,10 @@ fn draw_policy(area: &Area, map: &[&str], table: &QTable) -> Result<(), Box<dyn 
                 (x + size / 2 - 1, y + size / 2 - 1),
                 size / 3,
             );
-            area.draw(&PathElement::new(arrow[..2].to_vec(), BLACK.stroke_width(2)))?;
+            area.draw(&PathElement::new(
+                arrow[..2].to_vec(),
+                BLACK.stroke_width(2),
+            ))?;
             area.draw(&Polygon::new(arrow[2..].to_vec(), BLACK))?;
         }
     }

@@ -11,19 +11,21 @@ use crate::{Action, Boltzmann, Error, QTable, State, Status, Step, Value};
 /// Actions that lie together, and blocks that a row is divided into: what is compared at once.
 const GROUP: usize = 16;
 const BLOCKS: usize = 8;
-/// A row's offset follows its maximum once they are this many temperatures apart. The largest weight of a row lies
-/// within `exp(±30)`, where even the sum of a million of them is far from the ends of `f32`.
+/// A row's offset follows its maximum once they are this many temperatures apart. The largest
+/// weight of a row lies within `exp(±30)`, where even the sum of a million of them is far from the
+/// ends of `f32`.
 const DRIFT: f64 = 30.0;
 
-/// A table of `f32` for Q-learning with Boltzmann exploration at one temperature, which computes one exponential for
-/// each *update* instead of one for each action of each choice.
+/// A table of `f32` for Q-learning with Boltzmann exploration at one temperature, which computes
+/// one exponential for each *update* instead of one for each action of each choice.
 ///
-/// The weights `exp((Q - c) / T)` are kept beside the values, with one offset c for each state and running sums over
-/// the eight blocks of a row and within each block. A choice compares them with one random number, which needs no branch
-/// and no sum; an update writes one weight and sums its block anew, so that nothing drifts. While T stands still this is the
-/// distribution of [`Boltzmann`] to the rounding of `f32`: no probability is off by more than 1e-6. The draws are not the
-/// same ones. A change of the temperature rebuilds all weights, so it is made in blocks of many actions:
-/// [`train_in_blocks`](crate::train_in_blocks).
+/// The weights `exp((Q - c) / T)` are kept beside the values, with one offset c for each state and
+/// running sums over the eight blocks of a row and within each block. A choice compares them with
+/// one random number, which needs no branch and no sum; an update writes one weight and sums its
+/// block anew, so that nothing drifts. While T stands still this is the distribution of
+/// [`Boltzmann`] to the rounding of `f32`: no probability is off by more than 1e-6. The draws are
+/// not the same ones. A change of the temperature rebuilds all weights, so it is made in blocks of
+/// many actions: [`train_in_blocks`](crate::train_in_blocks).
 ///
 /// [`Boltzmann`] with [`QLearning`](crate::QLearning) is the readable form of the same thing.
 #[derive(Clone, Debug)]
@@ -45,8 +47,8 @@ struct Shape {
     block_shift: u32,
 }
 
-/// What there is once for each state. Here and below the alignment is that of a cache line, so that no vector lies
-/// across two of them.
+/// What there is once for each state. Here and below the alignment is that of a cache line, so that
+/// no vector lies across two of them.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Head {
@@ -95,7 +97,8 @@ const NO_ACTIONS: Group = Group {
 };
 
 impl CachedBoltzmann {
-    /// A copy of a table (values, visits and mask) with the weights for a temperature, in units of the values.
+    /// A copy of a table (values, visits and mask) with the weights for a temperature, in units of
+    /// the values.
     ///
     /// # Errors
     /// A temperature outside `1e-6..=1e6`, or a value too large for `f32`.
@@ -145,12 +148,13 @@ impl CachedBoltzmann {
         Ok(())
     }
 
-    /// One step of Q-learning (Eq. 3) with a given α: `action` taken in `state` led to `step`. Counts the visit and
-    /// returns the error before the update. Nothing is bootstrapped through a step that terminated the episode.
+    /// One step of Q-learning (Eq. 3) with a given α: `action` taken in `state` led to `step`.
+    /// Counts the visit and returns the error before the update. Nothing is bootstrapped through a
+    /// step that terminated the episode.
     ///
     /// # Errors
-    /// A state or action out of range or forbidden, a reward that is not finite, or a value that would not be. α and
-    /// γ are not checked.
+    /// A state or action out of range or forbidden, a reward that is not finite, or a value that
+    /// would not be. α and γ are not checked.
     #[inline(always)]
     pub fn update(
         &mut self,
@@ -186,7 +190,8 @@ impl CachedBoltzmann {
         group.values[lane] = value;
         group.visits[lane] = group.visits[lane].saturating_add(1);
 
-        // Selected, not branched to: the best action may be taken now and then, which no processor foresees.
+        // Selected, not branched to: the best action may be taken now and then, which no processor
+        // foresees.
         let index = action.0 as u32;
         let falls = (index == head.best) & (value < old);
         let leads = (value > head.max) | ((value >= head.max) & (index < head.best));
@@ -228,7 +233,11 @@ impl CachedBoltzmann {
                 reward: step.reward,
             }
         } else {
-            Error::ValueNotFinite { state, action, value }
+            Error::ValueNotFinite {
+                state,
+                action,
+                value,
+            }
         }
     }
 
@@ -241,7 +250,10 @@ impl CachedBoltzmann {
         for state in (0..self.heads.len()).map(State) {
             for action in (0..self.actions).map(Action) {
                 let group = &self.groups[state.0 * self.shape.groups_per_row + action.0 / GROUP];
-                let (value, visits) = (group.values[action.0 % GROUP], group.visits[action.0 % GROUP]);
+                let (value, visits) = (
+                    group.values[action.0 % GROUP],
+                    group.visits[action.0 % GROUP],
+                );
                 if value > f32::NEG_INFINITY {
                     table.set(state, action, V::from_f64(f64::from(value)))?;
                     table.set_visits(state, action, visits);
@@ -284,7 +296,10 @@ impl CachedBoltzmann {
     fn choose_within(&self, state: State, block: usize, rest: f32) -> Action {
         let (first, last) = self.shape.groups_of(block);
         let groups = &self.row(state)[first..last];
-        let place: usize = groups.iter().map(|group| count_up_to(&group.ends, rest)).sum();
+        let place: usize = groups
+            .iter()
+            .map(|group| count_up_to(&group.ends, rest))
+            .sum();
         if place < groups.len() * GROUP {
             Action(first * GROUP + place)
         } else {
@@ -418,12 +433,18 @@ impl CachedBoltzmann {
         if f64::from(head.ceiling) > ceiling {
             head.ceiling = head.ceiling.next_down();
         }
-        for group in &mut self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row] {
+        for group in
+            &mut self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row]
+        {
             for (weight, value) in group.weights.iter_mut().zip(group.values) {
                 *weight = exp2_parts((f64::from(value) - head.offset) * self.slope);
             }
         }
-        for block in 0..self.shape.groups_per_row.div_ceil(1 << self.shape.block_shift) {
+        for block in 0..self
+            .shape
+            .groups_per_row
+            .div_ceil(1 << self.shape.block_shift)
+        {
             head.sums[block] = self.shape.sum_block(&mut self.groups, state, block);
         }
         head.sum();
@@ -434,7 +455,10 @@ impl Shape {
     /// The first group of a block, and the one after its last.
     fn groups_of(self, block: usize) -> (usize, usize) {
         let first = block << self.block_shift;
-        (first, (first + (1 << self.block_shift)).min(self.groups_per_row))
+        (
+            first,
+            (first + (1 << self.block_shift)).min(self.groups_per_row),
+        )
     }
 
     /// Sums a block anew.
@@ -448,10 +472,12 @@ impl Shape {
     }
 }
 
-// Nothing is added to an old sum, so no error builds up. One weight after the other, not as a tree: so sums never fall
-// along a row, and those before and after a weight of 0 are equal, so that it cannot be drawn.
+// Nothing is added to an old sum, so no error builds up. One weight after the other, not as a tree:
+// so sums never fall along a row, and those before and after a weight of 0 are equal, so that it
+// cannot be drawn.
 impl Group {
-    /// Sums the weights anew, beyond the sum of those before; -0 if there is none, which changes no number.
+    /// Sums the weights anew, beyond the sum of those before; -0 if there is none, which changes no
+    /// number.
     #[inline(always)]
     fn sum(&mut self, before: f32) -> f32 {
         let mut sum = before;
@@ -476,12 +502,16 @@ impl Head {
     }
 }
 
-/// How many of some sums, none of them negative, are not beyond a point that is not negative either. Such floating-point
-/// numbers are ordered as their bits are, and integers are compared fast with vectors and without.
+/// How many of some sums, none of them negative, are not beyond a point that is not negative
+/// either. Such floating-point numbers are ordered as their bits are, and integers are compared
+/// fast with vectors and without.
 #[inline(always)]
 fn count_up_to(sums: &[f32], point: f32) -> usize {
     let point = point.to_bits() as i32;
-    let beyond: i32 = sums.iter().map(|sum| (point - sum.to_bits() as i32) >> 31).sum();
+    let beyond: i32 = sums
+        .iter()
+        .map(|sum| (point - sum.to_bits() as i32) >> 31)
+        .sum();
     (sums.len() as i32 + beyond) as usize
 }
 
@@ -492,6 +522,10 @@ fn finite(state: State, action: Action, value: f64) -> Result<f32, Error> {
     if stored.is_finite() {
         Ok(stored)
     } else {
-        Err(Error::ValueNotFinite { state, action, value })
+        Err(Error::ValueNotFinite {
+            state,
+            action,
+            value,
+        })
     }
 }

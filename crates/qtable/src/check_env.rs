@@ -26,8 +26,9 @@ pub enum EnvironmentFault {
         /// What has changed.
         what: &'static str,
     },
-    /// The same seed and the same actions gave another episode. Typical causes: `reset` leaves something of the
-    /// episode before, or randomness that does not come from the generator handed in.
+    /// The same seed and the same actions gave another episode. Typical causes: `reset` leaves
+    /// something of the episode before, or randomness that does not come from the generator handed
+    /// in.
     #[error("step {step} of an episode differs when repeated: {first:?}, then {second:?}")]
     NotReproducible {
         /// Number of the step within the episode; 0 is the reset.
@@ -37,8 +38,8 @@ pub enum EnvironmentFault {
         /// The second time.
         second: Step,
     },
-    /// No episode ended, neither by termination nor by truncation: training needs an episode limit. Not a fault of
-    /// a task that has no end.
+    /// No episode ended, neither by termination nor by truncation: training needs an episode limit.
+    /// Not a fault of a task that has no end.
     #[error("no episode ended within {steps} steps")]
     Endless {
         /// Steps taken.
@@ -59,9 +60,9 @@ pub struct EnvironmentReport {
     pub states_met: usize,
 }
 
-/// Plays `steps` random steps and checks what the contract of [`Environment`] asks for: a shape and a mask that are
-/// possible and stay the same, observations in range, finite rewards, and episodes that repeat exactly when the
-/// seed and the actions do.
+/// Plays `steps` random steps and checks what the contract of [`Environment`] asks for: a shape and
+/// a mask that are possible and stay the same, observations in range, finite rewards, and episodes
+/// that repeat exactly when the seed and the actions do.
 ///
 /// ```
 /// use qtable::{check_env, toys};
@@ -92,12 +93,14 @@ pub fn check_env<E: Environment + ?Sized>(
     while report.steps < steps {
         let limit = (steps - report.steps).min(1000);
         let episode_seed = seeds.random();
-        let first = play(environment, &table, limit, episode_seed, &[]).map_err(invalid(report.steps))?;
+        let first =
+            play(environment, &table, limit, episode_seed, &[]).map_err(invalid(report.steps))?;
         if episode < 10 {
-            // The actions are repeated, not drawn again, in case the environment counts on the generator's state.
+            // The actions are repeated, not drawn again, in case the environment counts on the
+            // generator's state.
             let taken: Vec<Action> = first.iter().skip(1).map(|(action, _)| *action).collect();
-            let second =
-                play(environment, &table, limit, episode_seed, &taken).map_err(invalid(report.steps))?;
+            let second = play(environment, &table, limit, episode_seed, &taken)
+                .map_err(invalid(report.steps))?;
             compare(&first, &second)?;
         }
         for (_, step) in &first {
@@ -124,14 +127,16 @@ pub fn check_env<E: Environment + ?Sized>(
         });
     }
     if report.terminated + report.truncated == 0 {
-        return Err(EnvironmentFault::Endless { steps: report.steps });
+        return Err(EnvironmentFault::Endless {
+            steps: report.steps,
+        });
     }
     report.states_met = met.into_iter().filter(|&met| met).count();
     Ok(report)
 }
 
-/// One episode of at most `limit` steps: the reset, then each action and its answer. Actions are random unless
-/// given.
+/// One episode of at most `limit` steps: the reset, then each action and its answer. Actions are
+/// random unless given.
 fn play<E: Environment + ?Sized>(
     environment: &mut E,
     table: &QTable<f32>,
@@ -140,7 +145,8 @@ fn play<E: Environment + ?Sized>(
     given: &[Action],
 ) -> Result<Vec<(Action, Step)>, Error> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    // Another generator, so that the environment's draws do not depend on where the actions come from.
+    // Another generator, so that the environment's draws do not depend on where the actions come
+    // from.
     let mut chooser = Xoshiro256PlusPlus::seed_from_u64(!seed);
     let mut state = environment.reset(&mut rng);
     table.check_state(state)?;

@@ -8,12 +8,18 @@ use crate::curve::{Record, Tally};
 use crate::error::check_setting;
 use crate::validated::validated;
 use crate::{
-    Action, ActionMask, Environment, Error, Experience, Learner, Policy, QTable, State, Status, Step, Value,
+    Action, ActionMask, Environment, Error, Experience, Learner, Policy, QTable, State, Status,
+    Step, Value,
 };
 
-/// Counters of a run, which stop at their largest number, the episode that is going on, and what has not yet been recorded.
+/// Counters of a run, which stop at their largest number, the episode that is going on, and what
+/// has not yet been recorded.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub(crate) struct Course {
     pub(crate) episode_limit: u64,
     pub(crate) record_every: u64,
@@ -59,7 +65,11 @@ impl Course {
 
     /// The same course with records further apart or closer together.
     pub(crate) fn with_record_every(self, record_every: u64) -> Result<Self, Error> {
-        Self { record_every, ..self }.restore()
+        Self {
+            record_every,
+            ..self
+        }
+        .restore()
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -119,7 +129,8 @@ impl Course {
             });
         } else {
             self.episodes = self.episodes.saturating_add(1);
-            self.tally.add_episode(steps, sum, environment.succeeded(&step));
+            self.tally
+                .add_episode(steps, sum, environment.succeeded(&step));
         }
         Ok(self
             .actions
@@ -139,12 +150,17 @@ validated!(Course);
 pub(crate) trait Actor {
     fn begin_episode(&mut self) {}
 
-    /// An offered action for a state that may be out of range: the one chosen before, which may come from a file and is
-    /// checked, or a new one.
-    fn choose(&mut self, state: State, before: Option<Action>, rng: &mut dyn Rng) -> Result<Action, Error>;
+    /// An offered action for a state that may be out of range: the one chosen before, which may
+    /// come from a file and is checked, or a new one.
+    fn choose(
+        &mut self,
+        state: State,
+        before: Option<Action>,
+        rng: &mut dyn Rng,
+    ) -> Result<Action, Error>;
 
-    /// Learns from a step whose state and reward may be anything. Returns the error before the update, and the next
-    /// action if that was chosen already.
+    /// Learns from a step whose state and reward may be anything. Returns the error before the
+    /// update, and the next action if that was chosen already.
     fn learn(
         &mut self,
         state: State,
@@ -167,7 +183,12 @@ impl<V: Value, L: Learner<V>, P: Policy<V>> Actor for Pair<'_, V, L, P> {
     }
 
     #[inline]
-    fn choose(&mut self, state: State, before: Option<Action>, rng: &mut dyn Rng) -> Result<Action, Error> {
+    fn choose(
+        &mut self,
+        state: State,
+        before: Option<Action>,
+        rng: &mut dyn Rng,
+    ) -> Result<Action, Error> {
         self.table.check_state(state)?;
         let action = match before {
             Some(action) => action,
@@ -196,7 +217,8 @@ impl<V: Value, L: Learner<V>, P: Policy<V>> Actor for Pair<'_, V, L, P> {
             next_action,
         };
         Ok((
-            self.learner.learn(self.table, &experience, self.policy, rng)?,
+            self.learner
+                .learn(self.table, &experience, self.policy, rng)?,
             next_action,
         ))
     }
@@ -207,12 +229,17 @@ pub(crate) fn check_count(name: &'static str, count: u64) -> Result<(), Error> {
     check_setting(name, count as f64, count > 0, "at least 1")
 }
 
-/// Checks that a table fits an environment, and has it take over the environment's mask if there is one.
+/// Checks that a table fits an environment, and has it take over the environment's mask if there is
+/// one.
 pub(crate) fn fit<V: Value, E: Environment + ?Sized>(
     environment: &E,
     table: &mut QTable<V>,
 ) -> Result<(), Error> {
-    table.check_shape("the environment", environment.states(), environment.actions())?;
+    table.check_shape(
+        "the environment",
+        environment.states(),
+        environment.actions(),
+    )?;
     if let Some(mask) = ActionMask::of(environment)? {
         table.set_mask(Some(mask))?;
     }

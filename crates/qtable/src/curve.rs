@@ -3,8 +3,8 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// One point of a learning curve. Counts are totals since the start; shares and means are over the actions and
-/// the episodes ended since the record before, and `None` where there were none.
+/// One point of a learning curve. Counts are totals since the start; shares and means are over the
+/// actions and the episodes ended since the record before, and `None` where there were none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Record {
@@ -12,8 +12,9 @@ pub struct Record {
     pub actions: u64,
     /// Episodes ended so far.
     pub episodes: u64,
-    /// Share of the episodes that ended in success, `0..=1`: terminated with a positive reward, unless the
-    /// environment says otherwise ([`Environment::succeeded`](crate::Environment::succeeded)).
+    /// Share of the episodes that ended in success, `0..=1`: terminated with a positive reward,
+    /// unless the environment says otherwise
+    /// ([`Environment::succeeded`](crate::Environment::succeeded)).
     pub success_share: Option<f64>,
     /// Mean reward of an action.
     pub mean_reward: Option<f64>,

@@ -55,11 +55,12 @@ pub enum DiscretiseError {
     TooManyStates,
 }
 
-/// A division of the real line into `edges + 1` bins. The outer bins are unbounded, so every number has a bin,
-/// the infinite ones too; NaN has none.
+/// A division of the real line into `edges + 1` bins. The outer bins are unbounded, so every number
+/// has a bin, the infinite ones too; NaN has none.
 ///
-/// A bin is closed below and open above: a value on an edge belongs to the bin above it. One bin can be named the
-/// *goal*; it is closed at both ends, as the paper's goal intervals `[99:108]` are.
+/// A bin is closed below and open above: a value on an edge belongs to the bin above it. One bin
+/// can be named the *goal*; it is closed at both ends, as the paper's goal intervals `[99:108]`
+/// are.
 ///
 /// ```
 /// use qtable::Intervals;
@@ -73,7 +74,11 @@ pub enum DiscretiseError {
 /// # Ok::<(), qtable::DiscretiseError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Intervals {
     edges: Vec<f64>,
     goal: Option<usize>,
@@ -170,8 +175,8 @@ impl Intervals {
 
 validated!(Intervals);
 
-/// Several quantities, each divided by its own [`Intervals`], as one state index: a mixed-radix number in which
-/// the last quantity varies fastest.
+/// Several quantities, each divided by its own [`Intervals`], as one state index: a mixed-radix
+/// number in which the last quantity varies fastest.
 ///
 /// ```
 /// use qtable::{Intervals, Product, State};
@@ -187,7 +192,11 @@ validated!(Intervals);
 /// # Ok::<(), qtable::DiscretiseError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Product {
     quantities: Vec<Intervals>,
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -300,7 +309,9 @@ impl Product {
         self.states = self
             .quantities
             .iter()
-            .try_fold(1usize, |states, intervals| states.checked_mul(intervals.bins()))
+            .try_fold(1usize, |states, intervals| {
+                states.checked_mul(intervals.bins())
+            })
             .ok_or(DiscretiseError::TooManyStates)?;
         Ok(self)
     }

@@ -1,16 +1,19 @@
-//! Exponential and logarithm from IEEE additions, multiplications and divisions alone, so that a learning run
-//! has the same bits on every platform (the ones of the standard library are the platform's), and so that the
-//! compiler can vectorise a row of them.
+//! Exponential and logarithm from IEEE additions, multiplications and divisions alone, so that a
+//! learning run has the same bits on every platform (the ones of the standard library are the
+//! platform's), and so that the compiler can vectorise a row of them.
 
 use std::f64::consts::{LN_2, LOG2_E, SQRT_2};
 
-/// Adding this to a number below 2^51 in size rounds it to an integer, which then sits in the low mantissa bits.
+/// Adding this to a number below 2^51 in size rounds it to an integer, which then sits in the low
+/// mantissa bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
-/// ln 2 in two parts, the first with trailing zero bits, so that its product with an exponent is exact.
+/// ln 2 in two parts, the first with trailing zero bits, so that its product with an exponent is
+/// exact.
 const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the largest number infinite.
+/// `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the largest
+/// number infinite.
 pub(crate) fn exp(x: f64) -> f64 {
     match x {
         x if x < LEAST => 0.0,
@@ -64,8 +67,8 @@ pub(crate) const fn exp_within(x: f64) -> f64 {
 pub(crate) const PARTS: usize = 1 << PART_BITS;
 const PART_BITS: u32 = 7;
 
-/// `2^(x / PARTS)` to a part in 10^8, without a branch: as much as an `f32` holds. 0 if that is below `2^-1022`;
-/// whatever if it is above `2^1023`.
+/// `2^(x / PARTS)` to a part in 10^8, without a branch: as much as an `f32` holds. 0 if that is
+/// below `2^-1022`; whatever if it is above `2^1023`.
 #[inline(always)]
 pub(crate) fn exp2_parts(x: f64) -> f32 {
     const LEAST: f64 = -1022.0 * PARTS as f64;

@@ -4,16 +4,16 @@ use rand::Rng;
 
 use crate::{Action, State};
 
-/// Whether an episode goes on, and if not, why not. The two endings mean different things to a learner: nothing
-/// comes after termination, while truncation only stops the clock.
+/// Whether an episode goes on, and if not, why not. The two endings mean different things to a
+/// learner: nothing comes after termination, while truncation only stops the clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// The episode goes on.
     Continuing,
     /// The task itself ended, in success or failure: the value of what follows is 0.
     Terminated,
-    /// The episode was cut short from outside, by a time limit for example. What would have followed still has
-    /// its value, so a learner bootstraps from the observation.
+    /// The episode was cut short from outside, by a time limit for example. What would have
+    /// followed still has its value, so a learner bootstraps from the observation.
     Truncated,
 }
 
@@ -30,9 +30,10 @@ pub struct Step {
 
 /// A problem with finitely many states and actions.
 ///
-/// An episode starts with [`reset`](Environment::reset) and goes on with [`step`](Environment::step) until its
-/// status is other than [`Status::Continuing`]; then only `reset` may follow. All randomness comes from the
-/// generator handed in, so that the same seed gives the same episode.
+/// An episode starts with [`reset`](Environment::reset) and goes on with
+/// [`step`](Environment::step) until its status is other than [`Status::Continuing`]; then only
+/// `reset` may follow. All randomness comes from the generator handed in, so that the same seed
+/// gives the same episode.
 pub trait Environment {
     /// Number of states; every observation is below it. At least 1.
     fn states(&self) -> usize;
@@ -46,15 +47,15 @@ pub trait Environment {
     /// Takes an action.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step;
 
-    /// Whether a state offers an action: the action mask. Every state must offer at least one, and the answer
-    /// must not change. All are offered unless this is overridden.
+    /// Whether a state offers an action: the action mask. Every state must offer at least one, and
+    /// the answer must not change. All are offered unless this is overridden.
     fn allows(&self, state: State, action: Action) -> bool {
         let _ = (state, action);
         true
     }
 
-    /// Whether an episode that ended with this step was a success, for reports only. Unless overridden: it
-    /// terminated with a positive reward.
+    /// Whether an episode that ended with this step was a success, for reports only. Unless
+    /// overridden: it terminated with a positive reward.
     fn succeeded(&self, last: &Step) -> bool {
         last.status == Status::Terminated && last.reward > 0.0
     }

@@ -2,8 +2,8 @@
 
 use crate::{Action, ScheduleError, State};
 
-/// An error of tables, models, policies, learners and training. Whatever failed: a table never holds a value that
-/// is not finite.
+/// An error of tables, models, policies, learners and training. Whatever failed: a table never
+/// holds a value that is not finite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -89,7 +89,8 @@ pub enum Error {
         /// The reward as reported.
         reward: f64,
     },
-    /// A value that would not be finite in the table: NaN, infinite, or too large for a table of `f32`.
+    /// A value that would not be finite in the table: NaN, infinite, or too large for a table of
+    /// `f32`.
     #[error("the value of action {} in state {} would become {value}: it must stay finite", action.0, state.0)]
     ValueNotFinite {
         /// The state.
@@ -121,8 +122,8 @@ pub enum Error {
         /// The range in words.
         expected: &'static str,
     },
-    /// A learner that learns from the next action was not given one: its policy must choose in the observed state
-    /// before the update.
+    /// A learner that learns from the next action was not given one: its policy must choose in the
+    /// observed state before the update.
     #[error("the learner needs the action chosen next in state {}, but none was given", state.0)]
     NextActionMissing {
         /// The observed state.
@@ -146,7 +147,8 @@ pub enum Error {
         /// Sum of the probabilities.
         sum: f64,
     },
-    /// A computation that did not settle. Typical cause: γ = 1 with a policy that never reaches an end.
+    /// A computation that did not settle. Typical cause: γ = 1 with a policy that never reaches an
+    /// end.
     #[error("no convergence after {sweeps} sweeps: the last one still changed a value by {change}")]
     NotConverged {
         /// Sweeps done.

@@ -23,12 +23,12 @@ pub struct Evaluation {
     pub mean_return: f64,
 }
 
-/// Plays episodes of at most `limit` steps with a policy, without learning. A mask is the table's own affair here:
-/// it is not taken over from the environment.
+/// Plays episodes of at most `limit` steps with a policy, without learning. A mask is the table's
+/// own affair here: it is not taken over from the environment.
 ///
 /// # Errors
-/// A table of the wrong shape, no episode or no step to play, an action that the table does not offer, or an
-/// environment that reports a state out of range or a reward that is not finite.
+/// A table of the wrong shape, no episode or no step to play, an action that the table does not
+/// offer, or an environment that reports a state out of range or a reward that is not finite.
 pub fn evaluate<V: Value, E: Environment + ?Sized, P: Policy<V> + ?Sized>(
     environment: &mut E,
     table: &QTable<V>,
@@ -39,7 +39,11 @@ pub fn evaluate<V: Value, E: Environment + ?Sized, P: Policy<V> + ?Sized>(
 ) -> Result<Evaluation, Error> {
     check_count("episodes", episodes)?;
     check_count("limit", limit)?;
-    table.check_shape("the environment", environment.states(), environment.actions())?;
+    table.check_shape(
+        "the environment",
+        environment.states(),
+        environment.actions(),
+    )?;
     let (mut successes, mut steps_of_successes, mut all_steps, mut sum) = (0, 0, 0, 0.0);
     for _ in 0..episodes {
         let mut state = environment.reset(rng);
@@ -71,7 +75,8 @@ pub fn evaluate<V: Value, E: Environment + ?Sized, P: Policy<V> + ?Sized>(
         episodes,
         success_share: successes as f64 / episodes as f64,
         mean_steps: all_steps as f64 / episodes as f64,
-        mean_steps_to_success: (successes > 0).then(|| steps_of_successes as f64 / successes as f64),
+        mean_steps_to_success: (successes > 0)
+            .then(|| steps_of_successes as f64 / successes as f64),
         mean_return: sum / episodes as f64,
     })
 }

@@ -31,19 +31,19 @@ pub struct Experience {
     pub action: Action,
     /// The environment's answer.
     pub step: Step,
-    /// The action that the policy has chosen in the observed state. Present for learners that ask for it
-    /// ([`Learner::on_policy`]) unless the step terminated the episode.
+    /// The action that the policy has chosen in the observed state. Present for learners that ask
+    /// for it ([`Learner::on_policy`]) unless the step terminated the episode.
     pub next_action: Option<Action>,
 }
 
 /// A rule that improves a table.
 ///
-/// The table is the caller's: it is what policies act upon and what is reported. What a rule needs beside it
-/// (traces, a model, a second table) it keeps itself, so that the pair of table and learner is the whole state of
-/// the learning.
+/// The table is the caller's: it is what policies act upon and what is reported. What a rule needs
+/// beside it (traces, a model, a second table) it keeps itself, so that the pair of table and
+/// learner is the whole state of the learning.
 pub trait Learner<V: Value = f64> {
-    /// Whether the learner needs the action that will be taken next ([`Experience::next_action`]). Then it is
-    /// chosen before the update, otherwise after it.
+    /// Whether the learner needs the action that will be taken next ([`Experience::next_action`]).
+    /// Then it is chosen before the update, otherwise after it.
     fn on_policy(&self) -> bool {
         false
     }
@@ -51,15 +51,16 @@ pub trait Learner<V: Value = f64> {
     /// Prepares for an episode: forgets what an episode that was broken off left behind.
     fn begin_episode(&mut self) {}
 
-    /// Learns from one action and returns its one-step temporal-difference error as it was before the update.
-    /// `policy` is the one that acts.
+    /// Learns from one action and returns its one-step temporal-difference error as it was before
+    /// the update. `policy` is the one that acts.
     ///
-    /// The visit is counted in the table. Nothing is bootstrapped through a step that terminated the episode;
-    /// through one that was truncated it is.
+    /// The visit is counted in the table. Nothing is bootstrapped through a step that terminated
+    /// the episode; through one that was truncated it is.
     ///
     /// # Errors
-    /// A state or action out of range or forbidden, a reward that is not finite, a value that would not be, or
-    /// something missing that the learner needs. The table never holds a value that is not finite.
+    /// A state or action out of range or forbidden, a reward that is not finite, a value that would
+    /// not be, or something missing that the learner needs. The table never holds a value that is
+    /// not finite.
     fn learn(
         &mut self,
         table: &mut QTable<V>,
@@ -91,7 +92,11 @@ impl<V: Value, L: Learner<V> + ?Sized> Learner<V> for Box<L> {
 
 /// Learning rate, discount and clock, which nearly all learners have.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 struct Rates {
     alpha: Schedule,
     gamma: f64,
@@ -130,7 +135,8 @@ impl Rates {
         }
     }
 
-    /// Moves a checked pair toward a target by α, counts the visit and ticks the clock. Returns the error before.
+    /// Moves a checked pair toward a target by α, counts the visit and ticks the clock. Returns the
+    /// error before.
     #[inline(always)]
     fn learn<V: Value>(
         &mut self,
@@ -160,7 +166,12 @@ validated!(Rates);
 
 /// Checks that an experience fits the table.
 #[inline(always)]
-fn check<V: Value>(table: &QTable<V>, state: State, action: Action, step: &Step) -> Result<(), Error> {
+fn check<V: Value>(
+    table: &QTable<V>,
+    state: State,
+    action: Action,
+    step: &Step,
+) -> Result<(), Error> {
     table.check(state, action)?;
     table.check_state(step.observation)?;
     if step.reward.is_finite() {
@@ -180,7 +191,9 @@ fn next_value<V: Value>(table: &QTable<V>, experience: &Experience) -> Result<f6
         return Ok(0.0);
     }
     let state = experience.step.observation;
-    let action = experience.next_action.ok_or(Error::NextActionMissing { state })?;
+    let action = experience
+        .next_action
+        .ok_or(Error::NextActionMissing { state })?;
     table.check(state, action)?;
     Ok(table.value(state, action).to_f64())
 }

@@ -1,28 +1,32 @@
 //! Tabular reinforcement learning for problems with finitely many states and actions.
 //!
-//! An [`Environment`] is the problem, in Gymnasium's words. A [`QTable`] holds what is known of it, one number for
-//! each [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, and a [`Learner`] improves the table
-//! from each [`Step`]. Three drivers run them against each other:
+//! An [`Environment`] is the problem, in Gymnasium's words. A [`QTable`] holds what is known of it,
+//! one number for each [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, and a
+//! [`Learner`] improves the table from each [`Step`]. Three drivers run them against each other:
 //!
 //! * [`Training`] takes any learner and any policy, and can be stopped, saved and continued;
 //! * [`train`] is one-step [`QLearning`] with a [`Boltzmann`] policy, in one call;
-//! * [`train_in_blocks`] is the same several times faster, on a [`CachedBoltzmann`]; [`TrainingInBlocks`] is that run
-//!   in pieces, saved and continued between blocks.
+//! * [`train_in_blocks`] is the same several times faster, on a [`CachedBoltzmann`];
+//!   [`TrainingInBlocks`] is that run in pieces, saved and continued between blocks.
 //!
-//! [`over_seeds`] repeats an experiment, and [`Estimate`] is the mean with its 95 % interval. States come from
-//! measured quantities by way of [`Intervals`] and their [`Product`]. Where the dynamics are known, a [`Model`] gives
-//! the optimum to compare with ([`ModelEnvironment::compare`]); a [`ModelEstimate`] is one learned from experience.
-//! [`save`] and [`load`] put anything of this on disk.
+//! [`over_seeds`] repeats an experiment, and [`Estimate`] is the mean with its 95 % interval.
+//! States come from measured quantities by way of [`Intervals`] and their [`Product`]. Where the
+//! dynamics are known, a [`Model`] gives the optimum to compare with
+//! ([`ModelEnvironment::compare`]); a [`ModelEstimate`] is one learned from experience. [`save`]
+//! and [`load`] put anything of this on disk.
 //!
 //! # Rules that hold everywhere
 //!
-//! * All randomness comes from the generator handed in. The same seed gives the same result, bit for bit, on every
-//!   platform: where a function of the standard library may differ between platforms, the crate has its own.
-//! * Nothing is bootstrapped through a step that *terminated* an episode; through one that was *truncated* it is.
-//! * A table never holds a value that is not finite. What comes from outside and cannot be, a reward of NaN or a
-//!   state out of range, is refused with an error that says what and where. Methods that return no `Result` panic
-//!   outside a table, as a slice does; each says so.
-//! * Of equally good actions the one with the lowest index is taken, unless a policy was told to draw ([`Ties`]).
+//! * All randomness comes from the generator handed in. The same seed gives the same result, bit
+//!   for bit, on every platform: where a function of the standard library may differ between
+//!   platforms, the crate has its own.
+//! * Nothing is bootstrapped through a step that *terminated* an episode; through one that was
+//!   *truncated* it is.
+//! * A table never holds a value that is not finite. What comes from outside and cannot be, a
+//!   reward of NaN or a state out of range, is refused with an error that says what and where.
+//!   Methods that return no `Result` panic outside a table, as a slice does; each says so.
+//! * Of equally good actions the one with the lowest index is taken, unless a policy was told to
+//!   draw ([`Ties`]).
 //!
 //! # A problem of one's own
 //!
@@ -111,8 +115,8 @@ pub use error::Error;
 pub use evaluate::{Evaluation, evaluate};
 pub use index::{Action, State};
 pub use learner::{
-    DoubleQLearning, DynaQ, ExpectedSarsa, Experience, Learner, NStepQ, PrioritizedSweeping, QLambda,
-    QLearning, Sarsa, SarsaLambda,
+    DoubleQLearning, DynaQ, ExpectedSarsa, Experience, Learner, NStepQ, PrioritizedSweeping,
+    QLambda, QLearning, Sarsa, SarsaLambda,
 };
 pub use mask::ActionMask;
 pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, Outcome, Plan};

@@ -6,13 +6,17 @@ use serde::{Deserialize, Serialize};
 use crate::validated::validated;
 use crate::{Action, Environment, Error, State};
 
-/// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by `actions` truth
-/// values with at least one `true` in every row.
+/// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by
+/// `actions` truth values with at least one `true` in every row.
 ///
-/// A [`QTable`](crate::QTable) that holds a mask never reports a forbidden action as its best, never lets its
-/// value count as the state's maximum, and no policy chooses it.
+/// A [`QTable`](crate::QTable) that holds a mask never reports a forbidden action as its best,
+/// never lets its value count as the state's maximum, and no policy chooses it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct ActionMask {
     actions: usize,
     allowed: Vec<bool>,
@@ -44,9 +48,11 @@ impl ActionMask {
     /// # Errors
     /// As [`ActionMask::new`].
     pub fn of<E: Environment + ?Sized>(environment: &E) -> Result<Option<Self>, Error> {
-        let mask = Self::new(environment.states(), environment.actions(), |state, action| {
-            environment.allows(state, action)
-        })?;
+        let mask = Self::new(
+            environment.states(),
+            environment.actions(),
+            |state, action| environment.allows(state, action),
+        )?;
         Ok(mask.restricts().then_some(mask))
     }
 
@@ -84,7 +90,9 @@ impl ActionMask {
             });
         }
         match (0..states).find(|&state| !self.row(State(state)).contains(&true)) {
-            Some(state) => Err(Error::NoActionAllowed { state: State(state) }),
+            Some(state) => Err(Error::NoActionAllowed {
+                state: State(state),
+            }),
             None => Ok(self),
         }
     }
@@ -92,13 +100,16 @@ impl ActionMask {
 
 validated!(ActionMask);
 
-/// `states * actions` where both are positive, the action index fits into 32 bits and the product into memory.
+/// `states * actions` where both are positive, the action index fits into 32 bits and the product
+/// into memory.
 pub(crate) fn checked_entries(states: usize, actions: usize) -> Result<usize, Error> {
     if states == 0 || actions == 0 {
         return Err(Error::EmptyShape { states, actions });
     }
     match states.checked_mul(actions) {
-        Some(entries) if entries <= isize::MAX as usize / 8 && u32::try_from(actions).is_ok() => Ok(entries),
+        Some(entries) if entries <= isize::MAX as usize / 8 && u32::try_from(actions).is_ok() => {
+            Ok(entries)
+        }
         _ => Err(Error::TooLarge { states, actions }),
     }
 }

@@ -73,7 +73,11 @@ impl Outcome {
 /// # Ok::<(), qtable::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Model {
     states: usize,
     actions: usize,
@@ -85,12 +89,13 @@ pub struct Model {
 }
 
 impl Model {
-    /// Asks `outcomes` for every pair, state by state. A pair without outcomes is one that the state does not
-    /// offer.
+    /// Asks `outcomes` for every pair, state by state. A pair without outcomes is one that the
+    /// state does not offer.
     ///
     /// # Errors
-    /// An empty shape or one that does not fit into memory, a state that offers nothing, a next state out of range,
-    /// a reward that is not finite, or probabilities that are not a distribution (to 1e-9).
+    /// An empty shape or one that does not fit into memory, a state that offers nothing, a next
+    /// state out of range, a reward that is not finite, or probabilities that are not a
+    /// distribution (to 1e-9).
     pub fn new(
         states: usize,
         actions: usize,
@@ -142,7 +147,13 @@ impl Model {
     }
 
     /// The expected `r + γ value(s')` of a pair, without the second term where the episode ends.
-    fn backup(&self, state: State, action: Action, gamma: f64, value: impl Fn(State) -> f64) -> f64 {
+    fn backup(
+        &self,
+        state: State,
+        action: Action,
+        gamma: f64,
+        value: impl Fn(State) -> f64,
+    ) -> f64 {
         self.outcomes(state, action)
             .iter()
             .map(|outcome| {

@@ -1,8 +1,8 @@
 //! Values on disk: a versioned envelope, written atomically.
 //!
-//! Layout, numbers little-endian: 8 bytes magic `\x89QTBL\r\n\x1a`, `u32` format version, `u32` length of the kind,
-//! `u64` length of the payload, the kind (UTF-8), the payload (bincode's standard configuration), and the CRC-32 of
-//! everything before as `u32`.
+//! Layout, numbers little-endian: 8 bytes magic `\x89QTBL\r\n\x1a`, `u32` format version, `u32`
+//! length of the kind, `u64` length of the payload, the kind (UTF-8), the payload (bincode's
+//! standard configuration), and the CRC-32 of everything before as `u32`.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -41,7 +41,8 @@ pub enum Problem {
     /// The operating system refused: no such file, no permission, no space.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// The bytes do not begin as this format does: another kind of file, or one damaged in transfer as text.
+    /// The bytes do not begin as this format does: another kind of file, or one damaged in transfer
+    /// as text.
     #[error("not a file of this format (it does not begin with its signature)")]
     Signature,
     /// Written by a newer version of this crate: update it.
@@ -61,7 +62,9 @@ pub enum Problem {
         known: u32,
     },
     /// The file ends too early: an interrupted copy, or a claimed length that is not there.
-    #[error("{found} bytes where {needed} are needed: the file is cut short or its length field is damaged")]
+    #[error(
+        "{found} bytes where {needed} are needed: the file is cut short or its length field is damaged"
+    )]
     Truncated {
         /// Bytes that the header asks for.
         needed: u128,
@@ -104,7 +107,8 @@ pub enum Problem {
         /// The limit in bytes.
         limit: u64,
     },
-    /// The payload is not a valid value of the type asked for, for example a table with a NaN in it.
+    /// The payload is not a valid value of the type asked for, for example a table with a NaN in
+    /// it.
     #[error("the contents are not valid: {0}")]
     Contents(String),
     /// The value could not be encoded.
@@ -112,10 +116,12 @@ pub enum Problem {
     Encode(String),
 }
 
-/// Writes a value to a file, which appears whole or not at all: it is written beside the target and then renamed.
+/// Writes a value to a file, which appears whole or not at all: it is written beside the target and
+/// then renamed.
 ///
-/// `kind` says what it is, including the version of its type where that may change (`"approach-policy/1"`);
-/// [`load`] asks for the same. An existing file is replaced and keeps its permissions.
+/// `kind` says what it is, including the version of its type where that may change
+/// (`"approach-policy/1"`); [`load`] asks for the same. An existing file is replaced and keeps its
+/// permissions.
 ///
 /// # Errors
 /// [`PersistError`], which names the path.
@@ -131,7 +137,8 @@ pub fn save<T: Serialize>(path: &Path, kind: &str, value: &T) -> Result<(), Pers
 /// Reads a value that [`save`] wrote under the same kind.
 ///
 /// # Errors
-/// [`PersistError`], which names the path; a damaged, foreign or oversized file is refused within bounded memory.
+/// [`PersistError`], which names the path; a damaged, foreign or oversized file is refused within
+/// bounded memory.
 pub fn load<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, PersistError> {
     read_bounded(path)
         .and_then(|bytes| decode(kind, &bytes))
@@ -172,7 +179,8 @@ pub fn encode<T: Serialize>(kind: &str, value: &T) -> Result<Vec<u8>, Problem> {
 /// The value in bytes that [`encode`] made under the same kind.
 ///
 /// # Errors
-/// [`Problem`], for every change of the bytes that the checksum can tell, which includes each single-bit flip.
+/// [`Problem`], for every change of the bytes that the checksum can tell, which includes each
+/// single-bit flip.
 pub fn decode<T: DeserializeOwned>(kind: &str, bytes: &[u8]) -> Result<T, Problem> {
     let found = bytes.len() as u64;
     let is_ours = bytes.len().min(MAGIC.len());
@@ -206,12 +214,23 @@ pub fn decode<T: DeserializeOwned>(kind: &str, bytes: &[u8]) -> Result<T, Proble
     ] = *header;
     match u32::from_le_bytes([f0, f1, f2, f3]) {
         FORMAT => {}
-        found if found > FORMAT => return Err(Problem::Newer { found, known: FORMAT }),
-        found => return Err(Problem::Older { found, known: FORMAT }),
+        found if found > FORMAT => {
+            return Err(Problem::Newer {
+                found,
+                known: FORMAT,
+            });
+        }
+        found => {
+            return Err(Problem::Older {
+                found,
+                known: FORMAT,
+            });
+        }
     }
     let kind_length = u32::from_le_bytes([k0, k1, k2, k3]);
-    let needed =
-        (HEADER + CHECKSUM) as u128 + u128::from(kind_length) + u128::from(u64::from_le_bytes(length));
+    let needed = (HEADER + CHECKSUM) as u128
+        + u128::from(kind_length)
+        + u128::from(u64::from_le_bytes(length));
     if u128::from(found) < needed {
         return Err(Problem::Truncated { needed, found });
     }
@@ -245,18 +264,20 @@ pub fn decode<T: DeserializeOwned>(kind: &str, bytes: &[u8]) -> Result<T, Proble
     let (value, used) = decoded.map_err(|error| Problem::Contents(error.to_string()))?;
     match payload.len() - used {
         0 => Ok(value),
-        extra => Err(Problem::TrailingBytes { extra: extra as u64 }),
+        extra => Err(Problem::TrailingBytes {
+            extra: extra as u64,
+        }),
     }
 }
 
-/// The most that bincode counts for a payload of a length: it counts numbers by their width in memory, up to 16 bytes
-/// for each byte read.
+/// The most that bincode counts for a payload of a length: it counts numbers by their width in
+/// memory, up to 16 bytes for each byte read.
 const fn widest(length: usize) -> usize {
     length.saturating_mul(16)
 }
 
-/// The value at the beginning of a payload, and how much of that it took. bincode makes room for a text before it looks
-/// for its end, hence the bound on what a payload may claim.
+/// The value at the beginning of a payload, and how much of that it took. bincode makes room for a
+/// text before it looks for its end, hence the bound on what a payload may claim.
 fn decode_within<T: DeserializeOwned, const BOUND: usize>(
     payload: &[u8],
 ) -> Result<(T, usize), bincode::error::DecodeError> {
@@ -276,9 +297,9 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, Problem> {
     Ok(bytes)
 }
 
-/// Writes a file beside its target and renames it; a target that is there and is no regular file (a device, a pipe) is written to as it is,
-/// not replaced. The permissions are those of the file replaced, or of a file
-/// created in the ordinary way.
+/// Writes a file beside its target and renames it; a target that is there and is no regular file (a
+/// device, a pipe) is written to as it is, not replaced. The permissions are those of the file
+/// replaced, or of a file created in the ordinary way.
 pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A link stays a link: what it points to is replaced.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

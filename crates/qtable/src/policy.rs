@@ -16,14 +16,15 @@ use crate::{Action, QTable, State, Value};
 
 /// A rule that chooses an action. Actions that the table's mask forbids are never chosen.
 ///
-/// A policy whose exploration changes with time counts its own choices, so that the same object goes on where it
-/// stopped.
+/// A policy whose exploration changes with time counts its own choices, so that the same object
+/// goes on where it stopped.
 pub trait Policy<V: Value = f64> {
     /// Chooses an action for a state of the table.
     fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action;
 
-    /// Writes the probability of every action, as the next call of [`choose`](Policy::choose) would have it, into
-    /// `probabilities` (one entry for each action) and returns `true`; returns `false` if the policy cannot say.
+    /// Writes the probability of every action, as the next call of [`choose`](Policy::choose) would
+    /// have it, into `probabilities` (one entry for each action) and returns `true`; returns
+    /// `false` if the policy cannot say.
     fn probabilities(&self, table: &QTable<V>, state: State, probabilities: &mut [f64]) -> bool {
         let _ = (table, state, probabilities);
         false
@@ -40,8 +41,8 @@ impl<V: Value, P: Policy<V> + ?Sized> Policy<V> for Box<P> {
     }
 }
 
-/// Always the best action; of equals the lowest index. ([`EpsilonGreedy`] with ε = 0 and [`Ties::Random`] is the
-/// greedy policy that draws among equals.)
+/// Always the best action; of equals the lowest index. ([`EpsilonGreedy`] with ε = 0 and
+/// [`Ties::Random`] is the greedy policy that draws among equals.)
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Greedy;
@@ -70,7 +71,8 @@ pub enum Ties {
 }
 
 impl Ties {
-    /// One of the offered actions for which `score` is highest. The generator is asked only if there are several.
+    /// One of the offered actions for which `score` is highest. The generator is asked only if
+    /// there are several.
     fn pick<V: Value>(
         self,
         table: &QTable<V>,

@@ -1,4 +1,5 @@
-//! Quantities that change while a run goes on: the learning rate α, the exploration rate ε, the temperature T.
+//! Quantities that change while a run goes on: the learning rate α, the exploration rate ε, the
+//! temperature T.
 
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -7,11 +8,17 @@ use crate::Error;
 use crate::elementary::{exp, ln};
 use crate::validated::validated;
 
-/// The value of a quantity after a number of steps (actions taken, or visits of one state-action pair).
+/// The value of a quantity after a number of steps (actions taken, or visits of one state-action
+/// pair).
 ///
-/// Variants are made by the constructors, which check them; they can be matched on, not written out.
+/// Variants are made by the constructors, which check them; they can be matched on, not written
+/// out.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 #[non_exhaustive]
 pub enum Schedule {
     /// Always `value`.
@@ -40,7 +47,8 @@ pub enum Schedule {
         /// Steps from `start` to `end`.
         steps: u64,
     },
-    /// `start / (1 + visits / scale)`: by the visits of the state-action pair, not by the steps of the run.
+    /// `start / (1 + visits / scale)`: by the visits of the state-action pair, not by the steps of
+    /// the run.
     #[non_exhaustive]
     InverseVisits {
         /// Value at the first visit.
@@ -121,9 +129,9 @@ impl Schedule {
         Self::Exponential { start, end, steps }.restore()
     }
 
-    /// `start / (1 + visits / scale)`, by the visits of each state-action pair. With both 1 it is `1/n` at the
-    /// n-th visit, the sample average; a larger scale keeps learning longer, and both satisfy the conditions of
-    /// Robbins and Monro under which Q-learning converges.
+    /// `start / (1 + visits / scale)`, by the visits of each state-action pair. With both 1 it is
+    /// `1/n` at the n-th visit, the sample average; a larger scale keeps learning longer, and both
+    /// satisfy the conditions of Robbins and Monro under which Q-learning converges.
     ///
     /// A quantity that belongs to no pair, such as ε or T, has its steps in place of visits.
     ///
@@ -144,8 +152,8 @@ impl Schedule {
         .restore()
     }
 
-    /// The paper's learning rate: exponential from 0.6 (section 4). The end, which the paper does not give, is
-    /// 0.02 after `actions`, at least 1.
+    /// The paper's learning rate: exponential from 0.6 (section 4). The end, which the paper does
+    /// not give, is 0.02 after `actions`, at least 1.
     pub fn paper_alpha(actions: u64) -> Self {
         Self::Exponential {
             start: 0.6,
@@ -154,8 +162,8 @@ impl Schedule {
         }
     }
 
-    /// The paper's temperature: from 1000 (section 4). Course and end, which the paper does not give, are
-    /// exponential and 0.1 after `actions`, at least 1.
+    /// The paper's temperature: from 1000 (section 4). Course and end, which the paper does not
+    /// give, are exponential and 0.1 after `actions`, at least 1.
     pub fn paper_temperature(actions: u64) -> Self {
         Self::Exponential {
             start: 1000.0,
@@ -164,7 +172,8 @@ impl Schedule {
         }
     }
 
-    /// The value at a step, 0 being the first. [`Schedule::InverseVisits`] takes it as the number of visits.
+    /// The value at a step, 0 being the first. [`Schedule::InverseVisits`] takes it as the number
+    /// of visits.
     pub fn at(&self, step: u64) -> f64 {
         match self {
             Self::Constant { value } => *value,
@@ -178,7 +187,9 @@ impl Schedule {
             Self::Piecewise { points } => {
                 let after = points.partition_point(|&(at, _)| at <= step);
                 match (points[..after].last(), points.get(after)) {
-                    (Some(&(from, start)), Some(&(to, end))) => between(start, end, step - from, to - from),
+                    (Some(&(from, start)), Some(&(to, end))) => {
+                        between(start, end, step - from, to - from)
+                    }
                     (Some(&(_, value)), None) | (None, Some(&(_, value))) => value,
                     (None, None) => f64::NAN,
                 }
@@ -186,7 +197,8 @@ impl Schedule {
         }
     }
 
-    /// The value at a step for a pair with a number of visits before it: whichever of the two the schedule runs by.
+    /// The value at a step for a pair with a number of visits before it: whichever of the two the
+    /// schedule runs by.
     #[inline]
     pub fn at_visit(&self, step: u64, visits: u64) -> f64 {
         match self {
@@ -205,11 +217,10 @@ impl Schedule {
                 within(*start, *end, *start)
             }
             Self::InverseVisits { start, .. } => within(0.0, *start, 0.0),
-            Self::Piecewise { points } => points
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &(_, value)| {
-                    within(low, value, high)
-                }),
+            Self::Piecewise { points } => points.iter().fold(
+                (f64::INFINITY, f64::NEG_INFINITY),
+                |(low, high), &(_, value)| within(low, value, high),
+            ),
         }
     }
 
@@ -305,7 +316,14 @@ mod tests {
             assert_eq!(linear.at(step).to_bits(), f64::to_bits(wanted));
         }
         let exponential = Schedule::exponential(1000.0, 0.1, 4).unwrap();
-        for (step, wanted) in [(0, 1000.0), (1, 100.0), (2, 10.0), (3, 1.0), (4, 0.1), (5, 0.1)] {
+        for (step, wanted) in [
+            (0, 1000.0),
+            (1, 100.0),
+            (2, 10.0),
+            (3, 1.0),
+            (4, 0.1),
+            (5, 0.1),
+        ] {
             assert!((exponential.at(step) / wanted - 1.0).abs() < 1e-14);
         }
         assert!((Schedule::paper_alpha(100).at(0) - 0.6).abs() < 1e-15);
@@ -318,8 +336,18 @@ mod tests {
         assert!((mean.at_visit(1_000, 3) - 0.25).abs() < 1e-15);
         assert_eq!(mean.range(), (0.0, 1.0));
         let piecewise = Schedule::piecewise(&[(10, 1.0), (20, 3.0), (21, -1.0)]).unwrap();
-        for (step, wanted) in [(0, 1.0), (10, 1.0), (15, 2.0), (20, 3.0), (21, -1.0), (99, -1.0)] {
-            assert!((piecewise.at_visit(step, 7) - wanted).abs() < 1e-15, "{step}");
+        for (step, wanted) in [
+            (0, 1.0),
+            (10, 1.0),
+            (15, 2.0),
+            (20, 3.0),
+            (21, -1.0),
+            (99, -1.0),
+        ] {
+            assert!(
+                (piecewise.at_visit(step, 7) - wanted).abs() < 1e-15,
+                "{step}"
+            );
         }
         assert_eq!(piecewise.range(), (-1.0, 3.0));
         assert_eq!(Schedule::piecewise(&[]), Err(ScheduleError::NoPoints));
@@ -349,7 +377,10 @@ mod tests {
                         let (low, high) = schedule.range();
                         for step in 0..=steps {
                             let value = schedule.at(step);
-                            assert!((low..=high).contains(&value), "{schedule:?} at {step}: {value:e}");
+                            assert!(
+                                (low..=high).contains(&value),
+                                "{schedule:?} at {step}: {value:e}"
+                            );
                         }
                     }
                 }

@@ -1,7 +1,7 @@
 //! Room to work in.
 
-/// A buffer kept between calls so that they allocate nothing. What is in it is no part of its owner's state: it is
-/// not saved, and two of them are always equal.
+/// A buffer kept between calls so that they allocate nothing. What is in it is no part of its
+/// owner's state: it is not saved, and two of them are always equal.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch(Vec<f64>);
 

@@ -7,8 +7,8 @@ use crate::Record;
 
 /// Runs an experiment once for every seed and returns the results in the order of the seeds.
 ///
-/// With the feature `parallel` the runs are spread over all processor cores; the results are the same to the bit,
-/// because a run sees nothing but its seed.
+/// With the feature `parallel` the runs are spread over all processor cores; the results are the
+/// same to the bit, because a run sees nothing but its seed.
 ///
 /// ```
 /// use qtable::{Estimate, QTable, TrainConfig, over_seeds, toys, train};
@@ -49,8 +49,8 @@ pub fn over_seeds<T: Send, E: Send>(
 pub struct Estimate {
     /// The mean; NaN of no values.
     pub mean: f64,
-    /// Half the width of the 95 % interval of the mean, by Student's t: the mean lies within `mean ± half_width`.
-    /// Infinite for fewer than two values.
+    /// Half the width of the 95 % interval of the mean, by Student's t: the mean lies within
+    /// `mean ± half_width`. Infinite for fewer than two values.
     pub half_width: f64,
     /// Number of values.
     pub count: usize,
@@ -68,7 +68,10 @@ impl Estimate {
                 count,
             };
         }
-        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        let squares: f64 = values
+            .iter()
+            .map(|value| (value - mean) * (value - mean))
+            .sum();
         let deviation = (squares / (count - 1) as f64).sqrt();
         Self {
             mean,
@@ -77,9 +80,12 @@ impl Estimate {
         }
     }
 
-    /// Of a quantity at each point of several learning curves; runs in which it is `None` are left out at that
-    /// point. As long as the shortest curve.
-    pub fn of_curves(curves: &[Vec<Record>], quantity: impl Fn(&Record) -> Option<f64>) -> Vec<Self> {
+    /// Of a quantity at each point of several learning curves; runs in which it is `None` are left
+    /// out at that point. As long as the shortest curve.
+    pub fn of_curves(
+        curves: &[Vec<Record>],
+        quantity: impl Fn(&Record) -> Option<f64>,
+    ) -> Vec<Self> {
         let points = curves.iter().map(Vec::len).min().unwrap_or(0);
         (0..points)
             .map(|point| {
@@ -97,12 +103,16 @@ impl std::fmt::Display for Estimate {
     /// `mean ± half width`, with the precision asked for (3 unless given).
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let precision = f.precision().unwrap_or(3);
-        write!(f, "{:.precision$} ± {:.precision$}", self.mean, self.half_width)
+        write!(
+            f,
+            "{:.precision$} ± {:.precision$}",
+            self.mean, self.half_width
+        )
     }
 }
 
-/// The 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher and Cornish from six
-/// degrees of freedom on).
+/// The 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher and
+/// Cornish from six degrees of freedom on).
 fn student_t(degrees: usize) -> f64 {
     const FEW: [f64; 5] = [12.706_2, 4.302_65, 3.182_45, 2.776_45, 2.570_58];
     if let Some(&t) = degrees.checked_sub(1).and_then(|index| FEW.get(index)) {

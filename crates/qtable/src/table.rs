@@ -7,8 +7,11 @@ use crate::mask::checked_entries;
 use crate::validated::validated;
 use crate::{Action, ActionMask, Error, State};
 
-/// A number that a table can hold: `f32` or `f64`. Arithmetic is done in `f64` and rounded on storing.
-pub trait Value: Copy + PartialOrd + std::fmt::Debug + Send + Sync + sealed::Sealed + 'static {
+/// A number that a table can hold: `f32` or `f64`. Arithmetic is done in `f64` and rounded on
+/// storing.
+pub trait Value:
+    Copy + PartialOrd + std::fmt::Debug + Send + Sync + sealed::Sealed + 'static
+{
     /// The number as `f64`, exactly.
     fn to_f64(self) -> f64;
     /// The nearest number of this type, infinite if there is none.
@@ -53,15 +56,16 @@ impl Value for f64 {
     }
 }
 
-/// A dense table of action values with visit counts, `states` rows of `actions` values, and the best action of
-/// every row kept up to date.
+/// A dense table of action values with visit counts, `states` rows of `actions` values, and the
+/// best action of every row kept up to date.
 ///
-/// It never holds a value that is not finite. The best action is the one with the highest value among those the
-/// state offers; of equal values the lowest index wins. Keeping it costs one comparison on a write; the row is
-/// searched again only after the best value itself was lowered.
+/// It never holds a value that is not finite. The best action is the one with the highest value
+/// among those the state offers; of equal values the lowest index wins. Keeping it costs one
+/// comparison on a write; the row is searched again only after the best value itself was lowered.
 ///
-/// `QTable` without parameter holds `f64`. Methods that take a [`State`] or an [`Action`] and return no `Result`
-/// panic outside the table, as a slice does; [`get`](QTable::get) and [`check`](QTable::check) do not.
+/// `QTable` without parameter holds `f64`. Methods that take a [`State`] or an [`Action`] and
+/// return no `Result` panic outside the table, as a slice does; [`get`](QTable::get) and
+/// [`check`](QTable::check) do not.
 ///
 /// ```
 /// use qtable::{Action, QTable, State};
@@ -75,7 +79,11 @@ impl Value for f64 {
 /// # Ok::<(), qtable::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct QTable<V: Value = f64> {
     actions: usize,
     values: Vec<V>,
@@ -103,8 +111,8 @@ impl QTable {
 }
 
 impl<V: Value> QTable<V> {
-    /// A table that holds `value` everywhere. A value above all possible returns is the *optimistic start*:
-    /// every action looks good until it has been tried.
+    /// A table that holds `value` everywhere. A value above all possible returns is the *optimistic
+    /// start*: every action looks good until it has been tried.
     ///
     /// ```
     /// # use qtable::QTable;
@@ -141,7 +149,8 @@ impl<V: Value> QTable<V> {
         })
     }
 
-    /// Restricts every state to the actions of a mask (`None` lifts the restriction). Values stay as they are.
+    /// Restricts every state to the actions of a mask (`None` lifts the restriction). Values stay
+    /// as they are.
     ///
     /// # Errors
     /// [`Error::ShapeMismatch`].
@@ -192,7 +201,9 @@ impl<V: Value> QTable<V> {
 
     /// The value of an action in a state, or `None` outside the table.
     pub fn get(&self, state: State, action: Action) -> Option<V> {
-        self.check(state, action).ok().map(|()| self.value(state, action))
+        self.check(state, action)
+            .ok()
+            .map(|()| self.value(state, action))
     }
 
     /// The values of all actions of a state, forbidden ones included.
@@ -233,7 +244,9 @@ impl<V: Value> QTable<V> {
     /// Whether a state offers an action.
     #[inline]
     pub fn allows(&self, state: State, action: Action) -> bool {
-        self.mask.as_ref().is_none_or(|mask| mask.row(state)[action.0])
+        self.mask
+            .as_ref()
+            .is_none_or(|mask| mask.row(state)[action.0])
     }
 
     /// The actions that a state offers, by ascending index.
@@ -278,7 +291,12 @@ impl<V: Value> QTable<V> {
     ///
     /// # Errors
     /// [`Error::ShapeMismatch`], in which `what` names the other thing.
-    pub fn check_shape(&self, what: &'static str, states: usize, actions: usize) -> Result<(), Error> {
+    pub fn check_shape(
+        &self,
+        what: &'static str,
+        states: usize,
+        actions: usize,
+    ) -> Result<(), Error> {
         if (states, actions) == (self.states(), self.actions) {
             return Ok(());
         }
@@ -296,7 +314,12 @@ impl<V: Value> QTable<V> {
     pub(crate) fn entry(&self, state: State, action: Action) -> Result<usize, Error> {
         let index = state.0.wrapping_mul(self.actions).wrapping_add(action.0);
         let inside = state.0 < self.states() && action.0 < self.actions;
-        if inside && self.mask.as_ref().is_none_or(|mask| mask.row(state)[action.0]) {
+        if inside
+            && self
+                .mask
+                .as_ref()
+                .is_none_or(|mask| mask.row(state)[action.0])
+        {
             Ok(index)
         } else {
             Err(self.refuse(state, action))
@@ -346,7 +369,11 @@ impl<V: Value> QTable<V> {
         if stored.is_finite() {
             Ok(stored)
         } else {
-            Err(Error::ValueNotFinite { state, action, value })
+            Err(Error::ValueNotFinite {
+                state,
+                action,
+                value,
+            })
         }
     }
 
@@ -364,9 +391,15 @@ impl<V: Value> QTable<V> {
                 self.find_best(state);
             }
         } else if (value > best.value || (value == best.value && index < best.action))
-            && self.mask.as_ref().is_none_or(|mask| mask.row(state)[action.0])
+            && self
+                .mask
+                .as_ref()
+                .is_none_or(|mask| mask.row(state)[action.0])
         {
-            *best = Best { value, action: index };
+            *best = Best {
+                value,
+                action: index,
+            };
         }
         Ok(())
     }
@@ -385,13 +418,22 @@ impl<V: Value> QTable<V> {
                         *lane = higher(*lane, value);
                     }
                 }
-                let highest = lanes.into_iter().chain(rest.iter().copied()).fold(row[0], higher);
+                let highest = lanes
+                    .into_iter()
+                    .chain(rest.iter().copied())
+                    .fold(row[0], higher);
                 row.iter().position(|&value| value >= highest).unwrap_or(0)
             }
             Some(mask) => {
                 let offered = (0..self.actions).filter(|&action| mask.row(state)[action]);
                 offered
-                    .reduce(|best, action| if row[action] > row[best] { action } else { best })
+                    .reduce(|best, action| {
+                        if row[action] > row[best] {
+                            action
+                        } else {
+                            best
+                        }
+                    })
                     .unwrap_or(0)
             }
         };
@@ -418,10 +460,18 @@ impl<V: Value> QTable<V> {
             ("the visit counts", self.visits.len()),
         ] {
             if found != needed {
-                return Err(Error::WrongLength { what, needed, found });
+                return Err(Error::WrongLength {
+                    what,
+                    needed,
+                    found,
+                });
             }
         }
-        if let Some(index) = self.values.iter().position(|value| !value.to_f64().is_finite()) {
+        if let Some(index) = self
+            .values
+            .iter()
+            .position(|value| !value.to_f64().is_finite())
+        {
             let (state, action) = (State(index / actions), Action(index % actions));
             return Err(Error::ValueNotFinite {
                 state,

@@ -24,7 +24,8 @@ pub enum CsvError {
         /// What it should be.
         expected: &'static str,
     },
-    /// A line that is not for the pair that comes next: state by state, action by action, none left out.
+    /// A line that is not for the pair that comes next: state by state, action by action, none left
+    /// out.
     #[error("line {line} is not for the pair that comes next (state {}, action {})", state.0, action.0)]
     Order {
         /// The line, counted from 1.
@@ -40,9 +41,9 @@ pub enum CsvError {
 }
 
 impl<V: Value + Display> QTable<V> {
-    /// The table as CSV, one line for each pair after the header `state,action,value,visits,offered`; `offered` is
-    /// 0 where the mask forbids the action. Values are written with as many digits as it takes to read back the
-    /// same bits.
+    /// The table as CSV, one line for each pair after the header
+    /// `state,action,value,visits,offered`; `offered` is 0 where the mask forbids the action.
+    /// Values are written with as many digits as it takes to read back the same bits.
     pub fn to_csv(&self) -> String {
         let mut text = format!("{HEADER}\n");
         for state in (0..self.states()).map(State) {
@@ -57,8 +58,9 @@ impl<V: Value + Display> QTable<V> {
         text
     }
 
-    /// The table as Markdown: a row for each state, a column for each action, the best value of each row in bold, and
-    /// a dash where the mask forbids the action. `digits` are those after the decimal point.
+    /// The table as Markdown: a row for each state, a column for each action, the best value of
+    /// each row in bold, and a dash where the mask forbids the action. `digits` are those after the
+    /// decimal point.
     pub fn to_markdown(&self, digits: usize) -> String {
         let mut text = String::from("| state |");
         for action in 0..self.actions() {
@@ -83,8 +85,9 @@ impl<V: Value + Display> QTable<V> {
 }
 
 impl<V: Value + FromStr> QTable<V> {
-    /// The table of a CSV text as [`to_csv`](QTable::to_csv) writes it: all pairs, state by state. Blank lines at the
-    /// end and Windows line ends are allowed. Memory stays in proportion to the text.
+    /// The table of a CSV text as [`to_csv`](QTable::to_csv) writes it: all pairs, state by state.
+    /// Blank lines at the end and Windows line ends are allowed. Memory stays in proportion to the
+    /// text.
     ///
     /// # Errors
     /// [`CsvError`], which names the line.
@@ -96,7 +99,10 @@ impl<V: Value + FromStr> QTable<V> {
         let pairs: Vec<Pair<V>> = lines
             .map(|(line, number)| parse_line(line, number))
             .collect::<Result<_, _>>()?;
-        let actions = pairs.iter().take_while(|pair| pair.state == State(0)).count();
+        let actions = pairs
+            .iter()
+            .take_while(|pair| pair.state == State(0))
+            .count();
         let states = pairs.len() / actions.max(1);
         let mut table = Self::filled(states, actions, V::from_f64(0.0))?;
         for (index, pair) in pairs.iter().enumerate() {
@@ -164,9 +170,10 @@ fn parse<T: FromStr>(
     field: &'static str,
     expected: &'static str,
 ) -> Result<T, CsvError> {
-    text.and_then(|text| text.parse().ok()).ok_or(CsvError::Field {
-        line,
-        field,
-        expected,
-    })
+    text.and_then(|text| text.parse().ok())
+        .ok_or(CsvError::Field {
+            line,
+            field,
+            expected,
+        })
 }

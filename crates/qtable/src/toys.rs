@@ -1,6 +1,7 @@
-//! Small problems with known dynamics, for tests, examples and comparisons: FrozenLake, CliffWalking and Taxi with
-//! the rules and the numbering of [Gymnasium](https://gymnasium.farama.org/environments/toy_text/), and a chain
-//! whose optimum has a closed form.
+//! Small problems with known dynamics, for tests, examples and comparisons: FrozenLake,
+//! CliffWalking and Taxi with the rules and the numbering of
+//! [Gymnasium](https://gymnasium.farama.org/environments/toy_text/), and a chain whose optimum has
+//! a closed form.
 //!
 //! Each is a [`ModelEnvironment`], so that a learned table can be compared with the optimum:
 //!
@@ -13,8 +14,9 @@
 //! # Ok::<(), qtable::Error>(())
 //! ```
 //!
-//! A time limit is not part of the dynamics; Gymnasium sets 100 steps for the 4x4 lake, 200 for the 8x8 lake and the
-//! taxi, and none for the cliff. [`TimeLimit`](crate::TimeLimit) and the driver's episode limit set one.
+//! A time limit is not part of the dynamics; Gymnasium sets 100 steps for the 4x4 lake, 200 for the
+//! 8x8 lake and the taxi, and none for the cliff. [`TimeLimit`](crate::TimeLimit) and the driver's
+//! episode limit set one.
 
 mod taxi;
 
@@ -32,12 +34,13 @@ pub const FROZEN_LAKE_8X8: [&str; 8] = [
 
 /// FrozenLake-v1: cross the ice from `S` to `G` without falling into a hole.
 ///
-/// States are `row * columns + column`. Actions: 0 left, 1 down, 2 right, 3 up; a move off the map stays. On
-/// slippery ice the move goes the way asked for or to either side of it, each with probability 1/3. The goal pays
-/// 1, all else 0; goal and holes end the episode.
+/// States are `row * columns + column`. Actions: 0 left, 1 down, 2 right, 3 up; a move off the map
+/// stays. On slippery ice the move goes the way asked for or to either side of it, each with
+/// probability 1/3. The goal pays 1, all else 0; goal and holes end the episode.
 ///
 /// # Errors
-/// A map without a cell, with a letter other than these four, whose rows are not equally long, or without a start.
+/// A map without a cell, with a letter other than these four, whose rows are not equally long, or
+/// without a start.
 pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Error> {
     for (row, cells) in map.iter().enumerate() {
         if let Some((column, letter)) = cells
@@ -45,7 +48,11 @@ pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Err
             .enumerate()
             .find(|(_, cell)| !"SFHG".contains(*cell))
         {
-            return Err(Error::MapLetter { letter, row, column });
+            return Err(Error::MapLetter {
+                letter,
+                row,
+                column,
+            });
         }
     }
     let (rows, columns) = (map.len(), map.first().map_or(0, |row| row.len()));
@@ -69,7 +76,12 @@ pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Err
         };
         let probability = 1.0 / ways.len() as f64;
         let outcome = |way: &usize| {
-            let direction = [Direction::Left, Direction::Down, Direction::Right, Direction::Up][*way];
+            let direction = [
+                Direction::Left,
+                Direction::Down,
+                Direction::Right,
+                Direction::Up,
+            ][*way];
             let next = direction.from(state, rows, columns);
             let reward = if cells[next.0] == b'G' { 1.0 } else { 0.0 };
             Outcome {
@@ -88,15 +100,19 @@ pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Err
     let share = 1.0 / starts.len() as f64;
     ModelEnvironment::new(
         model,
-        &starts.iter().map(|&state| (state, share)).collect::<Vec<_>>(),
+        &starts
+            .iter()
+            .map(|&state| (state, share))
+            .collect::<Vec<_>>(),
     )
 }
 
 /// CliffWalking-v1: from the lower left to the lower right corner of a 4x12 grid, along a cliff.
 ///
-/// States are `row * 12 + column`; the start is 36, the goal 47, the cliff 37 to 46. Actions: 0 up, 1 right, 2 down,
-/// 3 left; a move off the grid stays. Every move pays -1, one into the cliff -100 and leads back to the start. The
-/// goal ends the episode, and that is a success. The best return is -13.
+/// States are `row * 12 + column`; the start is 36, the goal 47, the cliff 37 to 46. Actions: 0 up,
+/// 1 right, 2 down, 3 left; a move off the grid stays. Every move pays -1, one into the cliff -100
+/// and leads back to the start. The goal ends the episode, and that is a success. The best return
+/// is -13.
 ///
 /// # Errors
 /// None for this map; the type is that of all toys.
@@ -107,8 +123,13 @@ pub fn cliff_walking() -> Result<ModelEnvironment, Error> {
         if state == GOAL {
             return vec![Outcome::certain(GOAL, 0.0, true)];
         }
-        let direction =
-            [Direction::Up, Direction::Right, Direction::Down, Direction::Left][action.0].from(state, 4, 12);
+        let direction = [
+            Direction::Up,
+            Direction::Right,
+            Direction::Down,
+            Direction::Left,
+        ][action.0]
+            .from(state, 4, 12);
         vec![match direction.0 {
             37..=46 => Outcome::certain(START, -100.0, false),
             _ => Outcome::certain(direction, -1.0, direction == GOAL),
@@ -117,8 +138,8 @@ pub fn cliff_walking() -> Result<ModelEnvironment, Error> {
     Ok(ModelEnvironment::new(model, &[(START, 1.0)])?.with_success_at_any_termination())
 }
 
-/// A row of `length` cells. Action 0 goes left (at the left end it stays), action 1 right; the right end pays 1 and
-/// ends the episode. From the left end on.
+/// A row of `length` cells. Action 0 goes left (at the left end it stays), action 1 right; the
+/// right end pays 1 and ends the episode. From the left end on.
 ///
 /// The optimum is `V*(s) = γ^(length - 2 - s)` for every cell but the last.
 ///

@@ -11,13 +11,14 @@ use crate::{Boltzmann, Environment, Error, QLearning, QTable, Record, Schedule, 
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct TrainConfig {
-    /// Discount factor γ \[0.9\], in `0..=1`. Near 0 only the next reward counts; at 1 an episode without end has
-    /// no finite value.
+    /// Discount factor γ \[0.9\], in `0..=1`. Near 0 only the next reward counts; at 1 an episode
+    /// without end has no finite value.
     pub gamma: f64,
     /// Learning rate α over the actions taken \[[`Schedule::paper_alpha`]\], within `0..=1`.
     pub alpha: Schedule,
     /// Temperature T of the Boltzmann policy over the actions taken, in units of the values
-    /// \[[`Schedule::paper_temperature`]\], within `1e-6..=1e6`. High: every action alike; low: the best one.
+    /// \[[`Schedule::paper_temperature`]\], within `1e-6..=1e6`. High: every action alike; low: the
+    /// best one.
     pub temperature: Schedule,
     /// Actions to take in all, at least 1.
     pub actions: u64,
@@ -29,8 +30,8 @@ pub struct TrainConfig {
 }
 
 impl TrainConfig {
-    /// The paper's settings (section 4) for a number of actions: γ = 0.9, α from 0.6, T from 1000; 60 actions to an
-    /// episode; 100 records.
+    /// The paper's settings (section 4) for a number of actions: γ = 0.9, α from 0.6, T from 1000;
+    /// 60 actions to an episode; 100 records.
     pub fn paper(actions: u64) -> Self {
         Self {
             gamma: 0.9,
@@ -76,14 +77,16 @@ pub struct TrainReport {
 
 /// Learns a table on an environment with one-step Q-learning and a Boltzmann policy.
 ///
-/// The table may hold knowledge from before. It must have the environment's shape; if the environment restricts
-/// its actions, the table takes over the mask. `on_progress` is called at every record.
+/// The table may hold knowledge from before. It must have the environment's shape; if the
+/// environment restricts its actions, the table takes over the mask. `on_progress` is called at
+/// every record.
 ///
 /// # Errors
-/// A setting out of range, a table of the wrong shape, or a fault of the environment (state out of range, reward
-/// not finite). After the last, the table keeps what was learned before.
+/// A setting out of range, a table of the wrong shape, or a fault of the environment (state out of
+/// range, reward not finite). After the last, the table keeps what was learned before.
 ///
-/// [`Training`](crate::Training) does the same with any learner and policy, in pieces that can be saved between.
+/// [`Training`](crate::Training) does the same with any learner and policy, in pieces that can be
+/// saved between.
 pub fn train<V: Value>(
     environment: &mut dyn Environment,
     table: &mut QTable<V>,

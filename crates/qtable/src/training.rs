@@ -18,10 +18,12 @@ pub enum Until {
     Episodes(u64),
 }
 
-/// A training run: table, learner, policy, counters, learning curve, and the episode that is going on.
+/// A training run: table, learner, policy, counters, learning curve, and the episode that is going
+/// on.
 ///
-/// Environment and generator are the caller's and are handed to every call. A run that is stopped, saved together
-/// with these two, loaded and continued, ends in the same bits as one that was never stopped:
+/// Environment and generator are the caller's and are handed to every call. A run that is stopped,
+/// saved together with these two, loaded and continued, ends in the same bits as one that was never
+/// stopped:
 ///
 #[cfg_attr(feature = "serde", doc = "```")]
 #[cfg_attr(not(feature = "serde"), doc = "```ignore")]
@@ -66,11 +68,13 @@ pub struct Training<L, P, V: Value = f64> {
 }
 
 impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
-    /// With a table, which may hold knowledge from before. If the environment restricts its actions, the table
-    /// takes over the mask. Episodes have no limit and a record is made every 1000 actions, unless changed.
+    /// With a table, which may hold knowledge from before. If the environment restricts its
+    /// actions, the table takes over the mask. Episodes have no limit and a record is made every
+    /// 1000 actions, unless changed.
     ///
     /// # Errors
-    /// [`Error::ShapeMismatch`] if table and environment differ, or a mask that leaves a state without action.
+    /// [`Error::ShapeMismatch`] if table and environment differ, or a mask that leaves a state
+    /// without action.
     pub fn new<E: Environment + ?Sized>(
         environment: &E,
         mut table: QTable<V>,
@@ -87,7 +91,8 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
         })
     }
 
-    /// Truncates an episode after a number of actions, at least 1. All else stays, also of a run that has begun.
+    /// Truncates an episode after a number of actions, at least 1. All else stays, also of a run
+    /// that has begun.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -96,8 +101,8 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
         Ok(self)
     }
 
-    /// Makes a record whenever the actions taken are a multiple of a number, at least 1. All else stays, also of a
-    /// run that has begun.
+    /// Makes a record whenever the actions taken are a multiple of a number, at least 1. All else
+    /// stays, also of a run that has begun.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -109,8 +114,8 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
     /// Trains until a total is reached; at once if it is already.
     ///
     /// # Errors
-    /// An environment of another shape or with a fault (state out of range, reward not finite), a policy or learner
-    /// that fails. What was learned before stays; the episode is given up.
+    /// An environment of another shape or with a fault (state out of range, reward not finite), a
+    /// policy or learner that fails. What was learned before stays; the episode is given up.
     pub fn run<E: Environment + ?Sized>(
         &mut self,
         environment: &mut E,
@@ -121,8 +126,8 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
             .map(|_| ())
     }
 
-    /// Trains as [`run`](Training::run) does and calls `on_record` with every record and the table, for a progress
-    /// bar or an early stop. Returns whether it was stopped early.
+    /// Trains as [`run`](Training::run) does and calls `on_record` with every record and the table,
+    /// for a progress bar or an early stop. Returns whether it was stopped early.
     ///
     /// ```
     /// # use std::ops::ControlFlow;
@@ -160,8 +165,8 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
         Ok(false)
     }
 
-    /// Trains as [`run`](Training::run) does, one record of the learning curve at a time. Ends after the first
-    /// error.
+    /// Trains as [`run`](Training::run) does, one record of the learning curve at a time. Ends
+    /// after the first error.
     pub fn records<'a, E: Environment + ?Sized>(
         &'a mut self,
         environment: &'a mut E,
@@ -209,7 +214,8 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
         self.course.episodes
     }
 
-    /// Whether an episode is going on, so that the environment's own state belongs to the state of the run.
+    /// Whether an episode is going on, so that the environment's own state belongs to the state of
+    /// the run.
     pub fn is_in_episode(&self) -> bool {
         self.course.is_in_episode()
     }
@@ -226,8 +232,11 @@ impl<L: Learner<V>, P: Policy<V>, V: Value> Training<L, P, V> {
         until: Until,
         rng: &mut dyn Rng,
     ) -> Result<Option<Record>, Error> {
-        self.table
-            .check_shape("the environment", environment.states(), environment.actions())?;
+        self.table.check_shape(
+            "the environment",
+            environment.states(),
+            environment.actions(),
+        )?;
         loop {
             let reached = match until {
                 Until::Actions(actions) => self.course.actions >= actions,

@@ -1,7 +1,8 @@
 //! Decoding that ends in a check: a type read from a file keeps the promises its constructors make.
 
-/// Implements `Serialize` and `Deserialize` for a type that derives both with `#[serde(remote = "Self")]` and
-/// has `fn restore(self) -> Result<Self, E>`, which checks what was read and rebuilds what was not stored.
+/// Implements `Serialize` and `Deserialize` for a type that derives both with
+/// `#[serde(remote = "Self")]` and has `fn restore(self) -> Result<Self, E>`, which checks what was
+/// read and rebuilds what was not stored.
 macro_rules! validated {
     ($type:ident $(<$v:ident: $bound:path>)?) => {
         #[cfg(feature = "serde")]

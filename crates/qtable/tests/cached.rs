@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
-    Action, ActionMask, Boltzmann, CachedBoltzmann, Environment, Error, Policy, QLearning, QTable, Schedule,
-    State, Status, Step, TrainConfig, over_seeds, toys, train, train_in_blocks,
+    Action, ActionMask, Boltzmann, CachedBoltzmann, Environment, Error, Policy, QLearning, QTable,
+    Schedule, State, Status, Step, TrainConfig, over_seeds, toys, train, train_in_blocks,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -24,8 +24,9 @@ fn plain_probabilities(table: &QTable<f32>, temperature: f64, state: State) -> V
     p
 }
 
-/// After many updates of both forms: the same values, the same best actions, the same probabilities. Rows of all
-/// lengths around the sizes of groups and blocks; jumps far beyond what the offset follows.
+/// After many updates of both forms: the same values, the same best actions, the same
+/// probabilities. Rows of all lengths around the sizes of groups and blocks; jumps far beyond what
+/// the offset follows.
 #[test]
 fn the_cached_table_stays_equal_to_the_plain_one() {
     for (actions, temperature, spread) in [
@@ -53,7 +54,8 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
             let step = Step {
                 observation: State(rng.random_range(0..3)),
                 reward: rng.random_range(-spread..spread),
-                status: [Status::Continuing, Status::Terminated, Status::Truncated][rng.random_range(0..3)],
+                status: [Status::Continuing, Status::Terminated, Status::Truncated]
+                    [rng.random_range(0..3)],
             };
             let here = learner.update(&mut table, state, action, &step).unwrap();
             let there = cached.update(state, action, &step, 0.5, 0.9).unwrap();
@@ -85,8 +87,9 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
     }
 }
 
-/// Pearson's chi-square of a million choices against the plain softmax. The bounds are the 99.99 % quantiles by the
-/// approximation of Wilson and Hilferty; with the fixed seed the test is repeatable.
+/// Pearson's chi-square of a million choices against the plain softmax. The bounds are the 99.99 %
+/// quantiles by the approximation of Wilson and Hilferty; with the fixed seed the test is
+/// repeatable.
 #[test]
 fn choices_have_the_distribution_of_the_plain_softmax() {
     for (seed, temperature) in [(1, 0.3), (2, 1.0), (3, 5.0), (4, 1000.0)] {
@@ -96,7 +99,10 @@ fn choices_have_the_distribution_of_the_plain_softmax() {
         // Learned values, not fresh ones: through as many updates as an entry sees.
         let mut learner = QLearning::new(constant(0.3), 0.5).unwrap();
         for _ in 0..5_000 {
-            let (state, action) = (State(rng.random_range(0..2)), Action(rng.random_range(0..81)));
+            let (state, action) = (
+                State(rng.random_range(0..2)),
+                Action(rng.random_range(0..81)),
+            );
             let reward = (action.0 % 9) as f64 * 0.3 + rng.random_range(-1.0..1.0);
             let step = Step {
                 observation: State(0),
@@ -134,7 +140,10 @@ fn choices_have_the_distribution_of_the_plain_softmax() {
             chi_square < bound,
             "T = {temperature}: {chi_square} with {n} degrees of freedom"
         );
-        assert!(n > 8.0, "T = {temperature} leaves too few cells to tell: {cells}");
+        assert!(
+            n > 8.0,
+            "T = {temperature} leaves too few cells to tell: {cells}"
+        );
     }
 }
 
@@ -153,7 +162,13 @@ fn training_in_blocks_learns_what_plain_training_learns() {
     let outcomes = over_seeds(0..8, |seed| {
         let mut plain = QTable::<f32>::filled(48, 4, 0.0)?;
         let mut fast = plain.clone();
-        let told = train(&mut toy.clone(), &mut plain, &config, &mut rng(seed), &mut |_| {})?;
+        let told = train(
+            &mut toy.clone(),
+            &mut plain,
+            &config,
+            &mut rng(seed),
+            &mut |_| {},
+        )?;
         let in_blocks = train_in_blocks(
             &mut toy.clone(),
             &mut fast,
@@ -166,11 +181,21 @@ fn training_in_blocks_learns_what_plain_training_learns() {
             (told.actions, in_blocks.actions, in_blocks.curve.len()),
             (60_000, 60_000, 10)
         );
-        let visits: u32 = (0..48).flat_map(|s| fast.visit_row(State(s)).to_vec()).sum();
+        let visits: u32 = (0..48)
+            .flat_map(|s| fast.visit_row(State(s)).to_vec())
+            .sum();
         assert_eq!(visits, 60_000);
         let middle = |report: &qtable::TrainReport| report.curve[4].mean_return.unwrap();
-        let steps = |table: &QTable<f32>| toy.assess(&table.greedy(), 0.99, 200).map(|found| found.steps);
-        Ok::<_, Error>((middle(&told), middle(&in_blocks), steps(&plain)?, steps(&fast)?))
+        let steps = |table: &QTable<f32>| {
+            toy.assess(&table.greedy(), 0.99, 200)
+                .map(|found| found.steps)
+        };
+        Ok::<_, Error>((
+            middle(&told),
+            middle(&in_blocks),
+            steps(&plain)?,
+            steps(&fast)?,
+        ))
     })
     .unwrap();
     let mean = |of: fn(&(f64, f64, f64, f64)) -> f64| outcomes.iter().map(of).sum::<f64>() / 8.0;
@@ -199,14 +224,21 @@ fn faults_are_refused_and_what_was_learned_stays() {
         reward,
         status: Status::Continuing,
     };
-    let mut update = |state, action, step: &Step| cached.update(State(state), Action(action), step, 1.0, 1.0);
+    let mut update =
+        |state, action, step: &Step| cached.update(State(state), Action(action), step, 1.0, 1.0);
     assert!(matches!(
         update(2, 0, &step(0, 0.0)),
-        Err(Error::StateOutOfRange { state: State(2), .. })
+        Err(Error::StateOutOfRange {
+            state: State(2),
+            ..
+        })
     ));
     assert!(matches!(
         update(0, 0, &step(7, 0.0)),
-        Err(Error::StateOutOfRange { state: State(7), .. })
+        Err(Error::StateOutOfRange {
+            state: State(7),
+            ..
+        })
     ));
     assert!(matches!(
         update(0, 3, &step(0, 0.0)),
@@ -275,16 +307,35 @@ fn faults_are_refused_and_what_was_learned_stays() {
         alpha: constant(0.5),
         ..TrainConfig::paper(10)
     };
-    let outcome = train_in_blocks(&mut Breaks(0), &mut table, &config, 5, &mut rng(0), &mut |_| {});
+    let outcome = train_in_blocks(
+        &mut Breaks(0),
+        &mut table,
+        &config,
+        5,
+        &mut rng(0),
+        &mut |_| {},
+    );
     assert!(matches!(outcome, Err(Error::RewardNotFinite { .. })));
     assert!((table.max(State(0)) - 6.0).abs() < 1e-6 && table.visits(State(0), Action(0)) == 2);
-    assert!(train_in_blocks(&mut Breaks(0), &mut table, &config, 0, &mut rng(0), &mut |_| {}).is_err());
+    assert!(
+        train_in_blocks(
+            &mut Breaks(0),
+            &mut table,
+            &config,
+            0,
+            &mut rng(0),
+            &mut |_| {}
+        )
+        .is_err()
+    );
 }
 
 #[test]
 fn an_action_out_of_range_is_no_padding() {
     let cached = CachedBoltzmann::new(&QTable::new(2, 5).unwrap(), 1.0).unwrap();
-    assert!(cached.value(State(1), Action(4)).abs() < 1e-30 && cached.visits(State(1), Action(4)) == 0);
+    assert!(
+        cached.value(State(1), Action(4)).abs() < 1e-30 && cached.visits(State(1), Action(4)) == 0
+    );
     for action in [5, 15, 16] {
         let action = Action(action);
         assert!(std::panic::catch_unwind(|| cached.value(State(0), action)).is_err());
@@ -301,11 +352,20 @@ fn of_equals_the_lowest_index_is_best() {
             reward,
             status: Status::Terminated,
         };
-        cached.update(State(0), Action(action), &step, 1.0, 0.0).unwrap();
+        cached
+            .update(State(0), Action(action), &step, 1.0, 0.0)
+            .unwrap();
         cached.best(State(0)).0
     };
     // Risen above, level from below and from above, and fallen.
-    let best = [(30, 2.0), (7, 2.0), (20, 2.0), (7, 1.0), (30, 0.0), (20, -1.0)];
+    let best = [
+        (30, 2.0),
+        (7, 2.0),
+        (20, 2.0),
+        (7, 1.0),
+        (30, 0.0),
+        (20, -1.0),
+    ];
     assert_eq!(
         best.map(|(action, reward)| learn(action, reward)),
         [30, 7, 7, 20, 20, 7]

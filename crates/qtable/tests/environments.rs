@@ -5,8 +5,8 @@ mod odd;
 
 use odd::{odd, rng, step, trained};
 use qtable::{
-    Action, ActionMask, Environment, EnvironmentFault, Error, QTable, Schedule, State, Status, Step,
-    TimeLimit, TrainConfig, check_env, toys, train,
+    Action, ActionMask, Environment, EnvironmentFault, Error, QTable, Schedule, State, Status,
+    Step, TimeLimit, TrainConfig, check_env, toys, train,
 };
 use rand::Rng;
 
@@ -38,7 +38,14 @@ fn a_mask_keeps_its_actions_out_of_everything() {
         alpha: Schedule::constant(0.5).unwrap(),
         ..TrainConfig::paper(500)
     };
-    train(&mut environment, &mut table, &config, &mut rng(5), &mut |_| {}).unwrap();
+    train(
+        &mut environment,
+        &mut table,
+        &config,
+        &mut rng(5),
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(table.best(State(0)), Action(2));
     assert_eq!(table.visits(State(0), Action(1)), 0);
     assert!((table.value(State(0), Action(1)) - 50.0).abs() < 1e-12 && table.max(State(0)) < 50.0);
@@ -156,8 +163,13 @@ fn a_time_limit_truncates() {
     let mut rng = rng(0);
     for _ in 0..2 {
         limited.reset(&mut rng);
-        let ends: Vec<Status> = (0..3).map(|_| limited.step(Action(0), &mut rng).status).collect();
-        assert_eq!(ends, [Status::Continuing, Status::Continuing, Status::Truncated]);
+        let ends: Vec<Status> = (0..3)
+            .map(|_| limited.step(Action(0), &mut rng).status)
+            .collect();
+        assert_eq!(
+            ends,
+            [Status::Continuing, Status::Continuing, Status::Truncated]
+        );
     }
     assert!(matches!(
         TimeLimit::new(toys::chain(9).unwrap(), 0),

@@ -84,7 +84,11 @@ fn seeds_come_back_in_order_and_the_first_failure_is_told() {
     assert_eq!(all, one_by_one);
     assert_ne!(all[0], all[1]);
     assert_eq!(
-        over_seeds(0..24, |seed| if seed % 10 == 7 { Err(seed) } else { Ok(()) }),
+        over_seeds(0..24, |seed| if seed % 10 == 7 {
+            Err(seed)
+        } else {
+            Ok(())
+        }),
         Err(7)
     );
     let estimate = Estimate::of(&[1.0, 2.0, 3.0]);

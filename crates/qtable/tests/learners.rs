@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
-    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience, Greedy,
-    Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, QLambda, QLearning, QTable, Sarsa,
-    SarsaLambda, Schedule, State, Status, Step, Training, Until, toys,
+    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience,
+    Greedy, Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, QLambda, QLearning,
+    QTable, Sarsa, SarsaLambda, Schedule, State, Status, Step, Training, Until, toys,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -45,7 +45,8 @@ fn learners(alpha: &Schedule, gamma: f64) -> Vec<(&'static str, Box<dyn Learner>
     ]
 }
 
-/// The table after learning with exploration that fades, so that on-policy learners find the optimum too.
+/// The table after learning with exploration that fades, so that on-policy learners find the
+/// optimum too.
 fn learned(
     toy: &ModelEnvironment,
     learner: Box<dyn Learner>,
@@ -91,12 +92,14 @@ fn every_learner_walks_along_the_cliff_in_13_steps() {
     let toy = toys::cliff_walking().unwrap();
     let actions = 200_000;
     for (name, learner) in learners(&Schedule::constant(0.2).unwrap(), 0.99) {
-        let epsilon = Schedule::piecewise(&[(0, 0.5), (actions / 2, 0.05), (actions * 3 / 4, 0.0)]).unwrap();
+        let epsilon =
+            Schedule::piecewise(&[(0, 0.5), (actions / 2, 0.05), (actions * 3 / 4, 0.0)]).unwrap();
         let policy = Box::new(EpsilonGreedy::new(epsilon).unwrap());
         let table = learned(&toy, learner, policy, actions, 5);
         let found = toy.assess(&table.greedy(), 0.99, 200).unwrap();
         assert!((found.success - 1.0).abs() < 1e-12, "{name}: {found:?}");
-        // Those that learn the policy that acts, exploration included, have learned to keep away from the edge.
+        // Those that learn the policy that acts, exploration included, have learned to keep away
+        // from the edge.
         let longest = if name.contains("SARSA") || name.contains("uncut") {
             17.0
         } else {
@@ -125,8 +128,8 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
             "{name}: the policy is worth {found} of {best}"
         );
         let start = table.max(State(0));
-        // Double Q, with half the updates for each table, comes from below and is 9.5 % short here; of the others none
-        // is off by more than 2.4 %.
+        // Double Q, with half the updates for each table, comes from below and is 9.5 % short here;
+        // of the others none is off by more than 2.4 %.
         let near = if name == "double Q" { 0.12 } else { 0.03 };
         assert!(
             (start - best).abs() < near * best,
@@ -159,7 +162,8 @@ fn uncut_learners_are_unbiased_once_exploration_has_faded() {
 #[test]
 fn double_q_counts_the_visits_of_the_table_that_learns() {
     // With α = 1/n each table holds the mean of what it alone has seen.
-    let mut learner = DoubleQLearning::<f64>::new(Schedule::inverse_visits(1.0, 1.0).unwrap(), 0.9).unwrap();
+    let mut learner =
+        DoubleQLearning::<f64>::new(Schedule::inverse_visits(1.0, 1.0).unwrap(), 0.9).unwrap();
     let mut table = QTable::new(1, 1).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
     let mut seen = [(0.0, 0.0); 2];
@@ -174,10 +178,15 @@ fn double_q_counts_the_visits_of_the_table_that_learns() {
             step: answer(0, reward, Status::Terminated),
             next_action: None,
         };
-        learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
+        learner
+            .learn(&mut table, &experience, &Greedy, &mut rng)
+            .unwrap();
     }
     assert!(seen.iter().all(|&(_, count)| count > 10.0));
-    let wanted = seen.iter().map(|(sum, count)| 0.5 * sum / count).sum::<f64>();
+    let wanted = seen
+        .iter()
+        .map(|(sum, count)| 0.5 * sum / count)
+        .sum::<f64>();
     assert!(
         (table.max(State(0)) - wanted).abs() < 1e-9,
         "{} {wanted}",
@@ -196,7 +205,10 @@ fn answer(observation: usize, reward: f64, status: Status) -> Step {
 
 #[test]
 fn no_learner_bootstraps_through_termination_and_all_do_through_truncation() {
-    for (status, wanted) in [(Status::Terminated, 1.0), (Status::Truncated, 1.0 + 0.5 * 8.0)] {
+    for (status, wanted) in [
+        (Status::Terminated, 1.0),
+        (Status::Truncated, 1.0 + 0.5 * 8.0),
+    ] {
         for (name, mut learner) in learners(&Schedule::constant(1.0).unwrap(), 0.5) {
             let mut table = QTable::new(2, 2).unwrap();
             table.set(State(1), Action(1), 8.0).unwrap();
@@ -209,12 +221,24 @@ fn no_learner_bootstraps_through_termination_and_all_do_through_truncation() {
                 next_action,
             };
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
-            let error = learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
-            assert!((error - wanted).abs() < 1e-12, "{name}, {status:?}: {error}");
+            let error = learner
+                .learn(&mut table, &experience, &Greedy, &mut rng)
+                .unwrap();
+            assert!(
+                (error - wanted).abs() < 1e-12,
+                "{name}, {status:?}: {error}"
+            );
             // Of Double Q's two tables one has learned, and the table shows the mean.
-            let wanted = if name == "double Q" { wanted / 2.0 } else { wanted };
+            let wanted = if name == "double Q" {
+                wanted / 2.0
+            } else {
+                wanted
+            };
             let found = table.value(State(0), Action(0));
-            assert!((found - wanted).abs() < 1e-12, "{name}, {status:?}: {found}");
+            assert!(
+                (found - wanted).abs() < 1e-12,
+                "{name}, {status:?}: {found}"
+            );
             assert_eq!(table.visits(State(0), Action(0)), 1, "{name}");
         }
     }
@@ -342,7 +366,12 @@ fn settings_out_of_range_are_refused() {
             .is_err()
     );
     assert!(NStepQ::new(alpha, 0.9).unwrap().with_steps(0).is_err());
-    assert!(PrioritizedSweeping::new(0.9).unwrap().with_backups(0).is_err());
+    assert!(
+        PrioritizedSweeping::new(0.9)
+            .unwrap()
+            .with_backups(0)
+            .is_err()
+    );
     assert!(
         PrioritizedSweeping::new(0.9)
             .unwrap()
@@ -369,13 +398,19 @@ fn traces_reach_back_as_the_formula_says() {
                 step,
                 next_action,
             };
-            learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
+            learner
+                .learn(&mut table, &experience, &Greedy, &mut rng)
+                .unwrap();
         };
         learn(0, Action(0), answer(1, 0.0, Status::Continuing), Some(last));
         learn(1, last, answer(2, 1.0, Status::Terminated), None);
-        (table.value(State(0), Action(0)), table.value(State(1), last))
+        (
+            table.value(State(0), Action(0)),
+            table.value(State(1), last),
+        )
     };
-    let near = |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs() < 1e-12 && (b - d).abs() < 1e-12;
+    let near =
+        |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs() < 1e-12 && (b - d).abs() < 1e-12;
     let q = || {
         QLambda::new(alpha.clone(), 0.8)
             .unwrap()
@@ -407,8 +442,14 @@ fn traces_reach_back_as_the_formula_says() {
         run(Box::new(sarsa), Action(1)),
         (first + 0.5 * 0.9 * 0.4, 0.55)
     ));
-    // Two-step returns: 0 + 0.8 * 1 for the first pair; closed at the exploratory action: 0.8 * 0.1.
-    let n_step = || NStepQ::new(alpha.clone(), 0.8).unwrap().with_steps(2).unwrap();
+    // Two-step returns: 0 + 0.8 * 1 for the first pair; closed at the exploratory action: 0.8 *
+    // 0.1.
+    let n_step = || {
+        NStepQ::new(alpha.clone(), 0.8)
+            .unwrap()
+            .with_steps(2)
+            .unwrap()
+    };
     assert!(near(run(Box::new(n_step()), Action(1)), (0.4, 0.55)));
     assert!(near(run(Box::new(n_step()), Action(0)), (0.04, 0.5)));
     assert!(near(run(Box::new(n_step().uncut()), Action(0)), (0.4, 0.5)));

@@ -33,7 +33,8 @@ fn learned(
     (both, believed)
 }
 
-/// From every one of the 300 first states the policy is optimal: 13.07 steps on average, and a value of 6.3275.
+/// From every one of the 300 first states the policy is optimal: 13.07 steps on average, and a
+/// value of 6.3275.
 #[test]
 fn the_taxi_is_driven_by_the_shortest_ways() {
     let taxi = toys::taxi().unwrap();
@@ -53,14 +54,18 @@ fn the_taxi_is_driven_by_the_shortest_ways() {
     }
 }
 
-/// 14 steps, whose value is 0.99^13. The start is optimistic, because at random the goal is all but never met.
+/// 14 steps, whose value is 0.99^13. The start is optimistic, because at random the goal is all but
+/// never met.
 #[test]
 fn the_large_lake_is_crossed_in_14_steps() {
     let lake = toys::frozen_lake(&toys::FROZEN_LAKE_8X8, false).unwrap();
     for seed in 0..3 {
         let alpha = Schedule::constant(0.5).unwrap();
         let (both, believed) = learned(&lake, &alpha, (0.1, 1.0), 200_000, seed);
-        assert!((both.learned.steps - 14.0).abs() < 1e-9, "seed {seed}: {both:?}");
+        assert!(
+            (both.learned.steps - 14.0).abs() < 1e-9,
+            "seed {seed}: {both:?}"
+        );
         assert!(
             (both.learned.success - 1.0).abs() < 1e-12,
             "seed {seed}: {both:?}"
@@ -72,14 +77,27 @@ fn the_large_lake_is_crossed_in_14_steps() {
     }
 }
 
-/// On the small lake the policy is the optimal one and the table believes in its value to 2 %; on the large one the
-/// policy is worth 99.7 % of the optimum or more after two million actions, and the belief is 2.5 % too high.
+/// On the small lake the policy is the optimal one and the table believes in its value to 2 %; on
+/// the large one the policy is worth 99.7 % of the optimum or more after two million actions, and
+/// the belief is 2.5 % too high.
 #[test]
 fn slippery_lakes_are_crossed_as_well_as_can_be() {
     let alpha = Schedule::inverse_visits(1.0, 30.0).unwrap();
     for (map, how, actions, short, off) in [
-        (&toys::FROZEN_LAKE_4X4[..], (0.5, 0.0), 1_000_000, 1e-6, 0.03),
-        (&toys::FROZEN_LAKE_8X8[..], (0.3, 1.0), 2_000_000, 0.005, 0.04),
+        (
+            &toys::FROZEN_LAKE_4X4[..],
+            (0.5, 0.0),
+            1_000_000,
+            1e-6,
+            0.03,
+        ),
+        (
+            &toys::FROZEN_LAKE_8X8[..],
+            (0.3, 1.0),
+            2_000_000,
+            0.005,
+            0.04,
+        ),
     ] {
         let lake = toys::frozen_lake(map, true).unwrap();
         for seed in 0..3 {

@@ -5,8 +5,8 @@
 use std::path::Path;
 
 use qtable::{
-    Action, EpsilonGreedy, Intervals, ModelEnvironment, Problem, Product, QTable, Sarsa, Schedule, State,
-    Training, Until, decode, encode, load, save, toys,
+    Action, EpsilonGreedy, Intervals, ModelEnvironment, Problem, Product, QTable, Sarsa, Schedule,
+    State, Training, Until, decode, encode, load, save, toys,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -17,7 +17,11 @@ fn learned(states: usize, actions: usize) -> QTable {
     for state in 0..states {
         for action in 0..actions {
             table
-                .set(State(state), Action(action), rng.random_range(-100.0..1000.0))
+                .set(
+                    State(state),
+                    Action(action),
+                    rng.random_range(-100.0..1000.0),
+                )
                 .unwrap();
             table.visit(State(state), Action(action)).unwrap();
         }
@@ -41,7 +45,10 @@ fn what_is_saved_is_loaded() {
         "no temporary file is left"
     );
 
-    let product = Product::new(vec![Intervals::new(&[1.0, 2.0]).unwrap().with_goal(1).unwrap()]).unwrap();
+    let product = Product::new(vec![
+        Intervals::new(&[1.0, 2.0]).unwrap().with_goal(1).unwrap(),
+    ])
+    .unwrap();
     let both = (product, Schedule::paper_alpha(500));
     assert_eq!(
         decode::<(Product, Schedule)>("x", &encode("x", &both).unwrap()).unwrap(),
@@ -104,7 +111,11 @@ fn a_saved_file_has_ordinary_permissions() {
     let link = folder.path().join("link");
     symlink(&ours, &link).unwrap();
     save(&link, "k", &2u8).unwrap();
-    assert_eq!(mode(&ours), 0o640, "the permissions of a replaced file stay");
+    assert_eq!(
+        mode(&ours),
+        0o640,
+        "the permissions of a replaced file stay"
+    );
     assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
     assert_eq!(load::<u8>(&ours, "k").unwrap(), 2);
 }
@@ -240,8 +251,8 @@ const GOLDEN: &str = concat!(
     "0000000000000000000000000000000000f83f0000000000000000040000010000e65c7633"
 );
 
-/// A run of every part that a file may hold: a table with visits, a learner with its clock, a policy, an episode on
-/// its way with the next action chosen, and a learning curve.
+/// A run of every part that a file may hold: a table with visits, a learner with its clock, a
+/// policy, an episode on its way with the next action chosen, and a learning curve.
 #[test]
 fn the_bytes_of_a_run_stay() {
     let mut chain = toys::chain(3).unwrap();
@@ -254,7 +265,9 @@ fn the_bytes_of_a_run_stay() {
         .with_record_every(10)
         .unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
-    training.run(&mut chain, Until::Actions(23), &mut rng).unwrap();
+    training
+        .run(&mut chain, Until::Actions(23), &mut rng)
+        .unwrap();
     assert!(training.is_in_episode() && training.episodes() > 0 && training.curve().len() == 2);
     let bytes = encode("run/1", &(&training, &chain, &rng)).unwrap();
     let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -302,7 +315,9 @@ fn no_room_is_made_for_a_text_that_is_not_there() {
     for claimed in [1u64 << 25, 1 << 32, 1 << 44, u64::MAX] {
         let payload = [&[253u8][..], &claimed.to_le_bytes()].concat();
         match decode::<String>("k", &sealed(1, "k", payload.len() as u64, &payload)) {
-            Err(Problem::Contents(why)) => assert!(why.contains("LimitExceeded"), "{claimed}: {why}"),
+            Err(Problem::Contents(why)) => {
+                assert!(why.contains("LimitExceeded"), "{claimed}: {why}")
+            }
             other => panic!("{claimed}: {other:?}"),
         }
     }

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
-    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience, Greedy,
-    Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, Problem, QLambda, QLearning, QTable,
-    Sarsa, SarsaLambda, Schedule, State, Status, Step, TimeLimit, TrainConfig, Training, TrainingInBlocks,
-    Ucb, Until, Value, decode, encode, toys, train_in_blocks,
+    Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience,
+    Greedy, Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, Problem, QLambda,
+    QLearning, QTable, Sarsa, SarsaLambda, Schedule, State, Status, Step, TimeLimit, TrainConfig,
+    Training, TrainingInBlocks, Ucb, Until, Value, decode, encode, toys, train_in_blocks,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -47,7 +47,10 @@ where
     assert_eq!(part.table().to_csv(), whole.table().to_csv());
     assert_eq!(part.curve().len(), 14);
     assert_eq!((&part_lake, &part_rng), (&whole_lake, &whole_rng));
-    assert_eq!(bytes, encode("run", &(&whole, &whole_lake, &whole_rng)).unwrap());
+    assert_eq!(
+        bytes,
+        encode("run", &(&whole, &whole_lake, &whole_rng)).unwrap()
+    );
     assert_eq!(part, whole);
 }
 
@@ -66,7 +69,10 @@ fn a_resumed_run_ends_as_an_uninterrupted_one() {
     );
     stopping_changes_nothing(Sarsa::new(alpha(), gamma).unwrap(), epsilon());
     stopping_changes_nothing(ExpectedSarsa::new(alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(DoubleQLearning::<f64>::new(alpha(), gamma).unwrap(), epsilon());
+    stopping_changes_nothing(
+        DoubleQLearning::<f64>::new(alpha(), gamma).unwrap(),
+        epsilon(),
+    );
     stopping_changes_nothing(QLambda::new(alpha(), gamma).unwrap(), epsilon());
     stopping_changes_nothing(SarsaLambda::new(alpha(), gamma).unwrap(), epsilon());
     stopping_changes_nothing(NStepQ::new(alpha(), gamma).unwrap(), epsilon());
@@ -92,7 +98,8 @@ fn a_run_in_blocks_goes_on_as_if_it_had_not_stopped() {
         let mut bytes = encode("run", &(training, &lake, &rng)).unwrap();
 
         let mut whole = table;
-        let told = train_in_blocks(&mut lake, &mut whole, &config, 37, &mut rng, &mut |_| {}).unwrap();
+        let told =
+            train_in_blocks(&mut lake, &mut whole, &config, 37, &mut rng, &mut |_| {}).unwrap();
 
         let mut in_episode = 0;
         // The ends of blocks 1, 1, 3, 13, 14 and 36, and of the run.
@@ -116,7 +123,10 @@ fn a_run_in_blocks_goes_on_as_if_it_had_not_stopped() {
         assert_eq!(part.table(), &whole);
         assert_eq!(part.table().to_csv(), whole.to_csv());
         assert_eq!((&part_lake, &part_rng), (&lake, &rng));
-        assert_eq!((part.actions(), part.episodes()), (told.actions, told.episodes));
+        assert_eq!(
+            (part.actions(), part.episodes()),
+            (told.actions, told.episodes)
+        );
         assert_eq!(part.curve(), told.curve);
         assert_eq!(told.curve.len(), 15);
     }
@@ -137,7 +147,10 @@ fn damaged_settings_of_a_run_in_blocks_are_refused() {
             (gamma, (0u32, 0.5f64), (0u32, temperature)),
             (100u64, 60u64, 1u64),
         );
-        let (running, tally) = (None::<u64>, (0u64, 0.0f64, 0.0f64, 0u64, 0u64, 0u64, 0.0f64));
+        let (running, tally) = (
+            None::<u64>,
+            (0u64, 0.0f64, 0.0f64, 0u64, 0u64, 0u64, 0.0f64),
+        );
         let course = ((60u64, 1u64, 0u64, 0u64), running, tally);
         let bytes = encode("run", &(table, config, blocks, course, Vec::<u8>::new())).unwrap();
         decode::<TrainingInBlocks>("run", &bytes)
@@ -156,20 +169,34 @@ fn damaged_settings_of_a_run_in_blocks_are_refused() {
         )
     };
     assert_eq!(forged(0.9, 1.0, 5).unwrap(), begun(5).unwrap());
-    for (gamma, temperature, blocks) in [(1.1, 1.0, 5), (0.9, 1e-7, 5), (0.9, f64::NAN, 5), (0.9, 1.0, 0)] {
+    for (gamma, temperature, blocks) in [
+        (1.1, 1.0, 5),
+        (0.9, 1e-7, 5),
+        (0.9, f64::NAN, 5),
+        (0.9, 1.0, 0),
+    ] {
         let refused = forged(gamma, temperature, blocks);
         assert!(matches!(refused, Err(Problem::Contents(_))), "{refused:?}");
     }
-    assert!(matches!(begun(0), Err(Error::Setting { name: "blocks", .. })));
+    assert!(matches!(
+        begun(0),
+        Err(Error::Setting { name: "blocks", .. })
+    ));
 }
 
 /// The change of a value from one end of the numbers to the other is beyond both.
 #[test]
 fn a_sweep_with_an_enormous_change_ahead_can_be_saved() {
-    let mut learner = PrioritizedSweeping::new(1.0).unwrap().with_backups(1).unwrap();
+    let mut learner = PrioritizedSweeping::new(1.0)
+        .unwrap()
+        .with_backups(1)
+        .unwrap();
     let mut table = QTable::filled(2, 1, -1.7e308).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    for (state, reward, status) in [(1, 0.0, Status::Continuing), (0, 1.7e308, Status::Terminated)] {
+    for (state, reward, status) in [
+        (1, 0.0, Status::Continuing),
+        (0, 1.7e308, Status::Terminated),
+    ] {
         let step = Step {
             observation: State(0),
             reward,
@@ -181,7 +208,9 @@ fn a_sweep_with_an_enormous_change_ahead_can_be_saved() {
             step,
             next_action: None,
         };
-        learner.learn(&mut table, &experience, &Greedy, &mut rng).unwrap();
+        learner
+            .learn(&mut table, &experience, &Greedy, &mut rng)
+            .unwrap();
     }
     assert!(table.max(State(0)) > 1e308 && table.max(State(1)) < -1e308);
     let back: PrioritizedSweeping = decode("l", &encode("l", &learner).unwrap()).unwrap();
@@ -190,17 +219,25 @@ fn a_sweep_with_an_enormous_change_ahead_can_be_saved() {
 
 #[test]
 fn damaged_parts_of_a_run_are_refused() {
-    // bincode writes a schedule's variant and numbers one after the other: a temperature of 1, then of 0.
+    // bincode writes a schedule's variant and numbers one after the other: a temperature of 1, then
+    // of 0.
     let sound = Boltzmann::new(Schedule::constant(1.0).unwrap()).unwrap();
     let bytes = encode("p", &sound).unwrap();
     assert_eq!(decode::<Boltzmann>("p", &bytes).unwrap(), sound);
     assert!(decode::<Boltzmann>("p", &encode("p", &(0u32, 0.0f64, 0u64)).unwrap()).is_err());
     assert!(decode::<Boltzmann>("p", &encode("p", &(0u32, f64::NAN, 0u64)).unwrap()).is_err());
-    assert!(decode::<QLearning>("p", &encode("p", &(0u32, 0.5f64, 1.5f64, 0u64)).unwrap()).is_err());
+    assert!(
+        decode::<QLearning>("p", &encode("p", &(0u32, 0.5f64, 1.5f64, 0u64)).unwrap()).is_err()
+    );
     assert!(decode::<QLearning>("p", &encode("p", &(0u32, 0.5f64, 1.0f64, 0u64)).unwrap()).is_ok());
     assert!(decode::<Schedule>("p", &encode("p", &(1u32, 0.0f64, 1.0f64, 0u64)).unwrap()).is_err());
-    assert!(decode::<qtable::Intervals>("p", &encode("p", &(vec![2.0, 1.0], None::<u64>)).unwrap()).is_err());
-    assert!(decode::<qtable::Intervals>("p", &encode("p", &(vec![1.0], Some(2u64))).unwrap()).is_err());
+    assert!(
+        decode::<qtable::Intervals>("p", &encode("p", &(vec![2.0, 1.0], None::<u64>)).unwrap())
+            .is_err()
+    );
+    assert!(
+        decode::<qtable::Intervals>("p", &encode("p", &(vec![1.0], Some(2u64))).unwrap()).is_err()
+    );
     assert!(
         decode::<qtable::ActionMask>(
             "p",
@@ -208,10 +245,13 @@ fn damaged_parts_of_a_run_are_refused() {
         )
         .is_err()
     );
-    assert!(decode::<qtable::ActionMask>("p", &encode("p", &(2u64, vec![true; 3])).unwrap()).is_err());
+    assert!(
+        decode::<qtable::ActionMask>("p", &encode("p", &(2u64, vec![true; 3])).unwrap()).is_err()
+    );
 }
 
-/// A run of SARSA on three cells with the given counters, in which state 0 is next and an action was chosen for it.
+/// A run of SARSA on three cells with the given counters, in which state 0 is next and an action
+/// was chosen for it.
 fn forged(chosen: u64, count: u64) -> Training<Sarsa, EpsilonGreedy> {
     let table = QTable::<f64>::new(3, 2).unwrap();
     let half = (0u32, 0.5f64);
@@ -219,7 +259,11 @@ fn forged(chosen: u64, count: u64) -> Training<Sarsa, EpsilonGreedy> {
     let policy = (half, 0u32, count);
     let running = Some((0u64, Some(chosen), count, 0.0f64));
     let tally = (count, 0.0f64, 0.0f64, count, count, count, 0.0f64);
-    let course = ((u64::MAX, 1u64, count, count.saturating_sub(1)), running, tally);
+    let course = (
+        (u64::MAX, 1u64, count, count.saturating_sub(1)),
+        running,
+        tally,
+    );
     let curve = Vec::<u8>::new();
     decode(
         "run",
@@ -255,6 +299,9 @@ fn counters_stop_at_their_largest_number() {
     training
         .run(&mut chain, Until::Episodes(u64::MAX), &mut rng)
         .unwrap();
-    assert_eq!((training.actions(), training.episodes()), (u64::MAX, u64::MAX));
+    assert_eq!(
+        (training.actions(), training.episodes()),
+        (u64::MAX, u64::MAX)
+    );
     assert_eq!(training.curve().last().unwrap().actions, u64::MAX);
 }

@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use qtable::{
-    Action, ActionMask, Boltzmann, CsvError, DiscretiseError, EpsilonGreedy, Error, Greedy, Intervals,
-    Policy, Product, QTable, Schedule, State, Ties, Ucb,
+    Action, ActionMask, Boltzmann, CsvError, DiscretiseError, EpsilonGreedy, Error, Greedy,
+    Intervals, Policy, Product, QTable, Schedule, State, Ties, Ucb,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -29,7 +29,10 @@ fn constant(value: f64) -> Schedule {
 fn impossible_tables_are_refused() {
     assert!(matches!(QTable::new(0, 3), Err(Error::EmptyShape { .. })));
     assert!(matches!(QTable::new(3, 0), Err(Error::EmptyShape { .. })));
-    assert!(matches!(QTable::new(usize::MAX, 2), Err(Error::TooLarge { .. })));
+    assert!(matches!(
+        QTable::new(usize::MAX, 2),
+        Err(Error::TooLarge { .. })
+    ));
     assert!(matches!(
         QTable::new(1 << 40, 1 << 10),
         Err(Error::TooLarge { .. })
@@ -56,7 +59,10 @@ fn impossible_tables_are_refused() {
         Err(Error::StateOutOfRange { .. })
     ));
     assert_eq!(
-        (table.get(State(0), Action(5)), table.get(State(1), Action(1))),
+        (
+            table.get(State(0), Action(5)),
+            table.get(State(1), Action(1))
+        ),
         (None, Some(0.0))
     );
     let mask = ActionMask::new(3, 2, |_, _| true).unwrap();
@@ -203,7 +209,10 @@ fn impossible_discretisations_are_refused() {
     let product = Product::new(vec![two.clone(), two.clone()]).unwrap();
     assert_eq!(
         product.index(&[0.0]),
-        Err(DiscretiseError::WrongCount { needed: 2, found: 1 })
+        Err(DiscretiseError::WrongCount {
+            needed: 2,
+            found: 1
+        })
     );
     assert_eq!(
         product.index(&[0.0, f64::NAN]),
@@ -213,7 +222,10 @@ fn impossible_discretisations_are_refused() {
         product.state(&[0, 2]),
         Err(DiscretiseError::BinOutOfRange { bin: 2, bins: 2 })
     );
-    assert_eq!(Product::new(vec![two; 64]), Err(DiscretiseError::TooManyStates));
+    assert_eq!(
+        Product::new(vec![two; 64]),
+        Err(DiscretiseError::TooManyStates)
+    );
 }
 
 /// Shares of each action in many choices.
@@ -245,7 +257,11 @@ fn every_policy_chooses_as_often_as_it_says() {
     let policies: Vec<Box<dyn Policy>> = vec![
         Box::new(Greedy),
         Box::new(EpsilonGreedy::new(constant(0.4)).unwrap()),
-        Box::new(EpsilonGreedy::new(constant(0.4)).unwrap().with_ties(Ties::Random)),
+        Box::new(
+            EpsilonGreedy::new(constant(0.4))
+                .unwrap()
+                .with_ties(Ties::Random),
+        ),
         Box::new(Boltzmann::new(constant(1.5)).unwrap()),
         Box::new(Ucb::new(1.0).unwrap()),
         Box::new(Ucb::new(1.0).unwrap().with_ties(Ties::Random)),
@@ -257,7 +273,10 @@ fn every_policy_chooses_as_often_as_it_says() {
             (p.iter().sum::<f64>() - 1.0).abs() < 1e-12,
             "policy {index}: {p:?}"
         );
-        for (action, share) in shares(&mut *policy, &table, 100_000).into_iter().enumerate() {
+        for (action, share) in shares(&mut *policy, &table, 100_000)
+            .into_iter()
+            .enumerate()
+        {
             // Five standard deviations.
             let off = 5.0 * (p[action] * (1.0 - p[action]) / 100_000.0).sqrt() + 1e-12;
             assert!(
@@ -266,7 +285,10 @@ fn every_policy_chooses_as_often_as_it_says() {
                 p[action]
             );
         }
-        assert!(p[4].abs() < 1e-300, "policy {index} would take what is forbidden");
+        assert!(
+            p[4].abs() < 1e-300,
+            "policy {index} would take what is forbidden"
+        );
     }
 }
 
@@ -286,7 +308,10 @@ fn boltzmann_has_the_probabilities_of_equation_4() {
     Boltzmann::new(constant(1e-6))
         .unwrap()
         .probabilities(&near, State(0), &mut p);
-    assert!(p[1] > 1.0 - 1e-15 && p[0] < 1e-40 && p[2].abs() < 1e-300, "{p:?}");
+    assert!(
+        p[1] > 1.0 - 1e-15 && p[0] < 1e-40 && p[2].abs() < 1e-300,
+        "{p:?}"
+    );
     Boltzmann::new(constant(1e6))
         .unwrap()
         .probabilities(&row(&[0.0, 1.0, -1.0]), State(0), &mut p);
@@ -320,15 +345,20 @@ fn ucb_tries_everything_once_and_then_by_its_bound() {
 fn markdown_shows_the_best_and_the_forbidden() {
     let mut table = QTable::<f32>::filled(2, 2, 0.0).unwrap();
     table.set(State(1), Action(1), 0.25).unwrap();
-    let mask = ActionMask::new(2, 2, |state, action| state == State(1) || action == Action(0)).unwrap();
+    let mask = ActionMask::new(2, 2, |state, action| {
+        state == State(1) || action == Action(0)
+    })
+    .unwrap();
     table.set_mask(Some(mask)).unwrap();
-    let expected = "| state | 0 | 1 |\n|---:|---:|---:|\n| 0 | **0.00** | – |\n| 1 | 0.00 | **0.25** |\n";
+    let expected =
+        "| state | 0 | 1 |\n|---:|---:|---:|\n| 0 | **0.00** | – |\n| 1 | 0.00 | **0.25** |\n";
     assert_eq!(table.to_markdown(2), expected);
 }
 
 #[test]
 fn damaged_csv_is_refused_with_its_line() {
-    let read = |body: &str| QTable::<f64>::from_csv(&format!("state,action,value,visits,offered\n{body}"));
+    let read =
+        |body: &str| QTable::<f64>::from_csv(&format!("state,action,value,visits,offered\n{body}"));
     assert!(read("0,0,1.5,3,1\r\n0,1,-2,0,1\r\n\r\n").is_ok());
     assert_eq!(
         QTable::<f64>::from_csv("0,0,1,1,1").unwrap_err(),
@@ -365,5 +395,8 @@ fn damaged_csv_is_refused_with_its_line() {
         read("0,0,1,0,0"),
         Err(CsvError::Table(Error::NoActionAllowed { .. }))
     ));
-    assert!(matches!(read(""), Err(CsvError::Table(Error::EmptyShape { .. }))));
+    assert!(matches!(
+        read(""),
+        Err(CsvError::Table(Error::EmptyShape { .. }))
+    ));
 }

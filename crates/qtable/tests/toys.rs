@@ -43,8 +43,8 @@ fn listing(toy: &ModelEnvironment) -> (usize, String) {
     (met.len(), text)
 }
 
-/// The checksums are those of the same listing made from `env.unwrapped.P` and `initial_state_distrib` of
-/// Gymnasium 1.4.0 in Python.
+/// The checksums are those of the same listing made from `env.unwrapped.P` and
+/// `initial_state_distrib` of Gymnasium 1.4.0 in Python.
 #[test]
 fn the_dynamics_are_those_of_gymnasium() {
     let lake = |map: &[&str], slippery| toys::frozen_lake(map, slippery).unwrap();
@@ -55,14 +55,24 @@ fn the_dynamics_are_those_of_gymnasium() {
             11,
             0x25c0_77c7,
         ),
-        ("lake 4x4", lake(&toys::FROZEN_LAKE_4X4, false), 11, 0x66bb_0791),
+        (
+            "lake 4x4",
+            lake(&toys::FROZEN_LAKE_4X4, false),
+            11,
+            0x66bb_0791,
+        ),
         (
             "lake 8x8, slippery",
             lake(&toys::FROZEN_LAKE_8X8, true),
             53,
             0x8cd0_74e3,
         ),
-        ("lake 8x8", lake(&toys::FROZEN_LAKE_8X8, false), 53, 0xaf0a_d373),
+        (
+            "lake 8x8",
+            lake(&toys::FROZEN_LAKE_8X8, false),
+            53,
+            0xaf0a_d373,
+        ),
         ("cliff", toys::cliff_walking().unwrap(), 37, 0x2193_c14e),
         ("taxi", toys::taxi().unwrap(), 400, 0xdaa0_12b8),
     ] {
@@ -127,7 +137,9 @@ fn policy_iteration_finds_what_value_iteration_finds() {
         let (model, gamma) = (toy.model(), 0.95);
         let by_value = model.value_iteration(gamma, 1e-11).unwrap();
         let by_policy = model.policy_iteration(gamma, 1e-11).unwrap();
-        let values = model.evaluate(&by_policy.table.greedy(), gamma, 1e-11).unwrap();
+        let values = model
+            .evaluate(&by_policy.table.greedy(), gamma, 1e-11)
+            .unwrap();
         for (state, value) in values.into_iter().enumerate() {
             assert!((by_value.table.max(State(state)) - value).abs() < 1e-8);
             assert!((by_policy.table.max(State(state)) - value).abs() < 1e-8);
@@ -170,7 +182,8 @@ fn an_action_out_of_range_never_reads_another_state() {
     let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
     for action in [4, 5, usize::MAX] {
         assert!(!lake.allows(State(0), Action(action)));
-        let read = std::panic::catch_unwind(|| lake.model().outcomes(State(0), Action(action)).len());
+        let read =
+            std::panic::catch_unwind(|| lake.model().outcomes(State(0), Action(action)).len());
         assert!(read.is_err(), "{read:?}");
         let stepped = std::panic::catch_unwind(|| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
@@ -179,5 +192,7 @@ fn an_action_out_of_range_never_reads_another_state() {
         assert!(stepped.is_err(), "{stepped:?}");
     }
     assert!(!lake.allows(State(16), Action(0)));
-    assert!(lake.allows(State(15), Action(3)) && lake.model().outcomes(State(15), Action(3)).len() == 1);
+    assert!(
+        lake.allows(State(15), Action(3)) && lake.model().outcomes(State(15), Action(3)).len() == 1
+    );
 }

@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 
 use odd::{odd, rng, step, trained};
 use qtable::{
-    Action, EnvironmentFault, EpsilonGreedy, Error, Policy, QLearning, QTable, Schedule, State, Status,
-    TrainConfig, Training, Until, check_env, evaluate, toys, train, train_in_blocks,
+    Action, EnvironmentFault, EpsilonGreedy, Error, Policy, QLearning, QTable, Schedule, State,
+    Status, TrainConfig, Training, Until, check_env, evaluate, toys, train, train_in_blocks,
 };
 use rand::Rng;
 
@@ -36,7 +36,10 @@ fn the_learning_curve_counts_what_happened() {
         },
     )
     .unwrap();
-    assert_eq!((report.actions, report.episodes, report.curve.len()), (30, 10, 3));
+    assert_eq!(
+        (report.actions, report.episodes, report.curve.len()),
+        (30, 10, 3)
+    );
     assert_eq!(
         told.iter().map(|t| (t.0, t.1)).collect::<Vec<_>>(),
         [(12, 30), (24, 30), (30, 30)]
@@ -53,7 +56,9 @@ fn the_learning_curve_counts_what_happened() {
         assert!((found.unwrap() - wanted).abs() < 1e-12, "{first:?}");
     }
     assert!(first.mean_td_error.unwrap() > 0.0);
-    let visits: u32 = (0..3).flat_map(|s| table.visit_row(State(s)).to_vec()).sum();
+    let visits: u32 = (0..3)
+        .flat_map(|s| table.visit_row(State(s)).to_vec())
+        .sum();
     assert_eq!(visits, 30);
 }
 
@@ -195,7 +200,9 @@ fn a_run_stops_where_it_is_told() {
         .with_record_every(10)
         .unwrap();
     let mut rng = rng(3);
-    training.run(&mut chain, Until::Episodes(7), &mut rng).unwrap();
+    training
+        .run(&mut chain, Until::Episodes(7), &mut rng)
+        .unwrap();
     assert_eq!((training.episodes(), training.is_in_episode()), (7, false));
     let so_far = training.actions();
     training
@@ -203,17 +210,24 @@ fn a_run_stops_where_it_is_told() {
         .unwrap();
     assert_eq!(training.actions(), so_far);
     let stopped = training
-        .run_with(&mut chain, Until::Actions(100_000), &mut rng, |record, table| {
-            assert_eq!(table.actions(), 2);
-            if record.actions >= so_far + 500 {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        })
+        .run_with(
+            &mut chain,
+            Until::Actions(100_000),
+            &mut rng,
+            |record, table| {
+                assert_eq!(table.actions(), 2);
+                if record.actions >= so_far + 500 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        )
         .unwrap();
     let reached = training.actions();
-    assert!(stopped && reached.is_multiple_of(10) && (so_far + 500..so_far + 510).contains(&reached));
+    assert!(
+        stopped && reached.is_multiple_of(10) && (so_far + 500..so_far + 510).contains(&reached)
+    );
     assert_eq!(training.curve().len() as u64, reached / 10);
     let more: Vec<_> = training
         .records(&mut chain, Until::Actions(reached + 45), &mut rng)
@@ -230,7 +244,9 @@ fn settings_changed_on_the_way_leave_the_counters_alone() {
     let table = QTable::new(9, 2).unwrap();
     let mut training = Training::new(&chain, table, learner, policy).unwrap();
     let mut rng = rng(3);
-    training.run(&mut chain, Until::Actions(1_503), &mut rng).unwrap();
+    training
+        .run(&mut chain, Until::Actions(1_503), &mut rng)
+        .unwrap();
     let (before, episodes) = (training.clone(), training.episodes());
     assert!(training.is_in_episode() && episodes > 3);
     let mut training = training
@@ -246,10 +262,14 @@ fn settings_changed_on_the_way_leave_the_counters_alone() {
         .unwrap();
     assert_eq!((training.actions(), training.episodes()), (1_503, episodes));
     assert!(training.is_in_episode() && training.curve() == before.curve());
-    training.run(&mut chain, Until::Actions(1_600), &mut rng).unwrap();
+    training
+        .run(&mut chain, Until::Actions(1_600), &mut rng)
+        .unwrap();
     let record = training.curve().last().unwrap();
     assert_eq!((training.curve().len(), record.actions), (2, 1_600));
-    assert!(training.clone().with_episode_limit(0).is_err() && training.with_record_every(0).is_err());
+    assert!(
+        training.clone().with_episode_limit(0).is_err() && training.with_record_every(0).is_err()
+    );
 }
 
 #[test]

@@ -94,9 +94,10 @@ impl Prior {
 
 /// A normal distribution over what is wrong with the nominal model.
 ///
-/// Thirteen numbers: logarithm of the focal length over the nominal one; shift of the principal point (units); turn of the camera about
-/// its x, y and z axes (radians) and shift along them (metres); logarithm of the ball's radius over the nominal one; play in `JT1`, `JT2`
-/// and `JT3` (whole width, radians).
+/// Thirteen numbers: logarithm of the focal length over the nominal one; shift of the principal
+/// point (units); turn of the camera about its x, y and z axes (radians) and shift along them
+/// (metres); logarithm of the ball's radius over the nominal one; play in `JT1`, `JT2` and `JT3`
+/// (whole width, radians).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -190,8 +191,8 @@ impl Belief {
         self.noise
     }
 
-    /// The same after a time in which camera, ball and gears may have changed by `share` of what `prior` allows for: as much is believed,
-    /// and less firmly.
+    /// The same after a time in which camera, ball and gears may have changed by `share` of what
+    /// `prior` allows for: as much is believed, and less firmly.
     pub(crate) fn loosened(self, prior: &Prior, share: f64) -> Self {
         if share.abs() < f64::MIN_POSITIVE {
             // Exactly the same, without the rounding of two inversions.
@@ -199,7 +200,8 @@ impl Belief {
         }
         let change = (prior.deviations() * share).map(|s| s * s);
         let information = self.information_matrix().try_inverse();
-        let information = information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());
+        let information =
+            information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());
         let Some(information) = information.filter(|i| i.iter().all(|v| v.is_finite())) else {
             return self.clone();
         };
@@ -210,8 +212,8 @@ impl Belief {
         )
     }
 
-    /// What is believed once a ball, known to be at `ball` but for `unsure` metres along each axis, has shown as `features` with the arm at
-    /// `joints`; the same as before where that cannot be.
+    /// What is believed once a ball, known to be at `ball` but for `unsure` metres along each axis,
+    /// has shown as `features` with the arm at `joints`; the same as before where that cannot be.
     pub(crate) fn having_seen(
         self,
         nominal: &CameraModel,
@@ -221,7 +223,8 @@ impl Belief {
     ) -> Self {
         const ITERATIONS: usize = 10;
         let (before, prior) = (self.numbers(), self.information_matrix());
-        let view = |numbers: &Numbers, ball: &Point3<f64>| corrected(nominal, numbers).view(joints, ball);
+        let view =
+            |numbers: &Numbers, ball: &Point3<f64>| corrected(nominal, numbers).view(joints, ball);
         let (mut numbers, mut information) = (before, prior);
         for _ in 0..ITERATIONS {
             let Some((expected, by_all)) = sensitivity(&numbers, ball, view) else {
@@ -229,8 +232,8 @@ impl Belief {
             };
             let by_numbers = by_all.fixed_columns::<LEARNED>(0);
             let by_place = by_all.fixed_columns::<3>(LEARNED);
-            let spread =
-                Matrix3::identity() * self.noise.powi(2) + by_place * by_place.transpose() * unsure.powi(2);
+            let spread = Matrix3::identity() * self.noise.powi(2)
+                + by_place * by_place.transpose() * unsure.powi(2);
             let Some(weight) = spread.try_inverse() else {
                 return self;
             };
@@ -242,7 +245,10 @@ impl Belief {
             };
             numbers += step;
         }
-        let finite = numbers.iter().chain(information.iter()).all(|v| v.is_finite());
+        let finite = numbers
+            .iter()
+            .chain(information.iter())
+            .all(|v| v.is_finite());
         if finite {
             Self::of(numbers, information, self.noise)
         } else {
@@ -270,7 +276,11 @@ impl Belief {
     }
 
     pub(crate) fn information_matrix(&self) -> Information {
-        let values = self.information.iter().copied().chain(std::iter::repeat(0.0));
+        let values = self
+            .information
+            .iter()
+            .copied()
+            .chain(std::iter::repeat(0.0));
         Information::from_iterator(values.take(LEARNED * LEARNED))
     }
 }
@@ -290,13 +300,15 @@ impl Belief {
     /// Reads a belief that [`Belief::save`] wrote.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged or is none of ours; numbers that are too few, too many or not finite.
+    /// A file that cannot be read, is damaged or is none of ours; numbers that are too few, too
+    /// many or not finite.
     pub fn load(path: &std::path::Path) -> Result<Self, BehaviourError> {
         Ok(qtable::load(path, Self::FILE_KIND)?)
     }
 }
 
-/// `nominal` with the camera and the ball as `numbers` say; the play of the joints is not part of a model.
+/// `nominal` with the camera and the ball as `numbers` say; the play of the joints is not part of a
+/// model.
 pub(crate) fn corrected(nominal: &CameraModel, numbers: &Numbers) -> CameraModel {
     let three = |i: usize| Vector3::new(numbers[i], numbers[i + 1], numbers[i + 2]);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_scaled_axis(three(at::TURN)));

@@ -10,7 +10,9 @@ use super::fit::{Fit, WITH_BALL, deviations, sensitivity};
 use crate::checked::checked;
 #[cfg(feature = "serde")]
 use crate::servo::check_goal;
-use crate::{CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits, TaughtGoal};
+use crate::{
+    CameraModel, Consequence, Controller, GaveUp, JointLimits, Situation, StepLimits, TaughtGoal,
+};
 
 /// What a [`Hybrid`] is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,14 +26,16 @@ pub struct HybridSettings {
     pub nominal: CameraModel,
     /// How wrong that may be.
     pub prior: Prior,
-    /// How much of that may have come about since a belief was learned that the controller begins with, as a share \[0.2\]; see
-    /// [`Hybrid::with_belief`]. At 0 a camera that has been knocked in the meantime is not learned again for a long time.
+    /// How much of that may have come about since a belief was learned that the controller begins
+    /// with, as a share \[0.2\]; see [`Hybrid::with_belief`]. At 0 a camera that has been knocked
+    /// in the meantime is not learned again for a long time.
     pub drift: f64,
     /// Features of the ball where it should be \[(103.5, 78, 33)\].
     pub goal: Features,
     /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
     pub steps: StepLimits,
-    /// A move is made only if the ball will still be in view when it is seen so many standard deviations off its expected place \[2\].
+    /// A move is made only if the ball will still be in view when it is seen so many standard
+    /// deviations off its expected place \[2\].
     pub caution: f64,
     /// Runs that are remembered, the latest ones \[400\].
     pub memory: usize,
@@ -40,8 +44,8 @@ pub struct HybridSettings {
     /// How far `JT4` turns for the grip, radians \[0\].
     #[cfg_attr(feature = "serde", serde(default))]
     pub grip_aside: f64,
-    /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and not left to the agent's settings
-    /// \[0.008\].
+    /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and
+    /// not left to the agent's settings \[0.008\].
     pub grip_certainty: f64,
 }
 
@@ -84,7 +88,10 @@ impl HybridSettings {
                 return Err(format!("{name} is {value}; it must be finite, 0 or above"));
             }
         }
-        for (name, value) in [("grip_turn", self.grip_turn), ("grip_aside", self.grip_aside)] {
+        for (name, value) in [
+            ("grip_turn", self.grip_turn),
+            ("grip_aside", self.grip_aside),
+        ] {
             if !value.is_finite() {
                 return Err(format!("{name} is {value}; it must be finite"));
             }
@@ -95,10 +102,11 @@ impl HybridSettings {
 
 /// Servoing by a model of the camera that is put right by what is seen.
 ///
-/// In every cycle the ball's place and the thirteen numbers of a [`Belief`] are estimated together from all sightings of the run (least
-/// squares with the belief as prior, outliers weighing less). The arm then moves as far toward the pose in which the ball would stand at
-/// the goal as leaves the ball in view for all that is not known for certain. While it learns, every run becomes evidence for
-/// the next.
+/// In every cycle the ball's place and the thirteen numbers of a [`Belief`] are estimated together
+/// from all sightings of the run (least squares with the belief as prior, outliers weighing less).
+/// The arm then moves as far toward the pose in which the ball would stand at the goal as leaves
+/// the ball in view for all that is not known for certain. While it learns, every run becomes
+/// evidence for the next.
 #[derive(Clone, Debug)]
 pub struct Hybrid {
     settings: HybridSettings,
@@ -114,7 +122,8 @@ pub struct Hybrid {
     boldness: f64,
     /// Losses since the last move that kept the ball in view.
     losses: usize,
-    /// Whether the last sighting was far from where the ball was; it is looked for once more before that is believed.
+    /// Whether the last sighting was far from where the ball was; it is looked for once more before
+    /// that is believed.
     doubt: bool,
     /// Sightings for which a ball that has just moved is taken to be still moving.
     moving: usize,
@@ -131,7 +140,8 @@ struct Estimate {
     covariance: SMatrix<f64, WITH_BALL, WITH_BALL>,
 }
 
-/// A sighting so many standard deviations off, and at least so many units, means that the ball has moved.
+/// A sighting so many standard deviations off, and at least so many units, means that the ball has
+/// moved.
 const MOVED: (f64, f64) = (5.0, 3.0);
 /// What is seen so many feature units off may be no ball at all.
 const FAR_OFF: f64 = 40.0;
@@ -141,7 +151,8 @@ const STILL_MOVING: usize = 3;
 const SHOWN: f64 = 0.002;
 /// Room to the border of the frame, feature units.
 const MARGIN: f64 = 4.0;
-/// Radius up to which a ball is far enough to be seen, and the largest that a move may lead to, feature units.
+/// Radius up to which a ball is far enough to be seen, and the largest that a move may lead to,
+/// feature units.
 const FAR_ENOUGH: f64 = 5.5;
 const LARGEST: f64 = 55.0;
 /// Shares of the way that are tried, the whole way first.
@@ -155,8 +166,8 @@ impl Hybrid {
         Self::beginning(settings, Belief::new(&settings.prior))
     }
 
-    /// A controller that has learned before, and goes on from there: what it sees from now on is weighed against `belief`, held as firmly as
-    /// [`HybridSettings::drift`] leaves it.
+    /// A controller that has learned before, and goes on from there: what it sees from now on is
+    /// weighed against `belief`, held as firmly as [`HybridSettings::drift`] leaves it.
     pub fn with_belief(settings: HybridSettings, belief: Belief) -> Self {
         Self::beginning(settings, belief.loosened(&settings.prior, settings.drift))
     }
@@ -179,13 +190,14 @@ impl Hybrid {
         }
     }
 
-    /// The same with a goal that was shown on the arm. That the ball was between the jaws then says much of the camera: the jaws are where the
-    /// arm says they are.
+    /// The same with a goal that was shown on the arm. That the ball was between the jaws then says
+    /// much of the camera: the jaws are where the arm says they are.
     #[must_use]
     pub fn shown(mut self, goal: &TaughtGoal) -> Self {
         let (nominal, from) = (&self.settings.nominal, goal.seen_from());
         let ball = nominal.tool_point(&(from + goal.grip()));
-        let seen = |belief: Belief| belief.having_seen(nominal, &from, (&ball, SHOWN), &goal.features());
+        let seen =
+            |belief: Belief| belief.having_seen(nominal, &from, (&ball, SHOWN), &goal.features());
         (self.before, self.belief) = (seen(self.before), seen(self.belief));
         self.settings.goal = goal.features();
         self.settings.grip_turn = goal.grip()[Joint::J5];
@@ -227,7 +239,12 @@ impl Hybrid {
             .estimate
             .as_ref()
             .map_or_else(|| self.belief.numbers(), |e| e.numbers);
-        let fit = Fit::of(&self.belief, &start, &self.settings.nominal, &[&self.current])?;
+        let fit = Fit::of(
+            &self.belief,
+            &start,
+            &self.settings.nominal,
+            &[&self.current],
+        )?;
         let ball = fit.balls.last().copied().flatten()?;
         Some(Estimate {
             model: corrected(&self.settings.nominal, &fit.numbers),
@@ -251,23 +268,35 @@ impl Hybrid {
             return Some(f64::INFINITY);
         };
         let unsure = deviations(&by_all, &estimate.covariance);
-        let off = Vector3::new(seen.x - expected.x, seen.y - expected.y, seen.r - expected.r);
-        let moved =
-            (0..3).any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())));
+        let off = Vector3::new(
+            seen.x - expected.x,
+            seen.y - expected.y,
+            seen.r - expected.r,
+        );
+        let moved = (0..3)
+            .any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())));
         moved.then(|| off.norm())
     }
 
     /// The longest way toward the goal after which the ball is in view for certain.
-    fn plan(&self, estimate: &Estimate, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+    fn plan(
+        &self,
+        estimate: &Estimate,
+        now: &Situation,
+        limits: &JointLimits,
+    ) -> Option<JointDelta> {
         let model = &estimate.model;
         let links = self.current.links(&estimate.numbers);
         let camera = model.arm.wrist(links.stand()) * model.mount;
         let here = camera.inverse_transform_point(&estimate.ball);
         let goal = model.in_camera(&self.settings.goal)?;
-        // On its line in the image at the distance it has: where to bring a ball that cannot be approached yet.
+        // On its line in the image at the distance it has: where to bring a ball that cannot be
+        // approached yet.
         let aside = Point3::from(goal.coords * (here.z / goal.z));
         // A ball that is hardly large enough to be seen must not become smaller.
-        let least = model.outline(&here).map_or(FAR_ENOUGH, |f| f.r.min(FAR_ENOUGH));
+        let least = model
+            .outline(&here)
+            .map_or(FAR_ENOUGH, |f| f.r.min(FAR_ENOUGH));
         let ways = [goal, aside].map(|target| SHARES.map(|share| (target, share)));
         let mut last = None;
         for (target, share) in ways.into_iter().flatten() {
@@ -283,21 +312,26 @@ impl Hybrid {
         last
     }
 
-    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits; NaN stays NaN.
+    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits;
+    /// NaN stays NaN.
     fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
         let target = limits.nearest(motors);
-        JointDelta(std::array::from_fn(|i| match self.settings.steps.0.get(i) {
-            // Not `min` and `max`, which make a whole step of NaN, nor `clamp`, which panics on a step that is NaN.
-            Some(most) => match target.0[i] - from.0[i] {
-                turn if turn.abs() <= *most => turn,
-                turn if turn.abs() > *most => most.copysign(turn),
-                _ => f64::NAN,
-            },
-            None => 0.0,
+        JointDelta(std::array::from_fn(|i| {
+            match self.settings.steps.0.get(i) {
+                // Not `min` and `max`, which make a whole step of NaN, nor `clamp`, which panics on
+                // a step that is NaN.
+                Some(most) => match target.0[i] - from.0[i] {
+                    turn if turn.abs() <= *most => turn,
+                    turn if turn.abs() > *most => most.copysign(turn),
+                    _ => f64::NAN,
+                },
+                None => 0.0,
+            }
         }))
     }
 
-    /// Whether the ball will be in view for all that is not known for certain, with a radius of at least `least` units.
+    /// Whether the ball will be in view for all that is not known for certain, with a radius of at
+    /// least `least` units.
     fn stays_in_view(&self, estimate: &Estimate, motors: &Joints, least: f64) -> bool {
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
             let mut links: Links = self.current.links(numbers);
@@ -353,7 +387,8 @@ impl Controller for Hybrid {
         } else {
             self.moving.saturating_sub(1)
         };
-        // A ball that was lost twice, though it should have stayed in view for certain, is not where it was taken to be.
+        // A ball that was lost twice, though it should have stayed in view for certain, is not
+        // where it was taken to be.
         let mistaken = self.losses >= 2;
         if odd || mistaken {
             if !mistaken {
@@ -422,7 +457,12 @@ impl Controller for Hybrid {
         }
         let all: Vec<&Evidence> = self.remembered.iter().collect();
         let before = self.before.clone().with_noise(self.belief.noise());
-        if let Some(fit) = Fit::of(&before, &self.belief.numbers(), &self.settings.nominal, &all) {
+        if let Some(fit) = Fit::of(
+            &before,
+            &self.belief.numbers(),
+            &self.settings.nominal,
+            &all,
+        ) {
             self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
         }
     }

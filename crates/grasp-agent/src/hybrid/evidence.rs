@@ -6,7 +6,8 @@ use puma_val2::Joints;
 
 use super::belief::{Numbers, at};
 
-/// The poses the arm went through in one run, and what was seen of a ball that lay still in the meantime.
+/// The poses the arm went through in one run, and what was seen of a ball that lay still in the
+/// meantime.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Evidence {
     /// Joint angles as the arm reported them, first three, radians, in the order they were taken.
@@ -59,7 +60,8 @@ impl Evidence {
     }
 }
 
-/// The links of the first three joints, which follow their motors as soon as the play of the gears is used up.
+/// The links of the first three joints, which follow their motors as soon as the play of the gears
+/// is used up.
 #[derive(Clone, Debug)]
 pub(crate) struct Links {
     half: [f64; 3],
@@ -113,6 +115,9 @@ impl Links {
 }
 
 /// A first guess of where the ball is, from one sighting.
-pub(crate) fn first_guess(model: &crate::CameraModel, view: &(Joints, Features)) -> Option<Point3<f64>> {
+pub(crate) fn first_guess(
+    model: &crate::CameraModel,
+    view: &(Joints, Features),
+) -> Option<Point3<f64>> {
     model.locate(&view.0, &view.1)
 }

@@ -21,14 +21,16 @@ pub(crate) struct Fit {
     pub(crate) information: Information,
     /// Information on the numbers and the last ball together.
     pub(crate) with_last_ball: SMatrix<f64, WITH_BALL, WITH_BALL>,
-    /// Sum of squared residuals, units squared, without outliers, and how many more residuals there are than numbers fitted.
+    /// Sum of squared residuals, units squared, without outliers, and how many more residuals there
+    /// are than numbers fitted.
     squares: f64,
     spare: f64,
 }
 
 /// Most iterations of one fit.
 const ITERATIONS: usize = 12;
-/// Residuals beyond so many standard deviations count less (Huber 1964): a circle that is not the ball.
+/// Residuals beyond so many standard deviations count less (Huber 1964): a circle that is not the
+/// ball.
 const OUTLIER: f64 = 3.0;
 /// Steps for numerical derivatives, of each number and of a coordinate.
 const STEPS: [f64; LEARNED] = [
@@ -53,7 +55,11 @@ impl Fit {
         let mut numbers = *start;
         let mut balls: Vec<Option<Point3<f64>>> = evidence
             .iter()
-            .map(|e| e.views(start).last().and_then(|view| first_guess(&model, view)))
+            .map(|e| {
+                e.views(start)
+                    .last()
+                    .and_then(|view| first_guess(&model, view))
+            })
             .collect();
         let cost_of = |numbers: &Numbers, balls: &[Option<Point3<f64>>]| {
             let off = numbers - before;
@@ -90,7 +96,10 @@ impl Fit {
             }
         }
         let information = normal.marginal();
-        let finite = information.iter().chain(numbers.iter()).all(|v| v.is_finite());
+        let finite = information
+            .iter()
+            .chain(numbers.iter())
+            .all(|v| v.is_finite());
         finite.then(|| Self {
             information,
             with_last_ball: normal.with_last_ball(),
@@ -147,7 +156,11 @@ fn cost(
 ) -> f64 {
     let model = corrected(nominal, numbers);
     let views = evidence.views(numbers);
-    let one = |(joints, features): &(Joints, Features)| match seen(&model, &model.arm.wrist(joints), ball) {
+    let one = |(joints, features): &(Joints, Features)| match seen(
+        &model,
+        &model.arm.wrist(joints),
+        ball,
+    ) {
         Some(expected) => (expected - vector(features))
             .iter()
             .map(|r| huber(r / noise))
@@ -198,7 +211,13 @@ impl Normal {
     }
 
     /// Adds what one piece of evidence says.
-    fn add(&mut self, varied: &Varied, evidence: &Evidence, ball: &Point3<f64>, noise: f64) -> BallBlock {
+    fn add(
+        &mut self,
+        varied: &Varied,
+        evidence: &Evidence,
+        ball: &Point3<f64>,
+        noise: f64,
+    ) -> BallBlock {
         let mut block = BallBlock {
             own: Matrix3::zeros(),
             cross: SMatrix::zeros(),
@@ -343,13 +362,16 @@ impl Varied {
         Self {
             numbers: *numbers,
             model: corrected(nominal, numbers),
-            models: (0..at::PLAY).map(|i| corrected(nominal, &other(i))).collect(),
+            models: (0..at::PLAY)
+                .map(|i| corrected(nominal, &other(i)))
+                .collect(),
             with_play: std::array::from_fn(|i| other(at::PLAY + i)),
         }
     }
 }
 
-/// How what would be seen changes with the numbers and the ball's place, by differences; `None` where nothing would be seen.
+/// How what would be seen changes with the numbers and the ball's place, by differences; `None`
+/// where nothing would be seen.
 pub(crate) fn sensitivity(
     numbers: &Numbers,
     ball: &Point3<f64>,
@@ -369,7 +391,10 @@ pub(crate) fn sensitivity(
                 METRE_STEP
             }
         };
-        by_all.set_column(i, &((vector(&view(&other, &place)?) - vector(&here)) / step));
+        by_all.set_column(
+            i,
+            &((vector(&view(&other, &place)?) - vector(&here)) / step),
+        );
     }
     Some((here, by_all))
 }

@@ -1,4 +1,5 @@
-//! How a run acts: orders to the arm, judged by supervision, and looks, judged by the watch over the camera.
+//! How a run acts: orders to the arm, judged by supervision, and looks, judged by the watch over
+//! the camera.
 
 use puma_val2::{ArmError, Gripper, JointDelta, Joints};
 
@@ -21,7 +22,11 @@ impl Hand for Run<'_> {
                 self.tell(EventKind::SameFrame, None);
             }
             // By a picture that is as it was from another pose no grip is verified.
-            let most = if self.closed { 1 } else { self.config.same_frames };
+            let most = if self.closed {
+                1
+            } else {
+                self.config.same_frames
+            };
             if self.watch.same() >= most {
                 return Err(self.frozen());
             }
@@ -71,7 +76,8 @@ impl Hand for Run<'_> {
 }
 
 impl Run<'_> {
-    /// Takes down where the arm says it stands. An arm may be anyone's: from where no number says it is, nothing can be decided.
+    /// Takes down where the arm says it stands. An arm may be anyone's: from where no number says
+    /// it is, nothing can be decided.
     pub(super) fn stand_at(&mut self, joints: Joints) -> Result<(), AgentError> {
         self.joints = joints;
         match joints.non_finite() {
@@ -97,7 +103,8 @@ impl Run<'_> {
         Ok(went)
     }
 
-    /// Tells `done`, or that the order was not answered, and has supervision judge where the arm stands. If something is too near it is stopped.
+    /// Tells `done`, or that the order was not answered, and has supervision judge where the arm
+    /// stands. If something is too near it is stopped.
     fn arrive(
         &mut self,
         order: Order,
@@ -108,7 +115,8 @@ impl Run<'_> {
         let answer = match answer {
             Ok(reached) => Ok((reached, false, None)),
             Err(ArmError::ProximityStop { joints, .. }) => Ok((joints, true, None)),
-            // An arm that something else has stopped stands somewhere on the way; its sensors may say what.
+            // An arm that something else has stopped stands somewhere on the way; its sensors may
+            // say what.
             Err(error @ ArmError::NotReached { .. }) => {
                 let stands = self.devices.arm.joints();
                 stands.map(|reached| (reached, false, Some(error)))

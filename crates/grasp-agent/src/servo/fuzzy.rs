@@ -8,9 +8,10 @@ use crate::{Consequence, Controller, GaveUp, JointLimits, Situation};
 
 /// A fuzzy controller of the Takagi–Sugeno kind, the paper's "alternative AI method" (section 1).
 ///
-/// The radius is *tiny*, *small*, *right* or *large*, in triangles that overlap; each of them has its own linear rule from the
-/// errors in x, y and 1/r to joint turns, and the rules act in proportion to how far their condition holds. A second set of rules gates
-/// the approach: the farther the ball is from its line in the image, the less it is approached.
+/// The radius is *tiny*, *small*, *right* or *large*, in triangles that overlap; each of them has
+/// its own linear rule from the errors in x, y and 1/r to joint turns, and the rules act in
+/// proportion to how far their condition holds. A second set of rules gates the approach: the
+/// farther the ball is from its line in the image, the less it is approached.
 #[derive(Clone, Debug)]
 pub struct Fuzzy {
     settings: ServoSettings,
@@ -26,7 +27,8 @@ struct Rule {
     turns: Matrix3<f64>,
 }
 
-/// The peaks of the four triangles, feature units, and a pose (degrees of JT2 and JT3) in which balls of that radius are typically seen.
+/// The peaks of the four triangles, feature units, and a pose (degrees of JT2 and JT3) in which
+/// balls of that radius are typically seen.
 const SETS: [(f64, f64, f64); 4] = [
     (9.0, -105.0, 205.0),
     (17.0, -80.0, 195.0),
@@ -45,10 +47,12 @@ impl Fuzzy {
             };
             let ball = settings.model.locate(&pose, &typical)?;
             let mut jacobian = settings.model.image_jacobian(&pose, &ball)?;
-            // From changes of r to changes of 33 / r, in which distance is linear; scaled up so that the three rows are alike.
+            // From changes of r to changes of 33 / r, in which distance is linear; scaled up so
+            // that the three rows are alike.
             let scale = -NEARNESS * 33.0 / (radius * radius);
             jacobian.row_mut(2).scale_mut(scale);
-            let columns = [Vector3::x(), Vector3::y(), Vector3::z() * NEARNESS].map(|e| turns(&jacobian, &e));
+            let columns =
+                [Vector3::x(), Vector3::y(), Vector3::z() * NEARNESS].map(|e| turns(&jacobian, &e));
             let [Some(x), Some(y), Some(nearness)] = columns else {
                 return None;
             };
@@ -85,7 +89,8 @@ impl Fuzzy {
 /// Weight of the row of 33 / r beside those of x and y, units.
 const NEARNESS: f64 = 60.0;
 
-/// How far an error of `error` units counts as *aligned*: wholly within `full`, not at all beyond `none`.
+/// How far an error of `error` units counts as *aligned*: wholly within `full`, not at all beyond
+/// `none`.
 fn aligned(error: f64, full: f64, none: f64) -> f64 {
     ((none - error.abs()) / (none - full)).clamp(0.0, 1.0)
 }

@@ -6,8 +6,9 @@ use puma_val2::{JointDelta, Joints};
 use super::{Boldness, ServoSettings, turns};
 use crate::{Consequence, Controller, GaveUp, JointLimits, Situation};
 
-/// Image-based visual servoing (Hutchinson, Hager, Corke 1996, section VI) on the features of a sphere, centre and radius: the error in
-/// the image is removed through the inverse of the image Jacobian.
+/// Image-based visual servoing (Hutchinson, Hager, Corke 1996, section VI) on the features of a
+/// sphere, centre and radius: the error in the image is removed through the inverse of the image
+/// Jacobian.
 #[derive(Clone, Debug)]
 pub struct ImageBased {
     settings: ServoSettings,
@@ -27,7 +28,8 @@ pub enum JacobianAt {
 }
 
 impl ImageBased {
-    /// The pose, degrees, that the constant Jacobian is taken at: the median of the poses in which reachable balls stand at the goal.
+    /// The pose, degrees, that the constant Jacobian is taken at: the median of the poses in which
+    /// reachable balls stand at the goal.
     pub const GOAL_POSE: [f64; 6] = [0.0, -57.0, 186.0, 0.0, 45.0, 0.0];
 
     /// With the given model, gain and Jacobian.

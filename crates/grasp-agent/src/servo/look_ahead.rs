@@ -7,13 +7,15 @@ use qtable::Action;
 use super::ServoSettings;
 use crate::{BehaviourSpec, Consequence, Controller, GaveUp, JointLimits, Situation};
 
-/// Tries all 9 x 81 moves of the paper's behaviours in the model and makes the one after which the ball would be nearest to the goal.
+/// Tries all 9 x 81 moves of the paper's behaviours in the model and makes the one after which the
+/// ball would be nearest to the goal.
 ///
-/// Nearest: least sum of squared errors in x, y and the logarithm of r, each in half widths of its goal interval, the last one so
-/// weighted that it counts like the others at the goal.
+/// Nearest: least sum of squared errors in x, y and the logarithm of r, each in half widths of its
+/// goal interval, the last one so weighted that it counts like the others at the goal.
 ///
-/// A move that lost the ball or was taken back is not made again from the same pose in the same run, as the learned behaviours do not either: the
-/// model that was wrong then would have it made for ever.
+/// A move that lost the ball or was taken back is not made again from the same pose in the same
+/// run, as the learned behaviours do not either: the model that was wrong then would have it made
+/// for ever.
 #[derive(Clone, Debug)]
 pub struct LookAhead {
     settings: ServoSettings,
@@ -25,13 +27,15 @@ pub struct LookAhead {
     barred: Vec<(Joints, JointDelta)>,
 }
 
-/// Poses that differ by no more than this in any joint are the same, radians: a third of the smallest step.
+/// Poses that differ by no more than this in any joint are the same, radians: a third of the
+/// smallest step.
 const SAME_POSE: f64 = 0.001;
 
 impl LookAhead {
     /// With the given model; gain and step limits play no part.
     pub fn new(settings: ServoSettings) -> Self {
-        let moves = |spec: &BehaviourSpec| (0..spec.actions()).map(|a| spec.delta(Action(a))).collect();
+        let moves =
+            |spec: &BehaviourSpec| (0..spec.actions()).map(|a| spec.delta(Action(a))).collect();
         Self {
             settings,
             turns: moves(&BehaviourSpec::centering()),
@@ -65,8 +69,12 @@ impl Controller for LookAhead {
         let ball = model
             .locate(&now.joints, &now.features)
             .ok_or(GaveUp::NoMoveLeft)?;
-        let near = |a: &Joints, b: &Joints| a.0.iter().zip(b.0).all(|(a, b)| (a - b).abs() <= SAME_POSE);
-        let barred = self.barred.iter().filter(|(from, _)| near(from, &now.joints));
+        let near =
+            |a: &Joints, b: &Joints| a.0.iter().zip(b.0).all(|(a, b)| (a - b).abs() <= SAME_POSE);
+        let barred = self
+            .barred
+            .iter()
+            .filter(|(from, _)| near(from, &now.joints));
         let barred: Vec<JointDelta> = barred.map(|(_, delta)| *delta).collect();
         let mut best: Option<(f64, JointDelta)> = None;
         for reach in &self.reaches {
@@ -78,7 +86,8 @@ impl Controller for LookAhead {
                 } else {
                     None
                 };
-                let Some(distance) = seen.filter(|f| in_view(f, 8.0)).map(|f| self.distance(&f)) else {
+                let Some(distance) = seen.filter(|f| in_view(f, 8.0)).map(|f| self.distance(&f))
+                else {
                     continue;
                 };
                 if best.is_none_or(|(least, _)| distance < least) {

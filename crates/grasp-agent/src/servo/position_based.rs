@@ -5,8 +5,9 @@ use puma_val2::JointDelta;
 use super::{Boldness, ServoSettings};
 use crate::{Consequence, Controller, GaveUp, JointLimits, Situation};
 
-/// Position-based visual servoing (Hutchinson, Hager, Corke 1996, section V): the ball's place in space is computed from the
-/// image by the geometrical model, and the error between the pose of the arm and the pose wanted is removed in joint space.
+/// Position-based visual servoing (Hutchinson, Hager, Corke 1996, section V): the ball's place in
+/// space is computed from the image by the geometrical model, and the error between the pose of the
+/// arm and the pose wanted is removed in joint space.
 #[derive(Clone, Debug)]
 pub struct PositionBased {
     settings: ServoSettings,

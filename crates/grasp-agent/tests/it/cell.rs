@@ -6,7 +6,9 @@ use std::rc::Rc;
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
 use grasp_agent::nalgebra::Point3;
-use grasp_agent::puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
+use grasp_agent::puma_val2::{
+    ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor,
+};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, CameraModel, Controller, EventLog, Eye, Look, Outcome, Sighting,
 };
@@ -49,7 +51,8 @@ pub(crate) enum Fault {
     HaltedClosed(usize),
     /// The jaws hold nothing.
     Slippery,
-    /// The jaws squeeze the ball out the first time; where it lies then it cannot be seen from the lifted hand.
+    /// The jaws squeeze the ball out the first time; where it lies then it cannot be seen from the
+    /// lifted hand.
     SqueezedOut,
     /// The ball, once it is in the jaws, shows at the border of the image, from so many looks on.
     ShowsInTheJaws(usize),
@@ -166,7 +169,10 @@ impl Eye for Shared {
         });
         let seen = match cell.fault {
             Fault::SqueezedOut
-                if cell.closed && cell.closed_at.is_some_and(|at| at.0[1] - cell.joints.0[1] > 0.1) =>
+                if cell.closed
+                    && cell
+                        .closed_at
+                        .is_some_and(|at| at.0[1] - cell.joints.0[1] > 0.1) =>
             {
                 None
             }
@@ -271,14 +277,16 @@ impl Manipulator for Shared {
         let mut cell = self.0.borrow_mut();
         cell.moves += 1;
         let (moves, from) = (cell.moves, cell.joints);
-        let gripping = !cell.closed && (target.0[4] - from.0[4]).to_degrees() < -10.0 && from.0[4] > 0.7;
+        let gripping =
+            !cell.closed && (target.0[4] - from.0[4]).to_degrees() < -10.0 && from.0[4] > 0.7;
         let halted = match cell.fault {
             Fault::ArmStuck(after) if moves > after => return Ok(from),
             Fault::LineDead(after) if moves > after => {
                 return Err(cell.dead_line("DRIVE"));
             }
             Fault::StoppedShort(at) if moves == at => {
-                cell.joints = from + JointDelta(std::array::from_fn(|i| 0.5 * (target.0[i] - from.0[i])));
+                cell.joints =
+                    from + JointDelta(std::array::from_fn(|i| 0.5 * (target.0[i] - from.0[i])));
                 return Err(ArmError::NotReached {
                     port: "ttyUSB0".into(),
                     joint: Joint::J1,
@@ -289,7 +297,11 @@ impl Manipulator for Shared {
             Fault::Halted(at) => moves == at,
             Fault::HaltedTwice(at) => moves == at || moves == at + 1,
             Fault::HaltedNear(r) => {
-                cell.halts < 3 && cell.truth.view(&target, &cell.ball).is_some_and(|f| f.r > r)
+                cell.halts < 3
+                    && cell
+                        .truth
+                        .view(&target, &cell.ball)
+                        .is_some_and(|f| f.r > r)
             }
             Fault::HaltedGrips(times) => gripping && cell.halts < times,
             Fault::HaltedClosed(way) => {
@@ -348,7 +360,9 @@ impl ProximitySensor for Shared {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let cell = self.0.borrow();
         match cell.fault {
-            Fault::SensorDead(after) if cell.moves > after => Err(cell.dead_line("reading SIG 1001")),
+            Fault::SensorDead(after) if cell.moves > after => {
+                Err(cell.dead_line("reading SIG 1001"))
+            }
             Fault::Near(at) | Fault::StopDead(at) | Fault::Nowhere(at) => Ok(cell.moves == at),
             _ => Ok(false),
         }

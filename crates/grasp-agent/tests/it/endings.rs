@@ -2,10 +2,12 @@
 
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
-use grasp_agent::puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
+use grasp_agent::puma_val2::{
+    ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor,
+};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, LastLook, LoggedEvent, Look, Outcome,
-    PositionBased, Recovery, Search, ServoSettings, Sighting, Situation, Viewpoint,
+    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, LastLook, LoggedEvent, Look,
+    Outcome, PositionBased, Recovery, Search, ServoSettings, Sighting, Situation, Viewpoint,
 };
 
 const AT_GOAL: Features = Features {
@@ -55,7 +57,8 @@ impl ProximitySensor for Sensor {
     }
 }
 
-/// What look number n, from 0, finds; no two frames are the same. More looks than anyone needs are a panic.
+/// What look number n, from 0, finds; no two frames are the same. More looks than anyone needs are
+/// a panic.
 struct Scene {
     looks: u32,
     finds: fn(u32) -> Option<Features>,
@@ -99,7 +102,9 @@ fn run(
     let mut log = EventLog::default();
     let (mut arm, mut sensor) = (Arm(pose()), Sensor(near));
     let mut eye = Scene { looks: 0, finds };
-    let end = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| log.note(event));
+    let end = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| {
+        log.note(event)
+    });
     (end, log)
 }
 
@@ -154,7 +159,10 @@ fn a_recovery_that_offers_nothing_ends_with_the_cycles() {
         n.is_multiple_of(3).then_some(AT_GOAL)
     });
     let outcome = end.unwrap();
-    assert_eq!((outcome.gave_up, outcome.cycles), (Some(GaveUp::OutOfCycles), 60));
+    assert_eq!(
+        (outcome.gave_up, outcome.cycles),
+        (Some(GaveUp::OutOfCycles), 60)
+    );
     // At the goal, gripped, and missed each time.
     let (end, log) = run(agent(1).recovering_by(Once(None)), false, |_| Some(AT_GOAL));
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::OutOfCycles));
@@ -208,7 +216,10 @@ impl Search for Endless {
 fn a_search_that_never_ends_has_found_nothing_after_so_many_viewpoints() {
     let (end, log) = run(agent(1).searching_by(Endless), false, |_| None);
     let outcome = end.unwrap();
-    assert_eq!((outcome.gave_up, outcome.cycles), (Some(GaveUp::NotFound), 0));
+    assert_eq!(
+        (outcome.gave_up, outcome.cycles),
+        (Some(GaveUp::NotFound), 0)
+    );
     let views = |log: &EventLog| {
         let at_pose = |e: &&LoggedEvent| matches!(e.kind, EventKind::AtSearchPose(_));
         log.events.iter().filter(at_pose).count()
@@ -225,10 +236,16 @@ fn a_search_that_never_ends_has_found_nothing_after_so_many_viewpoints() {
         agent.searching_by(Endless).recovering_by(Once(None))
     };
     let (end, log) = run(few(7), true, |_| None);
-    assert_eq!((end.unwrap().gave_up, views(&log)), (Some(GaveUp::Obstructed), 7));
+    assert_eq!(
+        (end.unwrap().gave_up, views(&log)),
+        (Some(GaveUp::Obstructed), 7)
+    );
     let (end, log) = run(few(20), false, |n| n.is_multiple_of(21).then_some(ASIDE));
     let outcome = end.unwrap();
-    assert_eq!((outcome.gave_up, outcome.cycles), (Some(GaveUp::OutOfCycles), 60));
+    assert_eq!(
+        (outcome.gave_up, outcome.cycles),
+        (Some(GaveUp::OutOfCycles), 60)
+    );
     assert!(views(&log) <= 20 * 61, "{}", views(&log));
 }
 

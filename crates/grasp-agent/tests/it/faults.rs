@@ -1,16 +1,18 @@
-//! Bad input and faults: the arm stops, the cause is in the log and in a typed error, what was learned is kept.
+//! Bad input and faults: the arm stops, the cause is in the log and in a typed error, what was
+//! learned is kept.
 
 use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp, Hybrid,
-    HybridSettings, LoggedEvent, PositionBased, ServoSettings,
+    Agent, AgentConfig, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp,
+    Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
 
 pub(crate) fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, Shared) {
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], fault);
-    let mut agent = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent =
+        Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
     let mut log = EventLog::default();
     (cell.run(&mut agent, &mut log), log, cell)
 }
@@ -82,7 +84,10 @@ fn a_failing_device_ends_the_run_with_its_cause_and_a_stop() {
             EventKind::Failed(error.to_string()),
             "{fault:?}"
         );
-        assert!(cell.0.borrow().stops > 0 && !cell.0.borrow().closed, "{fault:?}");
+        assert!(
+            cell.0.borrow().stops > 0 && !cell.0.borrow().closed,
+            "{fault:?}"
+        );
     }
 }
 
@@ -96,7 +101,8 @@ fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
             "{moves}: {error}"
         );
         assert!(cell.0.borrow().stops > 0 && cell.0.borrow().joints.non_finite().is_none());
-        let before = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+        let before =
+            Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
         let replayed = log.replay(&before).unwrap_err();
         assert_eq!(replayed.to_string(), error.to_string());
     }
@@ -106,14 +112,17 @@ fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
 fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
     let mut without_lift = config();
     without_lift.lift = None;
-    let mut agent = Agent::with_controller(without_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent =
+        Agent::with_controller(without_lift, PositionBased::new(ServoSettings::paper())).unwrap();
     let cell = Shared::new(
         CameraModel::paper(),
         [0.6, 0.1, -0.1],
         Fault::FrozenPicture(usize::MAX),
     );
     assert_eq!(
-        cell.run(&mut agent, &mut EventLog::default()).unwrap().gave_up,
+        cell.run(&mut agent, &mut EventLog::default())
+            .unwrap()
+            .gave_up,
         None
     );
     // From now on what was seen last, the ball at the goal, is seen from everywhere.
@@ -122,8 +131,15 @@ fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
     let before = agent.clone();
     let mut log = EventLog::default();
     let error = cell.run(&mut agent, &mut log).unwrap_err();
-    assert!(matches!(error, AgentError::FrozenCamera { looks: 2 }), "{error}");
-    assert!(log.events.iter().any(|event| event.kind == EventKind::SameFrame));
+    assert!(
+        matches!(error, AgentError::FrozenCamera { looks: 2 }),
+        "{error}"
+    );
+    assert!(
+        log.events
+            .iter()
+            .any(|event| event.kind == EventKind::SameFrame)
+    );
     assert!(!cell.0.borrow().closed && cell.0.borrow().stops > 0);
     let replayed = log.replay(&before).unwrap_err();
     assert!(
@@ -146,7 +162,11 @@ fn too_rapid_an_approach_is_taken_back_and_made_more_slowly() {
         (20.0, 30.1, true),
         (40.0, 30.0, false),
     ] {
-        assert_eq!(limit.exceeded(before, after), exceeded, "{before} to {after}");
+        assert_eq!(
+            limit.exceeded(before, after),
+            exceeded,
+            "{before} to {after}"
+        );
     }
 
     let mut slow = config();
@@ -248,17 +268,26 @@ fn where_every_move_is_halted_a_controller_that_can_aim_from_there_grips() {
         let y = 0.05 * f64::from(run) - 0.25;
         let cell = Shared::new(CameraModel::paper(), [0.6, y, -0.1], Fault::None);
         assert_eq!(
-            cell.run(&mut agent, &mut EventLog::default()).unwrap().gave_up,
+            cell.run(&mut agent, &mut EventLog::default())
+                .unwrap()
+                .gave_up,
             None
         );
     }
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.0, -0.1], Fault::HaltedNear(30.0));
+    let cell = Shared::new(
+        CameraModel::paper(),
+        [0.6, 0.0, -0.1],
+        Fault::HaltedNear(30.0),
+    );
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
     assert_eq!(outcome.gave_up, None);
     assert!(cell.0.borrow().held);
     assert!(words_from(&log, "at-goal").is_empty());
-    let halts = log.events.iter().filter(|event| event.kind == EventKind::TooNear);
+    let halts = log
+        .events
+        .iter()
+        .filter(|event| event.kind == EventKind::TooNear);
     assert!(halts.count() >= 3);
 }
 
@@ -304,7 +333,8 @@ fn what_was_learned_before_the_line_died_is_kept() {
 }
 
 #[test]
-fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a_pose_out_of_limits() {
+fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a_pose_out_of_limits()
+ {
     let checked = config();
     for gain in [1.0, 0.5] {
         let servo = ServoSettings::paper().with_gain(gain);
@@ -319,7 +349,11 @@ fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a
             .iter()
             .filter(|event| matches!(event.kind, EventKind::Moved(_)));
         assert!(moved.clone().count() > 3);
-        assert!(moved.into_iter().all(|event| checked.limits.admit(&event.joints)));
+        assert!(
+            moved
+                .into_iter()
+                .all(|event| checked.limits.admit(&event.joints))
+        );
     }
 }
 
@@ -337,7 +371,10 @@ fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
     let mut agent = Agent::with_controller(config(), learned).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::LineDead(6));
     let error = cell.run(&mut agent, &mut EventLog::default()).unwrap_err();
-    assert!(matches!(error, AgentError::Arm(ArmError::Line { .. })), "{error}");
+    assert!(
+        matches!(error, AgentError::Arm(ArmError::Line { .. })),
+        "{error}"
+    );
     let (centering, after) = agent.into_controller().into_behaviours();
     assert_ne!(after, approaching);
 
@@ -391,7 +428,8 @@ fn settings_that_cannot_work_are_refused() {
     for (name, change) in changes {
         let mut config = config();
         change(&mut config);
-        let refused = Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap_err();
+        let refused =
+            Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap_err();
         assert!(refused.to_string().contains(name), "{name}: {refused}");
     }
 }

@@ -2,8 +2,8 @@
 
 use grasp_agent::puma_val2::JointDelta;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp, Outcome, PositionBased,
-    ServoSettings, YGoal,
+    Agent, AgentConfig, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp, Outcome,
+    PositionBased, ServoSettings, YGoal,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -33,7 +33,8 @@ fn a_grip_that_is_halted_is_tried_again_and_not_for_ever() {
 
 #[test]
 fn a_closed_hand_that_is_halted_has_not_succeeded() {
-    // On its way back, which was free: the ball is in that way and not in the jaws. It is gripped again.
+    // On its way back, which was free: the ball is in that way and not in the jaws. It is gripped
+    // again.
     let (end, log, cell) = end_of(Fault::HaltedClosed(1));
     let expected = [
         "gripped",
@@ -44,7 +45,10 @@ fn a_closed_hand_that_is_halted_has_not_succeeded() {
         "recover",
         "seen",
     ];
-    assert!(words_from(&log, "gripped").starts_with(&expected), "{log:?}");
+    assert!(
+        words_from(&log, "gripped").starts_with(&expected),
+        "{log:?}"
+    );
     assert_eq!(end.unwrap().gave_up, None);
     assert!(cell.0.borrow().held);
     // As it lifts: what is in the jaws is not known.
@@ -63,7 +67,11 @@ fn a_circle_in_the_goal_that_is_no_ball_is_not_taken_for_a_success() {
     ] {
         let (end, log, cell) = end_of(fault);
         assert!(end.unwrap().gave_up.is_some(), "{fault:?}");
-        assert_eq!(!words_from(&log, "gripped").is_empty(), gripped, "{fault:?}");
+        assert_eq!(
+            !words_from(&log, "gripped").is_empty(),
+            gripped,
+            "{fault:?}"
+        );
         assert_eq!(!words_from(&log, "missed").is_empty(), gripped, "{fault:?}");
         assert!(!cell.0.borrow().closed, "{fault:?}");
     }
@@ -74,7 +82,8 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
     let mut short = config();
     short.max_cycles = 12;
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
-    let mut agent = Agent::with_controller(short, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent =
+        Agent::with_controller(short, PositionBased::new(ServoSettings::paper())).unwrap();
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
     let missed = log
@@ -118,8 +127,13 @@ fn two_places_in_the_goal_in_turn_do_not_keep_a_run_going_for_ever() {
         .with_y_goal(YGoal::Section4)
         .unwrap()
         .goal();
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Restless(10_000));
-    let mut agent = Agent::with_controller(wide, PositionBased::new(ServoSettings::paper())).unwrap();
+    let cell = Shared::new(
+        CameraModel::paper(),
+        [0.6, 0.1, -0.1],
+        Fault::Restless(10_000),
+    );
+    let mut agent =
+        Agent::with_controller(wide, PositionBased::new(ServoSettings::paper())).unwrap();
     let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
     assert_eq!(outcome.gave_up, Some(GaveUp::OutOfCycles));
     assert!(!cell.0.borrow().closed);
@@ -130,8 +144,12 @@ fn end_with(change: impl Fn(&mut AgentConfig)) -> (Outcome, Shared) {
     let mut changed = config();
     change(&mut changed);
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
-    let mut agent = Agent::with_controller(changed, PositionBased::new(ServoSettings::paper())).unwrap();
-    (cell.run(&mut agent, &mut EventLog::default()).unwrap(), cell)
+    let mut agent =
+        Agent::with_controller(changed, PositionBased::new(ServoSettings::paper())).unwrap();
+    (
+        cell.run(&mut agent, &mut EventLog::default()).unwrap(),
+        cell,
+    )
 }
 
 #[test]

@@ -4,8 +4,8 @@ use grasp_agent::hough_heuristic::Features;
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use grasp_agent::puma_val2::{JointDelta, Joints};
 use grasp_agent::{
-    Agent, CameraModel, Controller, EventLog, GaveUp, Hybrid, HybridSettings, JointLimits, Situation,
-    TaughtGoal,
+    Agent, CameraModel, Controller, EventLog, GaveUp, Hybrid, HybridSettings, JointLimits,
+    Situation, TaughtGoal,
 };
 #[cfg(feature = "serde")]
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
@@ -119,10 +119,16 @@ fn a_controller_that_begins_with_a_belief_goes_on_learning_from_there() {
     );
 
     // In the same cell, what was known before counts from the first run on.
-    let mut again = new(Hybrid::with_belief(HybridSettings::paper(), learned.clone()));
+    let mut again = new(Hybrid::with_belief(
+        HybridSettings::paper(),
+        learned.clone(),
+    ));
     let cell = Shared::new(wrong(1.0), [0.6, 0.1, -0.1], Fault::None);
     let outcome = cell.run(&mut again, &mut EventLog::default()).unwrap();
-    assert!(outcome.gave_up.is_none() && outcome.cycles <= 3, "{outcome:?}");
+    assert!(
+        outcome.gave_up.is_none() && outcome.cycles <= 3,
+        "{outcome:?}"
+    );
     let after_one = focal(&again);
     assert!(
         after_one.1 < 0.01 && (after_one.0 - mean).abs() < 0.01,
@@ -134,11 +140,20 @@ fn a_controller_that_begins_with_a_belief_goes_on_learning_from_there() {
 
     // In a cell whose camera has been exchanged, that one is learned instead.
     for share in [0.7, 0.3, 0.0, -0.3] {
-        let mut moved = new(Hybrid::with_belief(HybridSettings::paper(), learned.clone()));
+        let mut moved = new(Hybrid::with_belief(
+            HybridSettings::paper(),
+            learned.clone(),
+        ));
         let cycles = runs(&mut moved, wrong(share));
-        assert!(cycles.iter().all(|cycles| *cycles <= 5), "{share}: {cycles:?}");
+        assert!(
+            cycles.iter().all(|cycles| *cycles <= 5),
+            "{share}: {cycles:?}"
+        );
         let mean = focal(&moved).0;
-        assert!((mean - (1.0 + 0.2 * share).ln()).abs() < 0.005, "{share}: {mean}");
+        assert!(
+            (mean - (1.0 + 0.2 * share).ln()).abs() < 0.005,
+            "{share}: {mean}"
+        );
     }
 }
 
@@ -157,7 +172,8 @@ fn what_the_fixed_grip_has_missed_is_aimed_at() {
         joints: Joints::from_degrees([0.0, -55.0, 184.0, 0.0, 45.0, 0.0]),
     };
     hybrid.arm_at(&at_goal.joints);
-    // One sighting with a camera of which nothing is known: where the ball is, is not certain enough.
+    // One sighting with a camera of which nothing is known: where the ball is, is not certain
+    // enough.
     assert_eq!(hybrid.grip(&at_goal, &limits), None);
     let tries = (0..4).map(|_| hybrid.grip(&at_goal, &limits));
     let aim = tries

@@ -77,10 +77,11 @@ fn settings_by_which_nothing_can_be_learned_are_refused_by_name() {
     );
     assert!(OnlineLearning::new(0.0, 1.0, 1e-9, 0).is_ok());
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
-    let refused = |gamma, alpha, temperature| match OnlineLearning::new(gamma, alpha, temperature, 0) {
-        Err(BehaviourError::Learning { quantity, .. }) => quantity,
-        other => panic!("{other:?}"),
-    };
+    let refused =
+        |gamma, alpha, temperature| match OnlineLearning::new(gamma, alpha, temperature, 0) {
+            Err(BehaviourError::Learning { quantity, .. }) => quantity,
+            other => panic!("{other:?}"),
+        };
     for bad in [1.0, 1.5, -0.1, nan, infinite] {
         assert_eq!(refused(bad, alpha, temperature), "gamma", "{bad}");
     }
@@ -97,7 +98,10 @@ fn settings_by_which_nothing_can_be_learned_are_refused_by_name() {
 fn settings_from_a_file_are_tested_like_others() {
     let careful = OnlineLearning::careful(3);
     let json = serde_json::to_string(&careful).unwrap();
-    assert_eq!(serde_json::from_str::<OnlineLearning>(&json).unwrap(), careful);
+    assert_eq!(
+        serde_json::from_str::<OnlineLearning>(&json).unwrap(),
+        careful
+    );
     let refused = serde_json::from_str::<OnlineLearning>(&json.replace("0.9", "1.0")).unwrap_err();
     assert!(refused.to_string().contains("gamma"), "{refused}");
 }

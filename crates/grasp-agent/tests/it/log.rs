@@ -2,8 +2,8 @@
 
 use grasp_agent::qtable::QTable;
 use grasp_agent::{
-    Agent, AgentError, BehaviourPair, CameraModel, Controller, EventKind, EventLog, Hybrid, HybridSettings,
-    ImageBased, JacobianAt, Learned, OnlineLearning, PositionBased, ServoSettings,
+    Agent, AgentError, BehaviourPair, CameraModel, Controller, EventKind, EventLog, Hybrid,
+    HybridSettings, ImageBased, JacobianAt, Learned, OnlineLearning, PositionBased, ServoSettings,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -95,7 +95,8 @@ fn logs_of_runs_that_failed_replay_to_the_same_failure() {
 
 #[test]
 fn a_failure_of_another_kind_is_another_run() {
-    let agent = Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let agent =
+        Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
     let log_of = |fault| {
         let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
         let mut log = EventLog::default();
@@ -151,8 +152,8 @@ fn another_controller_is_told_apart() {
 mod saved {
     use grasp_agent::qtable::{Action, QTable, State};
     use grasp_agent::{
-        Agent, AgentError, Behaviour, BehaviourPair, CameraModel, Controller, EventKind, EventLog, Hybrid,
-        HybridSettings, Learned, OnlineLearning, Replayed, SavedController, SavedRun,
+        Agent, AgentError, Behaviour, BehaviourPair, CameraModel, Controller, EventKind, EventLog,
+        Hybrid, HybridSettings, Learned, OnlineLearning, Replayed, SavedController, SavedRun,
     };
 
     use super::FAULTS;
@@ -206,7 +207,11 @@ mod saved {
         for fault in FAULTS.into_iter().chain(more) {
             let cell = || Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
             let mut agent = Agent::with_controller(config(), learned()).unwrap();
-            saved(&mut agent, SavedController::of_learned(&learned(), None), &cell());
+            saved(
+                &mut agent,
+                SavedController::of_learned(&learned(), None),
+                &cell(),
+            );
 
             // Learning, in the third run: what was learned in the first two is part of it.
             let mut agent = Agent::with_controller(config(), learned()).unwrap();
@@ -242,7 +247,8 @@ mod saved {
             [0.6, 0.1, -0.1],
             Fault::FrozenPicture(usize::MAX),
         );
-        let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+        let mut agent =
+            Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
         cell.run(&mut agent, &mut EventLog::default()).unwrap();
         let looks = cell.0.borrow().looks;
         cell.0.borrow_mut().fault = Fault::FrozenPicture(looks);
@@ -254,7 +260,11 @@ mod saved {
     fn another_course_is_told_with_the_event() {
         let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
         let mut agent = Agent::with_controller(config(), learned()).unwrap();
-        let text = saved(&mut agent, SavedController::of_learned(&learned(), None), &cell);
+        let text = saved(
+            &mut agent,
+            SavedController::of_learned(&learned(), None),
+            &cell,
+        );
         let differs = |text: &str| match SavedRun::from_json(text).unwrap().replay().unwrap() {
             Replayed::Differs { event, then, now } => (event, then, now),
             same => panic!("{same:?}"),
@@ -299,11 +309,19 @@ mod saved {
     fn text_that_is_no_saved_run_is_refused_with_the_reason() {
         let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
         let mut agent = Agent::with_controller(config(), learned()).unwrap();
-        let text = saved(&mut agent, SavedController::of_learned(&learned(), None), &cell);
+        let text = saved(
+            &mut agent,
+            SavedController::of_learned(&learned(), None),
+            &cell,
+        );
         let cases = [
             ("grasp-agent run 1", "grasp-agent run 9", "run 9"),
             ("\"looks\":2", "\"looks\":0", "looks is 0"),
-            ("\"lost_weight\":50", "\"lost_weight\":5", "lost_weight is 5"),
+            (
+                "\"lost_weight\":50",
+                "\"lost_weight\":5",
+                "lost_weight is 5",
+            ),
             ("\"camera\"", "\"kamera\"", "camera"),
             ("\"events\"", "\"evens\"", "events"),
         ];
@@ -328,7 +346,9 @@ mod saved {
         let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
         let mut log = EventLog::default();
         cell.run(&mut agent.clone(), &mut log).unwrap();
-        let mut scores = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().cycle();
+        let mut scores = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY]
+            .into_iter()
+            .cycle();
         for event in &log.events {
             let mut kind = event.kind.clone();
             if let EventKind::Seen(sighting) = &mut kind {
@@ -358,7 +378,8 @@ mod saved {
     fn a_hybrid_that_cannot_work_is_refused() {
         let hybrid = Hybrid::new(HybridSettings::paper()).frozen();
         let agent = Agent::with_controller(config(), hybrid).unwrap();
-        let text = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller())).to_json();
+        let text =
+            SavedRun::before(&agent, SavedController::of_hybrid(agent.controller())).to_json();
         let cases = [
             ("\"mean\":[0.0,", "\"mean\":[", "thirteen"),
             ("\"noise\":1.0", "\"noise\":0.0", "thirteen"),

@@ -1,4 +1,5 @@
-//! The agent on a small simulated cell of its own, made of the camera model and the arm's kinematics.
+//! The agent on a small simulated cell of its own, made of the camera model and the arm's
+//! kinematics.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod cell;

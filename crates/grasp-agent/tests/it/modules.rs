@@ -3,8 +3,8 @@
 use grasp_agent::hough_heuristic::Features;
 use grasp_agent::puma_val2::Joints;
 use grasp_agent::{
-    Agent, Arrival, CameraModel, EventKind, EventLog, GaveUp, Guard, JointLimits, LastLook, PositionBased,
-    Recovery, Search, ServoSettings, Situation, Supervision, Verdict, Viewpoint,
+    Agent, Arrival, CameraModel, EventKind, EventLog, GaveUp, Guard, JointLimits, LastLook,
+    PositionBased, Recovery, Search, ServoSettings, Situation, Supervision, Verdict, Viewpoint,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -140,10 +140,15 @@ fn a_supervision_of_ones_own_is_what_takes_moves_back() {
     let log = log_of(|number| number == 3);
     let near = words_from(&log, "too-near");
     assert_eq!(near[..3], ["too-near", "taken-back", "seen"], "{near:?}");
-    // Every move after the ball was found: three in a row, and a servo controller cannot aim; nor can it be searched for again.
+    // Every move after the ball was found: three in a row, and a servo controller cannot aim; nor
+    // can it be searched for again.
     let log = log_of(|number| number > 1);
     let cornered = words_from(&log, "cornered");
-    assert_eq!(cornered[..3], ["cornered", "seen", "searching"], "{cornered:?}");
+    assert_eq!(
+        cornered[..3],
+        ["cornered", "seen", "searching"],
+        "{cornered:?}"
+    );
     assert_eq!(
         log.events.last().unwrap().kind,
         EventKind::GaveUp(GaveUp::Obstructed)

@@ -1,15 +1,17 @@
-//! What is looked for in a frame: balls, eggs, and anything else that comes in through the same door.
+//! What is looked for in a frame: balls, eggs, and anything else that comes in through the same
+//! door.
 
 use std::collections::VecDeque;
 
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{
-    Canny, CannyConfig, Circle, CircleDetector, CurveSearch, CurveSearchConfig, Detection, Ellipse, Features,
-    FrameError, FrameSource, Heuristic, HeuristicConfig,
+    Canny, CannyConfig, Circle, CircleDetector, CurveSearch, CurveSearchConfig, Detection, Ellipse,
+    Features, FrameError, FrameSource, Heuristic, HeuristicConfig,
 };
 use grasp_agent::{BallFeatures, CameraEye, EggFeatures, EggLimits, Eye, ObjectFeatures, Sighting};
 
-/// A bright ellipse on a dark ground, its longer half-axis at `angle` radians from x; 768x576 pixels.
+/// A bright ellipse on a dark ground, its longer half-axis at `angle` radians from x; 768x576
+/// pixels.
 fn frame_with(ellipse: &Ellipse) -> GrayImage {
     let (sin, cos) = ellipse.angle.sin_cos();
     GrayImage::from_fn(768, 576, |x, y| {
@@ -62,7 +64,10 @@ fn an_egg_is_its_centre_and_its_shorter_half_axis_however_it_lies() {
             .max((f.y - 75.0).abs())
             .max((f.r - 15.0).abs());
         assert!(off < 0.5, "{angle}: {f:?}");
-        assert!((seen.detection.circle.radius - 60.0).abs() < 2.0, "{seen:?}");
+        assert!(
+            (seen.detection.circle.radius - 60.0).abs() < 2.0,
+            "{seen:?}"
+        );
         let outline = eggs.outline().unwrap();
         let turned = (outline.angle - angle).rem_euclid(std::f64::consts::PI);
         let turned = turned.min(std::f64::consts::PI - turned);
@@ -147,9 +152,13 @@ fn a_ball_is_found_by_a_detector_that_looks() {
         ..HeuristicConfig::default()
     };
     let mut detector = Heuristic::new(config, canny).unwrap();
-    let seen = BallFeatures::new(&mut detector).find(&frame_with(&ellipse(300.0, 200.0, 90.0, 90.0, 0.0)));
+    let seen =
+        BallFeatures::new(&mut detector).find(&frame_with(&ellipse(300.0, 200.0, 90.0, 90.0, 0.0)));
     let f = seen.unwrap().features;
-    let off = (f.x - 75.0).abs().max((f.y - 50.0).abs()).max((f.r - 22.5).abs());
+    let off = (f.x - 75.0)
+        .abs()
+        .max((f.y - 50.0).abs())
+        .max((f.r - 22.5).abs());
     assert!(off < 0.5, "{f:?}");
     for (width, height) in [(0, 0), (1, 1), (768, 576)] {
         let nothing = BallFeatures::new(&mut detector).find(&GrayImage::new(width, height));
@@ -171,7 +180,9 @@ struct Brightest;
 
 impl ObjectFeatures for Brightest {
     fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
-        let (x, y, _) = frame.enumerate_pixels().max_by_key(|(_, _, pixel)| pixel.0[0])?;
+        let (x, y, _) = frame
+            .enumerate_pixels()
+            .max_by_key(|(_, _, pixel)| pixel.0[0])?;
         let detection = circle(f64::from(x), f64::from(y), 1.0, 1.0);
         Some(Sighting {
             features: Features::from_circle(&detection.circle, frame.width()),

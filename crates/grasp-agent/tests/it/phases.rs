@@ -86,7 +86,10 @@ fn every_transition_is_one_of_the_diagram_and_in_the_log() {
         let (_, log, _) = end_of(fault);
         let phases = phases(&log);
         for pair in phases.windows(2) {
-            assert!(DIAGRAM.contains(&(pair[0], pair[1])), "{fault:?}: {phases:?}");
+            assert!(
+                DIAGRAM.contains(&(pair[0], pair[1])),
+                "{fault:?}: {phases:?}"
+            );
             seen.insert((pair[0], pair[1]));
         }
         assert_eq!(phases.last(), Some(&Phase::End), "{fault:?}");
@@ -95,12 +98,14 @@ fn every_transition_is_one_of_the_diagram_and_in_the_log() {
             1,
             "{fault:?}"
         );
-        // What is not in the log as a transition has not happened: every event is one of the phase that the log is in.
+        // What is not in the log as a transition has not happened: every event is one of the phase
+        // that the log is in.
         let mut phase = None;
         for event in &log.events {
             phase = event.kind.enters().or(phase);
-            let here =
-                phase.is_none_or(|phase| phase == Phase::End || belongs_to(&event.kind).contains(&phase));
+            let here = phase.is_none_or(|phase| {
+                phase == Phase::End || belongs_to(&event.kind).contains(&phase)
+            });
             assert!(here, "{fault:?}: {:?} in {phase:?}", event.kind);
         }
     }
@@ -109,13 +114,18 @@ fn every_transition_is_one_of_the_diagram_and_in_the_log() {
 
 #[test]
 fn going_for_the_ball_away_from_the_goal_and_coming_back_are_told() {
-    // Three moves have been taken back, not in a row: a servo controller cannot aim, and reaches on.
+    // Three moves have been taken back, not in a row: a servo controller cannot aim, and reaches
+    // on.
     let (_, log, _) = end_of(Fault::HaltedNear(20.0));
     let words = words_from(&log, "cornered");
     assert_eq!(words[..3], ["cornered", "seen", "reaching"], "{words:?}");
     // The hybrid can aim.
     let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.0, -0.1], Fault::HaltedNear(20.0));
+    let cell = Shared::new(
+        CameraModel::paper(),
+        [0.6, 0.0, -0.1],
+        Fault::HaltedNear(20.0),
+    );
     let mut log = EventLog::default();
     cell.run(&mut agent, &mut log).unwrap();
     assert!(
@@ -138,7 +148,10 @@ fn an_order_that_is_not_answered_is_in_the_log() {
     };
     for after in 0..5 {
         let kind = of(Fault::LineDead(after));
-        let order = matches!(kind, EventKind::Unanswered(Order::MoveTo(_) | Order::MoveBy(_)));
+        let order = matches!(
+            kind,
+            EventKind::Unanswered(Order::MoveTo(_) | Order::MoveBy(_))
+        );
         assert!(order, "{after}: {kind:?}");
     }
     assert_eq!(

@@ -3,8 +3,8 @@
 use grasp_agent::hough_heuristic::Features;
 use grasp_agent::puma_val2::Joints;
 use grasp_agent::{
-    Agent, CameraModel, Consequence, Controller, EventLog, Fuzzy, ImageBased, JacobianAt, JointLimits,
-    LookAhead, PositionBased, ServoSettings, Situation,
+    Agent, CameraModel, Consequence, Controller, EventLog, Fuzzy, ImageBased, JacobianAt,
+    JointLimits, LookAhead, PositionBased, ServoSettings, Situation,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -26,7 +26,11 @@ fn every_rival_reaches_the_ball_with_the_right_model() {
             let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
             let name = agent.controller().name();
             assert_eq!(outcome.gave_up, None, "{name} {ball:?}");
-            assert!(outcome.cycles <= most, "{name} {ball:?}: {}", outcome.cycles);
+            assert!(
+                outcome.cycles <= most,
+                "{name} {ball:?}: {}",
+                outcome.cycles
+            );
         }
     }
 }

@@ -3,8 +3,8 @@
 use grasp_agent::hough_heuristic::{Features, FrameError};
 use grasp_agent::puma_val2::{Joint, Joints};
 use grasp_agent::{
-    Agent, AgentError, CameraModel, EventKind, Eye, Hybrid, HybridSettings, JacobianAt, Look, Replayed,
-    SavedController, SavedRun, ServoSettings, TaughtGoal,
+    Agent, AgentError, CameraModel, EventKind, Eye, Hybrid, HybridSettings, JacobianAt, Look,
+    Replayed, SavedController, SavedRun, ServoSettings, TaughtGoal,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -30,7 +30,9 @@ fn run_by(controller: &SavedController) -> String {
     let mut saved = SavedRun::before(&agent, controller.clone());
     let (mut eye, mut arm, mut sensor) = (Oblong(cell.clone()), cell.clone(), cell.clone());
     let outcome = agent
-        .run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| saved.note(event))
+        .run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| {
+            saved.note(event)
+        })
         .unwrap();
     assert_eq!(outcome.gave_up, None, "{controller:?}");
     saved.to_json()
@@ -84,7 +86,10 @@ fn every_controller_comes_back_and_decides_the_same_moves() {
             read.log().events.iter().any(
                 |event| matches!(event.kind, EventKind::Gripping(delta) if delta[Joint::J6].abs() > 0.1),
             );
-        assert_eq!(turned, matches!(controller, SavedController::GripAcross { .. }));
+        assert_eq!(
+            turned,
+            matches!(controller, SavedController::GripAcross { .. })
+        );
         // Saved before there were these.
         let earlier = text
             .replace(",\"long_axis\":0.4", "")
@@ -111,7 +116,10 @@ fn another_setting_takes_another_course_and_one_that_cannot_work_is_refused() {
         };
         assert_ne!(other, text);
         let replayed = SavedRun::from_json(&other).unwrap().replay().unwrap();
-        assert!(matches!(replayed, Replayed::Differs { .. }), "{controller:?}");
+        assert!(
+            matches!(replayed, Replayed::Differs { .. }),
+            "{controller:?}"
+        );
         let none = text
             .replace("\"gain\":0.7", "\"gain\":0.0")
             .replace("\"drift\":0.2", "\"drift\":-1.0");

@@ -1,8 +1,8 @@
 //! Settings that are read by themselves are checked as those of an agent or a saved run are.
 
 use grasp_agent::{
-    AgentConfig, BehaviourPair, CameraModel, EggLimits, HybridSettings, JointLimits, Prior, ServoSettings,
-    StepLimits,
+    AgentConfig, BehaviourPair, CameraModel, EggLimits, HybridSettings, JointLimits, Prior,
+    ServoSettings, StepLimits,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 
 use crate::cell::config;
 
-/// `settings` come back as they were written, and are refused with the value at `place` exchanged, with these words.
+/// `settings` come back as they were written, and are refused with the value at `place` exchanged,
+/// with these words.
 fn refused<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
     settings: &T,
     place: &str,
@@ -18,10 +19,16 @@ fn refused<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
     said: &str,
 ) {
     let mut text = serde_json::to_value(settings).unwrap();
-    assert_eq!(serde_json::from_value::<T>(text.clone()).unwrap(), *settings);
+    assert_eq!(
+        serde_json::from_value::<T>(text.clone()).unwrap(),
+        *settings
+    );
     *text.pointer_mut(place).expect("a place in it") = value;
     let refused = serde_json::from_value::<T>(text).unwrap_err().to_string();
-    assert!(refused.contains(said), "{place}: {refused} does not say {said}");
+    assert!(
+        refused.contains(said),
+        "{place}: {refused} does not say {said}"
+    );
 }
 
 #[test]
@@ -29,7 +36,12 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     let hybrid = HybridSettings::paper();
     refused(&hybrid, "/drift", json!(-1.0), "drift is -1");
     refused(&hybrid, "/steps/1", json!(0.0), "longest step of JT2 is 0");
-    refused(&hybrid, "/goal/r", json!(-33.0), "radius of the goal is -33");
+    refused(
+        &hybrid,
+        "/goal/r",
+        json!(-33.0),
+        "radius of the goal is -33",
+    );
     refused(&hybrid, "/prior/turn", json!(0.0), "prior is 0");
     refused(&hybrid, "/nominal/focal", json!(0.0), "focal length is 0");
     refused(&Prior::by_eye(), "/play", json!(-0.1), "prior is -0.1");
@@ -41,7 +53,12 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         json!(0.0),
         "radius of the ball is 0",
     );
-    refused(&CameraModel::paper(), "/focal", json!(-1.0), "focal length is -1");
+    refused(
+        &CameraModel::paper(),
+        "/focal",
+        json!(-1.0),
+        "focal length is -1",
+    );
     refused(
         &StepLimits::paper(),
         "/0",
@@ -61,11 +78,26 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         json!(90.0),
         "goal of Y is from 90 to 82",
     );
-    refused(&config().approach, "/growth", json!(0.0), "approach.growth is 0");
+    refused(
+        &config().approach,
+        "/growth",
+        json!(0.0),
+        "approach.growth is 0",
+    );
     let BehaviourPair { centering, .. } = BehaviourPair::paper_mended();
     refused(&centering, "/inputs", json!(["X"]), "1 inputs");
-    refused(&centering.goal[0], "/low", json!(500.0), "goal of X is from 500");
-    refused(&centering.moves[0], "/degrees", json!([]), "JT1 has no steps");
+    refused(
+        &centering.goal[0],
+        "/low",
+        json!(500.0),
+        "goal of X is from 500",
+    );
+    refused(
+        &centering.moves[0],
+        "/degrees",
+        json!([]),
+        "JT1 has no steps",
+    );
     refused(
         &centering.reward,
         "/floor",
@@ -84,5 +116,8 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
 fn settings_that_were_saved_without_a_bound_on_the_search_have_the_usual_one() {
     let mut text = serde_json::to_value(config()).unwrap();
     text.as_object_mut().unwrap().remove("max_views").unwrap();
-    assert_eq!(serde_json::from_value::<AgentConfig>(text).unwrap(), config());
+    assert_eq!(
+        serde_json::from_value::<AgentConfig>(text).unwrap(),
+        config()
+    );
 }

@@ -4,12 +4,14 @@ use crate::{Circle, EdgePixel};
 impl Curve for Circle {
     const PARAMETERS: usize = 3;
 
-    /// The circle through three pixels; none if two are nearer than 3 px or the three lie in a line.
+    /// The circle through three pixels; none if two are nearer than 3 px or the three lie in a
+    /// line.
     fn through(pixels: &[EdgePixel]) -> Option<Self> {
         let &[a, b, c] = pixels else {
             return None;
         };
-        // Whole numbers as floats: exact in frames of up to 2^16 pixels a side, and no overflow in larger ones.
+        // Whole numbers as floats: exact in frames of up to 2^16 pixels a side, and no overflow in
+        // larger ones.
         let from_a = |pixel: EdgePixel| {
             (
                 f64::from(pixel.x) - f64::from(a.x),
@@ -33,17 +35,24 @@ impl Curve for Circle {
         })
     }
 
-    /// The rule is that of the midpoint circle, for a centre and radius that need not be whole numbers: in the two arcs
-    /// above and below the centre, out to 45 degrees, the pixel of each column that lies nearest to the curve; in the arcs
-    /// left and right of it the nearest pixel of each row. The pixels form a closed line of about 5.7 pixels per pixel of
-    /// radius.
+    /// The rule is that of the midpoint circle, for a centre and radius that need not be whole
+    /// numbers: in the two arcs above and below the centre, out to 45 degrees, the pixel of each
+    /// column that lies nearest to the curve; in the arcs left and right of it the nearest pixel of
+    /// each row. The pixels form a closed line of about 5.7 pixels per pixel of radius.
     fn outline(&self, _width: u32, _height: u32, mut visit: impl FnMut(i32, i32) -> bool) -> bool {
-        let &Circle { x: cx, y: cy, radius } = self;
+        let &Circle {
+            x: cx,
+            y: cy,
+            radius,
+        } = self;
         // Half a pixel beyond 45 degrees, so that the arcs meet.
         let diagonal = radius * std::f64::consts::FRAC_1_SQRT_2 + 0.5;
         // Half the chord of the column or row at this distance from the centre.
         let half_chord = |distance: f64| (radius * radius - distance * distance).max(0.0).sqrt();
-        let (first, last) = ((cx - diagonal).ceil() as i32, (cx + diagonal).floor() as i32);
+        let (first, last) = (
+            (cx - diagonal).ceil() as i32,
+            (cx + diagonal).floor() as i32,
+        );
         let column = |x: i32| {
             let rise = half_chord(f64::from(x) - cx);
             (round(cy - rise), round(cy + rise))
@@ -55,11 +64,14 @@ impl Curve for Circle {
             }
         }
         // Where the arcs meet, a column may already have the pixel of the row.
-        let seen = |x: i32, y: i32| (first..=last).contains(&x) && (column(x).0 == y || column(x).1 == y);
+        let seen =
+            |x: i32, y: i32| (first..=last).contains(&x) && (column(x).0 == y || column(x).1 == y);
         for y in (cy - diagonal).ceil() as i32..=(cy + diagonal).floor() as i32 {
             let run = half_chord(f64::from(y) - cy);
             let (left, right) = (round(cx - run), round(cx + run));
-            if !seen(left, y) && !visit(left, y) || left != right && !seen(right, y) && !visit(right, y) {
+            if !seen(left, y) && !visit(left, y)
+                || left != right && !seen(right, y) && !visit(right, y)
+            {
                 return false;
             }
         }
@@ -77,7 +89,8 @@ pub(crate) fn longest_outline(radius: f64) -> f64 {
     4.0 * std::f64::consts::SQRT_2 * radius + 8.0
 }
 
-/// The two circles of a known radius through two pixels; none if the pixels are nearer than 3 px or too far apart.
+/// The two circles of a known radius through two pixels; none if the pixels are nearer than 3 px or
+/// too far apart.
 pub(crate) fn circles_of_radius(pixels: [EdgePixel; 2], radius: f64) -> Option<[Circle; 2]> {
     let [a, b] = pixels.map(|pixel| (f64::from(pixel.x), f64::from(pixel.y)));
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
@@ -136,7 +149,8 @@ mod tests {
 
     #[test]
     fn pixels_however_far_apart_give_a_finite_circle_or_none() {
-        // The longest frames that there can be, and so flat that every circle through three of their pixels is huge.
+        // The longest frames that there can be, and so flat that every circle through three of
+        // their pixels is huge.
         let far = [at(0, 0), at(u32::MAX, 2), at(u32::MAX / 3, 1)];
         let circle = Circle::through(&far).unwrap();
         assert!(circle.x.is_finite() && circle.y.is_finite() && circle.radius.is_finite());

@@ -21,7 +21,10 @@ impl Ellipse {
     /// `A dx^2 + B dx dy + C dy^2 = 1` with the centre at the origin.
     fn quadratic(&self) -> (f64, f64, f64) {
         let (sin, cos) = self.angle.sin_cos();
-        let (u, v) = (1.0 / (self.major * self.major), 1.0 / (self.minor * self.minor));
+        let (u, v) = (
+            1.0 / (self.major * self.major),
+            1.0 / (self.minor * self.minor),
+        );
         (
             cos * cos * u + sin * sin * v,
             2.0 * cos * sin * (u - v),
@@ -33,15 +36,16 @@ impl Ellipse {
 impl Curve for Ellipse {
     const PARAMETERS: usize = 5;
 
-    /// The ellipse through five pixels; none if two are nearer than 3 px, or the conic through them is another one, or a
-    /// half-axis is below one pixel.
+    /// The ellipse through five pixels; none if two are nearer than 3 px, or the conic through them
+    /// is another one, or a half-axis is below one pixel.
     fn through(pixels: &[EdgePixel]) -> Option<Self> {
         if pixels.len() != Self::PARAMETERS || crowded(pixels) {
             return None;
         }
         // Relative to the mean and in units of the spread, for numbers of one size.
-        let mean =
-            |of: fn(&EdgePixel) -> u32| pixels.iter().map(|pixel| f64::from(of(pixel))).sum::<f64>() / 5.0;
+        let mean = |of: fn(&EdgePixel) -> u32| {
+            pixels.iter().map(|pixel| f64::from(of(pixel))).sum::<f64>() / 5.0
+        };
         let (mx, my) = (mean(|pixel| pixel.x), mean(|pixel| pixel.y));
         let points: [(f64, f64); 5] =
             std::array::from_fn(|k| (f64::from(pixels[k].x) - mx, f64::from(pixels[k].y) - my));
@@ -69,7 +73,10 @@ impl Curve for Ellipse {
             let square = scale / eigenvalue;
             (square.is_finite() && square > 0.0).then(|| spread * square.sqrt())
         };
-        let (one, two) = (half_axis(0.5 * (trace - root))?, half_axis(0.5 * (trace + root))?);
+        let (one, two) = (
+            half_axis(0.5 * (trace - root))?,
+            half_axis(0.5 * (trace + root))?,
+        );
         // The axis of the smaller eigenvalue in the sense of `scale` is the longer one.
         let along_one = 0.5 * (-b).atan2(c - a);
         let (major, minor, angle) = if one >= two {
@@ -86,15 +93,18 @@ impl Curve for Ellipse {
             minor,
             angle,
         };
-        (minor >= 1.0 && ellipse.x.is_finite() && ellipse.y.is_finite() && major < 1e6).then_some(ellipse)
+        (minor >= 1.0 && ellipse.x.is_finite() && ellipse.y.is_finite() && major < 1e6)
+            .then_some(ellipse)
     }
 
-    /// Where the curve is nearer to the horizontal the pixel of each column that lies nearest to it, elsewhere that of each
-    /// row.
+    /// Where the curve is nearer to the horizontal the pixel of each column that lies nearest to
+    /// it, elsewhere that of each row.
     fn outline(&self, _width: u32, _height: u32, mut visit: impl FnMut(i32, i32) -> bool) -> bool {
         let (a, b, c) = self.quadratic();
-        // Along a column at dx the curve has dy = (-b dx ± root) / 2c, and the slope there tells whose turn it is.
-        let flat_at = |dx: f64, dy: f64| (2.0 * a * dx + b * dy).abs() <= (b * dx + 2.0 * c * dy).abs();
+        // Along a column at dx the curve has dy = (-b dx ± root) / 2c, and the slope there tells
+        // whose turn it is.
+        let flat_at =
+            |dx: f64, dy: f64| (2.0 * a * dx + b * dy).abs() <= (b * dx + 2.0 * c * dy).abs();
         let crossings = |offset: f64, along: f64, across: f64| {
             let under = (b * offset).powi(2) - 4.0 * along * (across * offset * offset - 1.0);
             (under >= 0.0).then(|| {
@@ -107,10 +117,14 @@ impl Curve for Ellipse {
         };
         let column = |x: i32| {
             let dx = f64::from(x) - self.x;
-            crossings(dx, c, a).map(|both| both.map(|dy| flat_at(dx, dy).then(|| round(self.y + dy))))
+            crossings(dx, c, a)
+                .map(|both| both.map(|dy| flat_at(dx, dy).then(|| round(self.y + dy))))
         };
         let determinant = 4.0 * a * c - b * b;
-        let (reach_x, reach_y) = ((4.0 * c / determinant).sqrt(), (4.0 * a / determinant).sqrt());
+        let (reach_x, reach_y) = (
+            (4.0 * c / determinant).sqrt(),
+            (4.0 * a / determinant).sqrt(),
+        );
         for x in (self.x - reach_x).ceil() as i32..=(self.x + reach_x).floor() as i32 {
             let [above, below] = column(x).unwrap_or_default();
             for y in above.into_iter().chain(below.filter(|_| above != below)) {
@@ -150,10 +164,12 @@ impl Curve for Ellipse {
     }
 }
 
-/// Solves five linear equations, each given as coefficients and right-hand side; none if they are (nearly) dependent.
+/// Solves five linear equations, each given as coefficients and right-hand side; none if they are
+/// (nearly) dependent.
 fn solve(mut rows: [[f64; 6]; 5]) -> Option<[f64; 5]> {
     for column in 0..5 {
-        let pivot = (column..5).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))?;
+        let pivot =
+            (column..5).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))?;
         rows.swap(column, pivot);
         if rows[column][column].abs() < 1e-9 {
             return None;
@@ -257,7 +273,10 @@ mod tests {
                 "{ellipse:?}"
             );
             for &(x, y) in &pixels {
-                assert!(ellipse.distance(x.into(), y.into()) <= 0.8, "{ellipse:?} {x} {y}");
+                assert!(
+                    ellipse.distance(x.into(), y.into()) <= 0.8,
+                    "{ellipse:?} {x} {y}"
+                );
             }
         }
     }

@@ -3,7 +3,8 @@ use crate::EdgePixel;
 
 /// A straight line without ends, in Hesse's normal form `x cos φ + y sin φ = ρ`.
 ///
-/// Its outline is the part inside the frame, so that β is the share of the whole chord of the frame that is edge.
+/// Its outline is the part inside the frame, so that β is the share of the whole chord of the frame
+/// that is edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Line {
@@ -75,7 +76,8 @@ mod tests {
     #[test]
     fn the_outline_crosses_the_frame_once_per_column_or_row() {
         for (end, expected) in [((39, 20), 40), ((10, 29), 30)] {
-            let line = Line::through(&[EdgePixel { x: 0, y: 0 }, EdgePixel { x: end.0, y: end.1 }]).unwrap();
+            let line = Line::through(&[EdgePixel { x: 0, y: 0 }, EdgePixel { x: end.0, y: end.1 }])
+                .unwrap();
             let mut pixels = Vec::new();
             line.outline(40, 30, |x, y| {
                 pixels.push((x, y));

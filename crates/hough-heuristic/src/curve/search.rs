@@ -16,12 +16,13 @@ pub struct CurveSearchConfig {
     pub theta: f64,
     /// How many n-tuples are drawn at most (default 60000; at least 1).
     pub iterations: u32,
-    /// How far an edge pixel may lie from a pixel of the curve to match it, pixels (default 1; 0..=8).
+    /// How far an edge pixel may lie from a pixel of the curve to match it, pixels (default 1;
+    /// 0..=8).
     pub tolerance: f64,
     /// How many curves to look for (default 1; at least 1).
     pub max_curves: usize,
-    /// If given, all pixels of a draw lie within about this distance of the first along each axis, pixels (default none: they
-    /// come from anywhere; at least 1).
+    /// If given, all pixels of a draw lie within about this distance of the first along each axis,
+    /// pixels (default none: they come from anywhere; at least 1).
     pub reach: Option<f64>,
     /// The seed of the draws (default 1). They begin anew with every call.
     pub seed: u64,
@@ -54,11 +55,12 @@ pub struct FoundCurve<C> {
 ///
 /// 1. Set the offset θ and the number of iterations ([`CurveSearchConfig`]).
 /// 2. Create the structure `D` of all edge pixels.
-/// 3. Repeat until β exceeds θ: draw an n-tuple from `D`, compute the parameters of its curve, and count β.
+/// 3. Repeat until β exceeds θ: draw an n-tuple from `D`, compute the parameters of its curve, and
+///    count β.
 /// 4. If β > θ, the curve is there; else it is not present.
 ///
-/// For several curves, the edge pixels that the curve found explains are taken out of `D`, and steps 3 and 4 go on with what
-/// is left of the iterations.
+/// For several curves, the edge pixels that the curve found explains are taken out of `D`, and
+/// steps 3 and 4 go on with what is left of the iterations.
 ///
 /// ```
 /// use hough_heuristic::image::{GrayImage, Luma};
@@ -89,7 +91,9 @@ impl CurveSearch {
     /// # Errors
     /// [`ConfigError::OutOfRange`] for the first parameter outside its range.
     pub fn new(config: CurveSearchConfig) -> Result<Self, ConfigError> {
-        let CurveSearchConfig { theta, tolerance, .. } = config;
+        let CurveSearchConfig {
+            theta, tolerance, ..
+        } = config;
         require(
             "theta",
             theta,
@@ -128,11 +132,17 @@ impl CurveSearch {
         })
     }
 
-    /// The curves of an edge image for which `admits` is true, in the order in which they were found.
+    /// The curves of an edge image for which `admits` is true, in the order in which they were
+    /// found.
     ///
-    /// Checking a curve takes as long as its outline is, up to the length at which no image with so many edge pixels could give it
-    /// a β above θ. So let `admits` turn away those much larger than the image.
-    pub fn find<C: Curve>(&mut self, edges: &EdgeMap, admits: impl Fn(&C) -> bool) -> Vec<FoundCurve<C>> {
+    /// Checking a curve takes as long as its outline is, up to the length at which no image with so
+    /// many edge pixels could give it a β above θ. So let `admits` turn away those much larger than
+    /// the image.
+    pub fn find<C: Curve>(
+        &mut self,
+        edges: &EdgeMap,
+        admits: impl Fn(&C) -> bool,
+    ) -> Vec<FoundCurve<C>> {
         let (width, height) = (edges.width(), edges.height());
         self.structure.fill(width, height, edges.pixels());
         self.near.fill(width, height, edges.pixels());
@@ -167,14 +177,21 @@ impl CurveSearch {
     }
 
     /// Draws `count` pixels; false if there are not so many left.
-    fn draw(&self, count: usize, rng: &mut Xoshiro256PlusPlus, pixels: &mut Vec<EdgePixel>) -> bool {
+    fn draw(
+        &self,
+        count: usize,
+        rng: &mut Xoshiro256PlusPlus,
+        pixels: &mut Vec<EdgePixel>,
+    ) -> bool {
         pixels.clear();
         if self.structure.entries().len() < count {
             return false;
         }
         while pixels.len() < count {
             match (self.config.reach, pixels.first()) {
-                (Some(reach), Some(&first)) => pixels.push(self.structure.draw_around(first, reach, rng)),
+                (Some(reach), Some(&first)) => {
+                    pixels.push(self.structure.draw_around(first, reach, rng))
+                }
                 _ => pixels.extend(self.structure.draw_anywhere::<1>(rng).into_iter().flatten()),
             }
         }

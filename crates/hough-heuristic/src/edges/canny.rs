@@ -16,24 +16,27 @@ const LOW_FLOOR: f32 = 0.6;
 
 /// The settings of [`Canny`].
 ///
-/// Thresholds are in grey levels of the Sobel gradient's length, `sqrt(gx^2 + gy^2)` with the 3x3 kernels that sum to 8
-/// times the slope per pixel; the largest possible value is about 1140. A step of `c` grey levels, smoothed by the
-/// default `sigma`, gives about `2.3 c`.
+/// Thresholds are in grey levels of the Sobel gradient's length, `sqrt(gx^2 + gy^2)` with the 3x3
+/// kernels that sum to 8 times the slope per pixel; the largest possible value is about 1140. A
+/// step of `c` grey levels, smoothed by the default `sigma`, gives about `2.3 c`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct CannyConfig {
-    /// A pixel this strong continues an edge (default 30; 0 < low <= high). Lower: longer edges, and more of them from
-    /// texture.
+    /// A pixel this strong continues an edge (default 30; 0 < low <= high). Lower: longer edges,
+    /// and more of them from texture.
     pub low: f32,
-    /// A pixel this strong starts an edge (default 70; low..=1141). Lower: fainter balls are seen, and more clutter.
+    /// A pixel this strong starts an edge (default 70; low..=1141). Lower: fainter balls are seen,
+    /// and more clutter.
     pub high: f32,
-    /// Deviation of the Gaussian that smooths the frame, pixels (default 1.2; 0..=2, and 0 does not smooth). Larger: less
-    /// noise, and corners and small circles rounded off. The kernel is cut off after 2 px up to 1.25, 3 px up to 1.6, else 4 px.
+    /// Deviation of the Gaussian that smooths the frame, pixels (default 1.2; 0..=2, and 0 does not
+    /// smooth). Larger: less noise, and corners and small circles rounded off. The kernel is cut
+    /// off after 2 px up to 1.25, 3 px up to 1.6, else 4 px.
     pub sigma: f32,
-    /// Raises the thresholds in noisy frames: `high` to at least this many times the deviation that the frame's noise gives
-    /// to each part of the gradient, `low` to at least 0.6 of that (default 5; 0..=20, and 0 leaves the thresholds as they
-    /// are). At 5 noise alone starts about one edge per frame of 768x576, at 4 a hundred.
+    /// Raises the thresholds in noisy frames: `high` to at least this many times the deviation that
+    /// the frame's noise gives to each part of the gradient, `low` to at least 0.6 of that (default
+    /// 5; 0..=20, and 0 leaves the thresholds as they are). At 5 noise alone starts about one edge
+    /// per frame of 768x576, at 4 a hundred.
     pub noise_factor: f32,
 }
 
@@ -50,9 +53,9 @@ impl Default for CannyConfig {
 
 /// Canny's edge operator: smooth, differentiate, thin, and keep what is connected to a strong edge.
 ///
-/// All passes run together over a few rows at a time, in integers, so that the result is the same on every machine. Each
-/// edge pixel keeps its gradient, and from that its position to a fraction of a pixel ([`EdgeMap::position`]). The
-/// outermost row and column of a frame hold no edges.
+/// All passes run together over a few rows at a time, in integers, so that the result is the same
+/// on every machine. Each edge pixel keeps its gradient, and from that its position to a fraction
+/// of a pixel ([`EdgeMap::position`]). The outermost row and column of a frame hold no edges.
 #[derive(Clone, Debug)]
 pub struct Canny {
     config: CannyConfig,
@@ -71,14 +74,21 @@ impl Canny {
     /// An operator with these settings.
     ///
     /// # Errors
-    /// [`ConfigError::Thresholds`] unless `0 < low <= high`, [`ConfigError::OutOfRange`] for anything else outside its
-    /// range.
+    /// [`ConfigError::Thresholds`] unless `0 < low <= high`, [`ConfigError::OutOfRange`] for
+    /// anything else outside its range.
     pub fn new(config: CannyConfig) -> Result<Self, ConfigError> {
         check_thresholds(config.low, config.high)?;
         let CannyConfig {
-            sigma, noise_factor, ..
+            sigma,
+            noise_factor,
+            ..
         } = config;
-        require("sigma", sigma.into(), "0..=2 px", (0.0..=2.0).contains(&sigma))?;
+        require(
+            "sigma",
+            sigma.into(),
+            "0..=2 px",
+            (0.0..=2.0).contains(&sigma),
+        )?;
         require(
             "noise_factor",
             noise_factor.into(),
@@ -106,8 +116,8 @@ impl Canny {
         }
     }
 
-    /// The thresholds `(low, high)` of the last frame, in the units of [`CannyConfig`], as its noise raised them; before
-    /// the first frame those of the configuration.
+    /// The thresholds `(low, high)` of the last frame, in the units of [`CannyConfig`], as its
+    /// noise raised them; before the first frame those of the configuration.
     pub fn thresholds(&self) -> (f32, f32) {
         self.thresholds
     }
@@ -164,23 +174,26 @@ impl EdgeDetector for Canny {
             ..
         } = self;
         candidates.clear();
-        self.edges.repaint(width, height, |image, pixels, gradients| {
-            dispatch::candidates(passes, grey, columns, rows, image, candidates);
-            // At most all of them are open; so the shape of the edges does not decide whether memory is asked for.
-            open.reserve(candidates.len());
-            pixels.reserve(candidates.len());
-            gradients.reserve(candidates.len());
-            follow(image, columns, candidates, open);
-            for candidate in candidates {
-                let kept = &mut image[candidate.pixel.y as usize * columns + candidate.pixel.x as usize];
-                if *kept == EDGE {
-                    pixels.push(candidate.pixel);
-                    gradients.push(candidate.gradient);
-                } else {
-                    *kept = 0;
+        self.edges
+            .repaint(width, height, |image, pixels, gradients| {
+                dispatch::candidates(passes, grey, columns, rows, image, candidates);
+                // At most all of them are open; so the shape of the edges does not decide whether
+                // memory is asked for.
+                open.reserve(candidates.len());
+                pixels.reserve(candidates.len());
+                gradients.reserve(candidates.len());
+                follow(image, columns, candidates, open);
+                for candidate in candidates {
+                    let kept = &mut image
+                        [candidate.pixel.y as usize * columns + candidate.pixel.x as usize];
+                    if *kept == EDGE {
+                        pixels.push(candidate.pixel);
+                        gradients.push(candidate.gradient);
+                    } else {
+                        *kept = 0;
+                    }
                 }
-            }
-        });
+            });
         &self.edges
     }
 
@@ -191,7 +204,8 @@ impl EdgeDetector for Canny {
 
 const EDGE: u8 = 255;
 
-/// Hysteresis: marks as edges the strong candidates and the weak ones that touch an edge, also by a corner.
+/// Hysteresis: marks as edges the strong candidates and the weak ones that touch an edge, also by a
+/// corner.
 fn follow(image: &mut [u8], width: usize, candidates: &[Candidate], open: &mut Vec<u32>) {
     for candidate in candidates {
         let seed = candidate.pixel.y as usize * width + candidate.pixel.x as usize;
@@ -201,7 +215,11 @@ fn follow(image: &mut [u8], width: usize, candidates: &[Candidate], open: &mut V
         }
         while let Some(index) = open.pop() {
             // Candidates never lie on the border. A strong neighbour has its own turn as a seed.
-            for centre in [index as usize - width, index as usize, index as usize + width] {
+            for centre in [
+                index as usize - width,
+                index as usize,
+                index as usize + width,
+            ] {
                 for (pixel, mark) in (centre - 1..).zip(&mut image[centre - 1..=centre + 1]) {
                     if *mark == WEAK {
                         *mark = EDGE;
@@ -224,7 +242,8 @@ pub(super) fn check_thresholds(low: f32, high: f32) -> Result<(), ConfigError> {
     require("high", high.into(), "at most 1141", high <= MAX_THRESHOLD)
 }
 
-/// Half of a sampled Gaussian in whole numbers; with the mirrored half they sum up to exactly [`WEIGHT_SUM`].
+/// Half of a sampled Gaussian in whole numbers; with the mirrored half they sum up to exactly
+/// [`WEIGHT_SUM`].
 pub(super) fn smoothing_weights(sigma: f32) -> Vec<u16> {
     let reach = match sigma {
         0.0 => 0,
@@ -241,7 +260,8 @@ pub(super) fn smoothing_weights(sigma: f32) -> Vec<u16> {
         .map(|weight| (weight / sum * f32::from(WEIGHT_SUM)).round() as u16)
         .collect();
     if let Some(first) = weights.get_mut(1) {
-        // Rounding changes how much is smoothed by some per cent; weight moved from the centre to its neighbours mends that.
+        // Rounding changes how much is smoothed by some per cent; weight moved from the centre to
+        // its neighbours mends that.
         let variance = |weight: &dyn Fn(usize) -> f32| -> f32 {
             (1..=reach).map(|k| 2.0 * (k * k) as f32 * weight(k)).sum()
         };
@@ -322,7 +342,8 @@ mod tests {
                 WEIGHT_SUM,
                 "{sigma}"
             );
-            let outer = |k: usize| 2.0 * (k * k) as f32 * f32::from(weights[k]) / f32::from(WEIGHT_SUM);
+            let outer =
+                |k: usize| 2.0 * (k * k) as f32 * f32::from(weights[k]) / f32::from(WEIGHT_SUM);
             let deviation = (1..weights.len()).map(outer).sum::<f32>().sqrt();
             // The cut-off takes some of it.
             assert!(
@@ -357,15 +378,19 @@ mod tests {
 
     /// Frames with flat parts, steps and texture, of sizes around the block size.
     fn frames() -> impl Strategy<Value = GrayImage> {
-        (3u32..80, 3u32..40, any::<u64>(), 1u8..=255).prop_map(|(width, height, seed, roughness)| {
-            let mut state = seed | 1;
-            GrayImage::from_fn(width, height, |x, y| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                let texture = (state >> 56) as u8 % roughness;
-                let step = if (x + y) % 37 < 18 { 90 } else { 0 };
-                image::Luma([texture.saturating_add(step)])
-            })
-        })
+        (3u32..80, 3u32..40, any::<u64>(), 1u8..=255).prop_map(
+            |(width, height, seed, roughness)| {
+                let mut state = seed | 1;
+                GrayImage::from_fn(width, height, |x, y| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    let texture = (state >> 56) as u8 % roughness;
+                    let step = if (x + y) % 37 < 18 { 90 } else { 0 };
+                    image::Luma([texture.saturating_add(step)])
+                })
+            },
+        )
     }
 
     proptest! {
@@ -448,7 +473,9 @@ mod tests {
             // The sum of twelve uniform numbers is close to normal, with deviation 1.
             (0..12)
                 .map(|_| {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
                     (state >> 40) as f32 / (1u64 << 24) as f32 - 0.5
                 })
                 .sum::<f32>()

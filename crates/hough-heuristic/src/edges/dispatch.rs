@@ -1,13 +1,13 @@
 //! Chooses the widest vectors that the machine has.
 //!
-//! The one place of the crate with `unsafe` code: a function compiled for AVX2 may only be called where AVX2 is there, which
-//! the compiler cannot know and the call below makes sure of.
+//! The one place of the crate with `unsafe` code: a function compiled for AVX2 may only be called
+//! where AVX2 is there, which the compiler cannot know and the call below makes sure of.
 #![allow(unsafe_code)]
 
 use super::rows::{self, Candidate, Passes, Rows};
 
-/// Work that is worth compiling for wider vectors: whatever [`run`](Vectorized::run) and the functions inlined into it do
-/// (`#[inline(always)]` on both). [`widest`] does it.
+/// Work that is worth compiling for wider vectors: whatever [`run`](Vectorized::run) and the
+/// functions inlined into it do (`#[inline(always)]` on both). [`widest`] does it.
 pub trait Vectorized {
     /// What it gives.
     type Output;
@@ -16,8 +16,8 @@ pub trait Vectorized {
     fn run(self) -> Self::Output;
 }
 
-/// Does `work` by the fastest code for this machine: with AVX2 where the processor has it. There are no fused multiplications, so the result
-/// is always the same.
+/// Does `work` by the fastest code for this machine: with AVX2 where the processor has it. There
+/// are no fused multiplications, so the result is always the same.
 ///
 /// ```
 /// use hough_heuristic::{Vectorized, widest};

@@ -7,7 +7,8 @@ use super::rows::UNITS;
 pub struct EdgeGradient {
     x: i16,
     y: i16,
-    /// Squared length at the neighbour before, here, and at the neighbour behind, along the gradient's sector.
+    /// Squared length at the neighbour before, here, and at the neighbour behind, along the
+    /// gradient's sector.
     squares: [i32; 3],
 }
 
@@ -16,7 +17,8 @@ impl EdgeGradient {
         Self { x, y, squares }
     }
 
-    /// The gradient, from dark to bright, in the units of [`CannyConfig::low`](crate::CannyConfig::low).
+    /// The gradient, from dark to bright, in the units of
+    /// [`CannyConfig::low`](crate::CannyConfig::low).
     pub fn vector(&self) -> (f64, f64) {
         (
             f64::from(self.x) / f64::from(UNITS),
@@ -29,9 +31,11 @@ impl EdgeGradient {
         f64::from(self.squares[1]).sqrt() / f64::from(UNITS)
     }
 
-    /// From the centre of the pixel to where the gradient is steepest, pixels; each part is within half a pixel.
+    /// From the centre of the pixel to where the gradient is steepest, pixels; each part is within
+    /// half a pixel.
     ///
-    /// The top of the parabola through the gradient's length here and at the two neighbours across the edge.
+    /// The top of the parabola through the gradient's length here and at the two neighbours across
+    /// the edge.
     pub fn offset(&self) -> (f64, f64) {
         let [before, here, behind] = self.squares.map(|square| f64::from(square).sqrt());
         let bend = 2.0 * here - before - behind;
@@ -83,7 +87,8 @@ impl<const N: usize> Geometry<N> {
             gradients.map(|gradient| i32::from(gradient.x)),
             gradients.map(|gradient| i32::from(gradient.y)),
         );
-        let lengths = |index: usize| gradients.map(|gradient| (gradient.squares[index] as f32).sqrt());
+        let lengths =
+            |index: usize| gradients.map(|gradient| (gradient.squares[index] as f32).sqrt());
         let (before, here, behind) = (lengths(0), lengths(1), lengths(2));
         let (mut dx, mut dy) = ([0.0; N], [0.0; N]);
         for i in 0..N {
@@ -128,7 +133,8 @@ mod tests {
             for (i, gradient) in gradients.iter().enumerate() {
                 let ((x, y), (dx, dy)) = (gradient.vector(), gradient.offset());
                 prop_assert_eq!((geometry.x[i], geometry.y[i]), ((16.0 * x) as f32, (16.0 * y) as f32));
-                // Where the three lengths are nearly on a line single precision places the top of the parabola anywhere.
+                // Where the three lengths are nearly on a line single precision places the top of
+                // the parabola anywhere.
                 let [before, here, behind] = gradient.squares.map(|square| f64::from(square).sqrt());
                 if (2.0 * here - before - behind).abs() > 1e-3 * here {
                     let off = (f64::from(geometry.dx[i]) - dx).abs() + (f64::from(geometry.dy[i]) - dy).abs();

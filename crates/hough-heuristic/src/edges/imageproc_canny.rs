@@ -6,9 +6,11 @@ use super::canny::check_thresholds;
 use super::{EdgeDetector, EdgeMap};
 use crate::ConfigError;
 
-/// Canny's operator of the crate `imageproc`: an independent second opinion, some thirty times as slow as [`Canny`].
+/// Canny's operator of the crate `imageproc`: an independent second opinion, some thirty times as
+/// slow as [`Canny`].
 ///
-/// Smooths with a Gaussian of 1.4 px. Allocates its planes anew for every frame, and knows no gradients.
+/// Smooths with a Gaussian of 1.4 px. Allocates its planes anew for every frame, and knows no
+/// gradients.
 ///
 /// [`Canny`]: crate::Canny
 #[derive(Clone, Debug)]
@@ -22,7 +24,8 @@ impl ImageprocCanny {
     /// An operator with these thresholds, in the units of [`CannyConfig`](crate::CannyConfig).
     ///
     /// # Errors
-    /// [`ConfigError::Thresholds`] unless `0 < low <= high`, [`ConfigError::OutOfRange`] for a `high` above 1141.
+    /// [`ConfigError::Thresholds`] unless `0 < low <= high`, [`ConfigError::OutOfRange`] for a
+    /// `high` above 1141.
     pub fn new(low: f32, high: f32) -> Result<Self, ConfigError> {
         check_thresholds(low, high)?;
         Ok(Self {

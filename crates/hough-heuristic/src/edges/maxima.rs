@@ -1,4 +1,5 @@
-//! The maxima of the gradient across edges, without hysteresis: what a detector wants that looks for order itself.
+//! The maxima of the gradient across edges, without hysteresis: what a detector wants that looks
+//! for order itself.
 
 use super::canny::{noise_gain, smoothing_weights};
 use super::dispatch;
@@ -40,9 +41,15 @@ impl Maxima {
         self.noise_gain
     }
 
-    /// The maxima above `threshold`, in grey levels of Sobel's gradient, row by row, and of more than `most` only the strongest; none in a
-    /// frame below 3x3.
-    pub(crate) fn find(&mut self, grey: &[u8], width: usize, threshold: f32, most: usize) -> &[Candidate] {
+    /// The maxima above `threshold`, in grey levels of Sobel's gradient, row by row, and of more
+    /// than `most` only the strongest; none in a frame below 3x3.
+    pub(crate) fn find(
+        &mut self,
+        grey: &[u8],
+        width: usize,
+        threshold: f32,
+        most: usize,
+    ) -> &[Candidate] {
         self.candidates.clear();
         let height = grey.len().checked_div(width).unwrap_or(0);
         if width >= 3 && height >= 3 {
@@ -101,7 +108,8 @@ const LEAST_ROWS: usize = 4;
 
 #[cfg(feature = "parallel")]
 impl Maxima {
-    /// Finds the candidates of large frames, a strip of rows on each thread; false if the frame is too small for that.
+    /// Finds the candidates of large frames, a strip of rows on each thread; false if the frame is
+    /// too small for that.
     fn find_in_strips(&mut self, grey: &[u8], width: usize) -> bool {
         use rayon::prelude::*;
 
@@ -112,24 +120,31 @@ impl Maxima {
         if count < 2 {
             return false;
         }
-        // A row's candidates depend on so many rows on either side: one for the maxima, one for Sobel's kernel, and the smoothing.
+        // A row's candidates depend on so many rows on either side: one for the maxima, one for
+        // Sobel's kernel, and the smoothing.
         let around = self.passes.weights.len() + 1;
         let passes = &self.passes;
         self.strips
             .resize_with(count.max(self.strips.len()), Strip::default);
         let strips = &mut self.strips[..count];
-        strips.par_iter_mut().enumerate().for_each(|(index, strip)| {
-            let own = index * height / count..(index + 1) * height / count;
-            let (first, end) = (own.start.saturating_sub(around), (own.end + around).min(height));
-            let part = &grey[first * width..end * width];
-            let Strip { rows, candidates } = strip;
-            candidates.clear();
-            dispatch::candidates(passes, part, width, rows, &mut [], candidates);
-            candidates.retain_mut(|candidate| {
-                candidate.pixel.y += first as u32;
-                own.contains(&(candidate.pixel.y as usize))
+        strips
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(index, strip)| {
+                let own = index * height / count..(index + 1) * height / count;
+                let (first, end) = (
+                    own.start.saturating_sub(around),
+                    (own.end + around).min(height),
+                );
+                let part = &grey[first * width..end * width];
+                let Strip { rows, candidates } = strip;
+                candidates.clear();
+                dispatch::candidates(passes, part, width, rows, &mut [], candidates);
+                candidates.retain_mut(|candidate| {
+                    candidate.pixel.y += first as u32;
+                    own.contains(&(candidate.pixel.y as usize))
+                });
             });
-        });
         for strip in strips {
             self.candidates.extend_from_slice(&strip.candidates);
         }

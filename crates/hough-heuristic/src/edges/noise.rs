@@ -2,18 +2,21 @@
 
 /// Every how many rows a row is usually looked at.
 pub(crate) const ROW_STEP: usize = 12;
-/// Every how many columns a pixel is looked at; odd, so that no two-pixel pattern is met in one phase only.
+/// Every how many columns a pixel is looked at; odd, so that no two-pixel pattern is met in one
+/// phase only.
 const COLUMN_STEP: usize = 3;
 /// Columns that are worked on together, a multiple of the step.
 const BLOCK: usize = 96;
 /// Responses reach 8 * 255.
 const BINS: usize = 2048;
 
-/// The standard deviation of the noise, grey levels, from every `row_step`-th row: 0 for frames smaller than 3x3.
+/// The standard deviation of the noise, grey levels, from every `row_step`-th row: 0 for frames
+/// smaller than 3x3.
 ///
-/// The median of the absolute response of the mask `1 -2 1; -2 4 -2; 1 -2 1`, which planes and straight edges along the axes do not
-/// move and noise of deviation σ gives the deviation 6 σ (Immerkær, 1996). The median leaves corners and texture out of account as long as
-/// they cover less than about a third of the frame; where they cover more, they count as noise.
+/// The median of the absolute response of the mask `1 -2 1; -2 4 -2; 1 -2 1`, which planes and
+/// straight edges along the axes do not move and noise of deviation σ gives the deviation 6 σ
+/// (Immerkær, 1996). The median leaves corners and texture out of account as long as they cover
+/// less than about a third of the frame; where they cover more, they count as noise.
 pub(crate) fn noise_deviation(grey: &[u8], width: usize, row_step: usize) -> f32 {
     let height = grey.len().checked_div(width).unwrap_or(0);
     if width < 3 || height < 3 {
@@ -42,7 +45,8 @@ pub(crate) fn noise_deviation(grey: &[u8], width: usize, row_step: usize) -> f32
             x += BLOCK;
         }
         for x in (x..width - 1).step_by(COLUMN_STEP) {
-            let three = |row: &[u8]| i32::from(row[x - 1]) - 2 * i32::from(row[x]) + i32::from(row[x + 1]);
+            let three =
+                |row: &[u8]| i32::from(row[x - 1]) - 2 * i32::from(row[x]) + i32::from(row[x + 1]);
             let response = three(a) - 2 * three(b) + three(c);
             histogram[response.unsigned_abs() as usize] += 1;
             samples += 1;

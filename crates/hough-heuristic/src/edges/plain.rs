@@ -1,4 +1,5 @@
-//! Canny's passes as plainly as they can be written: whole planes, one pixel at a time. What the fused rows must equal.
+//! Canny's passes as plainly as they can be written: whole planes, one pixel at a time. What the
+//! fused rows must equal.
 
 use super::rows::{Passes, STRONG, WEAK};
 
@@ -36,7 +37,9 @@ pub(super) fn maxima(passes: &Passes, grey: &[u8], width: usize) -> Vec<Maximum>
         (sum + 8) >> 4
     });
     let smooth = plane(&|x, y| {
-        let sum: i32 = (-reach..=reach).map(|k| weight(k) * down[at(x + k, y)]).sum();
+        let sum: i32 = (-reach..=reach)
+            .map(|k| weight(k) * down[at(x + k, y)])
+            .sum();
         (sum + 8) >> 4
     });
     let s = |x, y| smooth[at(x, y)];

@@ -1,8 +1,9 @@
 //! The fused passes of Canny's operator over one row after another.
 //!
-//! Everything is integer arithmetic on short rows that stay in the nearest cache, written as plain loops over slices of one
-//! length, which the compiler turns into vector code. The same source is compiled for the baseline of the target and, in
-//! `dispatch`, for wider vectors; the results are the same by construction, and a test compares both with a plain version.
+//! Everything is integer arithmetic on short rows that stay in the nearest cache, written as plain
+//! loops over slices of one length, which the compiler turns into vector code. The same source is
+//! compiled for the baseline of the target and, in `dispatch`, for wider vectors; the results are
+//! the same by construction, and a test compares both with a plain version.
 
 use super::{EdgeGradient, EdgePixel};
 
@@ -30,7 +31,8 @@ pub(super) struct Passes {
 /// The rows in work, reused from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
-    /// One row smoothed along the columns, in quarters of a grey level, `reach` pixels wider at either end.
+    /// One row smoothed along the columns, in quarters of a grey level, `reach` pixels wider at
+    /// either end.
     across: Vec<u16>,
     /// Three smoothed rows, in units, a pixel wider at either end.
     smooth: [Vec<i16>; 3],
@@ -59,7 +61,8 @@ pub(super) const WEAK: u8 = 1;
 /// See [`WEAK`].
 pub(super) const STRONG: u8 = 2;
 
-/// Lists the candidates of a frame of at least 3x3 pixels row by row, and marks them in `marks`, which has the frame's size or is empty.
+/// Lists the candidates of a frame of at least 3x3 pixels row by row, and marks them in `marks`,
+/// which has the frame's size or is empty.
 #[inline(always)]
 pub(super) fn candidates(
     passes: &Passes,
@@ -85,7 +88,9 @@ pub(super) fn candidates(
         }
         if y >= 3 {
             let row = y - 2;
-            let marks = marks.get_mut(row * width..(row + 1) * width).unwrap_or_default();
+            let marks = marks
+                .get_mut(row * width..(row + 1) * width)
+                .unwrap_or_default();
             maxima(passes, &mut rows.gradient, (row, width), marks, found);
         }
     }
@@ -96,7 +101,8 @@ pub(super) fn candidates(
 }
 
 impl Rows {
-    /// Makes room for rows of `width` pixels. What an earlier frame left beyond them is never looked at in a way that shows.
+    /// Makes room for rows of `width` pixels. What an earlier frame left beyond them is never
+    /// looked at in a way that shows.
     fn resize(&mut self, width: usize, reach: usize) {
         // The maxima of a block are sought a pixel farther to the right, and need a pixel beyond.
         let blocks = (width - 2).div_ceil(BLOCK) + 1;
@@ -125,7 +131,8 @@ impl Rows {
     }
 }
 
-/// Smooths row `y`, down the columns and then along the row; pixels beyond the border repeat the border's.
+/// Smooths row `y`, down the columns and then along the row; pixels beyond the border repeat the
+/// border's.
 #[inline(always)]
 fn smooth<const REACH: usize>(
     passes: &Passes,
@@ -155,7 +162,8 @@ fn smooth<const REACH: usize>(
     let (first, end) = (across[REACH], across[REACH + width - 1]);
     across[..REACH].fill(first);
     across[REACH + width..].fill(end);
-    let taps: [&[u16]; MAX_REACH * 2 + 1] = std::array::from_fn(|k| &across[k.min(2 * REACH)..][..width]);
+    let taps: [&[u16]; MAX_REACH * 2 + 1] =
+        std::array::from_fn(|k| &across[k.min(2 * REACH)..][..width]);
     let inner = &mut out[1..=width];
     for x in 0..width {
         let mut sum = taps[REACH][x] * weights[0];
@@ -226,7 +234,8 @@ impl GradientRow {
     }
 }
 
-/// Marks the pixels of a row whose gradient is above the low threshold and a maximum across the edge.
+/// Marks the pixels of a row whose gradient is above the low threshold and a maximum across the
+/// edge.
 #[inline(always)]
 fn maxima(
     passes: &Passes,
@@ -252,7 +261,8 @@ fn maxima(
     }
 }
 
-/// [`maxima`] for a block of pixels: first all marks without a branch, then the list of the few that are set.
+/// [`maxima`] for a block of pixels: first all marks without a branch, then the list of the few
+/// that are set.
 #[inline(always)]
 fn block_maxima(
     passes: &Passes,
@@ -327,7 +337,8 @@ fn block_maxima(
     }
 }
 
-/// The block of a row that begins at `x`, as an array: its fixed length is what makes the loops below vector code.
+/// The block of a row that begins at `x`, as an array: its fixed length is what makes the loops
+/// below vector code.
 #[inline(always)]
 fn block<T>(row: &[T], x: usize) -> &[T; BLOCK] {
     &row[x..x + BLOCK].as_chunks().0[0]
@@ -339,7 +350,8 @@ fn mask(condition: bool) -> i32 {
     -i32::from(condition)
 }
 
-/// Whether a direction with these absolute components lies within 22.5 degrees of the axis of `along`.
+/// Whether a direction with these absolute components lies within 22.5 degrees of the axis of
+/// `along`.
 #[inline(always)]
 pub(super) fn is_shallow(across: i32, along: i32) -> bool {
     (across << 15) < along * TAN_22

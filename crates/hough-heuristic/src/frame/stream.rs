@@ -18,8 +18,8 @@ const MAX_PIXELS: u64 = 1 << 28;
 /// ffmpeg -i /dev/video0 -f yuv4mpegpipe -pix_fmt yuv420p - | your-program
 /// ```
 ///
-/// A stream that ends in the middle of a frame delivers the frames before it, then an error that names the frame, then
-/// [`FrameError::End`]. After an error nothing more is read.
+/// A stream that ends in the middle of a frame delivers the frames before it, then an error that
+/// names the frame, then [`FrameError::End`]. After an error nothing more is read.
 #[derive(Debug)]
 pub struct Y4mFrames<R> {
     stream: Stream<R>,
@@ -31,7 +31,8 @@ impl<R: Read> Y4mFrames<R> {
     /// Reads the stream's header. Give a buffered reader, such as `stdin().lock()`.
     ///
     /// # Errors
-    /// [`FrameError::Failed`] if there is no Y4M header, or one of a format that is not read, with what it says.
+    /// [`FrameError::Failed`] if there is no Y4M header, or one of a format that is not read, with
+    /// what it says.
     pub fn new(mut reader: R) -> Result<Self, FrameError> {
         let header = match read_line(&mut reader) {
             Ok(Some(line)) => line,
@@ -298,7 +299,11 @@ mod tests {
         ] {
             let bytes = y4m(colour, chroma, 3);
             let mut frames = Y4mFrames::new(&bytes[..]).unwrap();
-            assert_eq!(greys(&mut frames), (vec![0, 1, 2], String::new()), "{colour}");
+            assert_eq!(
+                greys(&mut frames),
+                (vec![0, 1, 2], String::new()),
+                "{colour}"
+            );
         }
     }
 

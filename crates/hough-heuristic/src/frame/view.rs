@@ -2,10 +2,11 @@ use image::GrayImage;
 
 use crate::ConfigError;
 
-/// A monochrome frame in a caller's memory, row by row, each row `stride` bytes after the one before.
+/// A monochrome frame in a caller's memory, row by row, each row `stride` bytes after the one
+/// before.
 ///
-/// Cameras and video frameworks pad their rows. Detectors take a [`GrayImage`], whose rows follow one another; copy each
-/// frame into one that is reused:
+/// Cameras and video frameworks pad their rows. Detectors take a [`GrayImage`], whose rows follow
+/// one another; copy each frame into one that is reused:
 ///
 /// ```
 /// use hough_heuristic::GrayView;
@@ -29,8 +30,14 @@ impl<'a> GrayView<'a> {
     /// The frame of `width` x `height` pixels that begins with the first of `bytes`.
     ///
     /// # Errors
-    /// [`ConfigError::Stride`] if `stride` is below `width`, [`ConfigError::Buffer`] if the bytes end before the last row.
-    pub fn new(bytes: &'a [u8], width: u32, height: u32, stride: usize) -> Result<Self, ConfigError> {
+    /// [`ConfigError::Stride`] if `stride` is below `width`, [`ConfigError::Buffer`] if the bytes
+    /// end before the last row.
+    pub fn new(
+        bytes: &'a [u8],
+        width: u32,
+        height: u32,
+        stride: usize,
+    ) -> Result<Self, ConfigError> {
         if stride < width as usize {
             return Err(ConfigError::Stride { stride, width });
         }
@@ -77,7 +84,9 @@ mod tests {
     fn rows_are_taken_at_their_stride() {
         let bytes: Vec<u8> = (0..23).collect();
         let mut frame = GrayImage::new(50, 50);
-        GrayView::new(&bytes, 3, 3, 10).unwrap().copy_into(&mut frame);
+        GrayView::new(&bytes, 3, 3, 10)
+            .unwrap()
+            .copy_into(&mut frame);
         assert_eq!(frame.dimensions(), (3, 3));
         assert_eq!(frame.as_raw(), &[0, 1, 2, 10, 11, 12, 20, 21, 22]);
         for (width, height) in [(0, 0), (0, 5), (5, 0)] {

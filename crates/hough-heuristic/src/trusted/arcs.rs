@@ -1,4 +1,5 @@
-//! Circles from single arcs, for what no pair begins with because the opposite side is hidden or too faint.
+//! Circles from single arcs, for what no pair begins with because the opposite side is hidden or
+//! too faint.
 
 use super::budget::{Budget, Stage};
 use super::candidate::Collected;
@@ -20,8 +21,8 @@ const LEAST_POINTS: usize = 9;
 const LEAST_STRAIGHT: f32 = 0.8;
 /// How far the points of an arc may lie off its circle, pixels, in the quadratic mean.
 const SCATTER: f32 = 0.35;
-/// What is asked of the outline is less than of a pair's, whose two sides are seen. The points that the circle is fitted to lie nearer to
-/// it: farther off are those of what hides it.
+/// What is asked of the outline is less than of a pair's, whose two sides are seen. The points that
+/// the circle is fitted to lie nearer to it: farther off are those of what hides it.
 const START: Start = Start {
     share: 0.34,
     reach: [1.5; 2],
@@ -75,7 +76,8 @@ impl Arc {
         self.count += 1;
     }
 
-    /// Follows the edge from a point to one side, `side` pixels a step, until it ends or bends sharply.
+    /// Follows the edge from a point to one side, `side` pixels a step, until it ends or bends
+    /// sharply.
     #[inline(always)]
     fn follow(&mut self, level: &mut Level, start: usize, side: f32, budget: &mut Budget) {
         let mut id = start;
@@ -102,7 +104,8 @@ impl Arc {
         }
     }
 
-    /// The circle that the powers of the points with respect to have the least squares (Kåsa's); None if they lie off it or determine none.
+    /// The circle that the powers of the points with respect to have the least squares (Kåsa's);
+    /// None if they lie off it or determine none.
     #[inline(always)]
     fn ring(&self) -> Option<Ring> {
         if self.count < LEAST_POINTS {

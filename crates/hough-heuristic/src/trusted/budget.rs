@@ -4,9 +4,11 @@ use std::time::{Duration, Instant};
 
 use super::TrustedConfig;
 
-/// Looks that a draw takes, in the mean over dense texture; those of all draws are shared by what takes few and what takes many.
+/// Looks that a draw takes, in the mean over dense texture; those of all draws are shared by what
+/// takes few and what takes many.
 const LOOKS_PER_DRAW: u64 = 16;
-/// The budget of smaller frames is that of one with so many million pixels: a circle costs the same in each.
+/// The budget of smaller frames is that of one with so many million pixels: a circle costs the same
+/// in each.
 const LEAST_MEGAPIXELS: f64 = 0.25;
 
 /// What a proof costs at one size, in looks.
@@ -66,7 +68,9 @@ impl Budget {
 
     /// Looks at the clock, if there is one to be looked at.
     pub(super) fn is_late(&mut self) -> bool {
-        self.late |= self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        self.late |= self
+            .deadline
+            .is_some_and(|deadline| Instant::now() >= deadline);
         self.spent |= self.late;
         self.late
     }

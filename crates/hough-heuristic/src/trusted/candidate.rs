@@ -60,7 +60,8 @@ fn weight(r: f32, support: Support) -> f32 {
     if share <= 0.0 {
         return 0.0;
     }
-    independent * (share * log10(share / chance) + (1.0 - share) * log10((1.0 - share) / (1.0 - chance)))
+    independent
+        * (share * log10(share / chance) + (1.0 - share) * log10((1.0 - share) / (1.0 - chance)))
 }
 
 /// The candidates of a frame.
@@ -91,7 +92,11 @@ impl Collected {
     pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
         budget.looks += self.candidates.len() as u64 / 8;
         let better = |known: &Candidate| candidate.weight > known.weight;
-        let place = if let Some(place) = self.candidates.iter().position(|known| known.near(&candidate)) {
+        let place = if let Some(place) = self
+            .candidates
+            .iter()
+            .position(|known| known.near(&candidate))
+        {
             place
         } else if self.candidates.len() < self.most {
             self.candidates.push(candidate);

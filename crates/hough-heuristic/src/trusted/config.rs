@@ -10,25 +10,29 @@ use crate::{ConfigError, Region};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct TrustedConfig {
-    /// The smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is searched too, which takes several times as
-    /// long.
+    /// The smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame
+    /// is searched too, which takes several times as long.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius` the radius is known: circles that measure within a
-    /// pixel and 5 % of it are reported, with that radius.
+    /// The largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius` the
+    /// radius is known: circles that measure within a pixel and 5 % of it are reported, with that
+    /// radius.
     pub max_radius: f64,
     /// The most circles reported (default 32; at least 1): the best.
     pub max_circles: usize,
-    /// The least score reported (default 0.5, at most one circle of pure chance in ten frames; 0..=1). Higher: fewer things that are hardly round.
-    /// Lower: little more, as what is below is mostly chance.
+    /// The least score reported (default 0.5, at most one circle of pure chance in ten frames;
+    /// 0..=1). Higher: fewer things that are hardly round. Lower: little more, as what is below is
+    /// mostly chance.
     pub min_score: f64,
-    /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower finds fainter circles and takes longer; noise raises it.
+    /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower
+    /// finds fainter circles and takes longer; noise raises it.
     pub contrast: f64,
-    /// How many pairs may be drawn, for each million pixels of the frame (default 50000; at least 1), a frame of less than a quarter of a million counting as
-    /// a quarter. Sixteen looks go with each draw and bound all of the work that depends on what the frame shows. Less leaves out circles amid dense texture, more
-    /// finds little.
+    /// How many pairs may be drawn, for each million pixels of the frame (default 50000; at least
+    /// 1), a frame of less than a quarter of a million counting as a quarter. Sixteen looks go with
+    /// each draw and bound all of the work that depends on what the frame shows. Less leaves out
+    /// circles amid dense texture, more finds little.
     pub draws_per_megapixel: u32,
-    /// How long the search may take, milliseconds for each million pixels (default None: no clock is looked at; above 0). With a clock what is found
-    /// depends on the machine too.
+    /// How long the search may take, milliseconds for each million pixels (default None: no clock
+    /// is looked at; above 0). With a clock what is found depends on the machine too.
     pub milliseconds_per_megapixel: Option<f64>,
     /// Where the centre may lie (default None: anywhere).
     pub region: Option<Region>,

@@ -1,4 +1,5 @@
-//! Directions as small whole numbers, and points on the unit circle, without sines: the same bits on every machine.
+//! Directions as small whole numbers, and points on the unit circle, without sines: the same bits
+//! on every machine.
 
 use super::polar::whole;
 
@@ -29,11 +30,13 @@ impl UnitCircle {
         let mut points = vec![(0.0, 0.0); TURN];
         points[0] = (1.0, 0.0);
         points[TURN / 4] = (0.0, 1.0);
-        // Halve every angle between two known points of the first quarter: square roots and quotients only.
+        // Halve every angle between two known points of the first quarter: square roots and
+        // quotients only.
         let mut step = TURN / 4;
         while step > 1 {
             for start in (0..TURN / 4).step_by(step) {
-                let ((ax, ay), (bx, by)): ((f64, f64), (f64, f64)) = (points[start], points[start + step]);
+                let ((ax, ay), (bx, by)): ((f64, f64), (f64, f64)) =
+                    (points[start], points[start + step]);
                 let (x, y) = (ax + bx, ay + by);
                 let length = (x * x + y * y).sqrt();
                 points[start + step / 2] = (x / length, y / length);
@@ -44,10 +47,17 @@ impl UnitCircle {
             let (x, y) = points[index - TURN / 4];
             points[index] = (-y, x);
         }
-        let points: Vec<(f32, f32)> = points.into_iter().map(|(x, y)| (x as f32, y as f32)).collect();
+        let points: Vec<(f32, f32)> = points
+            .into_iter()
+            .map(|(x, y)| (x as f32, y as f32))
+            .collect();
         let rays = [64, 128, 256].map(|count| points.iter().step_by(TURN / count).copied().unzip());
         let codes = points.iter().map(|&(x, y)| code(x, y)).collect();
-        Self { points, codes, rays }
+        Self {
+            points,
+            codes,
+            rays,
+        }
     }
 
     /// About `wanted` evenly spaced directions: 64, 128 or 256.

@@ -2,7 +2,8 @@
 
 use super::polar::{LANES, Ring};
 
-/// Moments of `residual = dr + ux dx + uy dy` over unit vectors `u`, in eight sums each that are added up at the end.
+/// Moments of `residual = dr + ux dx + uy dy` over unit vectors `u`, in eight sums each that are
+/// added up at the end.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Moments([[f32; LANES]; 9]);
 

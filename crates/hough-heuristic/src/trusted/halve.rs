@@ -2,7 +2,8 @@
 
 use crate::edges::{Vectorized, widest};
 
-/// Makes `half` the frame of half the width and height (odd rests cut off), each pixel the rounded mean of four.
+/// Makes `half` the frame of half the width and height (odd rests cut off), each pixel the rounded
+/// mean of four.
 pub(super) fn halve(grey: &[u8], width: usize, half: &mut Vec<u8>) -> (usize, usize) {
     let height = grey.len().checked_div(width).unwrap_or(0);
     let (columns, rows) = (width / 2, height / 2);
@@ -25,7 +26,9 @@ fn halve_rows(grey: &[u8], width: usize, half: &mut [u8]) {
 
     /// Strips of fewer pixels are not worth a thread's waking.
     const LEAST_STRIP: usize = if cfg!(test) { 60 } else { 1_500_000 };
-    let count = rayon::current_num_threads().min(grey.len() / LEAST_STRIP).max(1);
+    let count = rayon::current_num_threads()
+        .min(grey.len() / LEAST_STRIP)
+        .max(1);
     let rows = (grey.len() / width / 2).div_ceil(count).max(1);
     if count == 1 {
         widest(Halving { grey, width, half });
@@ -50,7 +53,11 @@ impl Vectorized for Halving<'_> {
         let rows = self.grey.chunks_exact(2 * self.width);
         for (pair, out) in rows.zip(self.half.chunks_exact_mut(self.width / 2)) {
             let (upper, lower) = pair.split_at(self.width);
-            let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+            let pairs = upper
+                .as_chunks::<2>()
+                .0
+                .iter()
+                .zip(lower.as_chunks::<2>().0);
             for (out, (upper, lower)) in out.iter_mut().zip(pairs) {
                 // Two pixels as the two bytes of a word.
                 let (upper, lower) = (u16::from_le_bytes(*upper), u16::from_le_bytes(*lower));

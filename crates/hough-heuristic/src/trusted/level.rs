@@ -1,4 +1,5 @@
-//! One size of the frame: its edge points, in lists by row and by column, and as a map of directions.
+//! One size of the frame: its edge points, in lists by row and by column, and as a map of
+//! directions.
 
 use std::ops::Range;
 
@@ -9,7 +10,8 @@ use crate::edges::{Candidate, Geometry, Vectorized, widest};
 /// Set in the mark of a pixel with an edge.
 pub(super) const EDGE: u8 = 0x80;
 
-/// Edge points in rows, one list for each of their parts; or transposed in columns, where x and y have changed places.
+/// Edge points in rows, one list for each of their parts; or transposed in columns, where x and y
+/// have changed places.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lines {
     /// Where each line begins, and at the end the number of points.
@@ -35,7 +37,8 @@ pub(super) struct Level {
     pub(super) free: Vec<bool>,
     /// How steep the edge is at each point.
     strength: Vec<f32>,
-    /// For each pixel: 0 where no edge is within a pixel, else [`EDGE`] and the code of the edge's normal.
+    /// For each pixel: 0 where no edge is within a pixel, else [`EDGE`] and the code of the edge's
+    /// normal.
     near: Vec<u8>,
     /// Where `near` is not 0: which point it is.
     nearest: Vec<u32>,
@@ -69,7 +72,8 @@ impl Level {
         rows.starts.clear();
         for (block, eight) in candidates.chunks(LANES).enumerate() {
             let lane = |lane: usize| &eight[lane.min(eight.len() - 1)];
-            let Geometry { x, y, dx, dy } = Geometry::<LANES>::of(std::array::from_fn(|i| &lane(i).gradient));
+            let Geometry { x, y, dx, dy } =
+                Geometry::<LANES>::of(std::array::from_fn(|i| &lane(i).gradient));
             let pixel: [_; LANES] = std::array::from_fn(|i| lane(i).pixel);
             let (mut px, mut py) = ([0.0; LANES], [0.0; LANES]);
             let (mut strength, mut nx, mut ny) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -78,7 +82,10 @@ impl Level {
                 strength[i] = (x[i] * x[i] + y[i] * y[i]).sqrt();
                 let unit = 1.0 / strength[i].max(1e-20);
                 (nx[i], ny[i]) = (x[i] * unit, y[i] * unit);
-                (px[i], py[i]) = (pixel[i].x as i32 as f32 + dx[i], pixel[i].y as i32 as f32 + dy[i]);
+                (px[i], py[i]) = (
+                    pixel[i].x as i32 as f32 + dx[i],
+                    pixel[i].y as i32 as f32 + dy[i],
+                );
                 marks[i] = EDGE | code(x[i], y[i]);
             }
             // The last block reaches into the margin.
@@ -94,7 +101,8 @@ impl Level {
                 while rows.starts.len() <= row {
                     rows.starts.push(id);
                 }
-                // The candidate's own pixel and its four neighbours; candidates never lie on the border.
+                // The candidate's own pixel and its four neighbours; candidates never lie on the
+                // border.
                 let centre = row * width + pixel[i].x as usize;
                 for pixel in [centre - width, centre - 1, centre + 1, centre + width] {
                     if self.near[pixel] == 0 {

@@ -1,4 +1,5 @@
-//! The last step: a proven circle measured at the full size of the frame, with the error to be expected.
+//! The last step: a proven circle measured at the full size of the frame, with the error to be
+//! expected.
 
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
@@ -11,7 +12,8 @@ pub(super) struct Measured {
     /// Standard errors, pixels.
     pub(super) centre_error: f32,
     pub(super) radius_error: f32,
-    /// Amplitude of the second harmonic of the outline, pixels: `r + cos2 cos(2 a) + sin2 sin(2 a)`.
+    /// Amplitude of the second harmonic of the outline, pixels:
+    /// `r + cos2 cos(2 a) + sin2 sin(2 a)`.
     pub(super) cos2: f32,
     pub(super) sin2: f32,
 }
@@ -27,7 +29,8 @@ impl Measured {
         }
     }
 
-    /// Moves the circle by what shading and blur had displaced it, and adds what is uncertain of that to the errors.
+    /// Moves the circle by what shading and blur had displaced it, and adds what is uncertain of
+    /// that to the errors.
     fn shift_by(&mut self, limb: &Ring) {
         self.ring.x += limb.x;
         self.ring.y += limb.y;
@@ -62,9 +65,11 @@ impl Measured {
     }
 }
 
-/// What the scatter of the rays is worth beyond their number, as found on rendered frames: the errors of neighbours go together.
+/// What the scatter of the rays is worth beyond their number, as found on rendered frames: the
+/// errors of neighbours go together.
 const SCATTER: f32 = 2.0;
-/// Errors that no number of rays takes away, pixels: of pixels as squares, and for each pixel that shading had displaced the outline.
+/// Errors that no number of rays takes away, pixels: of pixels as squares, and for each pixel that
+/// shading had displaced the outline.
 const MODEL_CENTRE: f32 = 0.01;
 const MODEL_RADIUS: f32 = 0.03;
 const LIMB_CENTRE: f32 = 0.5;
@@ -127,7 +132,8 @@ pub(super) fn measure<'a>(
             );
             let focus = if round == 0 { 4.0 } else { 2.5 };
             let final_round = last && round + 1 == rounds;
-            // What noise makes of the slope; while the outline is being sought, the steep parts of it lead.
+            // What noise makes of the slope; while the outline is being sought, the steep parts of
+            // it lead.
             let doubtful = if final_round {
                 2.0 * noise / ((2 * half + 1) as f32).sqrt()
             } else {
@@ -150,7 +156,8 @@ pub(super) fn measure<'a>(
                     arc,
                     &mut measured,
                 );
-                let limb = limb_shift(frame, rays, polar, &measured.ring, half, noise).unwrap_or_default();
+                let limb =
+                    limb_shift(frame, rays, polar, &measured.ring, half, noise).unwrap_or_default();
                 measured.shift_by(&limb);
             }
         }
@@ -165,10 +172,11 @@ const PROFILE: usize = 8;
 
 /// How far the outline of a shaded ball lies outside of the steepest place.
 ///
-/// A ball that darkens towards its limb has slopes inside of the outline but none outside, and blur moves the steepest place
-/// inward. Where the profile of the slope has the half width `w` on the outside, and two half widths inside of its top it is
-/// higher than outside by the part `A` of the top, that is by about `w A`: to 4 % of `w`, for shading between none and all, radii of
-/// 12 to 100 px and blur of 0.6 to 1.8 px.
+/// A ball that darkens towards its limb has slopes inside of the outline but none outside, and blur
+/// moves the steepest place inward. Where the profile of the slope has the half width `w` on the
+/// outside, and two half widths inside of its top it is higher than outside by the part `A` of the
+/// top, that is by about `w A`: to 4 % of `w`, for shading between none and all, radii of 12 to 100
+/// px and blur of 0.6 to 1.8 px.
 #[inline(always)]
 fn limb_shift(
     frame: Grey<'_>,
@@ -199,14 +207,20 @@ fn limb_shift(
     }
     let mut whole = [0.0f32; 2 * PROFILE + 1];
     for profile in &profiles {
-        whole.iter_mut().zip(profile).for_each(|(sum, part)| *sum += part);
+        whole
+            .iter_mut()
+            .zip(profile)
+            .for_each(|(sum, part)| *sum += part);
     }
     let visible: f32 = used.iter().sum();
     let common = shift_of(&whole[..steps], 6.0 * noise * visible.sqrt()).unwrap_or(0.0);
     let mut moments = Moments::default();
     for block in 0..count / LANES {
         let sector = block * LANES * SECTORS / count;
-        let own = shift_of(&profiles[sector][..steps], 12.0 * noise * used[sector].sqrt());
+        let own = shift_of(
+            &profiles[sector][..steps],
+            12.0 * noise * used[sector].sqrt(),
+        );
         let shift = own.unwrap_or(common);
         let weight = if used[sector] > 0.0 { 1.0 } else { 0.0 };
         let (ux, uy) = (&rays.x.as_chunks().0[block], &rays.y.as_chunks().0[block]);
@@ -219,7 +233,8 @@ fn limb_shift(
 #[inline(always)]
 fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     let middle = profile.len() / 2;
-    let at = (middle.saturating_sub(1)..=middle + 1).max_by(|&a, &b| profile[a].total_cmp(&profile[b]))?;
+    let at = (middle.saturating_sub(1)..=middle + 1)
+        .max_by(|&a, &b| profile[a].total_cmp(&profile[b]))?;
     let top = profile[at];
     if at < 1 || at + 2 > profile.len() || top <= least {
         return None;
@@ -245,7 +260,8 @@ fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     Some(width * excess.clamp(0.0, 0.5))
 }
 
-/// The weight of a slope: its square where that is below what is doubtful, itself where it is far above.
+/// The weight of a slope: its square where that is below what is doubtful, itself where it is far
+/// above.
 #[inline(always)]
 fn weight_of(slope: f32, doubtful: f32) -> f32 {
     if doubtful.is_finite() {
@@ -265,9 +281,11 @@ impl Steepest {
         };
         for block in 0..count.min(MOST) / LANES {
             let (mut best, mut at) = ([0.0f32; LANES], [0i32; LANES]);
-            // The slope where it is best, and a step before and behind; all three the same at the ends of the ray.
+            // The slope where it is best, and a step before and behind; all three the same at the
+            // ends of the ray.
             let slopes = |step: usize| {
-                let row: &[f32; LANES] = &polar.outward[step * count..][..count].as_chunks().0[block];
+                let row: &[f32; LANES] =
+                    &polar.outward[step * count..][..count].as_chunks().0[block];
                 row.map(f32::abs)
             };
             let first = slopes(0);
@@ -281,7 +299,8 @@ impl Steepest {
                 };
                 let ends = step == 0 || step + 1 == polar.steps;
                 let (earlier, later) = if ends { (&now, &now) } else { (&last, &next) };
-                let along: &[f32; LANES] = &polar.along[step * count..][..count].as_chunks().0[block];
+                let along: &[f32; LANES] =
+                    &polar.along[step * count..][..count].as_chunks().0[block];
                 let off = polar.distance(step as f32) / (focus + 1.5);
                 let nearness = (1.0 - off * off).max(0.0);
                 for lane in 0..LANES {
@@ -304,7 +323,11 @@ impl Steepest {
                 let seen = visible[lane] > 0.0;
                 let ray = block * LANES + lane;
                 steepest.distance[ray] = if seen { polar.distance(place) } else { 0.0 };
-                steepest.weight[ray] = if seen && best[lane] > 0.0 { weight } else { 0.0 };
+                steepest.weight[ray] = if seen && best[lane] > 0.0 {
+                    weight
+                } else {
+                    0.0
+                };
             }
         }
         steepest
@@ -323,7 +346,8 @@ impl Steepest {
                 let slope = &self.weight.as_chunks::<LANES>().0[block];
                 let mut weight = [0.0; LANES];
                 for lane in 0..LANES {
-                    let off = (distance[lane] - step.r - step.x * ux[lane] - step.y * uy[lane]) / focus;
+                    let off =
+                        (distance[lane] - step.r - step.x * ux[lane] - step.y * uy[lane]) / focus;
                     let within = (1.0 - off * off).max(0.0);
                     weight[lane] = slope[lane] * within * within;
                 }
@@ -336,7 +360,15 @@ impl Steepest {
 
     /// The scatter about the circle after `step`, and what it means.
     #[inline(always)]
-    fn errors(&self, ux: &[f32], uy: &[f32], step: &Ring, averaged: f32, arc: f32, measured: &mut Measured) {
+    fn errors(
+        &self,
+        ux: &[f32],
+        uy: &[f32],
+        step: &Ring,
+        averaged: f32,
+        arc: f32,
+        measured: &mut Measured,
+    ) {
         let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
         let (mut cos2, mut sin2, mut oval) = (0.0, 0.0, 0.0);
         for ray in 0..ux.len() {

@@ -1,4 +1,5 @@
-//! A frame around a circle, unrolled: a column of values for each direction, a row for each distance from the outline.
+//! A frame around a circle, unrolled: a column of values for each direction, a row for each
+//! distance from the outline.
 //!
 //! All directions of a row lie together, so that the loops over them become vector code.
 
@@ -49,7 +50,8 @@ pub(super) struct Polar {
     pub(super) rays: usize,
     /// Distances.
     pub(super) steps: usize,
-    /// Grey levels, one row more than distances; a row begins and ends with [`MARGIN`] values of the other end.
+    /// Grey levels, one row more than distances; a row begins and ends with [`MARGIN`] values of
+    /// the other end.
     grey: Vec<f32>,
     /// Derivative outward per pixel, averaged along the outline; `rays` values a row.
     pub(super) outward: Vec<f32>,
@@ -71,16 +73,24 @@ impl Polar {
         row - 0.5 * (self.steps - 1) as f32
     }
 
-    /// The grey level half a pixel inside of the distance of this row; there is one row more than distances.
+    /// The grey level half a pixel inside of the distance of this row; there is one row more than
+    /// distances.
     #[inline(always)]
     pub(super) fn grey(&self, row: usize, ray: usize) -> f32 {
         self.grey[row.min(self.steps) * (self.rays + 2 * MARGIN) + MARGIN + ray]
     }
 
-    /// Samples the frame along the rays, up to `reach` pixels on either side of the outline, and averages the outward
-    /// slopes over `2 half + 1` neighbouring directions (`half` at most 8).
+    /// Samples the frame along the rays, up to `reach` pixels on either side of the outline, and
+    /// averages the outward slopes over `2 half + 1` neighbouring directions (`half` at most 8).
     #[inline(always)]
-    pub(super) fn sample(&mut self, frame: Grey<'_>, rays: Rays<'_>, ring: &Ring, reach: usize, half: usize) {
+    pub(super) fn sample(
+        &mut self,
+        frame: Grey<'_>,
+        rays: Rays<'_>,
+        ring: &Ring,
+        reach: usize,
+        half: usize,
+    ) {
         let Rays { x: ux, y: uy } = rays;
         let count = ux.len();
         let stride = count + 2 * MARGIN;
@@ -144,13 +154,15 @@ impl Polar {
             let (far_ahead, far_behind) = (&far[ahead..][..count], &far[behind..][..count]);
             for index in 0..count {
                 out[index] = slope
-                    * ((near_ahead[index] + far_ahead[index]) - (near_behind[index] + far_behind[index]));
+                    * ((near_ahead[index] + far_ahead[index])
+                        - (near_behind[index] + far_behind[index]));
             }
         }
     }
 }
 
-/// The nearest whole number, twice; of two equally near ones the even one. For numbers of less than 22 bits.
+/// The nearest whole number, twice; of two equally near ones the even one. For numbers of less than
+/// 22 bits.
 ///
 /// A cast would do, but as it saturates the compiler makes no vectors of it.
 #[inline(always)]
@@ -158,7 +170,10 @@ pub(super) fn whole(x: f32) -> (i32, f32) {
     // Numbers of this size have no room for fractions, and their last bits are whole numbers.
     const SHIFT: f32 = 12_582_912.0;
     let shifted = x + SHIFT;
-    (shifted.to_bits() as i32 - SHIFT.to_bits() as i32, shifted - SHIFT)
+    (
+        shifted.to_bits() as i32 - SHIFT.to_bits() as i32,
+        shifted - SHIFT,
+    )
 }
 
 /// The grey levels at distance `r` from the centre of the ring in eight directions.
@@ -181,7 +196,8 @@ fn bilinear(
         fy[lane] = y - above;
         at[lane] = top * width as i32 + left;
     }
-    // Two pixels of a row as the two bytes of a word. They are always there; one check for four pixels is cheaper than a proof.
+    // Two pixels of a row as the two bytes of a word. They are always there; one check for four
+    // pixels is cheaper than a proof.
     let below = pixels.get(width..).unwrap_or_default();
     let above = &pixels[..below.len()];
     let (mut upper, mut lower) = ([0i32; LANES], [0i32; LANES]);

@@ -1,4 +1,5 @@
-//! The evidence for a candidate, weighed where its radius is one or two dozen pixels: the same at every size.
+//! The evidence for a candidate, weighed where its radius is one or two dozen pixels: the same at
+//! every size.
 
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
@@ -14,24 +15,27 @@ const MOST_REACH: usize = 8;
 const FIRST_REACH: usize = 6;
 /// Samples that lie so far apart along the outline do not overlap, pixels.
 const SPACING: f32 = 2.5;
-/// Where slopes are averaged: the part of the averaged length that samples lie apart. With 0.75 noise alone made five times as many
-/// circles, with 1 a tenth of those in noise of 40 grey levels were lost.
+/// Where slopes are averaged: the part of the averaged length that samples lie apart. With 0.75
+/// noise alone made five times as many circles, with 1 a tenth of those in noise of 40 grey levels
+/// were lost.
 const OVERLAP: f32 = 0.85;
 
-/// From here on slopes are averaged along the outline, and the edges of a circle may lie farther off it, grey levels.
+/// From here on slopes are averaged along the outline, and the edges of a circle may lie farther
+/// off it, grey levels.
 const NOISE: f32 = 3.0;
 /// Of a circle less than this part of which lies in the frame
 const WHOLE: f32 = 0.9;
 /// the number of false alarms counts a thousandfold: its decimal logarithm.
 const CUT: f32 = 3.0;
-/// What a ray without any edge counts among the samples. It says little of where the outline is: balls darken towards one side.
+/// What a ray without any edge counts among the samples. It says little of where the outline is:
+/// balls darken towards one side.
 const NO_EDGE: f32 = 0.25;
 
 /// Fewer rays than these do not make a circle.
 const LEAST_NEAR: usize = 20;
 
-/// Nor does a smaller share of those in the frame, at first and once the outline has been moved to the edges: of balls of
-/// which two fifths are hidden some show little more.
+/// Nor does a smaller share of those in the frame, at first and once the outline has been moved to
+/// the edges: of balls of which two fifths are hidden some show little more.
 const LEAST_SHARE: [f32; 2] = [0.3, 0.4];
 
 /// What a candidate proved to be.
@@ -107,7 +111,13 @@ pub(super) fn prove(
     );
     let mut ring = start;
     for round in 0..4 {
-        let edges = Edges::around(&ring, grey, rays, polar, if round == 0 { wide } else { window });
+        let edges = Edges::around(
+            &ring,
+            grey,
+            rays,
+            polar,
+            if round == 0 { wide } else { window },
+        );
         let foci = if round == 0 {
             [4.0, 3.0, 2.0]
         } else {
@@ -138,7 +148,8 @@ pub(super) fn prove(
     Some(weigh(polar, &edges, ring, setting, window))
 }
 
-/// Moves the outline to the edges, in steps that look at those within the foci, pixels; also tells how many there were.
+/// Moves the outline to the edges, in steps that look at those within the foci, pixels; also tells
+/// how many there were.
 #[inline(always)]
 fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option<(Ring, usize)> {
     let mut ring = start;
@@ -200,7 +211,12 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
     } else {
         &[0.25, 0.5]
     };
-    let tests = setting.tests + if visible < WHOLE * RAYS as f32 { CUT } else { 0.0 };
+    let tests = setting.tests
+        + if visible < WHOLE * RAYS as f32 {
+            CUT
+        } else {
+            0.0
+        };
     for &slack in slacks {
         let on = |(distance, slope): (&f32, &f32)| *slope > 0.0 && distance.abs() <= slack;
         let hits = edges
@@ -220,7 +236,8 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
     best
 }
 
-/// The divergence of the share found from the share expected, in decimal digits per sample; 0 unless more is found.
+/// The divergence of the share found from the share expected, in decimal digits per sample; 0
+/// unless more is found.
 fn divergence(share: f32, p: f32) -> f32 {
     if share <= p {
         return 0.0;
@@ -229,7 +246,8 @@ fn divergence(share: f32, p: f32) -> f32 {
     term(share, p) + term(1.0 - share, 1.0 - p)
 }
 
-/// The decimal logarithm of a normal number above 0, by the four operations alone: the same bits on every machine.
+/// The decimal logarithm of a normal number above 0, by the four operations alone: the same bits on
+/// every machine.
 pub(super) fn log10(x: f32) -> f32 {
     let bits = f64::from(x).to_bits();
     let exponent = (bits >> 52) as i64 - 1023;

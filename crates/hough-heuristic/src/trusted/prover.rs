@@ -74,10 +74,12 @@ pub(super) struct Prover<'a> {
 }
 
 impl Prover<'_> {
-    /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond doubt.
+    /// Proves a candidate as far as it goes; the circle in pixels of the frame if it is beyond
+    /// doubt.
     pub(super) fn prove(&mut self, candidate: &Candidate, looks: &mut u64) -> Option<Ring> {
         let coarsest = self.depth_for(candidate.r);
-        // A larger size tells exact outlines from others, a smaller one forgives dents and noise: whichever says more.
+        // A larger size tells exact outlines from others, a smaller one forgives dents and noise:
+        // whichever says more.
         let finest = coarsest.saturating_sub(if self.noise > NOISY { 2 } else { 1 });
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
@@ -158,7 +160,13 @@ impl Vectorized for Proving<'_> {
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        proof::prove(self.grey, self.circle, self.polar, self.start, &self.setting)
+        proof::prove(
+            self.grey,
+            self.circle,
+            self.polar,
+            self.start,
+            &self.setting,
+        )
     }
 }
 

@@ -1,4 +1,5 @@
-//! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps 3a to 3c.
+//! Drawing pairs of edge points, and looking at the circle each pair determines: the paper's steps
+//! 3a to 3c.
 
 use super::budget::{Budget, Stage};
 use super::candidate::{Candidate, Collected};
@@ -39,7 +40,8 @@ impl Support {
     }
 }
 
-/// The points of the outline in the order in which they are looked at, each with the lowest code that its edge may have.
+/// The points of the outline in the order in which they are looked at, each with the lowest code
+/// that its edge may have.
 #[derive(Clone, Debug)]
 pub(super) struct Outline {
     x: [f32; LOOKS],
@@ -66,7 +68,13 @@ impl Outline {
 
     /// Looks at the outline until it is plain that there is no circle; None then.
     #[inline(always)]
-    pub(super) fn support(&self, level: &Level, ring: &Ring, least: f32, looks: &mut u64) -> Option<Support> {
+    pub(super) fn support(
+        &self,
+        level: &Level,
+        ring: &Ring,
+        least: f32,
+        looks: &mut u64,
+    ) -> Option<Support> {
         let (width, height) = (level.width as f32, level.height as f32);
         let inside = ring.x - ring.r >= 0.0
             && ring.y - ring.r >= 0.0
@@ -83,7 +91,10 @@ impl Outline {
             if inside {
                 let mut pixels = [0i32; BLOCK];
                 for i in 0..BLOCK {
-                    let (column, row) = (whole(ring.x + ring.r * x[i]).0, whole(ring.y + ring.r * y[i]).0);
+                    let (column, row) = (
+                        whole(ring.x + ring.r * x[i]).0,
+                        whole(ring.y + ring.r * y[i]).0,
+                    );
                     pixels[i] = row * level.width as i32 + column;
                 }
                 for i in 0..BLOCK {
@@ -92,7 +103,9 @@ impl Outline {
                 support.visible += BLOCK as u32;
             } else {
                 for i in 0..BLOCK {
-                    if let Some((mark, _)) = level.mark(ring.x + ring.r * x[i], ring.y + ring.r * y[i]) {
+                    if let Some((mark, _)) =
+                        level.mark(ring.x + ring.r * x[i], ring.y + ring.r * y[i])
+                    {
                         marks[i] = mark;
                         support.visible += 1;
                     }
@@ -109,25 +122,32 @@ impl Outline {
                 return None;
             }
         }
-        (support.visible >= LOOKS as u32 / 3 && support.hits as f32 >= support.visible as f32 * least)
+        (support.visible >= LOOKS as u32 / 3
+            && support.hits as f32 >= support.visible as f32 * least)
             .then_some(support)
     }
 
-    /// The pixels of the outline's points at distance `r` from the centre; the largest number for those outside of the frame.
+    /// The pixels of the outline's points at distance `r` from the centre; the largest number for
+    /// those outside of the frame.
     #[inline(always)]
     fn pixels(&self, level: &Level, ring: &Ring, r: f32) -> [u32; LOOKS] {
         let (width, height) = (level.width as u32, level.height as u32);
         let mut pixels = [u32::MAX; LOOKS];
         for (pixel, (x, y)) in pixels.iter_mut().zip(self.x.iter().zip(&self.y)) {
             // Numbers below 0 become very large ones.
-            let (column, row) = (whole(ring.x + r * x).0 as u32, whole(ring.y + r * y).0 as u32);
+            let (column, row) = (
+                whole(ring.x + r * x).0 as u32,
+                whole(ring.y + r * y).0 as u32,
+            );
             let inside = (column < width) & (row < height);
-            *pixel = row.wrapping_mul(width).wrapping_add(column) | (u32::from(inside).wrapping_sub(1));
+            *pixel =
+                row.wrapping_mul(width).wrapping_add(column) | (u32::from(inside).wrapping_sub(1));
         }
         pixels
     }
 
-    /// Fits the ring to the edge points along it, and counts those that lie on it then; None if they do not determine one.
+    /// Fits the ring to the edge points along it, and counts those that lie on it then; None if
+    /// they do not determine one.
     #[inline(always)]
     pub(super) fn fit(
         &self,
@@ -195,7 +215,13 @@ impl Outline {
     }
 
     /// Marks the points along the ring as explained.
-    pub(super) fn explain(&self, circle: &UnitCircle, level: &mut Level, ring: &Ring, looks: &mut u64) {
+    pub(super) fn explain(
+        &self,
+        circle: &UnitCircle,
+        level: &mut Level,
+        ring: &Ring,
+        looks: &mut u64,
+    ) {
         let count = ((6.3 * ring.r) as usize).clamp(16, 512);
         *looks += 3 * count as u64;
         for index in 0..count {
@@ -213,7 +239,8 @@ impl Outline {
     }
 }
 
-/// Whether a pixel with this mark has an edge whose code lies at most twice the slack above the lowest.
+/// Whether a pixel with this mark has an edge whose code lies at most twice the slack above the
+/// lowest.
 #[inline]
 fn runs_along(mark: u8, lowest: u8) -> bool {
     mark & EDGE != 0 && mark.wrapping_sub(lowest) % CODES <= 2 * DIRECTION_SLACK
@@ -223,7 +250,8 @@ fn runs_along(mark: u8, lowest: u8) -> bool {
 pub(super) struct Start {
     /// The share of the outline that must lie on edges.
     pub(super) share: f32,
-    /// How far off the circle the points lie that it is fitted to, pixels: in the first two rounds, and then.
+    /// How far off the circle the points lie that it is fitted to, pixels: in the first two rounds,
+    /// and then.
     pub(super) reach: [f32; 2],
 }
 
@@ -243,7 +271,8 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Draws pairs on the rows, then on the columns, until all points have had their turn or the budget is spent.
+    /// Draws pairs on the rows, then on the columns, until all points have had their turn or the
+    /// budget is spent.
     #[inline(always)]
     pub(super) fn run(
         &self,
@@ -253,7 +282,11 @@ impl Search<'_> {
         budget: &mut Budget,
     ) {
         for transposed in [false, true] {
-            let lines = if transposed { level.width } else { level.height };
+            let lines = if transposed {
+                level.width
+            } else {
+                level.height
+            };
             let stride = stride(lines);
             let mut line = (self.seed % lines.max(1) as u64) as usize;
             for _ in 0..lines {
@@ -283,7 +316,11 @@ impl Search<'_> {
         prover: &mut Prover<'_>,
         budget: &mut Budget,
     ) {
-        let lines = if transposed { &level.columns } else { &level.rows };
+        let lines = if transposed {
+            &level.columns
+        } else {
+            &level.rows
+        };
         if lines.nx[at].abs() < LEAST_ALONG || !level.free[lines.id[at] as usize] {
             return;
         }
@@ -325,25 +362,33 @@ impl Search<'_> {
         budget: &mut Budget,
     ) -> bool {
         budget.draws += 1;
-        let Some(_) = self.outline.support(level, &ring, start.share, &mut budget.looks) else {
+        let Some(_) = self
+            .outline
+            .support(level, &ring, start.share, &mut budget.looks)
+        else {
             return false;
         };
         // The same circle is met again and again; a few fits from different pairs are enough.
-        if found.is_known(&Candidate::new(&ring, self.scale, Support::default()), budget) {
+        if found.is_known(
+            &Candidate::new(&ring, self.scale, Support::default()),
+            budget,
+        ) {
             return false;
         }
         // Fit until it rests.
         let (mut ring, mut support) = (ring, Support::default());
         for round in 0..6 {
             let reach = start.reach[usize::from(round >= 2)];
-            let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks) else {
+            let Some((fitted, now)) = self.outline.fit(level, &ring, reach, &mut budget.looks)
+            else {
                 break;
             };
             let outside = fitted.r < 0.8 * self.radii.0 || fitted.r > 1.25 * self.most_radius;
             if outside || now.hits + 2 < support.hits {
                 break;
             }
-            let moved = (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
+            let moved =
+                (fitted.x - ring.x).abs() + (fitted.y - ring.y).abs() + (fitted.r - ring.r).abs();
             (ring, support) = (fitted, now);
             if moved < 0.15 {
                 break;
@@ -364,14 +409,19 @@ impl Search<'_> {
         let Some(proven) = prover.prove(&candidate, &mut budget.looks) else {
             return false;
         };
-        self.outline
-            .explain(self.circle, level, &proven.shrunk(self.scale), &mut budget.looks);
+        self.outline.explain(
+            self.circle,
+            level,
+            &proven.shrunk(self.scale),
+            &mut budget.looks,
+        );
         true
     }
 }
 
 impl Lines {
-    /// The circles of the point `at` and the nearest points further along its line whose normals mirror its own.
+    /// The circles of the point `at` and the nearest points further along its line whose normals
+    /// mirror its own.
     #[inline(always)]
     fn partners(
         &self,
@@ -384,16 +434,29 @@ impl Lines {
     ) -> usize {
         // Inward: along the line at p, against it at q.
         let sign = 1f32.copysign(self.nx[at]);
-        let (x, y, px, py) = (self.x[at], self.y[at], sign * self.nx[at], sign * self.ny[at]);
+        let (x, y, px, py) = (
+            self.x[at],
+            self.y[at],
+            sign * self.nx[at],
+            sign * self.ny[at],
+        );
         let end = x + 2.0 * radii.1;
         let mut count = 0;
         let mut first = at + 1;
         // The lists end in a margin of points that mirror none.
         while first < line_end && self.x[first] <= end {
             *looks += 1;
-            let block = |values: &'_ [f32]| -> [f32; LANES] { values[first..first + LANES].as_chunks().0[0] };
-            let (qx, qy, nx, ny) = (block(&self.x), block(&self.y), block(&self.nx), block(&self.ny));
-            // By how much what is to be at most 0 is more: one comparison for all of it keeps the lanes together.
+            let block = |values: &'_ [f32]| -> [f32; LANES] {
+                values[first..first + LANES].as_chunks().0[0]
+            };
+            let (qx, qy, nx, ny) = (
+                block(&self.x),
+                block(&self.y),
+                block(&self.nx),
+                block(&self.ny),
+            );
+            // By how much what is to be at most 0 is more: one comparison for all of it keeps the
+            // lanes together.
             let more = |a: f32, b: f32| if a > b { a } else { b };
             let mut excess = [0.0; LANES];
             for lane in 0..LANES {

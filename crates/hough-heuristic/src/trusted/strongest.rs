@@ -9,7 +9,8 @@ pub(super) const RAYS: usize = 64;
 const CLIPPED: f32 = 245.0;
 /// By how much wider than for edges the window is for the light around, pixels.
 const FALL: usize = 4;
-/// The part of the edge that the light falls by from 3 to 6 px beyond it, from which on it is a glow: with lamps 0.1 to 0.5, with balls up to 0.03.
+/// The part of the edge that the light falls by from 3 to 6 px beyond it, from which on it is a
+/// glow: with lamps 0.1 to 0.5, with balls up to 0.03.
 const GLOW: f32 = 0.08;
 
 /// How far around a circle edges are sought, and how slopes are averaged.
@@ -92,8 +93,9 @@ impl Edges {
         edges
     }
 
-    /// The grey level `pixels` away from the edge of a ray, on the dark side of it if positive; `beyond` is how much wider the
-    /// window sampled is than the one in which the edges were sought.
+    /// The grey level `pixels` away from the edge of a ray, on the dark side of it if positive;
+    /// `beyond` is how much wider the window sampled is than the one in which the edges were
+    /// sought.
     #[inline(always)]
     fn grey(&self, polar: &Polar, ray: usize, pixels: i32, beyond: usize) -> f32 {
         let step = self.at[ray] - 1 + beyond as i32;
@@ -117,11 +119,14 @@ impl Edges {
 
     /// Whether a good part of the outline runs along what is as bright as can be.
     pub(super) fn are_clipped(&self, polar: &Polar) -> bool {
-        (0..RAYS).filter(|&ray| self.is_clipped(polar, ray, 0)).count() >= RAYS / 8
+        (0..RAYS)
+            .filter(|&ray| self.is_clipped(polar, ray, 0))
+            .count()
+            >= RAYS / 8
     }
 
-    /// Forgets the edges of what is as bright as can be if the light falls off around it: a lamp and its glow, whose outline is
-    /// where the exposure ends and not that of a thing.
+    /// Forgets the edges of what is as bright as can be if the light falls off around it: a lamp
+    /// and its glow, whose outline is where the exposure ends and not that of a thing.
     pub(super) fn leave_out_glow(
         &mut self,
         ring: &Ring,

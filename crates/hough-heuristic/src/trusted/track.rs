@@ -6,11 +6,12 @@ use super::{LEAST_SIDE, Measurement, Trusted};
 use crate::{Circle, CircleDetector, Detection};
 
 impl Trusted {
-    /// Looks for the circle `last` first, whose centre and radius may have changed by `reach` pixels, and in the whole frame only
-    /// if it is not there; true if it was.
+    /// Looks for the circle `last` first, whose centre and radius may have changed by `reach`
+    /// pixels, and in the whole frame only if it is not there; true if it was.
     ///
-    /// Replaces the content of `found` by the one circle followed, or else by all circles of the frame. The number of false alarms
-    /// counts the circles in the part that was looked at. A `last` or a `reach` that is not finite, or has no radius, is never there.
+    /// Replaces the content of `found` by the one circle followed, or else by all circles of the
+    /// frame. The number of false alarms counts the circles in the part that was looked at. A
+    /// `last` or a `reach` that is not finite, or has no radius, is never there.
     pub fn track(
         &mut self,
         frame: &GrayImage,

@@ -1,4 +1,5 @@
-//! The search and the measurement by the widest vectors give the bits that plain code gives. (The proof has its test beside it.)
+//! The search and the measurement by the widest vectors give the bits that plain code gives. (The
+//! proof has its test beside it.)
 
 use image::{GrayImage, Luma};
 use proptest::prelude::*;
@@ -9,7 +10,8 @@ use super::*;
 fn frame(ball: &Ring, noise: f32, seed: u64) -> GrayImage {
     GrayImage::from_fn(160, 120, |x, y| {
         let (dx, dy) = (x as f32 - ball.x, y as f32 - ball.y);
-        let random = (seed.wrapping_mul(u64::from(2 * (160 * y + x) + 1)) >> 40) as f32 / (1u64 << 24) as f32;
+        let random = (seed.wrapping_mul(u64::from(2 * (160 * y + x) + 1)) >> 40) as f32
+            / (1u64 << 24) as f32;
         let bar = if (x + 2 * y) % 47 < 9 { 40.0 } else { 0.0 };
         let grey = if (dx * dx + dy * dy).sqrt() < ball.r {
             60.0

@@ -48,7 +48,10 @@ fn every_small_size_and_every_flat_frame_passes() {
         for width in 0..9 {
             for height in 0..9 {
                 let edges = detector.edges_of(&saturated_noise(width, height, width * 31 + height));
-                assert!(edges > 0 || width < 6 || height < 6, "{name} {width}x{height}");
+                assert!(
+                    edges > 0 || width < 6 || height < 6,
+                    "{name} {width}x{height}"
+                );
                 for grey in [0, 255] {
                     let flat = GrayImage::from_pixel(width, height, Luma([grey]));
                     assert_eq!(detector.detect(&flat), [], "{name} {width}x{height}");

@@ -38,7 +38,9 @@ fn lines_are_found_and_taken_out() {
         rho,
     });
     let map = edges(|plot| truth.iter().for_each(|line| draw(line, plot)));
-    let found = CurveSearch::new(CONFIG).unwrap().find::<Line>(&map, |_| true);
+    let found = CurveSearch::new(CONFIG)
+        .unwrap()
+        .find::<Line>(&map, |_| true);
     assert_eq!(found.len(), 3, "{found:?}");
     for line in truth {
         assert!(found.iter().any(|f| {
@@ -67,9 +69,12 @@ fn circles_and_ellipses_are_found() {
         draw(&ellipse, plot);
     });
     let mut search = CurveSearch::new(CONFIG).unwrap();
-    let circles = search.find::<Circle>(&map, |circle| circle.radius > 10.0 && circle.radius < 80.0);
+    let circles =
+        search.find::<Circle>(&map, |circle| circle.radius > 10.0 && circle.radius < 80.0);
     assert_eq!(circles.len(), 1, "{circles:?}");
-    assert!((circles[0].curve.x - 60.0).abs() < 1.0 && (circles[0].curve.radius - 40.0).abs() < 1.0);
+    assert!(
+        (circles[0].curve.x - 60.0).abs() < 1.0 && (circles[0].curve.radius - 40.0).abs() < 1.0
+    );
     assert!(circles[0].beta > 0.8 && circles[0].beta <= 1.0);
 
     let ellipses = search.find::<Ellipse>(&map, |e| {

@@ -2,9 +2,9 @@
 
 use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{
-    Acceptance, Canny, CannyConfig, Circle, CircleDetector, Heuristic, HeuristicConfig, ImageprocCanny,
-    RandomizedHough, RandomizedHoughConfig, Region, Sampling, StandardHough, StandardHoughConfig, Trusted,
-    TrustedConfig,
+    Acceptance, Canny, CannyConfig, Circle, CircleDetector, Heuristic, HeuristicConfig,
+    ImageprocCanny, RandomizedHough, RandomizedHoughConfig, Region, Sampling, StandardHough,
+    StandardHoughConfig, Trusted, TrustedConfig,
 };
 
 use crate::scenes::{Scene, same};
@@ -24,7 +24,10 @@ pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetect
 }
 
 /// All detectors that go by β with these settings on edges with those, by name.
-pub(crate) fn all_on(accept: Acceptance, edges: CannyConfig) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
+pub(crate) fn all_on(
+    accept: Acceptance,
+    edges: CannyConfig,
+) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
     let canny = || Canny::new(edges).unwrap();
     let rht = |sampling| RandomizedHoughConfig {
         accept,
@@ -53,7 +56,10 @@ pub(crate) fn all_on(accept: Acceptance, edges: CannyConfig) -> Vec<(&'static st
             "rht anywhere",
             Box::new(RandomizedHough::new(rht(Sampling::Anywhere), canny()).unwrap()),
         ),
-        ("sht", Box::new(StandardHough::new(sht(false), canny()).unwrap())),
+        (
+            "sht",
+            Box::new(StandardHough::new(sht(false), canny()).unwrap()),
+        ),
         (
             "sht gradient",
             Box::new(StandardHough::new(sht(true), canny()).unwrap()),
@@ -202,12 +208,19 @@ pub(crate) type Turn = (GrayImage, Box<dyn Fn(&Circle) -> Circle>);
 
 /// The frame flipped both ways, turned by a quarter, and transposed.
 pub(crate) fn turns(frame: &GrayImage) -> [Turn; 4] {
-    let (right, bottom) = (f64::from(frame.width()) - 1.0, f64::from(frame.height()) - 1.0);
-    let transposed = GrayImage::from_fn(frame.height(), frame.width(), |x, y| *frame.get_pixel(y, x));
+    let (right, bottom) = (
+        f64::from(frame.width()) - 1.0,
+        f64::from(frame.height()) - 1.0,
+    );
+    let transposed =
+        GrayImage::from_fn(frame.height(), frame.width(), |x, y| *frame.get_pixel(y, x));
     [
         (
             imageops::flip_horizontal(frame),
-            Box::new(move |c| Circle { x: right - c.x, ..*c }),
+            Box::new(move |c| Circle {
+                x: right - c.x,
+                ..*c
+            }),
         ),
         (
             imageops::flip_vertical(frame),
@@ -224,7 +237,14 @@ pub(crate) fn turns(frame: &GrayImage) -> [Turn; 4] {
                 ..*c
             }),
         ),
-        (transposed, Box::new(|c| Circle { x: c.y, y: c.x, ..*c })),
+        (
+            transposed,
+            Box::new(|c| Circle {
+                x: c.y,
+                y: c.x,
+                ..*c
+            }),
+        ),
     ]
 }
 

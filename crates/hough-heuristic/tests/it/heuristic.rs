@@ -30,7 +30,10 @@ fn a_small_ball_in_clutter_is_found_reliably() {
         );
     }
     let mean = edges.iter().sum::<usize>() / edges.len();
-    assert!((3000..6500).contains(&mean), "the scenes have {mean} edge pixels");
+    assert!(
+        (3000..6500).contains(&mean),
+        "the scenes have {mean} edge pixels"
+    );
 }
 
 #[test]
@@ -49,7 +52,10 @@ fn balls_of_every_radius_are_found_to_a_third_of_a_pixel() {
         let (frame, balls) = scene.render();
         let found = detector.detect(&frame);
         assert_eq!(found.len(), 1);
-        assert!(same(&found[0].circle, &balls[0], 0.34), "{found:?} {balls:?}");
+        assert!(
+            same(&found[0].circle, &balls[0], 0.34),
+            "{found:?} {balls:?}"
+        );
         assert!(found[0].score > 0.9 && found[0].score <= 1.0);
     }
 }
@@ -106,7 +112,8 @@ fn frame_and_configuration_alone_decide() {
             max_circles: 4,
             ..HeuristicConfig::default()
         };
-        let fresh = |frame: &GrayImage| Heuristic::with_canny(config.clone()).unwrap().detect(frame);
+        let fresh =
+            |frame: &GrayImage| Heuristic::with_canny(config.clone()).unwrap().detect(frame);
         let mut used = Heuristic::with_canny(config.clone()).unwrap();
         for index in [0, 1, 0, 2, 1] {
             assert_eq!(used.detect(&frames[index]), fresh(&frames[index]));
@@ -121,7 +128,15 @@ fn frame_and_configuration_alone_decide() {
 fn frames_without_circles_give_none() {
     let edges: Box<dyn EdgeDetector> = Box::new(Canny::default());
     let mut detector = Heuristic::new(HeuristicConfig::default(), edges).unwrap();
-    for (width, height) in [(0, 0), (1, 1), (1, 500), (500, 1), (2, 2), (3, 3), (768, 576)] {
+    for (width, height) in [
+        (0, 0),
+        (1, 1),
+        (1, 500),
+        (500, 1),
+        (2, 2),
+        (3, 3),
+        (768, 576),
+    ] {
         for grey in [0, 255] {
             let frame = GrayImage::from_pixel(width, height, Luma([grey]));
             assert_eq!(detector.detect(&frame), []);

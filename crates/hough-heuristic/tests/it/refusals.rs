@@ -34,7 +34,10 @@ fn a_frame_that_the_region_sticks_out_of_is_refused() {
             };
             let mut found = vec![stale; 2];
             let error = detector.try_detect_into(&small, &mut found).unwrap_err();
-            assert!(matches!(error, ConfigError::Region { .. }), "{name}: {error}");
+            assert!(
+                matches!(error, ConfigError::Region { .. }),
+                "{name}: {error}"
+            );
             let (error, size) = (error.to_string(), format!("{width}x{height}"));
             assert!(
                 error.contains("40x80 px at (200, 100)") && error.contains(&size),
@@ -73,7 +76,9 @@ fn the_accumulator_is_bounded() {
     );
     let mut found = Vec::new();
     let before = detector.memory();
-    let large = GrayImage::from_fn(3840, 2160, |x, y| Luma([((x / 40 + y / 40) % 2 * 200) as u8]));
+    let large = GrayImage::from_fn(3840, 2160, |x, y| {
+        Luma([((x / 40 + y / 40) % 2 * 200) as u8])
+    });
     assert_eq!(detector.try_detect_into(&large, &mut found), Err(error));
     assert_eq!(detector.detect(&large), []);
     assert_eq!(detector.memory(), before, "a refused frame takes no memory");
@@ -124,7 +129,10 @@ fn unusable_settings_are_refused() {
         RandomizedHoughConfig { votes: 1, ..rht() },
         RandomizedHoughConfig { cell: 0.0, ..rht() },
         RandomizedHoughConfig {
-            accept: Acceptance { theta: 2.0, ..ACCEPT },
+            accept: Acceptance {
+                theta: 2.0,
+                ..ACCEPT
+            },
             ..rht()
         },
     ] {

@@ -2,14 +2,19 @@ use std::fmt::Debug;
 
 use hough_heuristic::{
     Acceptance, CannyConfig, Circle, CurveSearchConfig, Detection, Ellipse, Features, FoundCurve,
-    HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling, StandardHoughConfig, TrustedConfig,
+    HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling, StandardHoughConfig,
+    TrustedConfig,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 fn comes_back<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
     let stored = serde_json::to_string(value).unwrap();
-    assert_eq!(serde_json::from_str::<T>(&stored).unwrap(), *value, "{stored}");
+    assert_eq!(
+        serde_json::from_str::<T>(&stored).unwrap(),
+        *value,
+        "{stored}"
+    );
 }
 
 #[test]
@@ -21,7 +26,10 @@ fn what_is_stored_comes_back() {
     };
     comes_back(&circle);
     comes_back(&Features::from_circle(&circle, 768));
-    comes_back(&Detection { circle, score: 0.875 });
+    comes_back(&Detection {
+        circle,
+        score: 0.875,
+    });
     comes_back(&FoundCurve {
         curve: Line {
             cos: 0.6,

@@ -1,5 +1,6 @@
 use hough_heuristic::{
-    Acceptance, CannyConfig, Circle, Detection, EdgeMap, EdgePixel, StageTimes, Stages, image, write_stages,
+    Acceptance, CannyConfig, Circle, Detection, EdgeMap, EdgePixel, StageTimes, Stages, image,
+    write_stages,
 };
 
 use crate::detectors;
@@ -21,7 +22,8 @@ fn each_stage_of_each_detector_has_its_picture() {
         assert!(!stages.edges.pixels().is_empty(), "{name}");
         let near = |circle: &Circle| {
             let best = found[0].circle;
-            (circle.x - best.x).hypot(circle.y - best.y) < 8.0 && (circle.radius - best.radius).abs() < 8.0
+            (circle.x - best.x).hypot(circle.y - best.y) < 8.0
+                && (circle.radius - best.radius).abs() < 8.0
         };
         assert!(
             stages.candidates.iter().any(near),
@@ -36,7 +38,10 @@ fn each_stage_of_each_detector_has_its_picture() {
         let folder = tempfile::tempdir().unwrap();
         let paths = write_stages(folder.path(), &frame, &stages, &found).unwrap();
         for path in &paths {
-            assert_eq!(image::open(path).unwrap().to_rgb8().dimensions(), (192, 144));
+            assert_eq!(
+                image::open(path).unwrap().to_rgb8().dimensions(),
+                (192, 144)
+            );
         }
         assert_eq!(
             image::open(&paths[0]).unwrap().to_luma8(),
@@ -88,12 +93,13 @@ fn what_is_no_regular_file_is_not_replaced_by_a_picture() {
     assert!(error.to_string().contains("1_edges.png"), "{error}");
     assert!(std::fs::metadata(&socket).unwrap().file_type().is_socket());
     let parts = std::fs::read_dir(folder.path()).unwrap();
-    let unfinished = |entry: &std::fs::DirEntry| entry.file_name().to_string_lossy().ends_with(".part");
+    let unfinished =
+        |entry: &std::fs::DirEntry| entry.file_name().to_string_lossy().ends_with(".part");
     assert!(!parts.map(Result::unwrap).any(|entry| unfinished(&entry)));
 }
 
-/// The picture of `D` shows as explained what an accepted circle takes out of `D`: a band that widens with the tolerance and
-/// with the radius.
+/// The picture of `D` shows as explained what an accepted circle takes out of `D`: a band that
+/// widens with the tolerance and with the radius.
 #[test]
 fn the_picture_explains_what_the_detectors_explain() {
     let circle = Circle {

@@ -1,10 +1,13 @@
-//! The detector whose score can be trusted: what holds for every detector, and what it promises beyond.
+//! The detector whose score can be trusted: what holds for every detector, and what it promises
+//! beyond.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use hough_heuristic::image::{GrayImage, Luma};
-use hough_heuristic::{Circle, CircleDetector, ConfigError, Trusted, TrustedConfig, detect_circles};
+use hough_heuristic::{
+    Circle, CircleDetector, ConfigError, Trusted, TrustedConfig, detect_circles,
+};
 use proptest::prelude::*;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
@@ -102,7 +105,10 @@ fn the_seed_decides_the_order_and_little_else() {
         let found = with(|config| config.seed = seed).detect(&frame);
         assert_eq!(found, with(|config| config.seed = seed).detect(&frame));
         for ball in &balls {
-            assert!(found.iter().any(|f| same(&f.circle, ball, 0.35)), "seed {seed}");
+            assert!(
+                found.iter().any(|f| same(&f.circle, ball, 0.35)),
+                "seed {seed}"
+            );
         }
     }
 }
@@ -151,7 +157,11 @@ fn discs_are_found_of_which_more_than_half_is_hidden_aslant() {
         let frame = GrayImage::from_fn(320, 240, |x, y| {
             let (x, y) = (f64::from(x) - 160.3, f64::from(y) - 118.7);
             let hidden = (x * dx + y * dy) * std::f64::consts::FRAC_1_SQRT_2 > -0.2 * 40.0;
-            Luma([if x.hypot(y) < 40.0 && !hidden { 40 } else { 200 }])
+            Luma([if x.hypot(y) < 40.0 && !hidden {
+                40
+            } else {
+                200
+            }])
         });
         let found = plain().detect(&frame);
         assert_eq!(found.len(), 1, "{dx} {dy}: {found:?}");
@@ -250,7 +260,8 @@ fn no_pattern_takes_more_than_the_budget() {
             let effort = detector.effort();
             // The frame counts as one of a quarter of a megapixel.
             let draws = u64::from(draws_per_megapixel) / 4;
-            // What is begun on is finished: the partners of a point, the circle they make, and its proofs.
+            // What is begun on is finished: the partners of a point, the circle they make, and its
+            // proofs.
             assert!(effort.draws <= draws + 6, "{name}: {effort:?}");
             assert!(effort.looks <= 16 * draws + 20_000, "{name}: {effort:?}");
             let within = effort.draws < draws && effort.looks < 16 * draws + 12_000;
@@ -341,13 +352,20 @@ fn a_circle_is_followed_with_less_effort() {
     }
 }
 
-/// The detections of some scenes, as they were when last looked at; `REGENERATE=1` writes them anew.
+/// The detections of some scenes, as they were when last looked at; `REGENERATE=1` writes them
+/// anew.
 #[test]
 fn detections_are_the_golden_ones() {
     let mut text = String::from("# scene: x y radius score, pixels\n");
     let scenes = [
         ("three balls", SCENE),
-        ("noise", Scene { noise: 20.0, ..SCENE }),
+        (
+            "noise",
+            Scene {
+                noise: 20.0,
+                ..SCENE
+            },
+        ),
         (
             "many",
             Scene {

@@ -1,4 +1,5 @@
-//! What `Trusted` says of a circle: that its score and its standard errors hold, and what counts as round.
+//! What `Trusted` says of a circle: that its score and its standard errors hold, and what counts as
+//! round.
 
 use hough_heuristic::image::{GrayImage, Luma, imageops};
 use hough_heuristic::{Circle, CircleDetector, Measurement};
@@ -24,7 +25,11 @@ fn the_score_means_what_it_says() {
         detector.detect(&frame);
         let least = |m: &Measurement| m.log_false_alarms <= -1.0;
         alarms += detector.measurements().iter().filter(|m| least(m)).count();
-        sure += detector.measurements().iter().filter(|m| m.score >= 0.5).count();
+        sure += detector
+            .measurements()
+            .iter()
+            .filter(|m| m.score >= 0.5)
+            .count();
     }
     assert_eq!(sure, 0);
     assert!(
@@ -40,7 +45,12 @@ fn the_standard_error_holds() {
     let (mut within, mut all) = ([0; 3], 0);
     for seed in 100..150 {
         let noise = [1.0, 4.0, 10.0, 20.0][seed as usize % 4];
-        let (frame, balls) = Scene { seed, noise, ..SCENE }.render();
+        let (frame, balls) = Scene {
+            seed,
+            noise,
+            ..SCENE
+        }
+        .render();
         detector.detect(&frame);
         for m in detector.measurements() {
             let Some(ball) = balls.iter().find(|ball| same(&m.circle, ball, 2.0)) else {
@@ -61,7 +71,8 @@ fn the_standard_error_holds() {
     assert!(all > 120, "{all}");
     for (k, within) in within.into_iter().enumerate() {
         let share = within as f64 / f64::from(all);
-        // Outlines as sharp as these are measured better than the radius error, which allows for shading, says.
+        // Outlines as sharp as these are measured better than the radius error, which allows for
+        // shading, says.
         assert!((0.5..=0.98).contains(&share), "{k}: {share}");
     }
 }
@@ -95,7 +106,11 @@ fn a_lamp_in_its_glow_is_no_circle_but_a_white_ball_is() {
 fn what_is_round_but_not_a_circle_is_not_reported() {
     let wavy = |part: f64| {
         around_the_centre(move |distance, angle| {
-            edge(distance - 20.0 * (1.0 + part * (4.0 * angle).cos()), 60.0, 170.0)
+            edge(
+                distance - 20.0 * (1.0 + part * (4.0 * angle).cos()),
+                60.0,
+                170.0,
+            )
         })
     };
     assert_eq!(plain().detect(&wavy(0.01)).len(), 1);
@@ -112,8 +127,12 @@ fn a_slight_ellipse_is_accepted_and_told() {
             );
             u * u + v * v < 1.0
         };
-        let covered =
-            (0..16).filter(|k| inside(f64::from(k % 4) / 4.0 - 0.375, f64::from(k / 4) / 4.0 - 0.375));
+        let covered = (0..16).filter(|k| {
+            inside(
+                f64::from(k % 4) / 4.0 - 0.375,
+                f64::from(k / 4) / 4.0 - 0.375,
+            )
+        });
         Luma([(200 - 9 * covered.count()) as u8])
     });
     let mut detector = plain();

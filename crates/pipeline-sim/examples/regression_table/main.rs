@@ -1,14 +1,17 @@
-//! How well each form of the regression simulators describes the cell: fits to many seeds, and the interval that 95 % of fits lie in.
+//! How well each form of the regression simulators describes the cell: fits to many seeds, and the
+//! interval that 95 % of fits lie in.
 //!
 //! ```text
 //! cargo run --release -p pipeline-sim --example regression_table [-- SAMPLES [SEEDS]]
 //! ```
 //!
-//! R² and root mean square errors (feature units) are those of as many other samples; the open-loop error is the mean error of y after 1, 3 and 5
-//! moves that the model does not see. For features noisy by 0, 0.125 and 0.5 units. Then two forms linear in y and r that the library does
-//! not offer, and the fits to balls in the arm's plane only, or in the task's workspace only, with the standard deviations of the changes. Last,
-//! what the README sets beside an independent study: in this cell, and in an earlier one with another mount and another range of the elbow.
-//! `SAMPLES` does not apply to that part, which has as many samples as the study; `SEEDS` does.
+//! R² and root mean square errors (feature units) are those of as many other samples; the open-loop
+//! error is the mean error of y after 1, 3 and 5 moves that the model does not see. For features
+//! noisy by 0, 0.125 and 0.5 units. Then two forms linear in y and r that the library does not
+//! offer, and the fits to balls in the arm's plane only, or in the task's workspace only, with the
+//! standard deviations of the changes. Last, what the README sets beside an independent study: in
+//! this cell, and in an earlier one with another mount and another range of the elbow. `SAMPLES`
+//! does not apply to that part, which has as many samples as the study; `SEEDS` does.
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod otherwise;
@@ -17,7 +20,8 @@ mod study;
 use std::error::Error;
 
 use otherwise::{
-    Balls, Form, Linear, Starts, Terms, centring_with_square, sample, to_second_order, with_products,
+    Balls, Form, Linear, Starts, Terms, centring_with_square, sample, to_second_order,
+    with_products,
 };
 use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
@@ -51,7 +55,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!(
             "\n{count} samples with noise of {noise} units, {seeds} fits: mean ± 1.96 standard deviations\n"
         );
-        println!("| form | R² of dy | R² of dr | error of y | error of r | y after 1 | 3 | 5 moves |");
+        println!(
+            "| form | R² of dy | R² of dr | error of y | error of r | y after 1 | 3 | 5 moves |"
+        );
         println!("|---|---|---|---|---|---|---|---|");
         for (name, form, edges) in [
             ("`Linear`, one fit", ReachForm::Linear, &[][..]),
@@ -104,7 +110,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             let (plain, full) = (&plain.quality()[0], &full.quality()[0]);
             rows.push([plain.r2, plain.rmse, full.r2, full.rmse]);
         }
-        println!("\n| centring: R² of dx on 1, d1 | error | on 1, d1, r d1 | error |\n|---|---|---|---|");
+        println!(
+            "\n| centring: R² of dx on 1, d1 | error | on 1, d1, r d1 | error |\n|---|---|---|---|"
+        );
         println!("| {} |", spread(&rows).join(" | "));
     }
     other_forms(&cell, count, seeds)?;
@@ -124,10 +132,16 @@ fn other_forms(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Erro
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
             let (_, training) = sample_moves(cell, count, 0.125, &mut rng);
             let (_, fresh) = sample_moves(cell, count, 0.125, &mut rng);
-            let form =
-                Form::fit(&training, Linear::Image, terms, &ReachModel::PAPER_ELBOW_EDGES).ok_or("no fit")?;
+            let form = Form::fit(
+                &training,
+                Linear::Image,
+                terms,
+                &ReachModel::PAPER_ELBOW_EDGES,
+            )
+            .ok_or("no fit")?;
             let [a, b, c, d] = form.quality(&fresh);
-            let [e, f, g] = form.open_loop(cell, &Starts::paper(Balls::Anywhere), false, RUNS, &mut rng);
+            let [e, f, g] =
+                form.open_loop(cell, &Starts::paper(Balls::Anywhere), false, RUNS, &mut rng);
             rows.push([a, b, c, d, e, f, g]);
         }
         println!("| {name} | {} |", spread(&rows).join(" | "));
@@ -166,7 +180,14 @@ fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Er
                 let quality = model.quality_on(&fresh)?;
                 let (y, r) = (&quality[0], &quality[1]);
                 let of = |rmse: f64, r2: f64| rmse / (1.0 - r2).sqrt();
-                rows.push([y.r2, r.r2, y.rmse, r.rmse, of(y.rmse, y.r2), of(r.rmse, r.r2)]);
+                rows.push([
+                    y.r2,
+                    r.r2,
+                    y.rmse,
+                    r.rmse,
+                    of(y.rmse, y.r2),
+                    of(r.rmse, r.r2),
+                ]);
             }
             println!("| `{form:?}` | {} |", spread(&rows).join(" | "));
         }
@@ -176,8 +197,13 @@ fn other_samples(cell: &Cell, count: usize, seeds: u64) -> Result<(), Box<dyn Er
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
                 let (_, training, _) = sample(cell, &starts, count, noise, &mut rng);
                 let (_, fresh, _) = sample(cell, &starts, count, noise, &mut rng);
-                let form = Form::fit(&training, Linear::Image, terms, &ReachModel::PAPER_ELBOW_EDGES)
-                    .ok_or("no fit")?;
+                let form = Form::fit(
+                    &training,
+                    Linear::Image,
+                    terms,
+                    &ReachModel::PAPER_ELBOW_EDGES,
+                )
+                .ok_or("no fit")?;
                 rows.push(form.quality(&fresh));
             }
             println!("| {name} | {} | | |", spread(&rows).join(" | "));

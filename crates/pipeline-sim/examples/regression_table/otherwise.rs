@@ -35,7 +35,8 @@ impl Starts {
         }
     }
 
-    /// A ball in sight that the arm can reach, on or above the table, and the joints, within their limits.
+    /// A ball in sight that the arm can reach, on or above the table, and the joints, within their
+    /// limits.
     pub(crate) fn draw<R: Rng>(&self, cell: &Cell, rng: &mut R) -> Option<(Cell, Joints)> {
         let uniform = |[low, high]: [f64; 2], rng: &mut R| rng.random_range(low..high);
         (0..100_000).find_map(|_| {
@@ -46,13 +47,15 @@ impl Starts {
                 _ => rng.random_range(4.0..188.0),
             };
             let (jt2, jt3) = (uniform(self.jt2, rng), uniform(self.jt3, rng));
-            let joints = Joints::from_degrees([0.0, jt2, jt3, 0.0, Cell::REACHING_JT5_DEGREES, 0.0]);
+            let joints =
+                Joints::from_degrees([0.0, jt2, jt3, 0.0, Cell::REACHING_JT5_DEGREES, 0.0]);
             let mut start = *cell;
             start.place_ball(cell.ball_showing(&joints, &Features { x, y, r })?);
             let place = start.ball.centre;
             let there = match self.balls {
                 Balls::Within([near, far], [low, high]) => {
-                    (near..=far).contains(&place.x.hypot(place.y)) && (low..=high).contains(&place.z)
+                    (near..=far).contains(&place.x.hypot(place.y))
+                        && (low..=high).contains(&place.z)
                 }
                 // Not those behind the waist, which the arm could reach after turning round.
                 Balls::InPlane => place.x > 0.0,
@@ -73,8 +76,8 @@ pub(crate) fn in_plane(cell: &Cell, r: f64) -> f64 {
     96.0 + r * cell.mount.0.translation.y / cell.ball.radius
 }
 
-/// `count` samples of each kind from these starts, as `sample_moves` has them, and the share of moves of `JT2` and `JT3` that keep the ball
-/// in sight and the arm within its limits.
+/// `count` samples of each kind from these starts, as `sample_moves` has them, and the share of
+/// moves of `JT2` and `JT3` that keep the ball in sight and the arm within its limits.
 pub(crate) fn sample<R: Rng>(
     cell: &Cell,
     starts: &Starts,
@@ -98,9 +101,13 @@ pub(crate) fn sample<R: Rng>(
                 .within_limits(&after)
                 .then(|| start.features(&after))
                 .flatten()?;
-            Some((with_noise(before, noise, rng), with_noise(after, noise, rng)))
+            Some((
+                with_noise(before, noise, rng),
+                with_noise(after, noise, rng),
+            ))
         };
-        if let Some((before, after)) = seen([d1, 0.0, 0.0, 0.0, 0.0, 0.0]).filter(|_| centring.len() < count)
+        if let Some((before, after)) =
+            seen([d1, 0.0, 0.0, 0.0, 0.0, 0.0]).filter(|_| centring.len() < count)
         {
             centring.push(CentreSample { before, d1, after });
         }
@@ -137,7 +144,8 @@ pub(crate) fn with_products(before: &Features, jt3: f64, d2: f64, d3: f64) -> Ve
     std::iter::once(1.0).chain(products).collect()
 }
 
-/// 1, the moves times 1, r, y, the elbow angle, r² and r y, and their squares and product times 1, r and r²: 22 terms.
+/// 1, the moves times 1, r, y, the elbow angle, r² and r y, and their squares and product times 1,
+/// r and r²: 22 terms.
 pub(crate) fn to_second_order(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
     let [r, y, e] = place(before, jt3);
     let (a, b) = (d2 / 20.0, d3 / 16.0);
@@ -150,23 +158,30 @@ pub(crate) fn to_second_order(before: &Features, jt3: f64, d2: f64, d3: f64) -> 
     std::iter::once(1.0).chain(first).chain(second).collect()
 }
 
-/// 1, and the moves, their squares and product times 1, r, y and the elbow angle, and its square times the first: 22 terms, those of `Rigid22`
-/// with r and y in the place of Z and V.
+/// 1, and the moves, their squares and product times 1, r, y and the elbow angle, and its square
+/// times the first: 22 terms, those of `Rigid22` with r and y in the place of Z and V.
 pub(crate) fn as_rigid22(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
     let [r, y, e] = place(before, jt3);
     let (a, b) = (d2 / 20.0, d3 / 16.0);
     let products = [a, b, a * a, a * b, b * b]
         .into_iter()
         .flat_map(|m| [1.0, r, y, e].map(|p| m * p));
-    std::iter::once(1.0).chain(products).chain([e * e * a]).collect()
+    std::iter::once(1.0)
+        .chain(products)
+        .chain([e * e * a])
+        .collect()
 }
 
 fn place(before: &Features, jt3: f64) -> [f64; 3] {
-    [before.r / 33.0, (before.y - 72.0) / 33.0, (jt3 - 140.0) / 40.0]
+    [
+        before.r / 33.0,
+        (before.y - 72.0) / 33.0,
+        (jt3 - 140.0) / 40.0,
+    ]
 }
 
-/// 1, the moves times 1, r, y, the elbow angle, its product with r and its square, and the squares and product of the moves times 1, r and y:
-/// 22 terms.
+/// 1, the moves times 1, r, y, the elbow angle, its product with r and its square, and the squares
+/// and product of the moves times 1, r and y: 22 terms.
 pub(crate) fn elbow_to_second_order(before: &Features, jt3: f64, d2: f64, d3: f64) -> Vec<f64> {
     let [r, y, e] = place(before, jt3);
     let (a, b) = (d2 / 20.0, d3 / 16.0);
@@ -179,7 +194,8 @@ pub(crate) fn elbow_to_second_order(before: &Features, jt3: f64, d2: f64, d3: f6
     std::iter::once(1.0).chain(first).chain(second).collect()
 }
 
-/// What a form is linear in: y and r themselves, or Z = 33 / r and V = (y - 72) / r in units that make them alike.
+/// What a form is linear in: y and r themselves, or Z = 33 / r and V = (y - 72) / r in units that
+/// make them alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Linear {
     Image,
@@ -210,7 +226,12 @@ pub(crate) struct Form {
 }
 
 impl Form {
-    pub(crate) fn fit(samples: &[ReachSample], linear: Linear, terms: Terms, edges: &[f64]) -> Option<Self> {
+    pub(crate) fn fit(
+        samples: &[ReachSample],
+        linear: Linear,
+        terms: Terms,
+        edges: &[f64],
+    ) -> Option<Self> {
         let mut form = Self {
             linear,
             terms,
@@ -230,8 +251,14 @@ impl Form {
                 .iter()
                 .map(|s| [&s.before, &s.after].map(|f| linear.swap(f)))
                 .collect();
-            let dy = pairs.iter().map(|[before, after]| after.y - before.y).collect();
-            let dr = pairs.iter().map(|[before, after]| after.r - before.r).collect();
+            let dy = pairs
+                .iter()
+                .map(|[before, after]| after.y - before.y)
+                .collect();
+            let dr = pairs
+                .iter()
+                .map(|[before, after]| after.r - before.r)
+                .collect();
             form.pieces
                 .push([least_squares(&rows, dy)?, least_squares(&rows, dr)?]);
         }
@@ -245,7 +272,9 @@ impl Form {
     pub(crate) fn predict(&self, before: &Features, jt3: f64, d2: f64, d3: f64) -> Features {
         let before = self.linear.swap(before);
         let terms = DVector::from_vec((self.terms)(&before, jt3, d2, d3));
-        let [y, r] = self.pieces[self.piece(jt3)].each_ref().map(|c| c.dot(&terms));
+        let [y, r] = self.pieces[self.piece(jt3)]
+            .each_ref()
+            .map(|c| c.dot(&terms));
         self.linear.swap(&Features {
             y: before.y + y,
             r: before.r + r,
@@ -267,8 +296,9 @@ impl Form {
         [y.0, r.0, y.1, r.1]
     }
 
-    /// Mean error of y after 1, 3 and 5 moves that the form does not see. A run ends with the first move that loses the ball or leaves the
-    /// limits, if `at_loss`; otherwise another move is drawn.
+    /// Mean error of y after 1, 3 and 5 moves that the form does not see. A run ends with the first
+    /// move that loses the ball or leaves the limits, if `at_loss`; otherwise another move is
+    /// drawn.
     pub(crate) fn open_loop<R: Rng>(
         &self,
         cell: &Cell,
@@ -297,7 +327,9 @@ impl Form {
                         .flatten()?;
                     Some((d2, d3, there, seen))
                 });
-                let Some((d2, d3, there, seen)) = next else { break };
+                let Some((d2, d3, there, seen)) = next else {
+                    break;
+                };
                 believed = self.predict(&believed, joints.degrees()[2], d2, d3);
                 // A believed ball does not vanish.
                 believed.r = believed.r.max(1.0);

@@ -1,4 +1,5 @@
-//! The rows of an independent study of the cell, fitted and judged as it seems to have done: in this cell, and in an earlier one.
+//! The rows of an independent study of the cell, fitted and judged as it seems to have done: in
+//! this cell, and in an earlier one.
 
 use std::error::Error;
 
@@ -9,12 +10,13 @@ use pipeline_sim::{Ball, Cell, CentreModel, Mount, ReachForm, ReachModel, ReachS
 use puma_val2::Joints;
 
 use super::otherwise::{
-    Balls, Form, Linear, Starts, Terms, as_rigid22, centring_with_square, elbow_to_second_order, in_plane,
-    linear, sample, to_second_order, with_products,
+    Balls, Form, Linear, Starts, Terms, as_rigid22, centring_with_square, elbow_to_second_order,
+    in_plane, linear, sample, to_second_order, with_products,
 };
 use super::spread;
 
-/// Runs for the open-loop error of a fit, where a run ends with the move that loses the ball: few have five moves.
+/// Runs for the open-loop error of a fit, where a run ends with the move that loses the ball: few
+/// have five moves.
 const RUNS: usize = 2000;
 
 /// The study's noise if its half pixel is one of the frame, units.
@@ -125,11 +127,13 @@ impl Setting {
         }
     }
 
-    /// An earlier one: the camera looks along the forearm, 490 mm past the elbow and 37 mm above it, `JT3` goes to 280 degrees, there is no table, and
-    /// a ball is lost only where its centre leaves the frame or its radius 5..=68 units.
+    /// An earlier one: the camera looks along the forearm, 490 mm past the elbow and 37 mm above
+    /// it, `JT3` goes to 280 degrees, there is no table, and a ball is lost only where its centre
+    /// leaves the frame or its radius 5..=68 units.
     ///
-    /// Camera and elbow follow from the changes of y and r per degree that the study gives; intervals, ranges and rule are those
-    /// with which its spreads of dy and dr and its R² come out.
+    /// Camera and elbow follow from the changes of y and r per degree that the study gives;
+    /// intervals, ranges and rule are those with which its spreads of dy and dr and its R² come
+    /// out.
     pub(crate) fn earlier() -> Self {
         let mut cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let hand = |jt5| {
@@ -158,7 +162,8 @@ impl Setting {
         }
     }
 
-    /// Changes of y and r per degree of study's +th2 (-`JT2`), +e (-`JT3`) and both in turn, with the ball at y = 78 and the two radii.
+    /// Changes of y and r per degree of study's +th2 (-`JT2`), +e (-`JT3`) and both in turn, with
+    /// the ball at y = 78 and the two radii.
     fn print_gains(&self) -> Result<(), Box<dyn Error>> {
         for r in [33.0, 10.0] {
             let at = |d2: f64, d3: f64| {
@@ -221,7 +226,10 @@ impl Setting {
                 changes(&sample(&strict, &self.starts, self.count, NOISE, &mut rng).1)
             })
             .collect();
-        println!("with 60 % of the outline inside: {}", spread(&spreads).join(", "));
+        println!(
+            "with 60 % of the outline inside: {}",
+            spread(&spreads).join(", ")
+        );
         println!(
             "\n| form | R² of dy | R² of dr | error of y | error of r | on others: R² of dy | of dr | error of y | of r | runs end: y after 1 | 3 | 5 | runs go on: 1 | 3 | 5 |"
         );
@@ -233,9 +241,10 @@ impl Setting {
                 qualities.push(joined::<8>(&[&fit.quality(own)?, &fit.quality(fresh)?]));
                 if let Fitted::Other(form) = fit {
                     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                    let [ends, goes_on] = [(true, RUNS), (false, RUNS / 10)].map(|(at_loss, runs)| {
-                        form.open_loop(&self.cell, &self.starts, at_loss, runs, &mut rng)
-                    });
+                    let [ends, goes_on] =
+                        [(true, RUNS), (false, RUNS / 10)].map(|(at_loss, runs)| {
+                            form.open_loop(&self.cell, &self.starts, at_loss, runs, &mut rng)
+                        });
                     runs.push(joined::<6>(&[&ends, &goes_on]));
                 }
             }
@@ -249,7 +258,8 @@ impl Setting {
         self.print_centring(seeds)
     }
 
-    /// The same forms, fitted to samples with half a unit of noise and judged on others without any.
+    /// The same forms, fitted to samples with half a unit of noise and judged on others without
+    /// any.
     fn print_in_units(&self, seeds: u64) -> Result<(), Box<dyn Error>> {
         let mut samples = Vec::new();
         for seed in 0..seeds {
@@ -277,7 +287,9 @@ impl Setting {
 
     /// Centring with balls anywhere, and in spaces of several widths.
     fn print_centring(&self, seeds: u64) -> Result<(), Box<dyn Error>> {
-        println!("\n| balls | dx on 1, d1: R² | error | and r d1: R² | error | and r² d1: R² | error |");
+        println!(
+            "\n| balls | dx on 1, d1: R² | error | and r d1: R² | error | and r² d1: R² | error |"
+        );
         println!("|---|---|---|---|---|---|---|");
         for balls in [
             Balls::Anywhere,
@@ -285,7 +297,10 @@ impl Setting {
             Balls::Within([0.3, 0.7], [-0.2, 0.05]),
             Balls::Within([0.2, 0.9], [-0.4, 0.3]),
         ] {
-            let starts = Starts { balls, ..self.starts };
+            let starts = Starts {
+                balls,
+                ..self.starts
+            };
             let mut rows = Vec::new();
             for seed in 0..seeds {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -293,7 +308,14 @@ impl Setting {
                 let plain = CentreModel::fit_without_radius(&samples)?.quality();
                 let full = CentreModel::fit(&samples)?.quality();
                 let [r2, error] = centring_with_square(&samples).ok_or("no fit")?;
-                rows.push([plain[0].r2, plain[0].rmse, full[0].r2, full[0].rmse, r2, error]);
+                rows.push([
+                    plain[0].r2,
+                    plain[0].rmse,
+                    full[0].r2,
+                    full[0].rmse,
+                    r2,
+                    error,
+                ]);
             }
             println!("| {balls:?} | {} |", spread(&rows).join(" | "));
         }
@@ -311,7 +333,10 @@ fn changes(samples: &[ReachSample]) -> [f64; 2] {
     let spread = |change: fn(&ReachSample) -> f64| {
         let n = samples.len() as f64;
         let mean = samples.iter().map(change).sum::<f64>() / n;
-        let squares = samples.iter().map(|s| (change(s) - mean).powi(2)).sum::<f64>();
+        let squares = samples
+            .iter()
+            .map(|s| (change(s) - mean).powi(2))
+            .sum::<f64>();
         (squares / n).sqrt()
     };
     [

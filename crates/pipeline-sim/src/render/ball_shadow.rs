@@ -37,7 +37,8 @@ impl BallShadow {
                 let axis = toward(light);
                 let reach = light.half_angle.clamp(0.0, 0.7).tan();
                 let drop = (ball.centre.z - table).max(0.0) / axis.z.max(0.05);
-                let margin = ball.radius / axis.z.max(0.05) + drop * reach * 1.5 / axis.z.max(0.05) + 0.03;
+                let margin =
+                    ball.radius / axis.z.max(0.05) + drop * reach * 1.5 / axis.z.max(0.05) + 0.03;
                 let tip = ball.centre - axis * drop;
                 let foot = holder.map_or(tip.xy(), |h| h.foot);
                 let bounds = [
@@ -66,14 +67,18 @@ impl BallShadow {
     #[inline(always)]
     pub(super) fn at(&self, x: &[f32], y: &[f32], factors: &mut [f32], spare: &mut [f32]) {
         factors.fill(1.0);
-        let least = |v: &[f32]| v.iter().fold(f32::INFINITY, |a, b| if *b < a { *b } else { a });
+        let least = |v: &[f32]| {
+            v.iter()
+                .fold(f32::INFINITY, |a, b| if *b < a { *b } else { a })
+        };
         let most = |v: &[f32]| {
             v.iter()
                 .fold(f32::NEG_INFINITY, |a, b| if *b > a { *b } else { a })
         };
         let places = [least(x), most(x), least(y), most(y)];
-        let apart =
-            |b: &[f32; 4]| places[1] <= b[0] || places[0] >= b[1] || places[3] <= b[2] || places[2] >= b[3];
+        let apart = |b: &[f32; 4]| {
+            places[1] <= b[0] || places[0] >= b[1] || places[3] <= b[2] || places[2] >= b[3]
+        };
         for lamp in &self.lamps {
             let bounds = lamp.bounds.map(|b| b as f32);
             if apart(&bounds) {
@@ -99,11 +104,17 @@ impl BallShadow {
                     let (dx, dy) = (x - fx, y - fy);
                     let distance2 = dx * dx + dy * dy;
                     let gloom = 0.35 * fading((distance2.sqrt() - radius).max(0.0) * (1.0 / 0.012));
-                    *factor *= if distance2 < NEAR * NEAR { 1.0 - gloom } else { 1.0 };
+                    *factor *= if distance2 < NEAR * NEAR {
+                        1.0 - gloom
+                    } else {
+                        1.0
+                    };
                 }
             }
         }
-        factors.iter_mut().for_each(|factor| *factor = factor.max(0.02));
+        factors
+            .iter_mut()
+            .for_each(|factor| *factor = factor.max(0.02));
     }
 
     /// Raises `hidden` to the shares of a lamp that the ball hides.
@@ -123,7 +134,14 @@ impl BallShadow {
 
     /// Raises `hidden` to the shares of a lamp that the holder hides.
     #[inline(always)]
-    fn behind_holder(&self, lamp: &Lamp, holder: &Holder, x: &[f32], y: &[f32], hidden: &mut [f32]) {
+    fn behind_holder(
+        &self,
+        lamp: &Lamp,
+        holder: &Holder,
+        x: &[f32],
+        y: &[f32],
+        hidden: &mut [f32],
+    ) {
         let steep = lamp.axis.z.max(0.05);
         let (dx, dy) = ((lamp.axis.x / steep) as f32, (lamp.axis.y / steep) as f32);
         let slope2 = dx * dx + dy * dy;
@@ -145,7 +163,8 @@ impl BallShadow {
 /// How far from its axis the holder hides part of the sky, metres.
 const NEAR: f32 = 0.1;
 
-/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body`, `across2` being the squared distance between their middles.
+/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body`, `across2` being the
+/// squared distance between their middles.
 #[inline(always)]
 fn overlap(body: f32, lamp: f32, across2: f32) -> f32 {
     let lamp = lamp.max(1e-4);
@@ -231,7 +250,10 @@ mod tests {
             } else {
                 1.0
             };
-            assert!((f64::from(*factor) - exact).abs() < 2e-5, "{k}: {factor} {exact}");
+            assert!(
+                (f64::from(*factor) - exact).abs() < 2e-5,
+                "{k}: {factor} {exact}"
+            );
         }
     }
 }

@@ -21,7 +21,8 @@ pub(super) struct Studio<'a> {
     pub(super) bounce: f64,
 }
 
-/// Writes a row of a textured plane of reflectance 1: `plane` takes pixels to homogeneous plane coordinates in metres.
+/// Writes a row of a textured plane of reflectance 1: `plane` takes pixels to homogeneous plane
+/// coordinates in metres.
 pub(super) fn plane_row(
     plane: &Matrix3<f64>,
     texture: &Texture,
@@ -108,7 +109,8 @@ impl Studio<'_> {
         };
         let eye = self.view.eye();
         let (top, bottom) = (ring(high), ring(low));
-        // Silhouette of the side: the hull of both rings, made of the half of each that faces away from the other in the image.
+        // Silhouette of the side: the hull of both rings, made of the half of each that faces away
+        // from the other in the image.
         let (mut a, mut b) = (Vec::new(), Vec::new());
         self.view.polygon(&top, &mut a);
         self.view.polygon(&bottom, &mut b);
@@ -153,7 +155,14 @@ impl Studio<'_> {
             }
         });
         if eye.z > high {
-            self.face(canvas, &top, &Vector3::x(), &Vector3::y(), look, look.albedo);
+            self.face(
+                canvas,
+                &top,
+                &Vector3::x(),
+                &Vector3::y(),
+                look,
+                look.albedo,
+            );
         }
     }
 
@@ -215,12 +224,26 @@ impl Studio<'_> {
                 for (out, u, v) in [(l, w, h), (-l, -w, h), (w, -l, h), (-w, l, h), (h, l, w)] {
                     if (eye - (centre + out)).dot(&out) > 0.0 {
                         let corners = quad(centre + out, u, v);
-                        self.face(canvas, &corners, &u.normalize(), &v.normalize(), look, albedo);
+                        self.face(
+                            canvas,
+                            &corners,
+                            &u.normalize(),
+                            &v.normalize(),
+                            look,
+                            albedo,
+                        );
                     }
                 }
             }
             Shape::Cylinder { radius, height } => {
-                self.cylinder(canvas, middle.xy(), radius, self.table, self.table + height, look);
+                self.cylinder(
+                    canvas,
+                    middle.xy(),
+                    radius,
+                    self.table,
+                    self.table + height,
+                    look,
+                );
             }
             Shape::Ball { radius } => {
                 self.sphere(canvas, &(middle + Vector3::z() * radius), radius, look);
@@ -250,7 +273,11 @@ impl Studio<'_> {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
                 self.face(canvas, &corners, &along, &across, look, albedo);
             }
-            Shape::Print { length, width, lines } => {
+            Shape::Print {
+                length,
+                width,
+                lines,
+            } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
                 self.face(canvas, &corners, &along, &across, look, albedo);
                 self.print(canvas, thing, (length, width), lines);
@@ -268,19 +295,22 @@ impl Studio<'_> {
         };
         let across = nalgebra::Vector2::new(-along.y, along.x);
         let light = strip.albedo * self.irradiance(&Vector3::z());
-        // Several ever narrower layers make a soft edge: each adds its share of what is still missing.
+        // Several ever narrower layers make a soft edge: each adds its share of what is still
+        // missing.
         const LAYERS: usize = 6;
         let soft = strip.softness.max(0.0) * unit;
         for k in 0..LAYERS {
             let half = across
-                * (0.5 * strip.width * unit + soft * (0.5 - (k as f64 + 0.5) / LAYERS as f64)).max(0.0);
+                * (0.5 * strip.width * unit + soft * (0.5 - (k as f64 + 0.5) / LAYERS as f64))
+                    .max(0.0);
             let corners = [from - half, to - half, to + half, from + half].map(Point2::from);
             let share = 1.0 / (LAYERS - k) as f32;
             canvas.blend(&corners, light as f32, share);
         }
     }
 
-    /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters from afar.
+    /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters
+    /// from afar.
     fn print(&self, canvas: &mut Canvas, thing: &Thing, (length, width): (f64, f64), lines: u32) {
         let (sin, cos) = thing.turn.sin_cos();
         let (along, across) = (Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0));
@@ -298,7 +328,8 @@ impl Studio<'_> {
             return;
         }
         // A fixed, scrambled sequence decides the letters: print looks the same in every frame.
-        let mut state = (thing.x.to_bits() ^ thing.y.to_bits()).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1;
+        let mut state =
+            (thing.x.to_bits() ^ thing.y.to_bits()).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1;
         let mut next = |n: u64| {
             state ^= state << 13;
             state ^= state >> 7;
@@ -328,7 +359,12 @@ impl Studio<'_> {
                         stroke(0.4 * size, 0.0, thick, 0.8 * size);
                     }
                     if kind > 1 {
-                        stroke(0.2 * size, 0.3 * size * (kind as f64 - 3.0), 0.5 * size, thick);
+                        stroke(
+                            0.2 * size,
+                            0.3 * size * (kind as f64 - 3.0),
+                            0.5 * size,
+                            thick,
+                        );
                     }
                     x += 0.75 * size;
                     if x > end {

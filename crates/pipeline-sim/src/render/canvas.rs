@@ -9,13 +9,15 @@ pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) light: Vec<f32>,
-    /// Share of each pixel that is covered, for a canvas that is laid over another; empty for one that is not.
+    /// Share of each pixel that is covered, for a canvas that is laid over another; empty for one
+    /// that is not.
     pub(super) cover: Vec<f32>,
     /// What has been drawn on since [`Canvas::wipe`].
     touched: Area,
     coverage: Vec<f32>,
     shade: Vec<f32>,
-    /// Edges of the present polygon that begin below the present row, the next one last; level ones are left out.
+    /// Edges of the present polygon that begin below the present row, the next one last; level ones
+    /// are left out.
     edges: Vec<Edge>,
     /// Those that the present row may touch.
     active: Vec<Edge>,
@@ -93,7 +95,8 @@ impl Canvas {
         }
     }
 
-    /// Gives the canvas another size, if it is another. A canvas that is laid over another is empty then; of any other all is to be drawn.
+    /// Gives the canvas another size, if it is another. A canvas that is laid over another is empty
+    /// then; of any other all is to be drawn.
     pub(super) fn resize(&mut self, width: usize, height: usize) {
         if (self.width, self.height) == (width, height) {
             return;
@@ -149,7 +152,12 @@ impl Canvas {
     }
 
     /// Notes that the columns start.. of row y are covered by these shares.
-    pub(super) fn note(&mut self, y: usize, start: usize, shares: impl ExactSizeIterator<Item = f32>) {
+    pub(super) fn note(
+        &mut self,
+        y: usize,
+        start: usize,
+        shares: impl ExactSizeIterator<Item = f32>,
+    ) {
         if self.cover.is_empty() {
             return;
         }
@@ -161,8 +169,13 @@ impl Canvas {
         }
     }
 
-    /// Fills a convex polygon. `shade(y, x0, row)` writes the light of the pixels x0.. of row y into `row`.
-    pub(super) fn fill(&mut self, polygon: &[Point2<f64>], shade: impl FnMut(usize, usize, &mut [f32])) {
+    /// Fills a convex polygon. `shade(y, x0, row)` writes the light of the pixels x0.. of row y
+    /// into `row`.
+    pub(super) fn fill(
+        &mut self,
+        polygon: &[Point2<f64>],
+        shade: impl FnMut(usize, usize, &mut [f32]),
+    ) {
         widest(Filling {
             canvas: self,
             polygon,
@@ -171,8 +184,14 @@ impl Canvas {
     }
 
     #[inline(always)]
-    fn fill_rows(&mut self, polygon: &[Point2<f64>], mut shade: impl FnMut(usize, usize, &mut [f32])) {
-        let Some(rows) = self.rows_of(polygon) else { return };
+    fn fill_rows(
+        &mut self,
+        polygon: &[Point2<f64>],
+        mut shade: impl FnMut(usize, usize, &mut [f32]),
+    ) {
+        let Some(rows) = self.rows_of(polygon) else {
+            return;
+        };
         for y in rows {
             let Some((start, end, solid)) = self.cover_row(y) else {
                 continue;
@@ -185,7 +204,9 @@ impl Canvas {
             }
             let shades = &mut self.shade[..end - start];
             shade(y, start, shades);
-            for ((light, shade), share) in row.iter_mut().zip(&*shades).zip(&self.coverage[start..end]) {
+            for ((light, shade), share) in
+                row.iter_mut().zip(&*shades).zip(&self.coverage[start..end])
+            {
                 *light += (shade - *light) * share;
             }
             let shares = std::mem::take(&mut self.coverage);
@@ -196,7 +217,9 @@ impl Canvas {
 
     /// Lays an even layer of light over a convex polygon that replaces `share` of what is below.
     pub(super) fn blend(&mut self, polygon: &[Point2<f64>], light: f32, share: f32) {
-        let Some(rows) = self.rows_of(polygon) else { return };
+        let Some(rows) = self.rows_of(polygon) else {
+            return;
+        };
         for y in rows {
             let Some((start, end, solid)) = self.cover_row(y) else {
                 continue;
@@ -220,12 +243,18 @@ impl Canvas {
             return None;
         }
         let left = polygon.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
-        let right = polygon.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);
+        let right = polygon
+            .iter()
+            .map(|p| p.x)
+            .fold(f64::NEG_INFINITY, f64::max);
         if left > self.width as f64 || right < -1.0 {
             return None;
         }
         let top = polygon.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let bottom = polygon.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
+        let bottom = polygon
+            .iter()
+            .map(|p| p.y)
+            .fold(f64::NEG_INFINITY, f64::max);
         let first = (top + 0.5).floor().max(0.0);
         let last = (bottom + 0.5).floor().min(self.height as f64 - 1.0);
         if first > last {
@@ -250,11 +279,13 @@ impl Canvas {
         Some(first as usize..last as usize + 1)
     }
 
-    /// Coverage of one row, after those above it: the touched pixels start..end, and whether all of them are covered wholly.
+    /// Coverage of one row, after those above it: the touched pixels start..end, and whether all of
+    /// them are covered wholly.
     #[inline(always)]
     fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
         let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
-        let lines: [f64; SUBROWS] = std::array::from_fn(|i| above + (i as f64 + 0.5) / SUBROWS as f64);
+        let lines: [f64; SUBROWS] =
+            std::array::from_fn(|i| above + (i as f64 + 0.5) / SUBROWS as f64);
         let (mut lefts, mut rights) = ([f64::INFINITY; SUBROWS], [f64::NEG_INFINITY; SUBROWS]);
         while let Some(edge) = self.edges.pop_if(|edge| edge.top <= below) {
             self.active.push(edge);
@@ -265,7 +296,11 @@ impl Canvas {
                 let x = edge.x + (lines[i] - edge.top) * edge.slope;
                 let crosses = edge.top <= lines[i] && lines[i] < edge.bottom;
                 lefts[i] = if crosses && x < lefts[i] { x } else { lefts[i] };
-                rights[i] = if crosses && x > rights[i] { x } else { rights[i] };
+                rights[i] = if crosses && x > rights[i] {
+                    x
+                } else {
+                    rights[i]
+                };
             }
         }
         let mut spans = [(0.0_f64, -1.0_f64); SUBROWS];
@@ -335,7 +370,8 @@ mod tests {
     #[test]
     fn the_covered_area_is_the_polygons_area() {
         let mut canvas = Canvas::new(40, 30);
-        let polygon = [(3.2, 2.1), (30.7, 5.9), (25.3, 24.4), (6.6, 20.2)].map(|(x, y)| Point2::new(x, y));
+        let polygon =
+            [(3.2, 2.1), (30.7, 5.9), (25.3, 24.4), (6.6, 20.2)].map(|(x, y)| Point2::new(x, y));
         canvas.fill(&polygon, |_, _, row| row.fill(1.0));
         let mut area = 0.0;
         for (i, p) in polygon.iter().enumerate() {
@@ -343,13 +379,17 @@ mod tests {
             area += 0.5 * (p.x * q.y - q.x * p.y);
         }
         let covered: f64 = canvas.light.iter().map(|v| f64::from(*v)).sum();
-        assert!((covered - area).abs() < 0.002 * area, "{covered} against {area}");
+        assert!(
+            (covered - area).abs() < 0.002 * area,
+            "{covered} against {area}"
+        );
     }
 
     #[test]
     fn what_lies_outside_the_frame_is_cut() {
         let mut canvas = Canvas::new(8, 8);
-        let polygon = [(-1e6, -1e6), (1e6, -1e6), (1e6, 1e6), (-1e6, 1e6)].map(|(x, y)| Point2::new(x, y));
+        let polygon =
+            [(-1e6, -1e6), (1e6, -1e6), (1e6, 1e6), (-1e6, 1e6)].map(|(x, y)| Point2::new(x, y));
         canvas.fill(&polygon, |_, _, row| row.fill(1.0));
         assert!(canvas.light.iter().all(|v| *v > 0.999));
         canvas.fill(&[Point2::new(f64::NAN, 0.0); 3], |_, _, row| row.fill(0.0));

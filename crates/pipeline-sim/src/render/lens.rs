@@ -6,7 +6,8 @@ use nalgebra::{Point2, Vector2};
 use crate::Camera;
 use crate::render::canvas::{Area, Canvas};
 
-/// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts of the focal length.
+/// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts
+/// of the focal length.
 const STEP: (f64, f64) = (16.0, 1.0 / 60.0);
 /// The same for places between which pixels of a row are taken from a straight line.
 const RUN: (f64, f64) = (WHOLE_RUN as f64, 1.0 / 250.0);
@@ -14,9 +15,10 @@ const WHOLE_RUN: usize = 4;
 
 /// The map from a distorted frame to the ideal one it is taken from.
 ///
-/// A distortion is undone exactly on a coarse grid. Between, cubic polynomials tell where every fourth pixel of every row comes from (every
-/// one in small frames), and those that follow lie on a straight line to the next: in all within .005 pixels of the exact place for lenses
-/// whose corners move by up to a tenth of the frame's width.
+/// A distortion is undone exactly on a coarse grid. Between, cubic polynomials tell where every
+/// fourth pixel of every row comes from (every one in small frames), and those that follow lie on a
+/// straight line to the next: in all within .005 pixels of the exact place for lenses whose corners
+/// move by up to a tenth of the frame's width.
 #[derive(Clone, Debug)]
 pub(super) struct Warp {
     camera: Camera,
@@ -31,8 +33,8 @@ pub(super) struct Warp {
 }
 
 impl Warp {
-    /// `None` for a camera without distortion. For any other the ideal frame is larger, but not endless: a radial distortion of three terms that does
-    /// not fold squeezes by less than three.
+    /// `None` for a camera without distortion. For any other the ideal frame is larger, but not
+    /// endless: a radial distortion of three terms that does not fold squeezes by less than three.
     pub(super) fn new(camera: &Camera) -> Option<Self> {
         if camera.distortion().is_none() {
             return None;
@@ -45,7 +47,8 @@ impl Warp {
             Nodes::new(width as usize, step),
             Nodes::new(height as usize, step),
         );
-        // From place to place the answer changes little: the last one is where to look for the next.
+        // From place to place the answer changes little: the last one is where to look for the
+        // next.
         let mut last = (Point2::origin(), Point2::origin());
         let mut exact = |x: f64, y: f64| {
             let shown = Point2::from((Point2::new(x, y) - principal) / focal);
@@ -58,14 +61,20 @@ impl Warp {
             .map(|(i, j)| exact(across.place(i), down.place(j)))
             .collect();
         // The border bulges between two of its places by a small part of a pixel only.
-        let low = grid.iter().fold(Vector2::zeros(), |a: Vector2<f64>, p| a.inf(p));
-        let high = grid.iter().fold(Vector2::zeros(), |a: Vector2<f64>, p| a.sup(p));
+        let low = grid
+            .iter()
+            .fold(Vector2::zeros(), |a: Vector2<f64>, p| a.inf(p));
+        let high = grid
+            .iter()
+            .fold(Vector2::zeros(), |a: Vector2<f64>, p| a.sup(p));
         let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
         let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
         let ideal = Camera::ideal(focal, principal - low, w, h);
         let run = pixels(RUN) as usize;
         let runs = (width as usize).div_ceil(run);
-        let ends: Vec<usize> = (0..=runs).map(|k| (k * run).min(width as usize - 1)).collect();
+        let ends: Vec<usize> = (0..=runs)
+            .map(|k| (k * run).min(width as usize - 1))
+            .collect();
         let shares: Vec<(usize, [f64; 4])> = ends.iter().map(|x| across.shares(*x)).collect();
         let mut sources = vec![[0.0; 2]; ends.len() * height as usize];
         let mut row = vec![[0.0; 2]; across.count];
@@ -112,7 +121,8 @@ impl Warp {
         // Whole pixels and their 65536ths; no frame is so large that these do not fit.
         let fixed = |v: f32| (v * 65536.0) as i32;
         let part = |v: i32| (v & 0xffff) as f32 / 65536.0;
-        let (mut x, mut y, mut places) = (vec![0_i32; width], vec![0_i32; width], vec![0_u32; width]);
+        let (mut x, mut y, mut places) =
+            (vec![0_i32; width], vec![0_i32; width], vec![0_u32; width]);
         // Of each pixel the two above its place, and the two below.
         let (mut upper, mut lower) = (vec![[0.0_f32; 2]; width], vec![[0.0_f32; 2]; width]);
         let rows = out.light.chunks_exact_mut(width.max(1));
@@ -130,8 +140,11 @@ impl Warp {
             for (c, line) in [&mut x[..last], &mut y[..last]].into_iter().enumerate() {
                 let ends = sources.windows(2).map(|ends| (ends[0][c], ends[1][c]));
                 if self.run == WHOLE_RUN {
-                    for (run, (from, to)) in line.as_chunks_mut::<WHOLE_RUN>().0.iter_mut().zip(ends) {
-                        let (at, step) = (fixed(from), fixed((to - from) * (1.0 / WHOLE_RUN as f32)));
+                    for (run, (from, to)) in
+                        line.as_chunks_mut::<WHOLE_RUN>().0.iter_mut().zip(ends)
+                    {
+                        let (at, step) =
+                            (fixed(from), fixed((to - from) * (1.0 / WHOLE_RUN as f32)));
                         *run = [at, at + step, at + 2 * step, at + 3 * step];
                     }
                 } else {
@@ -192,7 +205,8 @@ impl Vectorized for Sources<'_> {
     #[inline(always)]
     fn run(self) {
         for (source, (left, w)) in self.sources.iter_mut().zip(self.shares) {
-            let Some([n0, n1, n2, n3]) = self.row.get(*left..).and_then(|row| row.first_chunk()) else {
+            let Some([n0, n1, n2, n3]) = self.row.get(*left..).and_then(|row| row.first_chunk())
+            else {
                 continue;
             };
             for c in 0..2 {
@@ -224,7 +238,8 @@ impl Nodes {
         node as f64 * self.spacing
     }
 
-    /// The first of the four places next to a pixel, and their shares in the value of the cubic through all four there.
+    /// The first of the four places next to a pixel, and their shares in the value of the cubic
+    /// through all four there.
     fn shares(&self, pixel: usize) -> (usize, [f64; 4]) {
         if self.spacing <= 0.0 {
             return (0, [1.0, 0.0, 0.0, 0.0]);
@@ -245,8 +260,8 @@ impl Nodes {
     }
 }
 
-/// Blurs an area of a canvas as the sensor's own pass does ([`crate::Sensor::blur`]): three taps along each axis. For fields, which
-/// must be blurred before they are woven.
+/// Blurs an area of a canvas as the sensor's own pass does ([`crate::Sensor::blur`]): three taps
+/// along each axis. For fields, which must be blurred before they are woven.
 pub(super) fn soften(canvas: &mut Canvas, area: Area, sigma: f64, spare: &mut Vec<f32>) {
     let (side, middle) = three_taps(sigma);
     if area.is_empty() || side <= 0.0 {
@@ -311,7 +326,8 @@ impl Vectorized for Softening<'_> {
     }
 }
 
-/// Side and middle weight of the three-tap kernel whose variance is sigma², up to the widest that three taps give.
+/// Side and middle weight of the three-tap kernel whose variance is sigma², up to the widest that
+/// three taps give.
 pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
     let side = (0.5 * sigma * sigma).clamp(0.0, 0.333) as f32;
     (side, 1.0 - 2.0 * side)
@@ -380,13 +396,19 @@ impl<'a, P: Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone> Vectorized for
 }
 
 #[inline(always)]
-fn weigh_blocks<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
+fn weigh_blocks<'a>(
+    pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone),
+    out: &mut [f32],
+) {
     let mut at = 0;
     let mut blocks = out.chunks_exact_mut(BLOCK);
     for block in &mut blocks {
         let mut sums = [0.0_f32; BLOCK];
         for (k, a, b) in pairs.clone() {
-            let (Some(a), Some(b)) = (a[at..].first_chunk::<BLOCK>(), b[at..].first_chunk::<BLOCK>()) else {
+            let (Some(a), Some(b)) = (
+                a[at..].first_chunk::<BLOCK>(),
+                b[at..].first_chunk::<BLOCK>(),
+            ) else {
                 continue;
             };
             for i in 0..BLOCK {
@@ -397,7 +419,10 @@ fn weigh_blocks<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> +
         at += BLOCK;
     }
     for (i, value) in blocks.into_remainder().iter_mut().enumerate() {
-        *value = pairs.clone().map(|(k, a, b)| k * (a[at + i] + b[at + i])).sum();
+        *value = pairs
+            .clone()
+            .map(|(k, a, b)| k * (a[at + i] + b[at + i]))
+            .sum();
     }
 }
 
@@ -439,7 +464,9 @@ mod tests {
                 k2,
                 ..Distortion::default()
             };
-            let camera = Camera::paper().with_distortion(lens).expect("does not fold");
+            let camera = Camera::paper()
+                .with_distortion(lens)
+                .expect("does not fold");
             let off = worst(&camera);
             assert!(off < 0.005, "{k1} {k2}: {off}");
             for (width, height) in [(769, 577), (192, 144), (62, 46), (8, 6), (5, 2), (1, 1)] {

@@ -13,7 +13,8 @@ const ALIKE: f32 = 0.01;
 
 /// Something that tells the light on a plane.
 pub(super) trait Lighting {
-    /// Writes the light at places of the plane; `spare` holds three times as many numbers. To be inlined always.
+    /// Writes the light at places of the plane; `spare` holds three times as many numbers. To be
+    /// inlined always.
     fn shed(&self, x: &[f32], y: &[f32], light: &mut [f32], spare: &mut [f32]);
 }
 
@@ -30,7 +31,8 @@ pub(super) struct LightGrid {
 struct Row {
     /// Their columns.
     wanted: Vec<u32>,
-    /// Where they are on the plane, whether they are at all (1 or 0), the light there, and room to work it out.
+    /// Where they are on the plane, whether they are at all (1 or 0), the light there, and room to
+    /// work it out.
     x: Vec<f32>,
     y: Vec<f32>,
     met: Vec<f32>,
@@ -39,7 +41,8 @@ struct Row {
 }
 
 impl Row {
-    /// Works out the light at the wanted nodes, pixels `step` apart from `start` on, and writes it to their places in `values`.
+    /// Works out the light at the wanted nodes, pixels `step` apart from `start` on, and writes it
+    /// to their places in `values`.
     #[inline(always)]
     fn work_out(
         &mut self,
@@ -67,8 +70,8 @@ impl Row {
 }
 
 impl LightGrid {
-    /// Works out the light where the rays of the grid's pixels meet the plane; where they do not, it is dark. Between every second node along
-    /// both axes that is done only where these differ.
+    /// Works out the light where the rays of the grid's pixels meet the plane; where they do not,
+    /// it is dark. Between every second node along both axes that is done only where these differ.
     pub(super) fn lay(&mut self, view: &View, plane: &Matrix3<f64>, lighting: &impl Lighting) {
         widest(Laying {
             grid: self,
@@ -79,7 +82,12 @@ impl LightGrid {
     }
 
     #[inline(always)]
-    fn lay_rows(&mut self, (width, height): (usize, usize), plane: &Matrix3<f64>, lighting: &impl Lighting) {
+    fn lay_rows(
+        &mut self,
+        (width, height): (usize, usize),
+        plane: &Matrix3<f64>,
+        lighting: &impl Lighting,
+    ) {
         let nodes = |pixels: usize| pixels / (2 * STEP) * 2 + 3;
         let (columns, rows) = (nodes(width), nodes(height));
         self.columns = columns;
@@ -94,7 +102,11 @@ impl LightGrid {
         for j in (0..rows).step_by(2) {
             row.wanted.clear();
             row.wanted.extend((0..columns as u32).step_by(2));
-            row.work_out(line(j), lighting, &mut self.values[j * columns..][..columns]);
+            row.work_out(
+                line(j),
+                lighting,
+                &mut self.values[j * columns..][..columns],
+            );
         }
         let alike = |a: f32, b: f32| (a - b).abs() <= ALIKE * (a + b);
         for j in 0..rows {
@@ -223,14 +235,18 @@ mod tests {
     impl Lighting for Strip {
         #[inline(always)]
         fn shed(&self, x: &[f32], _: &[f32], light: &mut [f32], _: &mut [f32]) {
-            light.iter_mut().zip(x).for_each(|(light, x)| *light = strip(*x));
+            light
+                .iter_mut()
+                .zip(x)
+                .for_each(|(light, x)| *light = strip(*x));
         }
     }
 
     #[test]
     fn a_thin_shadow_has_straight_edges() {
         // Half a metre above the table, looking down, rolled by 25 degrees.
-        let down = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 25.0_f64.to_radians());
+        let down =
+            UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 25.0_f64.to_radians());
         let pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.5), down);
         let view = View::new(&Camera::paper(), pose);
         let plane = view.plane(&Point3::origin(), &Vector3::x(), &Vector3::y());

@@ -36,8 +36,9 @@ pub use truth::{Round, Sighting};
 
 /// Draws frames of a cell.
 ///
-/// Owns its buffers: after the first frame nothing is allocated but small lists of corners. The scene's textures are made once, from the
-/// seed; the sensor's noise depends on the seed and on how many frames have been drawn, on nothing else.
+/// Owns its buffers: after the first frame nothing is allocated but small lists of corners. The
+/// scene's textures are made once, from the seed; the sensor's noise depends on the seed and on how
+/// many frames have been drawn, on nothing else.
 ///
 /// ```
 /// use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
@@ -129,8 +130,14 @@ impl Renderer {
     /// The light that reaches the sensor.
     fn illuminate(&mut self, cell: &Cell, joints: &Joints) {
         let pose = cell.camera_pose(joints);
-        let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
-        let finite = numbers.chain(cell.ball.centre.iter()).all(|v| v.is_finite());
+        let numbers = pose
+            .translation
+            .vector
+            .iter()
+            .chain(pose.rotation.coords.iter());
+        let finite = numbers
+            .chain(cell.ball.centre.iter())
+            .all(|v| v.is_finite());
         self.through_lens(&cell.camera, |this, canvas, camera| {
             if finite {
                 this.draw(canvas, cell, &View::new(camera, pose));
@@ -141,8 +148,8 @@ impl Renderer {
         });
     }
 
-    /// Has `draw` draw what a camera without distortion sees, and distorts and blurs it as the lens of `camera` does. Passes on what `draw`
-    /// returns; after `false` there is no picture.
+    /// Has `draw` draw what a camera without distortion sees, and distorts and blurs it as the lens
+    /// of `camera` does. Passes on what `draw` returns; after `false` there is no picture.
     fn through_lens(
         &mut self,
         camera: &Camera,

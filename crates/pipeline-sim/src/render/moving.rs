@@ -1,4 +1,5 @@
-//! Frames that take time, drawn in parts: what lies flat, and each thing that stands, is drawn once and averaged along its own way.
+//! Frames that take time, drawn in parts: what lies flat, and each thing that stands, is drawn once
+//! and averaged along its own way.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use puma_val2::Joints;
@@ -14,14 +15,16 @@ use crate::{Camera, Cell, Shape};
 /// A cell and the joints of its arm.
 pub(super) type Moment = (Cell, Joints);
 
-/// An exposure: its middle, and for each field when the shutter opens, half way, and when it closes.
+/// An exposure: its middle, and for each field when the shutter opens, half way, and when it
+/// closes.
 #[derive(Clone, Debug)]
 pub(super) struct Exposed {
     pub(super) middle: Moment,
     pub(super) fields: Vec<[Moment; 3]>,
 }
 
-/// Content that moves farther than this from where it is in the middle of the exposure is drawn moment by moment, pixels.
+/// Content that moves farther than this from where it is in the middle of the exposure is drawn
+/// moment by moment, pixels.
 const FARTHEST: f64 = 48.0;
 /// So is content whose way is bent by more than this, pixels.
 const BENT: f64 = 0.3;
@@ -39,18 +42,25 @@ struct Way {
 }
 
 impl Renderer {
-    /// Draws an exposure from its middle; `false` if it must be drawn moment by moment instead: because something else than arm, ball and
-    /// holder changes, or something moves far, not straight or right before the lens.
+    /// Draws an exposure from its middle; `false` if it must be drawn moment by moment instead:
+    /// because something else than arm, ball and holder changes, or something moves far, not
+    /// straight or right before the lens.
     pub(super) fn illuminate_moving(&mut self, exposed: &Exposed) -> bool {
         let (middle, _) = &exposed.middle;
         let alike = |(cell, joints): &Moment| {
             let pose = cell.camera_pose(joints);
-            let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+            let numbers = pose
+                .translation
+                .vector
+                .iter()
+                .chain(pose.rotation.coords.iter());
             let holders = match (cell.holder, middle.holder) {
                 (Some(a), Some(b)) => a.radius.to_bits() == b.radius.to_bits(),
                 (a, b) => a.is_none() && b.is_none(),
             };
-            numbers.chain(cell.ball.centre.iter()).all(|v| v.is_finite())
+            numbers
+                .chain(cell.ball.centre.iter())
+                .all(|v| v.is_finite())
                 && holders
                 && cell.camera == middle.camera
                 && cell.table.to_bits() == middle.table.to_bits()
@@ -101,17 +111,27 @@ impl Renderer {
         true
     }
 
-    /// How each item moves; `None` for those out of sight and for what hangs before the lens. No answer at all if one of them cannot be
-    /// drawn from the middle of the exposure.
-    fn ways(&self, items: &[Item], cell: &Cell, view: &View, times: &Times<'_>) -> Option<Vec<Option<Way>>> {
+    /// How each item moves; `None` for those out of sight and for what hangs before the lens. No
+    /// answer at all if one of them cannot be drawn from the middle of the exposure.
+    fn ways(
+        &self,
+        items: &[Item],
+        cell: &Cell,
+        view: &View,
+        times: &Times<'_>,
+    ) -> Option<Vec<Option<Way>>> {
         let room = view.wider(FARTHEST as usize);
         items
             .iter()
             .map(|item| {
                 let points = self.points(item, cell, view);
                 let n = points.len() as f64;
-                let middle = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n);
-                let around = points.iter().map(|p| (p - middle).norm()).fold(0.0, f64::max);
+                let middle =
+                    Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n);
+                let around = points
+                    .iter()
+                    .map(|p| (p - middle).norm())
+                    .fold(0.0, f64::max);
                 if points.is_empty() || room.misses(&middle, around) {
                     return Some(None);
                 }
@@ -133,7 +153,8 @@ impl Renderer {
             .collect()
     }
 
-    /// Points that move with an item that stands or floats: the corners of a box, both rims of a cylinder, four points of a ball's outline.
+    /// Points that move with an item that stands or floats: the corners of a box, both rims of a
+    /// cylinder, four points of a ball's outline.
     fn points(&self, item: &Item, cell: &Cell, view: &View) -> Vec<Point3<f64>> {
         let ball = |centre: Point3<f64>, radius: f64| {
             let (u, v) = (
@@ -159,7 +180,9 @@ impl Renderer {
                 let thing = &self.scene.things[*i];
                 let (low, high) = (cell.table, cell.table + thing.shape.height());
                 match thing.shape {
-                    Shape::Ball { radius } => ball(Point3::new(thing.x, thing.y, low + radius), radius),
+                    Shape::Ball { radius } => {
+                        ball(Point3::new(thing.x, thing.y, low + radius), radius)
+                    }
                     Shape::Cylinder { radius, .. } => rims(thing.x, thing.y, radius, (low, high)),
                     Shape::Box { length, width, .. } => {
                         let (sin, cos) = thing.turn.sin_cos();
@@ -183,7 +206,9 @@ impl Renderer {
     fn compose(&mut self, canvas: &mut Canvas, parts: &Parts<'_>) {
         let Parts { cell, times, .. } = *parts;
         let ways = parts.items.iter().filter_map(|(_, way)| way.as_ref());
-        let reach = ways.chain([&parts.ground, &parts.background]).map(|w| w.reach);
+        let reach = ways
+            .chain([&parts.ground, &parts.background])
+            .map(|w| w.reach);
         let margin = reach.fold(0.0, f64::max).ceil() as usize + 3;
         let wide = parts.view.wider(margin);
         let mut cells: Vec<&Cell> = times.iter().flatten().map(|(c, _)| *c).collect();
@@ -218,7 +243,8 @@ impl Renderer {
             std::mem::swap(&mut table.drawn, &mut layer);
         }
         self.draw_table(&mut table.drawn, &studio);
-        let flat = |item: &Item| matches!(item, Item::Thing(i) if self.scene.things[*i].shape.is_flat());
+        let flat =
+            |item: &Item| matches!(item, Item::Thing(i) if self.scene.things[*i].shape.is_flat());
         for (item, _) in parts.items.iter().filter(|(item, _)| flat(item)) {
             self.draw_item(&mut table.drawn, &studio, cell, item);
         }
@@ -238,7 +264,10 @@ impl Renderer {
             table.lay(way, canvas);
         }
         let Layer {
-            drawn, smear, spare, ..
+            drawn,
+            smear,
+            spare,
+            ..
         } = table;
         (self.sharp, self.layer, self.smear, self.spare) = (layer, drawn, smear, spare);
     }
@@ -275,7 +304,12 @@ impl Layer {
         if area.is_empty() {
             return;
         }
-        soften(&mut self.drawn, area.grown(1, size), self.blur, &mut self.spare);
+        soften(
+            &mut self.drawn,
+            area.grown(1, size),
+            self.blur,
+            &mut self.spare,
+        );
         let grown = area.grown(way.reach.ceil() as usize + 3, size);
         let within = |at: usize, length: usize| at.saturating_sub(self.margin).min(length);
         let area = Area {
@@ -299,7 +333,8 @@ impl Way {
         }
     }
 
-    /// Notes how far points move that are at `shown` in the middle of the exposure; `None` if too far, or not straight on.
+    /// Notes how far points move that are at `shown` in the middle of the exposure; `None` if too
+    /// far, or not straight on.
     fn note(
         &mut self,
         shown: &[Point2<f64>],
@@ -319,11 +354,13 @@ impl Way {
     }
 }
 
-/// The way of what lies on a plane, `plane` being the map from a view's pixels to it; `None` as for [`Way::note`].
+/// The way of what lies on a plane, `plane` being the map from a view's pixels to it; `None` as for
+/// [`Way::note`].
 fn way_on(view: &View, times: &Times<'_>, plane: impl Fn(&View) -> Matrix3<f64>) -> Option<Way> {
     let back = plane(view).try_inverse()?;
     let (w, h) = (view.width as f64 - 1.0, view.height as f64 - 1.0);
-    let frame = [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h), (0.5 * w, 0.5 * h)].map(|(x, y)| Point2::new(x, y));
+    let frame = [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h), (0.5 * w, 0.5 * h)]
+        .map(|(x, y)| Point2::new(x, y));
     let mut way = Way::still(0);
     for field in times {
         let maps = field.each_ref().map(|(_, seen)| back * plane(seen));
@@ -346,7 +383,8 @@ mod tests {
     use crate::render::Renderer;
     use crate::{BenchmarkKind, Scene, SceneKind, Sensor, Shot, Snapshot};
 
-    /// The frame as it is taken, and as it is when 48 moments of every field are drawn; without noise.
+    /// The frame as it is taken, and as it is when 48 moments of every field are drawn; without
+    /// noise.
     fn both(mut scene: Scene, snapshot: &Snapshot) -> [Vec<u8>; 2] {
         scene.sensor = Sensor {
             read_noise: 0.0,
@@ -362,7 +400,9 @@ mod tests {
             },
             ..*snapshot
         };
-        let exact = renderer.take_exactly(&fine.shot, |t| fine.moment(t)).to_vec();
+        let exact = renderer
+            .take_exactly(&fine.shot, |t| fine.moment(t))
+            .to_vec();
         [quick, exact]
     }
 
@@ -379,19 +419,30 @@ mod tests {
                 ));
             }
             let kind = BenchmarkKind::MotionBlur;
-            let (scene, snapshot) = kind.draw((768, 576), &mut rng).expect("a frame with pixels");
+            let (scene, snapshot) = kind
+                .draw((768, 576), &mut rng)
+                .expect("a frame with pixels");
             cases.push((kind.to_string(), scene, snapshot));
             for (name, scene, snapshot) in cases {
                 let [quick, exact] = both(scene, &snapshot);
-                let mut differences: Vec<u8> =
-                    quick.iter().zip(&exact).map(|(a, b)| a.abs_diff(*b)).collect();
+                let mut differences: Vec<u8> = quick
+                    .iter()
+                    .zip(&exact)
+                    .map(|(a, b)| a.abs_diff(*b))
+                    .collect();
                 differences.sort_unstable();
                 let n = differences.len();
                 let mean = differences.iter().map(|d| f64::from(*d)).sum::<f64>() / n as f64;
                 let (most, worst) = (differences[n - n / 1000], differences[n - 1]);
-                println!("{name} {seed}: mean {mean:.3}, all but a thousandth {most}, worst {worst}");
-                // Rows and columns of grain pass under the edges of what stands: there the mean of a product is not the product of the means.
-                assert!(mean < 0.8 && most <= 30, "{name} {seed}: {mean} {most} {worst}");
+                println!(
+                    "{name} {seed}: mean {mean:.3}, all but a thousandth {most}, worst {worst}"
+                );
+                // Rows and columns of grain pass under the edges of what stands: there the mean of
+                // a product is not the product of the means.
+                assert!(
+                    mean < 0.8 && most <= 30,
+                    "{name} {seed}: {mean} {most} {worst}"
+                );
             }
         }
     }
@@ -407,7 +458,9 @@ mod tests {
                 change(t / snapshot.shot.exposure, &mut cell);
                 (cell, joints)
             };
-            let quick = Renderer::new(&scene, 7).take(&snapshot.shot, moment).to_vec();
+            let quick = Renderer::new(&scene, 7)
+                .take(&snapshot.shot, moment)
+                .to_vec();
             let exact = Renderer::new(&scene, 7)
                 .take_exactly(&snapshot.shot, moment)
                 .to_vec();
@@ -415,7 +468,10 @@ mod tests {
         };
         // The ball jumps, swings, grows, is not there; the table sinks; the lens zooms.
         let side = |cell: &mut crate::Cell, by: f64| cell.ball.centre.y += by;
-        assert!(frames(&|t, cell| side(cell, if t > 0.6 { 0.05 } else { 0.0 })));
+        assert!(frames(&|t, cell| side(
+            cell,
+            if t > 0.6 { 0.05 } else { 0.0 }
+        )));
         assert!(frames(&|t, cell| side(cell, 0.02 * (6.0 * t).sin())));
         assert!(frames(&|t, cell| cell.ball.radius *= 1.0 + 0.1 * t));
         assert!(frames(&|t, cell| if t > 0.7 {
@@ -451,7 +507,10 @@ mod tests {
         for kind in kinds {
             let snapshot = Snapshot::draw(kind, &mut rng);
             let after_others = snapshot.take(&mut renderer);
-            assert!(after_others == snapshot.take(&mut untouched.clone()), "{kind}");
+            assert!(
+                after_others == snapshot.take(&mut untouched.clone()),
+                "{kind}"
+            );
         }
     }
 }

@@ -32,7 +32,8 @@ impl Renderer {
         }
     }
 
-    /// Works out the light on the table, with the mean of the shadows that balls and holders of `cells` throw.
+    /// Works out the light on the table, with the mean of the shadows that balls and holders of
+    /// `cells` throw.
     pub(super) fn lay_light(&mut self, view: &View, table: f64, cells: &[&Cell]) {
         let things = self.scene.things.iter().enumerate();
         let gone = things.filter(|(_, t)| cells.iter().any(|cell| in_the_way(t, cell)));
@@ -90,13 +91,15 @@ impl Renderer {
 
     /// All that is drawn over the table, in the order of drawing.
     ///
-    /// What lies flat comes first; then what stands, far things before near ones; occluders, which are before the lens, last. Circles that
-    /// do not overlap are in the right order when sorted by power (squared distance less squared radius): their radical axes
-    /// separate them. A ball above a thing, or on its holder, overlaps it as seen from above: a level plane separates the two, and the one
-    /// on the far side of it comes first.
+    /// What lies flat comes first; then what stands, far things before near ones; occluders, which
+    /// are before the lens, last. Circles that do not overlap are in the right order when sorted by
+    /// power (squared distance less squared radius): their radical axes separate them. A ball above
+    /// a thing, or on its holder, overlaps it as seen from above: a level plane separates the two,
+    /// and the one on the far side of it comes first.
     pub(super) fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
         let (eye, ball) = (view.eye(), cell.ball.centre);
-        let overlaps = |x: f64, y: f64, r: f64| (x - ball.x).hypot(y - ball.y) < r + cell.ball.radius;
+        let overlaps =
+            |x: f64, y: f64, r: f64| (x - ball.x).hypot(y - ball.y) < r + cell.ball.radius;
         let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
         let things = || self.scene.things.iter().enumerate();
         let mut items: Vec<Item> = things()
@@ -118,12 +121,21 @@ impl Renderer {
             .collect();
         standing.extend(cell.holder.map(|h| {
             let under = ball.z > h.top && overlaps(h.foot.x, h.foot.y, h.radius);
-            (power(h.foot.x, h.foot.y, h.radius), h.top, under, Item::Holder)
+            (
+                power(h.foot.x, h.foot.y, h.radius),
+                h.top,
+                under,
+                Item::Holder,
+            )
         }));
         standing.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Where the ball goes among them: by power, but after what it is above, and before what it is above as seen from below.
+        // Where the ball goes among them: by power, but after what it is above, and before what it
+        // is above as seen from below.
         let of_ball = power(ball.x, ball.y, cell.ball.radius);
-        let by_power = standing.iter().filter(|(power, ..)| *power >= of_ball).count();
+        let by_power = standing
+            .iter()
+            .filter(|(power, ..)| *power >= of_ball)
+            .count();
         let seen_from_above = |top: f64| eye.z > top;
         let after = standing
             .iter()
@@ -141,11 +153,22 @@ impl Renderer {
         items
     }
 
-    pub(super) fn draw_item(&self, canvas: &mut Canvas, studio: &Studio<'_>, cell: &Cell, item: &Item) {
+    pub(super) fn draw_item(
+        &self,
+        canvas: &mut Canvas,
+        studio: &Studio<'_>,
+        cell: &Cell,
+        item: &Item,
+    ) {
         match item {
             Item::Thing(i) => studio.thing(canvas, &self.scene.things[*i]),
             Item::Ball => {
-                studio.sphere(canvas, &cell.ball.centre, cell.ball.radius, &studio.scene.ball);
+                studio.sphere(
+                    canvas,
+                    &cell.ball.centre,
+                    cell.ball.radius,
+                    &studio.scene.ball,
+                );
             }
             Item::Holder => {
                 if let Some(h) = cell.holder {
@@ -221,7 +244,8 @@ impl Lighting for TableLight<'_> {
     }
 }
 
-/// Whether a thing is left out: one that stands where the holder stands, or in a ball that lies or is carried low.
+/// Whether a thing is left out: one that stands where the holder stands, or in a ball that lies or
+/// is carried low.
 fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
     let ball = cell.ball.centre;
     let foot = thing.shape.footprint();
@@ -230,7 +254,8 @@ fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
     });
     let in_ball = || (thing.x - ball.x).hypot(thing.y - ball.y) < foot + cell.ball.radius;
     !thing.shape.is_flat()
-        && (at_holder || (ball.z - cell.ball.radius < cell.table + thing.shape.height() && in_ball()))
+        && (at_holder
+            || (ball.z - cell.ball.radius < cell.table + thing.shape.height() && in_ball()))
 }
 
 /// How the holder looks.

@@ -28,19 +28,27 @@ pub(super) struct Exposure {
     row: Vec<f32>,
     /// Squared tangent of the angle to the axis, column by column.
     columns: Vec<f32>,
-    /// Share of the light that the pixels of the present row count, and by how much it changes to the next row.
+    /// Share of the light that the pixels of the present row count, and by how much it changes to
+    /// the next row.
     gains: Vec<f32>,
     changes: Vec<f32>,
 }
 
-/// Rows from one at which the share of light is worked out to the next; between them it changes evenly.
+/// Rows from one at which the share of light is worked out to the next; between them it changes
+/// evenly.
 const GAIN_ROWS: usize = 8;
 
 impl Exposure {
     pub(super) fn new<R: Rng + ?Sized>(sensor: Sensor, rng: &mut R) -> Self {
         let noise = (0..NOISES).map(|_| StandardNormal.sample(rng)).collect();
-        let exponent = 1.0 / if sensor.gamma > 0.0 { sensor.gamma } else { 1.0 };
-        let level = |i: usize| (255.0 * (i as f64 / (LEVELS - 1) as f64).powf(exponent)).round() as u8;
+        let exponent = 1.0
+            / if sensor.gamma > 0.0 {
+                sensor.gamma
+            } else {
+                1.0
+            };
+        let level =
+            |i: usize| (255.0 * (i as f64 / (LEVELS - 1) as f64).powf(exponent)).round() as u8;
         let curve = Box::new(std::array::from_fn(level));
         Self {
             sensor,
@@ -55,8 +63,16 @@ impl Exposure {
         }
     }
 
-    /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and with it the noise.
-    pub(super) fn expose(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, frame: u64, out: &mut [u8]) {
+    /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and
+    /// with it the noise.
+    pub(super) fn expose(
+        &mut self,
+        canvas: &Canvas,
+        camera: &Camera,
+        seed: u64,
+        frame: u64,
+        out: &mut [u8],
+    ) {
         widest(Exposing {
             exposure: self,
             canvas,
@@ -99,8 +115,17 @@ impl Exposure {
         let run = width.min(NOISES / 2);
         for y in 0..height {
             let line = |k: usize| &canvas.light[k * width..(k + 1) * width];
-            let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1)));
-            for (((m, a), h), b) in self.mixed[1..=width].iter_mut().zip(above).zip(here).zip(below) {
+            let (above, here, below) = (
+                line(y.saturating_sub(1)),
+                line(y),
+                line((y + 1).min(height - 1)),
+            );
+            for (((m, a), h), b) in self.mixed[1..=width]
+                .iter_mut()
+                .zip(above)
+                .zip(here)
+                .zip(below)
+            {
                 *m = middle * h + side * (a + b);
             }
             self.mixed[0] = self.mixed[1];
@@ -119,7 +144,9 @@ impl Exposure {
                 let length = run.min(width - left);
                 let mixed = &self.mixed[left..left + length + 2];
                 let (before, here, after) = (&mixed[..length], &mixed[1..=length], &mixed[2..]);
-                let gains = self.gains[left..][..length].iter_mut().zip(&self.changes[left..]);
+                let gains = self.gains[left..][..length]
+                    .iter_mut()
+                    .zip(&self.changes[left..]);
                 let lights = before.iter().zip(here).zip(after);
                 let row = self.row[left..][..length].iter_mut().zip(noise);
                 for (((value, noise), ((l, c), r)), (gain, change)) in row.zip(lights).zip(gains) {
@@ -134,7 +161,8 @@ impl Exposure {
             if straight {
                 // As in the table: no level of it lies half way between two greys.
                 for (grey, value) in greys {
-                    *grey = ((value - WHOLE) * (255.0 / (LEVELS - 1) as f32) + WHOLE).to_bits() as u8;
+                    *grey =
+                        ((value - WHOLE) * (255.0 / (LEVELS - 1) as f32) + WHOLE).to_bits() as u8;
                 }
             } else {
                 let curve = &self.curve;

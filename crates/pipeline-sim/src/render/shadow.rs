@@ -41,7 +41,8 @@ struct Cast {
     factors: Vec<f32>,
 }
 
-/// The light on the table apart from ball and holder: stains, and the shadows of the things that stand there.
+/// The light on the table apart from ball and holder: stains, and the shadows of the things that
+/// stand there.
 #[derive(Clone, Debug)]
 pub(super) struct ThingShadows {
     /// Without the things.
@@ -55,9 +56,14 @@ pub(super) struct ThingShadows {
 }
 
 impl ThingShadows {
-    /// Darkens `stains` where things keep the lamps' light off the table, and a little around their feet.
+    /// Darkens `stains` where things keep the lamps' light off the table, and a little around their
+    /// feet.
     pub(super) fn new(stains: CoarseMap, scene: &Scene) -> Self {
-        let casts: Vec<Option<Cast>> = scene.things.iter().map(|t| cast(&stains, scene, t)).collect();
+        let casts: Vec<Option<Cast>> = scene
+            .things
+            .iter()
+            .map(|t| cast(&stains, scene, t))
+            .collect();
         let mut shadows = Self {
             bare: stains.values.clone(),
             map: stains,
@@ -76,7 +82,8 @@ impl ThingShadows {
         self.map.at(x, y, factors);
     }
 
-    /// Takes away the shadows of these things, in ascending order, and brings back those of all others.
+    /// Takes away the shadows of these things, in ascending order, and brings back those of all
+    /// others.
     pub(super) fn leave_out(&mut self, things: Vec<usize>) {
         if things == self.left_out {
             return;
@@ -112,7 +119,8 @@ impl ThingShadows {
                 continue;
             }
             for j in rows.start.max(other.rows.start)..rows.end.min(other.rows.end) {
-                let from = (j - other.rows.start) * other.columns.len() + left - other.columns.start;
+                let from =
+                    (j - other.rows.start) * other.columns.len() + left - other.columns.start;
                 let values = &mut self.map.values[j * side + left..j * side + right];
                 for (value, factor) in values.iter_mut().zip(&other.factors[from..]) {
                     *value *= factor;
@@ -147,7 +155,8 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
     if columns.is_empty() || rows.is_empty() {
         return None;
     }
-    // Each point of a lamp looks at another place of the map's cell, so that edges of shadows are as soft as the map can show them.
+    // Each point of a lamp looks at another place of the map's cell, so that edges of shadows are
+    // as soft as the map can show them.
     let cell = map.size / (map.side - 1) as f64;
     let within = |k: usize, step: f64| cell * ((k as f64 * step).fract() - 0.5);
     let aside: [Vector3<f64>; LAMP_POINTS] =
@@ -194,7 +203,8 @@ fn gap(shape: &Shape, from: &Point3<f64>) -> f64 {
     }
 }
 
-/// Directions toward points spread evenly over a lamp's disc, in the frame of a thing turned by `turn`.
+/// Directions toward points spread evenly over a lamp's disc, in the frame of a thing turned by
+/// `turn`.
 fn lamp_points(light: &Light, turn: f64) -> Vec<Vector3<f64>> {
     let axis = toward(light);
     let side = if axis.x.abs() < 0.9 {
@@ -219,7 +229,8 @@ fn lamp_points(light: &Light, turn: f64) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-/// Whether the ray from a point of the table upward along `d` meets the shape, which stands at the origin.
+/// Whether the ray from a point of the table upward along `d` meets the shape, which stands at the
+/// origin.
 fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
     match *shape {
         Shape::Box {

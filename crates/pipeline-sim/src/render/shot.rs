@@ -13,12 +13,15 @@ use crate::{Cell, Renderer};
 pub struct Shot {
     /// Time the shutter is open, seconds, up to [`Shot::LONGEST`]. 0 freezes all motion.
     pub exposure: f64,
-    /// 1 freezes all motion. With more, the frame is drawn once, in the middle of its exposure, and each part of it is averaged along the way
-    /// it takes, as long as arm, ball and holder move evenly and not far (48 pixels either way). Otherwise, and for two frozen fields, this
-    /// many moments, spread evenly over the exposure of each field, are drawn and averaged at the cost of a frame each: one for every two
-    /// pixels of motion is enough. 1 to [`Shot::MOST_MOMENTS`]; [`Renderer::take`] takes what is beyond for the nearer of both.
+    /// 1 freezes all motion. With more, the frame is drawn once, in the middle of its exposure, and
+    /// each part of it is averaged along the way it takes, as long as arm, ball and holder move
+    /// evenly and not far (48 pixels either way). Otherwise, and for two frozen fields, this many
+    /// moments, spread evenly over the exposure of each field, are drawn and averaged at the cost
+    /// of a frame each: one for every two pixels of motion is enough. 1 to [`Shot::MOST_MOMENTS`];
+    /// [`Renderer::take`] takes what is beyond for the nearer of both.
     pub moments: usize,
-    /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones, at most [`Shot::LONGEST`].
+    /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones, at most
+    /// [`Shot::LONGEST`].
     pub interlace: Option<f64>,
 }
 
@@ -38,8 +41,8 @@ impl Shot {
         }
     }
 
-    /// The two fields of PAL, 20 ms apart (the paper's grabber delivers 768x576 pixels at 50 Hz, which are fields), each
-    /// exposed for `exposure` seconds.
+    /// The two fields of PAL, 20 ms apart (the paper's grabber delivers 768x576 pixels at 50 Hz,
+    /// which are fields), each exposed for `exposure` seconds.
     pub fn pal(exposure: f64, moments: usize) -> Self {
         Self {
             exposure,
@@ -56,10 +59,15 @@ impl Default for Shot {
 }
 
 impl Renderer {
-    /// Takes a frame while cell and joints change: `moment(t)` tells what they are t seconds after the shutter opened.
+    /// Takes a frame while cell and joints change: `moment(t)` tells what they are t seconds after
+    /// the shutter opened.
     ///
     /// The truth of such a frame is that of the middle of its exposure.
-    pub fn take(&mut self, shot: &Shot, mut moment: impl FnMut(f64) -> (Cell, Joints)) -> &GrayImage {
+    pub fn take(
+        &mut self,
+        shot: &Shot,
+        mut moment: impl FnMut(f64) -> (Cell, Joints),
+    ) -> &GrayImage {
         let count = shot.moments.clamp(1, Shot::MOST_MOMENTS);
         if count == 1 && shot.interlace.is_none() {
             let (cell, joints) = moment(0.5 * shot.exposure);
@@ -137,7 +145,12 @@ impl Renderer {
                 // Lens and sensor blur what they see of each field; only then are the rows woven.
                 std::mem::swap(&mut self.canvas.light, &mut total);
                 let whole = self.canvas.whole();
-                soften(&mut self.canvas, whole, self.scene.sensor.blur, &mut self.spare);
+                soften(
+                    &mut self.canvas,
+                    whole,
+                    self.scene.sensor.blur,
+                    &mut self.spare,
+                );
                 std::mem::swap(&mut self.canvas.light, &mut total);
             }
             if field == 0 {

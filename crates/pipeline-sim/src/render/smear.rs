@@ -1,4 +1,5 @@
-//! A layer in motion: drawn once, in the middle of the exposure, and averaged along the way that every pixel's content takes.
+//! A layer in motion: drawn once, in the middle of the exposure, and averaged along the way that
+//! every pixel's content takes.
 
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
@@ -12,7 +13,8 @@ const LANES: usize = 8;
 /// Motion of less than this is none, pixels.
 const STILL: f64 = 0.01;
 
-/// Where, in the layer as drawn, the content of a frame's pixels is to be found: when the shutter of a field opens and when it closes.
+/// Where, in the layer as drawn, the content of a frame's pixels is to be found: when the shutter
+/// of a field opens and when it closes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweep {
     pub(super) opened: Matrix3<f64>,
@@ -26,7 +28,8 @@ pub(super) fn mapped(map: &Matrix3<f64>, p: Point2<f64>) -> Point2<f64> {
     Point2::new(q.x / q.z, q.y / q.z)
 }
 
-/// The affine map that takes `from` nearest to `to` (least squares); `None` for fewer than three points, or points in a line.
+/// The affine map that takes `from` nearest to `to` (least squares); `None` for fewer than three
+/// points, or points in a line.
 pub(super) fn affine(from: &[Point2<f64>], to: &[Point2<f64>]) -> Option<Matrix3<f64>> {
     let n = from.len().min(to.len()) as f64;
     let mean = |points: &[Point2<f64>]| points.iter().map(|p| p.coords).sum::<Vector2<f64>>() / n;
@@ -53,12 +56,13 @@ pub(super) struct Smear {
 }
 
 impl Smear {
-    /// Lays `layer` in motion over `out`: row y of `out` moves as `sweeps[y % sweeps.len()]` says. Where the layer has no coverage of its own it
-    /// replaces what is below.
+    /// Lays `layer` in motion over `out`: row y of `out` moves as `sweeps[y % sweeps.len()]` says.
+    /// Where the layer has no coverage of its own it replaces what is below.
     ///
-    /// The layer is larger than `out` by `margin` pixels on every side; `area` is what of `out` may be reached. Within a square of
-    /// 16 pixels all move as its middle does, on a straight line; along the line the average is exact, for a layer that is linear
-    /// between its pixels along both axes.
+    /// The layer is larger than `out` by `margin` pixels on every side; `area` is what of `out` may
+    /// be reached. Within a square of 16 pixels all move as its middle does, on a straight line;
+    /// along the line the average is exact, for a layer that is linear between its pixels along
+    /// both axes.
     pub(super) fn lay(
         &mut self,
         layer: &Canvas,
@@ -78,7 +82,14 @@ impl Smear {
     }
 
     #[inline(always)]
-    fn lay_squares(&mut self, layer: &Canvas, sweeps: &[Sweep], margin: usize, area: Area, out: &mut Canvas) {
+    fn lay_squares(
+        &mut self,
+        layer: &Canvas,
+        sweeps: &[Sweep],
+        margin: usize,
+        area: Area,
+        out: &mut Canvas,
+    ) {
         for top in (area.top..area.bottom).step_by(SQUARE) {
             for left in (area.left..area.right).step_by(SQUARE) {
                 let square = Area {
@@ -97,7 +108,8 @@ impl Smear {
                         mapped(&sweep.closed, middle) - middle,
                     );
                     self.aim(a, b, layer.width as isize);
-                    let first = (0..sweeps.len()).find(|k| (square.top + k) % sweeps.len() == field);
+                    let first =
+                        (0..sweeps.len()).find(|k| (square.top + k) % sweeps.len() == field);
                     let start = square.top + first.unwrap_or(0);
                     for y in (start..square.bottom).step_by(sweeps.len()) {
                         self.row(layer, margin, y, (square.left, square.right), out);
@@ -107,7 +119,8 @@ impl Smear {
         }
     }
 
-    /// Works out the shares of the pixels along the line from `a` to `b`, in pixels of the layer from the pixel itself.
+    /// Works out the shares of the pixels along the line from `a` to `b`, in pixels of the layer
+    /// from the pixel itself.
     #[inline(always)]
     fn aim(&mut self, a: Vector2<f64>, b: Vector2<f64>, width: isize) {
         self.taps.clear();
@@ -146,13 +159,23 @@ impl Smear {
         let (first, last) = (from.x.floor() as isize, to.x.ceil() as isize);
         for k in first..=last {
             let k = k as f64;
-            put(k, (tent_integral(to.x - k) - tent_integral(from.x - k)) / length);
+            put(
+                k,
+                (tent_integral(to.x - k) - tent_integral(from.x - k)) / length,
+            );
         }
     }
 
     /// Writes columns left..right of a row.
     #[inline(always)]
-    fn row(&self, layer: &Canvas, margin: usize, y: usize, (left, right): (usize, usize), out: &mut Canvas) {
+    fn row(
+        &self,
+        layer: &Canvas,
+        margin: usize,
+        y: usize,
+        (left, right): (usize, usize),
+        out: &mut Canvas,
+    ) {
         let base = ((y + margin) * layer.width + left + margin) as isize;
         let n = right - left;
         let target = &mut out.light[y * out.width + left..y * out.width + right];

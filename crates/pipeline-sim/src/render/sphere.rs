@@ -9,7 +9,13 @@ use crate::render::canvas::Canvas;
 
 impl Studio<'_> {
     /// Draws a sphere.
-    pub(super) fn sphere(&self, canvas: &mut Canvas, centre: &Point3<f64>, radius: f64, look: &Look) {
+    pub(super) fn sphere(
+        &self,
+        canvas: &mut Canvas,
+        centre: &Point3<f64>,
+        radius: f64,
+        look: &Look,
+    ) {
         // In units of the radius, camera frame.
         let c = self.view.seen(centre).coords / radius;
         if c.z <= 1.05 || c.norm_squared() <= 1.0 {
@@ -92,7 +98,8 @@ struct SphereRow<'a> {
     centre: [f32; 3],
     /// Squared distance of the centre, less 1.
     k: f32,
-    /// Tangents of the angle to the axis: down, and across at the first pixel and from one pixel to the next.
+    /// Tangents of the angle to the axis: down, and across at the first pixel and from one pixel to
+    /// the next.
     yn: f32,
     first: f32,
     step: f32,
@@ -121,7 +128,10 @@ impl Vectorized for SphereRow<'_> {
         let (yn, k, up) = (self.yn, self.k, self.up);
         // Added on top of the reflectance, hence divided by it here.
         let shine = self.gloss / self.albedo.max(0.05);
-        let lights = self.light.chunks_mut(LANES).zip(self.shares.chunks_mut(LANES));
+        let lights = self
+            .light
+            .chunks_mut(LANES)
+            .zip(self.shares.chunks_mut(LANES));
         for (chunk, (light, shares)) in lights.enumerate() {
             let ahead = chunk * LANES;
             let mut share = [0.0_f32; LANES];

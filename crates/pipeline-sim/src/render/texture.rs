@@ -16,9 +16,10 @@ pub(super) struct Texture {
 struct Level {
     /// Logarithm of the side in texels.
     bits: u32,
-    /// Strips of 64 columns, one after another, of rows that are a little longer: the first columns of the next strip are there as well, and
-    /// the first row once more below the last. A place and what is around it are then a row apart, and a walk in any direction meets few pages
-    /// of memory.
+    /// Strips of 64 columns, one after another, of rows that are a little longer: the first columns
+    /// of the next strip are there as well, and the first row once more below the last. A place and
+    /// what is around it are then a row apart, and a walk in any direction meets few pages of
+    /// memory.
     values: Vec<u8>,
 }
 
@@ -42,10 +43,14 @@ impl Level {
                 bytes.extend((left..left + pitch).map(|u| (row[u % n] + 0.5) as u8));
             }
         }
-        Self { bits, values: bytes }
+        Self {
+            bits,
+            values: bytes,
+        }
     }
 
-    /// Where the half texel nearest below (u, v), in 2^32ths of the side, has its texel; with [`HALF_U`] and [`HALF_V`].
+    /// Where the half texel nearest below (u, v), in 2^32ths of the side, has its texel; with
+    /// [`HALF_U`] and [`HALF_V`].
     #[inline(always)]
     fn place(u: u32, v: u32, bits: u32) -> u32 {
         let (column, row) = (u >> (32 - bits), v >> (32 - bits));
@@ -54,7 +59,8 @@ impl Level {
         (row * PITCH + (column & (STRIP - 1)) + (column / STRIP) * size) | halves
     }
 
-    /// The texel at a place, and the next along u, along v, and along both: a byte each, the lowest first.
+    /// The texel at a place, and the next along u, along v, and along both: a byte each, the lowest
+    /// first.
     #[inline(always)]
     fn four(values: &[u8], place: u32) -> u32 {
         const AROUND: usize = PITCH as usize + 2;
@@ -104,7 +110,10 @@ impl Texture {
             }
         }
         for _ in 0..14 {
-            let (mut u, mut v) = (rng.random_range(0.0..n as f32), rng.random_range(0.0..n as f32));
+            let (mut u, mut v) = (
+                rng.random_range(0.0..n as f32),
+                rng.random_range(0.0..n as f32),
+            );
             let angle = rng.random_range(0.0_f32..std::f32::consts::TAU);
             let (du, dv) = (angle.cos(), angle.sin());
             let tone = rng.random_range(-1.5_f32..2.5);
@@ -115,7 +124,8 @@ impl Texture {
             }
         }
         let mean = values.iter().sum::<f32>() / values.len() as f32;
-        let deviation = (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / values.len() as f32).sqrt();
+        let deviation =
+            (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / values.len() as f32).sqrt();
         for value in &mut values {
             *value = (128.0 + 40.0 * (*value - mean) / deviation).clamp(0.0, 255.0);
         }
@@ -153,12 +163,14 @@ impl Texture {
         }
     }
 
-    /// Samples along an image row from column `x0` on, one for each entry of `row`, scaled so that the mean is 1 and one standard deviation
-    /// about `strength` / 3.2. `place` tells where on the surface a column lies (metres); it is asked at multiples of [`STRIDE`], with
-    /// straight lines between, so that what lies between is the same in all rows.
+    /// Samples along an image row from column `x0` on, one for each entry of `row`, scaled so that
+    /// the mean is 1 and one standard deviation about `strength` / 3.2. `place` tells where on the
+    /// surface a column lies (metres); it is asked at multiples of [`STRIDE`], with straight lines
+    /// between, so that what lies between is the same in all rows.
     ///
-    /// A sample is the nearest of the level's values, at most a quarter of a texel away along either axis. Every odd column is the mean of
-    /// its neighbours: with the level chosen for the pixels' size nothing visible is lost.
+    /// A sample is the nearest of the level's values, at most a quarter of a texel away along
+    /// either axis. Every odd column is the mean of its neighbours: with the level chosen for the
+    /// pixels' size nothing visible is lost.
     #[inline(always)]
     pub(super) fn walk(
         &self,
@@ -175,8 +187,8 @@ impl Texture {
         // To the nearest half texel is down from a quarter of one further.
         let quarter = 1_u32 << (30 - bits);
         let (gain, base) = (strength / 512.0, 1.0 - strength);
-        // Places of a stretch first, then its values, then their means: each can be done to several at once, or, the values, be waited for
-        // several at once.
+        // Places of a stretch first, then its values, then their means: each can be done to several
+        // at once, or, the values, be waited for several at once.
         let mut places = [0_u32; STRETCH / 2 + STRIDE / 2];
         let mut fours = [0_u32; STRETCH / 2 + STRIDE / 2];
         let mut found = [0.0_f32; STRETCH / 2 + STRIDE / 2];
@@ -204,7 +216,10 @@ impl Texture {
                 here = next;
             }
             let needed = from / 2..to / 2 + 1;
-            for (four, place) in fours[needed.clone()].iter_mut().zip(&places[needed.clone()]) {
+            for (four, place) in fours[needed.clone()]
+                .iter_mut()
+                .zip(&places[needed.clone()])
+            {
                 *four = Level::four(values, *place);
             }
             let between = fours[needed.clone()].iter().zip(&places[needed.clone()]);
@@ -267,13 +282,15 @@ fn add_noise<R: Rng + ?Sized>(
             let (i, fx) = (x as usize, smooth(x.fract()));
             let (left, right) = (i % cells_u, (i + 1) % cells_u);
             let upper = lattice[top + left] + (lattice[top + right] - lattice[top + left]) * fx;
-            let lower = lattice[bottom + left] + (lattice[bottom + right] - lattice[bottom + left]) * fx;
+            let lower =
+                lattice[bottom + left] + (lattice[bottom + right] - lattice[bottom + left]) * fx;
             values[v * n + u] += strength * (upper + (lower - upper) * fy);
         }
     }
 }
 
-/// A coarse map of factors over a square part of the table, for what changes slowly: stains, light, shadows of things.
+/// A coarse map of factors over a square part of the table, for what changes slowly: stains, light,
+/// shadows of things.
 #[derive(Clone, Debug)]
 pub(super) struct CoarseMap {
     pub(super) side: usize,
@@ -306,7 +323,10 @@ impl CoarseMap {
     /// Place of entry (i, j), metres.
     pub(super) fn place(&self, i: usize, j: usize) -> (f64, f64) {
         let step = self.size / (self.side - 1) as f64;
-        (self.corner.0 + i as f64 * step, self.corner.1 + j as f64 * step)
+        (
+            self.corner.0 + i as f64 * step,
+            self.corner.1 + j as f64 * step,
+        )
     }
 
     /// Columns and rows of the entries within `reach` of (x, y) along each axis.
@@ -340,7 +360,11 @@ impl CoarseMap {
             let (i, j) = (x as u32, y as u32);
             let (fx, fy) = (x - i as f32, y - j as f32);
             let k = j as usize * self.side + i as usize;
-            let row = |k: usize| self.values.get(k..k + 2).map_or([0.0; 2], |two| [two[0], two[1]]);
+            let row = |k: usize| {
+                self.values
+                    .get(k..k + 2)
+                    .map_or([0.0; 2], |two| [two[0], two[1]])
+            };
             let ([a, b], [c, d]) = (row(k), row(k + self.side));
             let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
             *value = upper + (lower - upper) * fy;
@@ -358,8 +382,11 @@ mod tests {
     fn a_walk_meets_each_texel_and_the_means_between_them() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let n = 1_usize << FINEST_BITS;
-        let texels: Vec<f32> = (0..n * n).map(|_| rng.random_range(0_u8..=255).into()).collect();
-        // A texel is a metre, and a half texel one step; the walk goes round the texture's border along both axes.
+        let texels: Vec<f32> = (0..n * n)
+            .map(|_| rng.random_range(0_u8..=255).into())
+            .collect();
+        // A texel is a metre, and a half texel one step; the walk goes round the texture's border
+        // along both axes.
         let texture = Texture::from_values(texels.clone(), 1.0);
         let texel = |u: i64, v: i64| {
             let wrap = |k: i64| k.rem_euclid(n as i64) as usize;
@@ -391,7 +418,10 @@ mod tests {
                 let (right, down) = (i64::from(u > i), i64::from(v > j));
                 let (i, j) = (i as i64, j as i64);
                 let mean = 0.25
-                    * (texel(i, j) + texel(i + right, j) + texel(i, j + down) + texel(i + right, j + down));
+                    * (texel(i, j)
+                        + texel(i + right, j)
+                        + texel(i, j + down)
+                        + texel(i + right, j + down));
                 let error = 128.0 * row[k as usize] - mean;
                 assert!(error.abs() <= 0.51, "{u} {v}: {error}");
             }

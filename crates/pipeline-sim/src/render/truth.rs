@@ -34,17 +34,20 @@ pub struct Sighting {
     pub what: Round,
     /// The exact outline ([`Ellipse::circle`] is the circle of equal mean radius), pixels.
     pub ellipse: Ellipse,
-    /// Share of the outlined area that the frame shows, 0..=1: the rest is hidden behind nearer things or cut off by the frame.
+    /// Share of the outlined area that the frame shows, 0..=1: the rest is hidden behind nearer
+    /// things or cut off by the frame.
     pub visible: f64,
 }
 
-/// Pixels along the longer side of what is looked at to see what hides an outline, however small or large it is in the frame.
+/// Pixels along the longer side of what is looked at to see what hides an outline, however small or
+/// large it is in the frame.
 const CLOSE_UP: f64 = 96.0;
 
 /// Points of an outline.
 const OUTLINE: i32 = 96;
 
-/// A round outline: what it is, the exact ellipse in the frame, and the outline in directions (x, y, 1) of the camera frame.
+/// A round outline: what it is, the exact ellipse in the frame, and the outline in directions (x,
+/// y, 1) of the camera frame.
 struct Outline {
     what: Round,
     ellipse: Ellipse,
@@ -52,8 +55,9 @@ struct Outline {
 }
 
 impl Renderer {
-    /// Every round outline that the frame of `cell` with the arm at `joints` shows, the ball's first; outlines of which nothing is
-    /// visible, or that reach beyond what the lens shows, are left out. Exact but for [`Sighting::visible`], which is good to about a hundredth.
+    /// Every round outline that the frame of `cell` with the arm at `joints` shows, the ball's
+    /// first; outlines of which nothing is visible, or that reach beyond what the lens shows, are
+    /// left out. Exact but for [`Sighting::visible`], which is good to about a hundredth.
     pub fn truth(&self, cell: &Cell, joints: &Joints) -> Vec<Sighting> {
         let pose = cell.camera_pose(joints);
         if pose.translation.vector.iter().any(|v| !v.is_finite()) {
@@ -84,7 +88,8 @@ impl Renderer {
         found
     }
 
-    /// The share of the outlined area that is inside the frame and that none of the `nearer` things hides.
+    /// The share of the outlined area that is inside the frame and that none of the `nearer` things
+    /// hides.
     fn visible(
         &self,
         cell: &Cell,
@@ -132,7 +137,8 @@ impl Renderer {
         for item in nearer {
             self.draw_item(&mut canvas, &studio, cell, item);
         }
-        // A pixel that reaches beyond the border of the frame by rounding is worth what is inside; a distorted frame's border is bent.
+        // A pixel that reaches beyond the border of the frame by rounding is worth what is inside;
+        // a distorted frame's border is bent.
         let worth = |k: usize| {
             let (x, y) = ((k % size.0) as f64, (k / size.0) as f64);
             if straight {
@@ -145,7 +151,8 @@ impl Renderer {
                 );
                 let shown = cell.camera.project(&Point3::from(direction));
                 let inside = shown.is_some_and(|p| {
-                    (-0.5..=frame_width - 0.5).contains(&p.x) && (-0.5..=frame_height - 0.5).contains(&p.y)
+                    (-0.5..=frame_width - 0.5).contains(&p.x)
+                        && (-0.5..=frame_height - 0.5).contains(&p.y)
                 });
                 f64::from(u8::from(inside))
             }
@@ -185,7 +192,8 @@ impl Renderer {
         };
         let Item::Thing(i) = item else {
             let target = matches!(item, Item::Ball).then(|| (cell.ball.centre, cell.ball.radius));
-            let outline = target.and_then(|(centre, radius)| sphere(Round::Target, &centre, radius));
+            let outline =
+                target.and_then(|(centre, radius)| sphere(Round::Target, &centre, radius));
             return outline.into_iter().collect();
         };
         let thing = &self.scene.things[*i];
@@ -197,7 +205,9 @@ impl Renderer {
                 ring(Round::Disc, at(0.0), radius),
                 ring(Round::Disc, at(0.0), inner),
             ],
-            Shape::Cylinder { radius, height } if above => vec![ring(Round::Top, at(height), radius)],
+            Shape::Cylinder { radius, height } if above => {
+                vec![ring(Round::Top, at(height), radius)]
+            }
             _ => Vec::new(),
         };
         found.into_iter().flatten().collect()

@@ -40,8 +40,8 @@ impl View {
         }
     }
 
-    /// A part of the view, drawn larger by `scale`: `size` pixels wide and high, with its upper left corner at `corner` (pixels of this
-    /// view).
+    /// A part of the view, drawn larger by `scale`: `size` pixels wide and high, with its upper
+    /// left corner at `corner` (pixels of this view).
     pub(super) fn part(&self, corner: Vector2<f64>, scale: f64, size: (usize, usize)) -> Self {
         let there = |p: Vector2<f64>| (p - corner) * scale - Vector2::new(0.5, 0.5);
         Self {
@@ -58,7 +58,11 @@ impl View {
     /// The view with `margin` more pixels on every side.
     pub(super) fn wider(&self, margin: usize) -> Self {
         let corner = Vector2::repeat(-0.5 - margin as f64);
-        self.part(corner, 1.0, (self.width + 2 * margin, self.height + 2 * margin))
+        self.part(
+            corner,
+            1.0,
+            (self.width + 2 * margin, self.height + 2 * margin),
+        )
     }
 
     /// Where this view has points of the world, as long as all are well before the camera.
@@ -101,15 +105,17 @@ impl View {
             self.height as f64 - self.principal.y,
         );
         // How far the centre lies beyond the plane through the eye and one border of the frame.
-        let beyond =
-            |across: f64, border: f64| (across * self.focal - border * c.z) / self.focal.hypot(border);
+        let beyond = |across: f64, border: f64| {
+            (across * self.focal - border * c.z) / self.focal.hypot(border)
+        };
         c.z < -radius
             || [(c.x, right), (-c.x, left), (c.y, bottom), (-c.y, top)]
                 .iter()
                 .any(|(a, b)| beyond(*a, *b) > radius)
     }
 
-    /// Projects a convex polygon given in the world, cut at the near plane. Empty if nothing is left.
+    /// Projects a convex polygon given in the world, cut at the near plane. Empty if nothing is
+    /// left.
     pub(super) fn polygon(&self, corners: &[Point3<f64>], out: &mut Vec<Point2<f64>>) {
         out.clear();
         let n = corners.len();
@@ -134,11 +140,17 @@ impl View {
         self.principal + Vector2::new(p.x, p.y) * (self.focal / p.z)
     }
 
-    /// The matrix that takes a pixel (x, y, 1) to homogeneous coordinates on the plane through `origin` spanned by `u` and `v`
-    /// (world frame): the third divides the first two.
-    pub(super) fn plane(&self, origin: &Point3<f64>, u: &Vector3<f64>, v: &Vector3<f64>) -> Matrix3<f64> {
+    /// The matrix that takes a pixel (x, y, 1) to homogeneous coordinates on the plane through
+    /// `origin` spanned by `u` and `v` (world frame): the third divides the first two.
+    pub(super) fn plane(
+        &self,
+        origin: &Point3<f64>,
+        u: &Vector3<f64>,
+        v: &Vector3<f64>,
+    ) -> Matrix3<f64> {
         let (o, u, v) = (self.seen(origin).coords, self.turned(u), self.turned(v));
-        // A plane point with coordinates (a, b) lies at a u + b v + o in the camera frame: columns of the matrix to invert.
+        // A plane point with coordinates (a, b) lies at a u + b v + o in the camera frame: columns
+        // of the matrix to invert.
         let to_camera = Matrix3::from_columns(&[u, v, o]);
         let ray = Matrix3::new(
             1.0 / self.focal,

@@ -4,42 +4,54 @@ use std::time::Duration;
 
 use crate::PumaParams;
 
-/// Settings of a [`Val2Client`](super::Val2Client). The defaults suit a real controller behind a USB serial adapter.
+/// Settings of a [`Val2Client`](super::Val2Client). The defaults suit a real controller behind a
+/// USB serial adapter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClientConfig {
-    /// Silence after which a prompt counts as one (default: 30 ms). A USB adapter delivers in bursts up to 16 ms apart: below that a `.` in mid-reply can
-    /// be taken for the prompt; every exchange waits this long, so an emulator is talked to faster with 1 to 2 ms.
+    /// Silence after which a prompt counts as one (default: 30 ms). A USB adapter delivers in
+    /// bursts up to 16 ms apart: below that a `.` in mid-reply can be taken for the prompt; every
+    /// exchange waits this long, so an emulator is talked to faster with 1 to 2 ms.
     pub quiet: Duration,
-    /// Silence after which a reply counts as missing (default: 1 s). The line is then asked for its prompt; too small a value asks while the controller
-    /// still thinks, which is harmless but slow.
+    /// Silence after which a reply counts as missing (default: 1 s). The line is then asked for its
+    /// prompt; too small a value asks while the controller still thinks, which is harmless but
+    /// slow.
     pub reply_timeout: Duration,
-    /// Longest time for a motion, a calibration or anything else that moves the arm (default: 60 s). When it is over the arm is stopped.
+    /// Longest time for a motion, a calibration or anything else that moves the arm (default: 60
+    /// s). When it is over the arm is stopped.
     pub motion_timeout: Duration,
-    /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect) (default: 10 s); loading from a floppy takes longer.
+    /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect)
+    /// (default: 10 s); loading from a floppy takes longer.
     pub connect_timeout: Duration,
-    /// Monitor speed set by `connect`, percent (default: 50), above 0 to 327; `None` leaves it as it is.
+    /// Monitor speed set by `connect`, percent (default: 50), above 0 to 327; `None` leaves it as
+    /// it is.
     pub speed_percent: Option<f64>,
-    /// How far a joint may stand from where it was sent, radians (default: 0.05 degrees). A PUMA 560 stands at encoder counts up to 0.009 degrees apart; less
-    /// than 0.01 degrees makes good moves fail.
+    /// How far a joint may stand from where it was sent, radians (default: 0.05 degrees). A PUMA
+    /// 560 stands at encoder counts up to 0.009 degrees apart; less than 0.01 degrees makes good
+    /// moves fail.
     pub tolerance: f64,
-    /// How often something is tried again when the line has failed it (default: 3). 0 reports the first fault.
+    /// How often something is tried again when the line has failed it (default: 3). 0 reports the
+    /// first fault.
     pub retries: usize,
-    /// Whether what is typed is compared with its echo before the line is ended, if the controller echoes at all (default: yes). Costs one round trip;
-    /// without it a character lost on the line can change a command.
+    /// Whether what is typed is compared with its echo before the line is ended, if the controller
+    /// echoes at all (default: yes). Costs one round trip; without it a character lost on the line
+    /// can change a command.
     pub check_echo: bool,
     /// How a coordinated motion is commanded (default: automatic).
     pub way: MoveWay,
     /// Answer to a start-up question that speaks of loading (default: yes).
     pub load_from_floppy: bool,
-    /// Answer to a start-up question that speaks of initializing, which erases programs and locations (default: no).
+    /// Answer to a start-up question that speaks of initializing, which erases programs and
+    /// locations (default: no).
     pub initialize: bool,
-    /// Whether a program found running is aborted by `connect` (default: yes); otherwise that is an error.
+    /// Whether a program found running is aborted by `connect` (default: yes); otherwise that is an
+    /// error.
     pub abort_running_program: bool,
     /// How often `calibrate` tries again while arm power is off (default: 0).
     pub power_retries: usize,
     /// Pause between these tries (default: 2 s).
     pub power_retry_delay: Duration,
-    /// Name of the precision point that the client uses for its moves (default: `PGOAL`), letters and digits, at most six.
+    /// Name of the precision point that the client uses for its moves (default: `PGOAL`), letters
+    /// and digits, at most six.
     pub point_name: String,
     /// The input that the pair of proximity sensors is wired to (default: 1001).
     pub proximity_signal: u16,
@@ -49,8 +61,8 @@ pub struct ClientConfig {
     pub idle_prompt: char,
     /// Prompt of the monitor while a program runs (default: `*`).
     pub run_prompt: char,
-    /// Geometry and limits: moves out of the ranges are refused before anything is sent, and `WHERE` is checked against its own two halves
-    /// (default: [`PumaParams::unimation`]).
+    /// Geometry and limits: moves out of the ranges are refused before anything is sent, and
+    /// `WHERE` is checked against its own two halves (default: [`PumaParams::unimation`]).
     pub params: PumaParams,
 }
 
@@ -99,8 +111,9 @@ impl ClientConfig {
 /// How a motion of several joints is commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MoveWay {
-    /// A relative move of one joint by `DRIVE`; anything else by `#PPOINT` if the controller knows it, by `POINT` otherwise. Without an echo
-    /// to check, always by `POINT`, whose display shows what has arrived.
+    /// A relative move of one joint by `DRIVE`; anything else by `#PPOINT` if the controller knows
+    /// it, by `POINT` otherwise. Without an echo to check, always by `POINT`, whose display shows
+    /// what has arrived.
     Automatic,
     /// `DO DRIVE` for each joint, one after the other.
     Drive,

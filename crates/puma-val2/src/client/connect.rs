@@ -5,11 +5,13 @@ use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
 use crate::{ArmError, Transport};
 
 impl<T: Transport> Val2Client<T> {
-    /// Gets hold of the monitor: through the start-up dialogue of a controller just switched on, out of any other dialogue, over a half-typed
-    /// line (which is deleted, never carried out), or at once. Sets the speed of `config`.
+    /// Gets hold of the monitor: through the start-up dialogue of a controller just switched on,
+    /// out of any other dialogue, over a half-typed line (which is deleted, never carried out), or
+    /// at once. Sets the speed of `config`.
     ///
     /// # Errors
-    /// [`ArmError::Silence`] or [`ArmError::Garbled`] within `config.connect_timeout` if there is no VAL monitor at the other end.
+    /// [`ArmError::Silence`] or [`ArmError::Garbled`] within `config.connect_timeout` if there is
+    /// no VAL monitor at the other end.
     pub fn connect(transport: T, config: ClientConfig) -> Result<Self, ArmError> {
         check(&config)?;
         let mut client = Self {
@@ -27,7 +29,8 @@ impl<T: Transport> Val2Client<T> {
         Ok(client)
     }
 
-    /// Goes through the start-up dialogue again, after [`ArmError::Restarted`] for instance. The arm has to be calibrated anew.
+    /// Goes through the start-up dialogue again, after [`ArmError::Restarted`] for instance. The
+    /// arm has to be calibrated anew.
     ///
     /// # Errors
     /// As for [`Val2Client::connect`].
@@ -53,7 +56,8 @@ impl<T: Transport> Val2Client<T> {
     fn find_prompt(&mut self) -> Result<(), ArmError> {
         let begun = self.wire.line.clock();
         let until = begun.saturating_add(self.config.connect_timeout);
-        // Something that is no command and no answer: a half-typed line is spoilt by it, a question asked again.
+        // Something that is no command and no answer: a half-typed line is spoilt by it, a question
+        // asked again.
         self.wire.send(SPOIL, "connecting")?;
         let (mut questions, mut ways) = (0, 0);
         loop {
@@ -108,7 +112,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Types a command that does no harm and listens whether it comes back before its line is ended.
+    /// Types a command that does no harm and listens whether it comes back before its line is
+    /// ended.
     fn find_echo(&mut self) -> Result<(), ArmError> {
         self.wire.echo = Some(false);
         for attempt in 0..=self.config.retries {
@@ -138,14 +143,14 @@ impl<T: Transport> Val2Client<T> {
                 .read_reply("WHERE", self.config.patience(), &self.config)
             {
                 Ok(reply) => {
-                    // An echo may come late, behind a message that nobody asked for, or damaged. What looks like neither echo nor silence is
-                    // listened to again.
+                    // An echo may come late, behind a message that nobody asked for, or damaged.
+                    // What looks like neither echo nor silence is listened to again.
                     let said = String::from_utf8_lossy(&heard).to_ascii_uppercase();
-                    let echoed =
-                        said.contains("WHERE") || reply.text.to_ascii_uppercase().contains("WHERE\r");
+                    let echoed = said.contains("WHERE")
+                        || reply.text.to_ascii_uppercase().contains("WHERE\r");
                     let plain = echoed || heard.is_empty() || attempt == self.config.retries;
-                    let answered =
-                        Location::parse(&reply.text).is_some() || !reader::messages(&reply.text).is_empty();
+                    let answered = Location::parse(&reply.text).is_some()
+                        || !reader::messages(&reply.text).is_empty();
                     if answered && plain {
                         self.wire.echo = Some(echoed || !heard.is_empty());
                         return Ok(());
@@ -162,11 +167,13 @@ impl<T: Transport> Val2Client<T> {
             .garbled("WHERE", expected, "nothing of the kind, several times"))
     }
 
-    /// Lets the arm find its joint angles: `CALIBRATE`, the answer yes, and up to `config.motion_timeout` for the small moves.
+    /// Lets the arm find its joint angles: `CALIBRATE`, the answer yes, and up to
+    /// `config.motion_timeout` for the small moves.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch these moves; [`ArmError::Refused`] with the controller's message,
-    /// arm power off for instance, after `config.power_retries` further tries.
+    /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch these moves;
+    /// [`ArmError::Refused`] with the controller's message, arm power off for instance, after
+    /// `config.power_retries` further tries.
     pub fn calibrate(&mut self) -> Result<(), ArmError> {
         self.refuse_under_guard("calibration")?;
         // What the arm has shown until now was counted from another zero.
@@ -200,7 +207,9 @@ impl<T: Transport> Val2Client<T> {
         self.without_message("CAL", &reply)
             .map_err(|failed| failed.error)?;
         if reply.ending != Ending::Question {
-            return Err(self.wire.garbled("CAL", "a question", &shortened(&reply.text)));
+            return Err(self
+                .wire
+                .garbled("CAL", "a question", &shortened(&reply.text)));
         }
         self.command_once("Y", self.config.motion_timeout)
             .map(drop)

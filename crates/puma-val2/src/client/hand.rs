@@ -7,12 +7,15 @@ use super::{Val2Client, plain};
 use crate::{ArmError, Location, Transport, Xyzoat};
 
 impl<T: Transport> Val2Client<T> {
-    /// Moves the hand to a pose in the world frame by `DO MOVE TRANS(...)`, the joints interpolated, or along a straight line.
+    /// Moves the hand to a pose in the world frame by `DO MOVE TRANS(...)`, the joints
+    /// interpolated, or along a straight line.
     ///
-    /// Position within 0.1 mm and direction within 0.1 degrees are confirmed by `WHERE`. An armed proximity guard watches this motion as any other.
+    /// Position within 0.1 mm and direction within 0.1 degrees are confirmed by `WHERE`. An armed
+    /// proximity guard watches this motion as any other.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] if a number of the pose is not finite; [`ArmError::Refused`] if the controller cannot reach it; otherwise as for
+    /// [`ArmError::Setting`] if a number of the pose is not finite; [`ArmError::Refused`] if the
+    /// controller cannot reach it; otherwise as for
     /// [`Manipulator::move_to`](crate::Manipulator::move_to).
     pub fn move_hand(&mut self, hand: &Xyzoat, straight: bool) -> Result<Location, ArmError> {
         if !hand.is_finite() {
@@ -46,7 +49,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Commands a motion of the hand: in one line where its echo is checked, as a point whose display is checked otherwise.
+    /// Commands a motion of the hand: in one line where its echo is checked, as a point whose
+    /// display is checked otherwise.
     fn send_hand(&mut self, hand: &Xyzoat, word: &str) -> Result<(), Failed> {
         let move_to_pose = format!("{word} TRANS({})", hand.val().map(plain).join(","));
         if let Some(signal) = self.guard {
@@ -63,7 +67,8 @@ impl<T: Transport> Val2Client<T> {
             })?;
             format!("DO {word} {name}")
         };
-        self.command_once(&line, self.config.motion_timeout).map(drop)
+        self.command_once(&line, self.config.motion_timeout)
+            .map(drop)
     }
 }
 

@@ -23,14 +23,17 @@ use wire::{Failed, Reply, Wire, is_doubt, shortened};
 
 /// A client of a VAL II controller.
 ///
-/// Every call waits until the controller has answered and, where the arm moves, until `WHERE` shows that it stands where it was sent.
+/// Every call waits until the controller has answered and, where the arm moves, until `WHERE` shows
+/// that it stands where it was sent.
 ///
-/// **The rule for faults on the line.** A relative motion is never repeated blindly: after any doubt about what the controller has
-/// understood, the position is read, and only what is missing from there to the goal is commanded. A call therefore ends with the arm at
-/// its goal, or with a typed error, the arm stopped and its last known joint angles kept ([`Val2Client::last_known`]).
+/// **The rule for faults on the line.** A relative motion is never repeated blindly: after any
+/// doubt about what the controller has understood, the position is read, and only what is missing
+/// from there to the goal is commanded. A call therefore ends with the arm at its goal, or with a
+/// typed error, the arm stopped and its last known joint angles kept ([`Val2Client::last_known`]).
 ///
-/// A move starts from the joint angles that the arm reported last, which saves a reply of a quarter of a second on a slow line. Whoever moves the
-/// arm by other means (the teach pendant, a program) calls [`Manipulator::joints`] before the next [`Manipulator::move_by`].
+/// A move starts from the joint angles that the arm reported last, which saves a reply of a quarter
+/// of a second on a slow line. Whoever moves the arm by other means (the teach pendant, a program)
+/// calls [`Manipulator::joints`] before the next [`Manipulator::move_by`].
 #[derive(Debug)]
 pub struct Val2Client<T: Transport> {
     wire: Wire<T>,
@@ -53,7 +56,8 @@ impl<T: Transport> Val2Client<T> {
         &self.wire.line
     }
 
-    /// The line, to press the buttons of an emulator at its other end. Bytes read or written here are missing in the client's dialogue.
+    /// The line, to press the buttons of an emulator at its other end. Bytes read or written here
+    /// are missing in the client's dialogue.
     pub fn line_mut(&mut self) -> &mut T {
         &mut self.wire.line
     }
@@ -63,7 +67,8 @@ impl<T: Transport> Val2Client<T> {
         self.wire.line
     }
 
-    /// The joint angles that the arm reported last, without asking it; `None` if it may have moved since, or the controller was started again.
+    /// The joint angles that the arm reported last, without asking it; `None` if it may have moved
+    /// since, or the controller was started again.
     pub fn last_known(&self) -> Option<Joints> {
         self.last_known.filter(|_| !self.wire.restarted)
     }
@@ -73,12 +78,14 @@ impl<T: Transport> Val2Client<T> {
         self.wire.echo == Some(true)
     }
 
-    /// Messages of the controller that belong to no command, oldest first, at most a hundred; taken out.
+    /// Messages of the controller that belong to no command, oldest first, at most a hundred; taken
+    /// out.
     pub fn take_notices(&mut self) -> Vec<String> {
         std::mem::take(&mut self.wire.notices)
     }
 
-    /// Carries out one line that neither moves the arm nor opens a dialogue, trying again after doubt, and returns the reply.
+    /// Carries out one line that neither moves the arm nor opens a dialogue, trying again after
+    /// doubt, and returns the reply.
     fn command(&mut self, line: &str) -> Result<String, ArmError> {
         let mut tries = 0;
         loop {
@@ -93,7 +100,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Carries out one line, once. The reply must end with the monitor's prompt and hold no message.
+    /// Carries out one line, once. The reply must end with the monitor's prompt and hold no
+    /// message.
     fn command_once(&mut self, line: &str, timeout: Duration) -> Result<String, Failed> {
         let reply = self.wire.exchange(line, timeout, &self.config)?;
         self.without_message(line, &reply)?;
@@ -124,7 +132,8 @@ impl<T: Transport> Val2Client<T> {
     /// Sets the monitor's speed, percent of normal, above 0 to 327.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] before anything is sent; otherwise what the line or the controller said.
+    /// [`ArmError::Setting`] before anything is sent; otherwise what the line or the controller
+    /// said.
     pub fn set_speed(&mut self, percent: f64) -> Result<(), ArmError> {
         check_percent(percent)?;
         self.command(&format!("SPEED {}", plain(percent))).map(drop)
@@ -132,8 +141,9 @@ impl<T: Transport> Val2Client<T> {
 
     /// Where the arm says it is.
     ///
-    /// The reply is believed when its joint angles and its hand pose belong together; with a tool or base set in the controller they do not, and
-    /// then two equal replies in a row are asked for.
+    /// The reply is believed when its joint angles and its hand pose belong together; with a tool
+    /// or base set in the controller they do not, and then two equal replies in a row are asked
+    /// for.
     ///
     /// # Errors
     /// What kept the arm from answering, [`ArmError::Garbled`] if no two replies agree.
@@ -143,7 +153,8 @@ impl<T: Transport> Val2Client<T> {
         for _ in 0..self.config.retries.saturating_add(3) {
             match self.where_once() {
                 Ok(location) => {
-                    if location.agrees(&self.config.params) || before.is_some_and(|b| b == location) {
+                    if location.agrees(&self.config.params) || before.is_some_and(|b| b == location)
+                    {
                         self.last_known = Some(location.joints);
                         return Ok(location);
                     }
@@ -156,7 +167,10 @@ impl<T: Transport> Val2Client<T> {
                 Err(error) => return Err(error),
             }
         }
-        Err(last_error.unwrap_or_else(|| self.wire.garbled("WHERE", "two equal replies in a row", "none")))
+        Err(last_error.unwrap_or_else(|| {
+            self.wire
+                .garbled("WHERE", "two equal replies in a row", "none")
+        }))
     }
 
     fn where_once(&mut self) -> Result<Location, ArmError> {
@@ -173,7 +187,9 @@ impl<T: Transport> Val2Client<T> {
         self.without_message("WHERE", &reply)
             .map_err(|failed| failed.error)?;
         let expected = "a heading and six numbers each for X Y Z O A T and JT1 to JT6";
-        Err(self.wire.garbled("WHERE", expected, &shortened(&reply.text)))
+        Err(self
+            .wire
+            .garbled("WHERE", expected, &shortened(&reply.text)))
     }
 
     /// Opens or closes the hand and waits until that is done.
@@ -198,8 +214,8 @@ impl<T: Transport> Val2Client<T> {
 
     /// The value of a condition, -1 for true and 0 for false.
     ///
-    /// No single character that changes, gets lost or comes twice makes one of the other. Whatever else is shown counts when it is shown twice
-    /// in a row.
+    /// No single character that changes, gets lost or comes twice makes one of the other. Whatever
+    /// else is shown counts when it is shown twice in a row.
     fn truth(&mut self, condition: &str) -> Result<bool, ArmError> {
         let line = format!("DO TYPE {condition}");
         let mut before = None;
@@ -231,7 +247,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Stops the arm: `PANIC` and Ctrl-C, without waiting for a prompt before. The client can be used again afterwards.
+    /// Stops the arm: `PANIC` and Ctrl-C, without waiting for a prompt before. The client can be
+    /// used again afterwards.
     ///
     /// `PANIC` is sent twice: the first may end a half-typed line, which it spoils.
     ///
@@ -239,7 +256,8 @@ impl<T: Transport> Val2Client<T> {
     /// [`ArmError::Line`] if the line did not take it.
     pub fn panic_stop(&mut self) -> Result<(), ArmError> {
         self.wire.send(b"PANIC\rPANIC\r\x03", "PANIC")?;
-        // Whatever is said to that, in whichever number of prompts, is of no interest; only a dead line is.
+        // Whatever is said to that, in whichever number of prompts, is of no interest; only a dead
+        // line is.
         match self.wire.settle(&self.config) {
             Err(error @ ArmError::Line { .. }) => Err(error),
             _ => Ok(()),
@@ -280,11 +298,16 @@ fn check_percent(percent: f64) -> Result<(), ArmError> {
     })
 }
 
-/// A number with up to three decimals and no more characters than needed: every character is a millisecond on the line.
+/// A number with up to three decimals and no more characters than needed: every character is a
+/// millisecond on the line.
 fn plain(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
+    if text == "-0" {
+        "0".into()
+    } else {
+        text.into()
+    }
 }
 
 /// A value in degrees for one joint, for a message.

@@ -9,8 +9,8 @@ use crate::{ArmError, Joint, JointDelta, Joints, Transport};
 /// Less than VAL's smallest step of a joint, half a thousandth of a degree.
 pub(super) const STILL: f64 = 0.0005 * std::f64::consts::PI / 180.0;
 
-/// An arm that shows its goal to within an encoder count and a display digit stands there. One that is a little further off may be about to
-/// arrive and is looked at again.
+/// An arm that shows its goal to within an encoder count and a display digit stands there. One that
+/// is a little further off may be about to arrive and is looked at again.
 pub(super) const AS_SENT: f64 = 0.012 * std::f64::consts::PI / 180.0;
 
 /// What is commanded to get from where the arm stands to a goal.
@@ -20,7 +20,8 @@ enum Means {
     Drive(f64),
     Ppoint,
     Point,
-    /// `POINT`, then a stored program that watches a signal while it moves, at this speed in percent if it is not the monitor's own.
+    /// `POINT`, then a stored program that watches a signal while it moves, at this speed in
+    /// percent if it is not the monitor's own.
     Guarded(Option<f64>),
     Ready,
 }
@@ -34,11 +35,12 @@ pub(super) struct Doubt {
 }
 
 impl<T: Transport> Val2Client<T> {
-    /// Turns one joint by `radians` at `speed` percent of the monitor's speed and returns the joint angles afterwards.
+    /// Turns one joint by `radians` at `speed` percent of the monitor's speed and returns the joint
+    /// angles afterwards.
     ///
     /// # Errors
-    /// [`ArmError::JointLimit`], [`ArmError::NotFinite`] or [`ArmError::Setting`] before anything is sent; otherwise as for
-    /// [`Manipulator::move_by`](crate::Manipulator::move_by).
+    /// [`ArmError::JointLimit`], [`ArmError::NotFinite`] or [`ArmError::Setting`] before anything
+    /// is sent; otherwise as for [`Manipulator::move_by`](crate::Manipulator::move_by).
     pub fn drive(&mut self, joint: Joint, radians: f64, speed: f64) -> Result<Joints, ArmError> {
         check_percent(speed)?;
         let means = match self.guard {
@@ -115,8 +117,14 @@ impl<T: Transport> Val2Client<T> {
         self.travel(start, target, means)
     }
 
-    /// Gets the arm from `start` to `target`. After doubt, what is missing is commanded from where the arm is read to stand.
-    fn travel(&mut self, start: Joints, target: Joints, mut means: Means) -> Result<Joints, ArmError> {
+    /// Gets the arm from `start` to `target`. After doubt, what is missing is commanded from where
+    /// the arm is read to stand.
+    fn travel(
+        &mut self,
+        start: Joints,
+        target: Joints,
+        mut means: Means,
+    ) -> Result<Joints, ArmError> {
         let mut from = start;
         let mut tries = 0;
         loop {
@@ -156,19 +164,21 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Whether a motion was commanded in doubt. The monitor has its prompt again then, or the arm has been told to stop.
+    /// Whether a motion was commanded in doubt. The monitor has its prompt again then, or the arm
+    /// has been told to stop.
     pub(super) fn doubt(&mut self, outcome: Result<(), Failed>) -> Result<Option<Doubt>, ArmError> {
         let error = match outcome {
             Ok(()) => return Ok(None),
             Err(failed) if is_doubt(&failed.error) => failed.error,
             Err(failed) => return Err(self.given_up(failed)),
         };
-        let overdue =
-            matches!(error, ArmError::Silence { waited, .. } if waited >= self.config.motion_timeout);
+        let overdue = matches!(error, ArmError::Silence { waited, .. } if waited >= self.config.motion_timeout);
         if overdue {
             let _ = self.panic_stop();
         } else {
-            self.wire.settle(&self.config).map_err(|error| self.lost(error))?;
+            self.wire
+                .settle(&self.config)
+                .map_err(|error| self.lost(error))?;
         }
         Ok(Some(Doubt { error, overdue }))
     }
@@ -185,10 +195,11 @@ impl<T: Transport> Val2Client<T> {
                         let by = plain(by.to_degrees());
                         let line = format!("DO DRIVE {},{by},{}", joint.number(), plain(speed));
                         // Whatever becomes of this one, those before it have moved the arm.
-                        self.command_once(&line, patience).map_err(|failed| Failed {
-                            maybe_done: failed.maybe_done || under_way,
-                            ..failed
-                        })?;
+                        self.command_once(&line, patience)
+                            .map_err(|failed| Failed {
+                                maybe_done: failed.maybe_done || under_way,
+                                ..failed
+                            })?;
                         under_way = true;
                     }
                 }
@@ -213,7 +224,11 @@ impl<T: Transport> Val2Client<T> {
 
     /// Reads the position until the arm is at `target` or stands elsewhere.
     fn stand(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let until = self.wire.line.clock().saturating_add(self.config.motion_timeout);
+        let until = self
+            .wire
+            .line
+            .clock()
+            .saturating_add(self.config.motion_timeout);
         let mut before = self.where_()?.joints;
         let mut equal = 0;
         loop {
@@ -238,7 +253,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// The controller refused, or was restarted, or the line broke: where the arm stands is still worth knowing.
+    /// The controller refused, or was restarted, or the line broke: where the arm stands is still
+    /// worth knowing.
     fn given_up(&mut self, failed: Failed) -> ArmError {
         match failed.error {
             error @ ArmError::Refused { .. } => {
@@ -259,7 +275,8 @@ impl<T: Transport> Val2Client<T> {
         self.stand(nowhere)
     }
 
-    /// The arm's position cannot be read after a motion was commanded: it is told to stop, in case it hears.
+    /// The arm's position cannot be read after a motion was commanded: it is told to stop, in case
+    /// it hears.
     pub(super) fn lost(&mut self, cause: ArmError) -> ArmError {
         if matches!(cause, ArmError::Restarted { .. }) {
             // A controller that starts has no arm power.
@@ -282,9 +299,16 @@ fn names_no_place(error: &ArmError) -> bool {
         return false;
     };
     let message = message.to_ascii_uppercase();
-    !["RANGE", "CLOSE", "POWER", "CALIBRATED", "ENVELOPE", "EXECUTING"]
-        .iter()
-        .any(|word| message.contains(word))
+    ![
+        "RANGE",
+        "CLOSE",
+        "POWER",
+        "CALIBRATED",
+        "ENVELOPE",
+        "EXECUTING",
+    ]
+    .iter()
+    .any(|word| message.contains(word))
 }
 
 /// The joint that is furthest off, and by how many radians.
@@ -292,8 +316,7 @@ pub(super) fn furthest(a: &Joints, b: &Joints) -> (Joint, f64) {
     Joint::ALL
         .into_iter()
         .map(|joint| (joint, (a[joint] - b[joint]).abs()))
-        .fold(
-            (Joint::J1, 0.0),
-            |worst, this| if this.1 > worst.1 { this } else { worst },
-        )
+        .fold((Joint::J1, 0.0), |worst, this| {
+            if this.1 > worst.1 { this } else { worst }
+        })
 }

@@ -4,7 +4,8 @@ use super::wire::{Failed, is_doubt};
 use super::{Ending, Val2Client};
 use crate::{ArmError, Joints, Transport};
 
-/// Whether values displayed, each with what rounding can have changed of it, are those that were meant.
+/// Whether values displayed, each with what rounding can have changed of it, are those that were
+/// meant.
 pub(super) type Fits<'a> = &'a dyn Fn(&[(f64, f64); 6]) -> bool;
 
 impl<T: Transport> Val2Client<T> {
@@ -20,7 +21,8 @@ impl<T: Transport> Val2Client<T> {
         })
     }
 
-    /// `POINT name`, the values, an empty line; what the controller shows of it must be what was meant.
+    /// `POINT name`, the values, an empty line; what the controller shows of it must be what was
+    /// meant.
     pub(super) fn define_point(
         &mut self,
         name: &str,
@@ -52,7 +54,9 @@ impl<T: Transport> Val2Client<T> {
                 .map_err(|failed| not_done(failed.error))?;
             self.without_message(typed, &reply)?;
             if reply.ending != Ending::Question {
-                let error = self.wire.garbled(typed, "a question for changes", &reply.text);
+                let error = self
+                    .wire
+                    .garbled(typed, "a question for changes", &reply.text);
                 return Err(not_done(error));
             }
             let shown = reply
@@ -61,7 +65,9 @@ impl<T: Transport> Val2Client<T> {
                 .filter_map(shown_values)
                 .next_back();
             if are_values && !shown.is_some_and(|shown| fits(&shown)) {
-                let error = self.wire.garbled(typed, "the same values displayed", &reply.text);
+                let error = self
+                    .wire
+                    .garbled(typed, "the same values displayed", &reply.text);
                 return Err(not_done(error));
             }
         }
@@ -78,7 +84,8 @@ pub(super) fn not_done(error: ArmError) -> Failed {
     }
 }
 
-/// The numbers of a line that holds exactly six, each with what rounding to its decimals can have changed.
+/// The numbers of a line that holds exactly six, each with what rounding to its decimals can have
+/// changed.
 pub(super) fn shown_values(line: &str) -> Option<[(f64, f64); 6]> {
     let numbers: Vec<(f64, f64)> = line
         .split_whitespace()

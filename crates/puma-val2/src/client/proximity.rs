@@ -4,24 +4,31 @@ use super::wire::{Failed, NUDGE, Reply, is_doubt};
 use super::{Ending, Val2Client, plain, shortened};
 use crate::{ArmError, Joints, ProximitySensor, Transport};
 
-/// The program in which the client's moves run under guard, one for a single move of another kind, and the one that the signal calls.
+/// The program in which the client's moves run under guard, one for a single move of another kind,
+/// and the one that the signal calls.
 const RUN: &str = "PGRUN";
 const ONCE: &str = "PGONCE";
 const HIT: &str = "PGHIT";
 
-/// The variable in which the last of them keeps that it was called: a signal that has come and gone again leaves nothing else behind.
+/// The variable in which the last of them keeps that it was called: a signal that has come and gone
+/// again leaves nothing else behind.
 const LATCH: &str = "PGH";
 
 impl<T: Transport> Val2Client<T> {
-    /// Lets the controller itself stop the next motions as soon as input `signal` comes on, without waiting for us (`REACTI`).
+    /// Lets the controller itself stop the next motions as soon as input `signal` comes on, without
+    /// waiting for us (`REACTI`).
     ///
-    /// A move during which the signal comes, be it for a moment only, ends in [`ArmError::ProximityStop`] and uses the guard up: the way back is
-    /// free until it is armed again. Motions run inside small programs that are stored in the controller (`PGRUN`, `PGONCE`, `PGHIT`; older ones
-    /// of these names are replaced), for whether a monitor watches signals while no program runs is not known.
+    /// A move during which the signal comes, be it for a moment only, ends in
+    /// [`ArmError::ProximityStop`] and uses the guard up: the way back is free until it is armed
+    /// again. Motions run inside small programs that are stored in the controller (`PGRUN`,
+    /// `PGONCE`, `PGHIT`; older ones of these names are replaced), for whether a monitor watches
+    /// signals while no program runs is not known.
     ///
-    /// While armed, every motion that this client commands is guarded: moves of several joints are always coordinated, and
-    /// [`Val2Client::drive`], [`Val2Client::ready`] and [`Val2Client::move_hand`] run inside a program as well. What cannot be guarded is refused
-    /// with [`ArmError::Setting`]: [`Val2Client::calibrate`], [`Val2Client::execute`] and [`Val2Client::resident`].
+    /// While armed, every motion that this client commands is guarded: moves of several joints are
+    /// always coordinated, and [`Val2Client::drive`], [`Val2Client::ready`] and
+    /// [`Val2Client::move_hand`] run inside a program as well. What cannot be guarded is refused
+    /// with [`ArmError::Setting`]: [`Val2Client::calibrate`], [`Val2Client::execute`] and
+    /// [`Val2Client::resident`].
     ///
     /// # Errors
     /// What the line or the controller said, that there is no such signal for instance.
@@ -58,8 +65,13 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// These steps, which move the arm to a place that does not depend on where it stands, under guard.
-    pub(super) fn run_guarded_once(&mut self, signal: u16, motion: &[String]) -> Result<(), Failed> {
+    /// These steps, which move the arm to a place that does not depend on where it stands, under
+    /// guard.
+    pub(super) fn run_guarded_once(
+        &mut self,
+        signal: u16,
+        motion: &[String],
+    ) -> Result<(), Failed> {
         self.store_program(ONCE, &guarded_steps(signal, motion))
             .map_err(|error| Failed {
                 error,
@@ -68,9 +80,14 @@ impl<T: Transport> Val2Client<T> {
         self.run(&format!("EXECUTE {ONCE}")).map(drop)
     }
 
-    /// The arm stands after a motion: if that was under guard, whether the signal has come, even if it has gone again. Where the program may still
-    /// be running it is ended. Returns where the arm stands then.
-    pub(super) fn check_guard(&mut self, mut stands: Joints, doubtful: bool) -> Result<Joints, ArmError> {
+    /// The arm stands after a motion: if that was under guard, whether the signal has come, even if
+    /// it has gone again. Where the program may still be running it is ended. Returns where the arm
+    /// stands then.
+    pub(super) fn check_guard(
+        &mut self,
+        mut stands: Joints,
+        doubtful: bool,
+    ) -> Result<Joints, ArmError> {
         let Some(signal) = self.guard else {
             return Ok(stands);
         };
@@ -89,12 +106,14 @@ impl<T: Transport> Val2Client<T> {
         })
     }
 
-    /// Types a program into the controller's editor, replacing one of the same name, and compares it with what the controller lists.
+    /// Types a program into the controller's editor, replacing one of the same name, and compares
+    /// it with what the controller lists.
     ///
     /// # Errors
-    /// [`ArmError::Setting`], before anything is sent, for a name or a step that is not one line of printable characters: what comes after a line end
-    /// would be a line of its own, and carried out; otherwise what the line or the controller said; [`ArmError::Garbled`] if the listing differs
-    /// several times over.
+    /// [`ArmError::Setting`], before anything is sent, for a name or a step that is not one line of
+    /// printable characters: what comes after a line end would be a line of its own, and carried
+    /// out; otherwise what the line or the controller said; [`ArmError::Garbled`] if the listing
+    /// differs several times over.
     pub fn store_program(&mut self, name: &str, steps: &[String]) -> Result<(), ArmError> {
         check_line("the name of a program", name)?;
         for step in steps {
@@ -133,12 +152,17 @@ impl<T: Transport> Val2Client<T> {
             }
         }
         self.say("E")?;
-        let listed = self.say(&format!("LISTP {name}"))?.text.to_ascii_uppercase();
+        let listed = self
+            .say(&format!("LISTP {name}"))?
+            .text
+            .to_ascii_uppercase();
         if holds(&listed, steps) {
             return Ok(());
         }
         let heard = shortened(&listed);
-        Err(self.wire.garbled(name, "a listing of what was typed", &heard))
+        Err(self
+            .wire
+            .garbled(name, "a listing of what was typed", &heard))
     }
 
     fn say(&mut self, line: &str) -> Result<Reply, ArmError> {
@@ -147,12 +171,14 @@ impl<T: Transport> Val2Client<T> {
             .map_err(|failed| failed.error)
     }
 
-    /// Runs a stored program to its end and returns what it printed. A program that asks for values gets none: it is aborted, at once if what it asks
-    /// ends with a question mark, else after `config.motion_timeout`.
+    /// Runs a stored program to its end and returns what it printed. A program that asks for values
+    /// gets none: it is aborted, at once if what it asks ends with a question mark, else after
+    /// `config.motion_timeout`.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] for a name that is not one line of printable characters, and while a proximity guard is armed, which does not watch what
-    /// other programs do; what the line or the controller said, its messages in asterisks included; [`ArmError::Silence`] after
+    /// [`ArmError::Setting`] for a name that is not one line of printable characters, and while a
+    /// proximity guard is armed, which does not watch what other programs do; what the line or the
+    /// controller said, its messages in asterisks included; [`ArmError::Silence`] after
     /// `config.motion_timeout`, the program aborted.
     pub fn execute(&mut self, program: &str) -> Result<String, ArmError> {
         check_line("the name of a program", program)?;
@@ -163,7 +189,8 @@ impl<T: Transport> Val2Client<T> {
         self.wire.nudge = NUDGE;
         match outcome {
             Ok(text) => Ok(text),
-            Err(failed) if failed.maybe_done && is_doubt(&failed.error) => match self.end_program() {
+            Err(failed) if failed.maybe_done && is_doubt(&failed.error) => match self.end_program()
+            {
                 Ok(()) => Err(failed.error),
                 Err(error) => Err(self.lost(error)),
             },
@@ -188,7 +215,8 @@ impl<T: Transport> Val2Client<T> {
                 Ok(reply) if reply.ending == Ending::Idle => return Ok(()),
                 Ok(reply) => {
                     let heard = shortened(&reply.text);
-                    self.wire.garbled("ABORT", "the idle monitor's prompt", &heard)
+                    self.wire
+                        .garbled("ABORT", "the idle monitor's prompt", &heard)
                 }
                 Err(failed) if is_doubt(&failed.error) => failed.error,
                 Err(failed) => return Err(failed.error),
@@ -210,7 +238,9 @@ impl<T: Transport> Val2Client<T> {
         if reply.ending == Ending::Question {
             let heard = shortened(&reply.text);
             return Err(Failed {
-                error: self.wire.garbled(line, "a program that asks for nothing", &heard),
+                error: self
+                    .wire
+                    .garbled(line, "a program that asks for nothing", &heard),
                 maybe_done: true,
             });
         }
@@ -230,7 +260,8 @@ fn check_line(what: &'static str, text: &str) -> Result<(), ArmError> {
     })
 }
 
-/// The steps of a program that moves the arm under guard. A signal that is on already lets it stand.
+/// The steps of a program that moves the arm under guard. A signal that is on already lets it
+/// stand.
 fn guarded_steps(signal: u16, motion: &[String]) -> Vec<String> {
     let before = [
         format!("REACTI {signal},{HIT}"),
@@ -261,7 +292,8 @@ fn holds(listing: &str, steps: &[String]) -> bool {
 }
 
 impl<T: Transport> ProximitySensor for Val2Client<T> {
-    /// Reads the input of [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
+    /// Reads the input of
+    /// [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
     fn object_near(&mut self) -> Result<bool, ArmError> {
         self.signal(self.config.proximity_signal)
     }

@@ -11,8 +11,9 @@ pub enum Ending {
     Question,
 }
 
-/// Collects bytes until they can be a whole reply. No time passes in here: a caller that sees an [`Ending`] must still wait for silence, for a
-/// `.` at the start of a line may be the beginning of something.
+/// Collects bytes until they can be a whole reply. No time passes in here: a caller that sees an
+/// [`Ending`] must still wait for silence, for a `.` at the start of a line may be the beginning of
+/// something.
 #[derive(Clone, Debug)]
 pub struct ReplyReader {
     text: String,
@@ -34,7 +35,8 @@ impl ReplyReader {
         }
     }
 
-    /// Adds bytes. Of what exceeds the limit the older half is forgotten, so that the end is still found.
+    /// Adds bytes. Of what exceeds the limit the older half is forgotten, so that the end is still
+    /// found.
     pub fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             match byte {
@@ -65,7 +67,12 @@ impl ReplyReader {
 
     /// How the reply ends, if nothing more comes.
     pub fn ending(&self) -> Option<Ending> {
-        let last_line = self.text.rsplit(['\r', '\n']).next().unwrap_or_default().trim();
+        let last_line = self
+            .text
+            .rsplit(['\r', '\n'])
+            .next()
+            .unwrap_or_default()
+            .trim();
         let mut characters = last_line.chars();
         match (characters.next(), characters.next()) {
             (Some(c), None) if c == self.idle_prompt => Some(Ending::Idle),
@@ -76,7 +83,8 @@ impl ReplyReader {
     }
 }
 
-/// The controller's messages in a reply: the text between asterisks, and what follows it on the line (` Jt 1`).
+/// The controller's messages in a reply: the text between asterisks, and what follows it on the
+/// line (` Jt 1`).
 pub(super) fn messages(reply: &str) -> Vec<String> {
     reply
         .split(['\r', '\n'])

@@ -1,4 +1,5 @@
-//! A program that stays in the controller and moves the arm as it is told: the fewest characters per move.
+//! A program that stays in the controller and moves the arm as it is told: the fewest characters
+//! per move.
 
 use super::motion::{AS_SENT, STILL, furthest};
 use super::point::shown_values;
@@ -12,15 +13,17 @@ const NAME: &str = "PGLOOP";
 /// What it asks.
 pub(super) const QUESTION: &str = "GO? ";
 
-/// Keys of the program. A changed bit can make a carriage return of a character, and its line two: so what a line begins with after an angle
-/// (no angle is as large as these numbers) is no key, and a move ends with its key once more.
+/// Keys of the program. A changed bit can make a carriage return of a character, and its line two:
+/// so what a line begins with after an angle (no angle is as large as these numbers) is no key, and
+/// a move ends with its key once more.
 const MOVE: &str = "7";
 const OPEN: &str = "508";
 const CLOSE: &str = "609";
 const WHERE: &str = "817";
 const END: &str = "914";
 
-/// It asks for a key, six angles and the key again. An empty, cut or damaged answer makes it ask anew.
+/// It asks for a key, six angles and the key again. An empty, cut or damaged answer makes it ask
+/// anew.
 const STEPS: [&str; 17] = [
     "10 PROMPT \"GO? \",PGK,PGA,PGB,PGC,PGD,PGE,PGF,PGZ",
     "IF PGK == 914 GOTO 20",
@@ -44,16 +47,20 @@ const STEPS: [&str; 17] = [
 /// The line that ends the program.
 pub(super) const LEAVE: &[u8] = b"914\r";
 
-/// The arm through a program that runs in its controller. While this lives, the monitor is not used.
+/// The arm through a program that runs in its controller. While this lives, the monitor is not
+/// used.
 ///
-/// The controller must know `#PPOINT`. A move is one short line and its answer, the joint angles reached. Angles are absolute, so that a move can be commanded again after doubt. The
-/// program ends with [`Resident::end`] or when this is dropped.
+/// The controller must know `#PPOINT`. A move is one short line and its answer, the joint angles
+/// reached. Angles are absolute, so that a move can be commanded again after doubt. The program
+/// ends with [`Resident::end`] or when this is dropped.
 ///
-/// One line shows the angles once, and nothing else with it that would betray a changed digit. They are believed when they are those that the arm was
-/// sent to; otherwise the program is asked until it shows the same twice in a row.
+/// One line shows the angles once, and nothing else with it that would betray a changed digit. They
+/// are believed when they are those that the arm was sent to; otherwise the program is asked until
+/// it shows the same twice in a row.
 ///
-/// A motion that the controller refuses ends the program, and so does a restart or a line that is lost in mid-move. Every further call is then an
-/// [`ArmError::Setting`]; [`Val2Client::last_known`] says where the arm stands if it could still be asked.
+/// A motion that the controller refuses ends the program, and so does a restart or a line that is
+/// lost in mid-move. Every further call is then an [`ArmError::Setting`];
+/// [`Val2Client::last_known`] says where the arm stands if it could still be asked.
 #[derive(Debug)]
 pub struct Resident<'a, T: Transport> {
     client: &'a mut Val2Client<T>,
@@ -61,11 +68,12 @@ pub struct Resident<'a, T: Transport> {
 }
 
 impl<T: Transport> Val2Client<T> {
-    /// Stores a small program (`PGLOOP`) in the controller and starts it, for the fastest control over a slow line.
+    /// Stores a small program (`PGLOOP`) in the controller and starts it, for the fastest control
+    /// over a slow line.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] on a line without echo, where nothing would check the angles on their way, and while a proximity guard is armed;
-    /// otherwise what the line or the controller said.
+    /// [`ArmError::Setting`] on a line without echo, where nothing would check the angles on their
+    /// way, and while a proximity guard is armed; otherwise what the line or the controller said.
     pub fn resident(&mut self) -> Result<Resident<'_, T>, ArmError> {
         if !self.echoes() || !self.config.check_echo || self.guard.is_some() {
             return Err(ArmError::Setting {
@@ -145,7 +153,8 @@ impl<T: Transport> Resident<'_, T> {
         })
     }
 
-    /// Gives the program a line until it has answered with its question again, and returns what it said before. Nothing in a line is relative.
+    /// Gives the program a line until it has answered with its question again, and returns what it
+    /// said before. Nothing in a line is relative.
     fn give(&mut self, answer: &str) -> Result<Reply, ArmError> {
         self.check_alive()?;
         let mut tries = 0;
@@ -160,7 +169,9 @@ impl<T: Transport> Resident<'_, T> {
                         Err(failed) => failed.error,
                         Ok(()) => {
                             let heard = shortened(&reply.text);
-                            client.wire.garbled(answer, "the program's question", &heard)
+                            client
+                                .wire
+                                .garbled(answer, "the program's question", &heard)
                         }
                     };
                     return Err(self.over(error));
@@ -221,7 +232,8 @@ impl<T: Transport> Resident<'_, T> {
         Err(self.client.wire.garbled(answer, "six joint angles", &heard))
     }
 
-    /// Where the arm stands: what the program shows twice in a row. The arm moves only while a line that says so is answered.
+    /// Where the arm stands: what the program shows twice in a row. The arm moves only while a line
+    /// that says so is answered.
     fn stands(&mut self, mut before: Option<Joints>) -> Result<Joints, ArmError> {
         for _ in 0..self.client.config.retries.saturating_add(3) {
             let joints = self.ask(WHERE)?;
@@ -271,7 +283,10 @@ impl<T: Transport> Resident<'_, T> {
     }
 
     /// Keeps where the arm is known to stand after a call that may have moved it.
-    fn kept(&mut self, call: impl FnOnce(&mut Self) -> Result<Joints, ArmError>) -> Result<Joints, ArmError> {
+    fn kept(
+        &mut self,
+        call: impl FnOnce(&mut Self) -> Result<Joints, ArmError>,
+    ) -> Result<Joints, ArmError> {
         self.check_alive()?;
         let before = self.client.last_known.take();
         match call(self) {

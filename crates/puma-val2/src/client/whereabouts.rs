@@ -2,7 +2,8 @@
 
 use crate::{Joints, PumaParams, Xyzoat};
 
-/// Where the arm says it is: its joints, and the hand in the world frame (with the controller's own tool and base).
+/// Where the arm says it is: its joints, and the hand in the world frame (with the controller's own
+/// tool and base).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Location {
     /// Joint angles.
@@ -12,8 +13,9 @@ pub struct Location {
 }
 
 impl Location {
-    /// Reads the reply to `WHERE`: by its headings in either order, or, where no headings are found, by counting from the end (six joint angles,
-    /// before them six numbers that belong to a heading, before them X Y Z O A T). `None` if neither fits.
+    /// Reads the reply to `WHERE`: by its headings in either order, or, where no headings are
+    /// found, by counting from the end (six joint angles, before them six numbers that belong to a
+    /// heading, before them X Y Z O A T). `None` if neither fits.
     pub fn parse(reply: &str) -> Option<Self> {
         Self::by_headings(reply).or_else(|| {
             let has_heading = reply
@@ -59,8 +61,8 @@ impl Location {
         })
     }
 
-    /// Whether the two halves belong together for an arm without tool and base shift: within 0.1 mm and 0.01 degrees. A check against characters
-    /// that changed on the line.
+    /// Whether the two halves belong together for an arm without tool and base shift: within 0.1 mm
+    /// and 0.01 degrees. A check against characters that changed on the line.
     pub fn agrees(&self, arm: &PumaParams) -> bool {
         let (by_joints, by_hand) = (arm.forward(&self.joints), self.hand.pose());
         let off = (by_joints.translation.vector - by_hand.translation.vector).norm();
@@ -84,7 +86,9 @@ fn is_hand_heading(line: &str) -> bool {
     "XYZOAT".chars().all(|letter| {
         words.next().is_some_and(|word| {
             let mut characters = word.chars();
-            characters.next().is_some_and(|c| c.eq_ignore_ascii_case(&letter))
+            characters
+                .next()
+                .is_some_and(|c| c.eq_ignore_ascii_case(&letter))
                 && characters.next().is_none_or(|c| c == '[' || c == '(')
         })
     })
@@ -133,7 +137,10 @@ mod tests {
     #[test]
     fn a_damaged_reply_is_none_or_does_not_agree() {
         assert_eq!(Location::parse(&REPLY.replace("921.12", "92#.12")), None);
-        assert_eq!(Location::parse(&REPLY.replace("    0.000\r\n.", "\r\n.")), None);
+        assert_eq!(
+            Location::parse(&REPLY.replace("    0.000\r\n.", "\r\n.")),
+            None
+        );
         let flipped = Location::parse(&REPLY.replace("    0.000\r\n.", "    2.000\r\n.")).unwrap();
         assert!(!flipped.agrees(&PumaParams::unimation()));
     }

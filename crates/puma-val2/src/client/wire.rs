@@ -41,8 +41,8 @@ pub(super) fn is_doubt(error: &ArmError) -> bool {
     matches!(error, ArmError::Silence { .. } | ArmError::Garbled { .. })
 }
 
-/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried out. Ctrl-Q comes before it: a single flipped
-/// bit makes an `S` a Ctrl-S, which holds all output.
+/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried
+/// out. Ctrl-Q comes before it: a single flipped bit makes an `S` a Ctrl-S, which holds all output.
 pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
 
 /// Asks for the prompt.
@@ -63,7 +63,8 @@ pub(super) struct Wire<T> {
     pub(super) notices: Vec<String>,
     /// Whether a line has been begun at the other end that was neither ended nor deleted.
     pub(super) half_typed: bool,
-    /// What a reply that does not come is asked for with. A program of somebody else's may take an empty line for an answer.
+    /// What a reply that does not come is asked for with. A program of somebody else's may take an
+    /// empty line for an answer.
     pub(super) nudge: &'static [u8],
     /// Whether the start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
@@ -96,7 +97,9 @@ impl<T: Transport> Wire<T> {
     pub(super) fn send(&mut self, bytes: &[u8], doing: &str) -> Result<(), ArmError> {
         #[cfg(feature = "tracing")]
         tracing::trace!(port = self.line.name(), bytes = %bytes.escape_ascii(), "sent");
-        self.line.send(bytes).map_err(|source| self.broken(doing, source))
+        self.line
+            .send(bytes)
+            .map_err(|source| self.broken(doing, source))
     }
 
     /// What comes within `wait`, at least one byte, or nothing.
@@ -114,7 +117,11 @@ impl<T: Transport> Wire<T> {
     }
 
     fn reader(config: &ClientConfig) -> ReplyReader {
-        ReplyReader::new(config.reply_limit.max(256), config.idle_prompt, config.run_prompt)
+        ReplyReader::new(
+            config.reply_limit.max(256),
+            config.idle_prompt,
+            config.run_prompt,
+        )
     }
 
     /// The controller asks its start-up questions in mid-session.
@@ -126,7 +133,8 @@ impl<T: Transport> Wire<T> {
         }
     }
 
-    /// Types `line` at a prompt or question, ends it and reads the reply, waiting up to `timeout` for it.
+    /// Types `line` at a prompt or question, ends it and reads the reply, waiting up to `timeout`
+    /// for it.
     pub(super) fn exchange(
         &mut self,
         line: &str,
@@ -155,7 +163,9 @@ impl<T: Transport> Wire<T> {
         }
         self.send(b"\r", line).map_err(Failed::after)?;
         self.half_typed = false;
-        let reply = self.read_reply(line, timeout, config).map_err(Failed::after)?;
+        let reply = self
+            .read_reply(line, timeout, config)
+            .map_err(Failed::after)?;
         if reply.ending == Ending::Question && is_boot_question(&reply.text) {
             return Err(Failed::after(self.restart(&reply.text)));
         }
@@ -185,7 +195,8 @@ impl<T: Transport> Wire<T> {
         self.notices.drain(..excess);
     }
 
-    /// Sends the text and, where there is an echo, waits until it has come back unchanged. The line is not ended.
+    /// Sends the text and, where there is an echo, waits until it has come back unchanged. The line
+    /// is not ended.
     fn type_text(&mut self, text: &str, config: &ClientConfig) -> Result<(), ArmError> {
         self.half_typed = true;
         self.send(text.as_bytes(), text)?;
@@ -220,8 +231,9 @@ impl<T: Transport> Wire<T> {
 
     /// Reads until a prompt or question is followed by silence.
     ///
-    /// When nothing comes for `config.reply_timeout` an empty line is sent: if only the prompt was lost this brings it back, and if the controller
-    /// is still busy it is answered later. A line that says more than a reply may be long, or something all the time, is given up.
+    /// When nothing comes for `config.reply_timeout` an empty line is sent: if only the prompt was
+    /// lost this brings it back, and if the controller is still busy it is answered later. A line
+    /// that says more than a reply may be long, or something all the time, is given up.
     pub(super) fn read_reply(
         &mut self,
         sent: &str,
@@ -230,7 +242,8 @@ impl<T: Transport> Wire<T> {
     ) -> Result<Reply, ArmError> {
         let mut reader = Self::reader(config);
         let until = self.line.clock().saturating_add(timeout);
-        let at_the_latest = until.saturating_add(config.reply_timeout.max(config.quiet.saturating_mul(4)));
+        let at_the_latest =
+            until.saturating_add(config.reply_timeout.max(config.quiet.saturating_mul(4)));
         let mut taken = 0;
         loop {
             let ending = reader.ending();
@@ -243,7 +256,11 @@ impl<T: Transport> Wire<T> {
                 reader.push(&bytes);
                 taken += bytes.len();
                 if reader.overflowed() || taken > config.reply_limit.max(256) {
-                    return Err(self.garbled(sent, "a reply of bounded length", &shortened(reader.text())));
+                    return Err(self.garbled(
+                        sent,
+                        "a reply of bounded length",
+                        &shortened(reader.text()),
+                    ));
                 }
                 if left.is_zero() && ending.is_none() || self.line.clock() >= at_the_latest {
                     return Err(self.garbled(sent, "a reply that ends", &shortened(reader.text())));
@@ -315,7 +332,8 @@ impl<T: Transport> Wire<T> {
         Ok(reply)
     }
 
-    /// Gets back to the monitor's prompt from whatever dialogue the line is in, saying no to everything.
+    /// Gets back to the monitor's prompt from whatever dialogue the line is in, saying no to
+    /// everything.
     pub(super) fn settle(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
         let patience = config.patience();
         let mut reply = self.spoil(config)?;
@@ -342,7 +360,13 @@ impl<T: Transport> Wire<T> {
         ))
     }
 
-    pub(super) fn silence(&self, sent: &str, expected: &str, heard: &str, waited: Duration) -> ArmError {
+    pub(super) fn silence(
+        &self,
+        sent: &str,
+        expected: &str,
+        heard: &str,
+        waited: Duration,
+    ) -> ArmError {
         ArmError::Silence {
             port: self.port(),
             sent: sent.to_owned(),
@@ -370,8 +394,9 @@ pub(super) fn is_boot_question(text: &str) -> bool {
 
 /// What leaves a dialogue, tried in turn.
 ///
-/// An empty line ends those that ask for changes or for yes and no. It is not the first thing that an unknown question is answered with: a program
-/// that asks for numbers would take it for zeros and go on with them.
+/// An empty line ends those that ask for changes or for yes and no. It is not the first thing that
+/// an unknown question is answered with: a program that asks for numbers would take it for zeros
+/// and go on with them.
 pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     let question = last_line(text).to_ascii_uppercase();
     let words = question.trim_end_matches(['?', ' ']);
@@ -391,14 +416,21 @@ pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     }
 }
 
-/// The last question of a text, in upper case and without its mark. Where nothing is echoed one question can follow another on its line.
+/// The last question of a text, in upper case and without its mark. Where nothing is echoed one
+/// question can follow another on its line.
 pub(super) fn last_question(text: &str) -> String {
     let line = last_line(text).trim_end_matches(['?', ' ']);
-    line.rsplit('?').next().unwrap_or_default().to_ascii_uppercase()
+    line.rsplit('?')
+        .next()
+        .unwrap_or_default()
+        .to_ascii_uppercase()
 }
 
 fn last_line(text: &str) -> &str {
-    text.trim_end().rsplit(['\r', '\n']).next().unwrap_or_default()
+    text.trim_end()
+        .rsplit(['\r', '\n'])
+        .next()
+        .unwrap_or_default()
 }
 
 /// The end of a text, short enough for a message.

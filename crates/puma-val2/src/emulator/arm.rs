@@ -54,7 +54,8 @@ impl Speed {
         }
     }
 
-    /// Fraction of full speed, `line_speed` metres per second being full for a speed in units of length.
+    /// Fraction of full speed, `line_speed` metres per second being full for a speed in units of
+    /// length.
     fn fraction(self, line_speed: f64) -> f64 {
         match self.unit {
             SpeedUnit::Percent => self.value / 100.0,
@@ -104,12 +105,15 @@ impl Arm {
 
     /// Joint angles as the encoders give them.
     pub(super) fn shown(&self) -> Joints {
-        self.drives.map_or(self.joints, |d| d.quantized(&self.joints))
+        self.drives
+            .map_or(self.joints, |d| d.quantized(&self.joints))
     }
 
     /// Where the present motion ends, or where the arm stands.
     pub(super) fn destination(&self) -> Joints {
-        self.motion.as_ref().map_or_else(|| self.shown(), Motion::target)
+        self.motion
+            .as_ref()
+            .map_or_else(|| self.shown(), Motion::target)
     }
 
     /// The hand in the world frame.
@@ -125,7 +129,8 @@ impl Arm {
         self.motion.as_ref().map(Motion::end)
     }
 
-    /// Follows the motion to `now`. If it has ended, says how: with the fault that the path ended in, if any.
+    /// Follows the motion to `now`. If it has ended, says how: with the fault that the path ended
+    /// in, if any.
     pub(super) fn advance(&mut self, now: Duration) -> Option<Result<(), Fault>> {
         let motion = self.motion.as_ref()?;
         self.joints = motion.at(now);
@@ -192,7 +197,9 @@ impl Arm {
     }
 
     fn pace(&mut self, profile: &Profile, speed: Option<Speed>) -> Pace {
-        let speed = speed.or(self.next_speed.take()).unwrap_or(self.program_speed);
+        let speed = speed
+            .or(self.next_speed.take())
+            .unwrap_or(self.program_speed);
         let fraction = speed.fraction(profile.line_speed) * self.monitor_speed / 100.0;
         Pace {
             fraction: fraction.clamp(1e-4, 1.0),
@@ -259,8 +266,8 @@ impl Arm {
         })
     }
 
-    /// Whether the arm stands so near to the border between two postures that it is in neither: the upright arm between left and right, the
-    /// straight wrist between flip and no flip.
+    /// Whether the arm stands so near to the border between two postures that it is in neither: the
+    /// upright arm between left and right, the straight wrist between flip and no flip.
     fn between_postures(&self) -> [bool; 2] {
         let [_, t2, t3, _, t5, _] = self.joints.0;
         let p = &self.params;
@@ -285,7 +292,12 @@ impl Arm {
     }
 
     /// Starts a straight-line motion of the hand, in the present posture.
-    pub(super) fn start_line(&mut self, to: &Place, now: Duration, profile: &Profile) -> Result<(), Fault> {
+    pub(super) fn start_line(
+        &mut self,
+        to: &Place,
+        now: Duration,
+        profile: &Profile,
+    ) -> Result<(), Fault> {
         self.check_ready()?;
         let to = match to {
             Place::Transformation(pose) => *pose,
@@ -296,7 +308,8 @@ impl Arm {
         self.reach(&to, &self.joints, |c| c == posture)?;
         let length = (to.translation.vector - from.translation.vector).norm();
         let turn = from.rotation.angle_to(&to.rotation);
-        // A knot every 5 mm or 2 degrees keeps the joint-interpolated chord within some micrometres of the line.
+        // A knot every 5 mm or 2 degrees keeps the joint-interpolated chord within some micrometres
+        // of the line.
         let spans = (length / 0.005)
             .max(turn / 2.0_f64.to_radians())
             .ceil()
@@ -324,7 +337,8 @@ impl Arm {
         let mut pace = self.pace(profile, None);
         let seconds = (length / profile.line_speed).max(turn / profile.line_turn) * travelled;
         let path_speed = pace.fraction / seconds.max(1e-6);
-        // A line's speed is a matter of the hand; the joints are held to their own limits at full speed.
+        // A line's speed is a matter of the hand; the joints are held to their own limits at full
+        // speed.
         pace.fraction = 1.0;
         let mut motion = Motion::along(knots, now, path_speed, pace, &self.params);
         motion.failure = failure;
@@ -345,17 +359,23 @@ impl Arm {
     pub(super) fn aligned(&self) -> Place {
         let hand = self.hand(&self.destination());
         let axis = hand * Vector3::z();
-        let (nearest, _) = axis.iter().enumerate().fold((0, 0.0), |(best, size), (i, v)| {
-            if v.abs() > size {
-                (i, v.abs())
-            } else {
-                (best, size)
-            }
-        });
+        let (nearest, _) = axis
+            .iter()
+            .enumerate()
+            .fold((0, 0.0), |(best, size), (i, v)| {
+                if v.abs() > size {
+                    (i, v.abs())
+                } else {
+                    (best, size)
+                }
+            });
         let mut wanted = Vector3::zeros();
         wanted[nearest] = if axis[nearest] < 0.0 { -1.0 } else { 1.0 };
         let turn = UnitQuaternion::rotation_between(&axis, &wanted).unwrap_or_default();
-        Place::Transformation(Isometry3::from_parts(hand.translation, turn * hand.rotation))
+        Place::Transformation(Isometry3::from_parts(
+            hand.translation,
+            turn * hand.rotation,
+        ))
     }
 
     /// Every joint by a degree and a half and back, which passes an index pulse of each encoder.

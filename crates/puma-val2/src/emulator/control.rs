@@ -9,8 +9,13 @@ use super::program::Program;
 use super::{Emulator, Fault, Message};
 
 impl Emulator {
-    /// `GOTO`, `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their parts. The frame's step already points behind the instruction.
-    pub(super) fn control(&mut self, instruction: &Instruction, job: &mut Job) -> Result<Flow, Fault> {
+    /// `GOTO`, `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their parts. The frame's step already points
+    /// behind the instruction.
+    pub(super) fn control(
+        &mut self,
+        instruction: &Instruction,
+        job: &mut Job,
+    ) -> Result<Flow, Fault> {
         let frame = job.frames.last_mut().ok_or(Message::IllegalInstruction)?;
         let program = Arc::clone(&frame.program);
         let at = frame.step - 1;
@@ -100,7 +105,11 @@ impl Emulator {
                             frame.loops.remove(index);
                         }
                         self.memory.set_real(key, next, &self.profile)?;
-                        if over { Flow::Next } else { Flow::Jump(head + 1) }
+                        if over {
+                            Flow::Next
+                        } else {
+                            Flow::Jump(head + 1)
+                        }
                     }
                     _ => Flow::Next,
                 }
@@ -109,7 +118,8 @@ impl Emulator {
         })
     }
 
-    /// The step of a `CASE` to go on with: behind the first `VALUE` that fits, behind `ANY`, or behind the `END`.
+    /// The step of a `CASE` to go on with: behind the first `VALUE` that fits, behind `ANY`, or
+    /// behind the `END`.
     #[allow(clippy::float_cmp)] // `VALUE` compares as the controller does.
     fn branch(&self, program: &Program, case: usize, of: f64) -> Result<usize, Fault> {
         let scope = self.scope();

@@ -105,7 +105,8 @@ impl Emulator {
         !matches!(self.mode, Mode::Busy)
     }
 
-    /// A line has just been completed. While `DO` blocks only the words that stop the arm are heard.
+    /// A line has just been completed. While `DO` blocks only the words that stop the arm are
+    /// heard.
     pub(super) fn line_complete(&mut self) {
         if self.takes_lines() || !self.profile.stop_while_busy {
             return;
@@ -190,7 +191,13 @@ impl Emulator {
                 self.boot(question);
             }
             Some(yes) => {
-                if yes && self.profile.boot.get(question).is_some_and(|q| q.initializes) {
+                if yes
+                    && self
+                        .profile
+                        .boot
+                        .get(question)
+                        .is_some_and(|q| q.initializes)
+                {
                     self.forget_everything();
                     self.arm.monitor_speed = 100.0;
                 }
@@ -263,7 +270,8 @@ impl Emulator {
         self.mode = Mode::Change { key, place };
     }
 
-    /// Elements between commas replace those of the location; an empty line, or one that changes nothing, ends the dialogue.
+    /// Elements between commas replace those of the location; an empty line, or one that changes
+    /// nothing, ends the dialogue.
     fn change(&mut self, key: String, place: Place, line: &str) {
         match changed(&place, line) {
             Ok(None) => self.prompt(),

@@ -17,11 +17,16 @@ pub(super) fn number(value: f64, width: usize, decimals: usize) -> String {
     }
 }
 
-/// A real as `TYPE` and `LISTR` show it by default: whole numbers plain, others with up to four decimals.
+/// A real as `TYPE` and `LISTR` show it by default: whole numbers plain, others with up to four
+/// decimals.
 pub(super) fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
+    if text == "-0" {
+        "0".into()
+    } else {
+        text.into()
+    }
 }
 
 /// A word over the middle of a column of numbers.
@@ -67,7 +72,9 @@ pub(super) fn whereabouts(
     let [cartesian_heading, joint_heading] =
         [cartesian_heading, joint_heading].map(|h| h.trim_end().to_owned());
     match profile.where_layout {
-        WhereLayout::CartesianFirst => vec![cartesian_heading, cartesian, joint_heading, joint_line],
+        WhereLayout::CartesianFirst => {
+            vec![cartesian_heading, cartesian, joint_heading, joint_line]
+        }
         WhereLayout::JointsFirst => vec![joint_heading, joint_line, cartesian_heading, cartesian],
     }
 }

@@ -31,7 +31,9 @@ impl Emulator {
         let mut at = 0;
         if cursor.sign(",") {
             match cursor.next() {
-                Some(Token::Number(step)) if *step >= 1.0 && *step <= 32767.0 => at = *step as usize - 1,
+                Some(Token::Number(step)) if *step >= 1.0 && *step <= 32767.0 => {
+                    at = *step as usize - 1
+                }
                 _ => return Err(Message::InvalidArgument.into()),
             }
         }
@@ -87,8 +89,8 @@ impl Emulator {
 
     /// A line typed to the editor: one of its own commands, or a step.
     ///
-    /// `E` ends; an empty line goes to the next step; `S n` to step n, `P n` prints n steps, `L` goes one step back, `D n` deletes n steps,
-    /// `I` inserts until an empty line.
+    /// `E` ends; an empty line goes to the next step; `S n` to step n, `P n` prints n steps, `L`
+    /// goes one step back, `D n` deletes n steps, `I` inserts until an empty line.
     pub(super) fn edit_line(&mut self, mut editing: Editing, line: &str) {
         let text = line.trim().to_ascii_uppercase();
         let mut words = text.split_whitespace();
@@ -104,7 +106,9 @@ impl Emulator {
                 self.keep(editing);
                 return self.prompt();
             }
-            ("S", Some(number)) => editing.at = number.saturating_sub(1).min(editing.program.steps.len()),
+            ("S", Some(number)) => {
+                editing.at = number.saturating_sub(1).min(editing.program.steps.len())
+            }
             ("L", Some(number)) => editing.at = editing.at.saturating_sub(number),
             ("P", Some(number)) => {
                 let end = (editing.at + number).min(editing.program.steps.len());

@@ -158,7 +158,9 @@ impl Expr {
     fn parse_operand(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         match cursor.next() {
             Some(Token::Number(number)) => Ok(Self::Number(*number)),
-            Some(Token::Sign("-")) => Ok(Self::Negate(Box::new(Self::parse_from(cursor, SIGN_BINDS)?))),
+            Some(Token::Sign("-")) => Ok(Self::Negate(Box::new(Self::parse_from(
+                cursor, SIGN_BINDS,
+            )?))),
             Some(Token::Sign("+")) => Self::parse_from(cursor, SIGN_BINDS),
             Some(Token::Sign("(")) => {
                 let inner = Self::parse(cursor)?;
@@ -231,7 +233,9 @@ impl Expr {
             Self::Variable(variable) => scope.real(&variable.key(scope)?)?,
             Self::Negate(inner) => -inner.value(scope)?,
             Self::Not(inner) => truth(!is_true(inner.value(scope)?)),
-            Self::Binary(operator, left, right) => operator.apply(left.value(scope)?, right.value(scope)?)?,
+            Self::Binary(operator, left, right) => {
+                operator.apply(left.value(scope)?, right.value(scope)?)?
+            }
             Self::Call(function, arguments) => {
                 let values = arguments
                     .iter()
@@ -363,7 +367,9 @@ impl PlaceFunction {
         let first = places[0].transformation(scope)?.translation.vector;
         Ok(1000.0
             * match self {
-                Self::Distance => (places[1].transformation(scope)?.translation.vector - first).norm(),
+                Self::Distance => {
+                    (places[1].transformation(scope)?.translation.vector - first).norm()
+                }
                 Self::Dx => first.x,
                 Self::Dy => first.y,
                 Self::Dz => first.z,

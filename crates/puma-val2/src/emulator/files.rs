@@ -38,13 +38,14 @@ pub struct TextError {
 }
 
 impl Emulator {
-    /// All programs, locations and real variables as text, which [`Emulator::load_text`] takes back.
+    /// All programs, locations and real variables as text, which [`Emulator::load_text`] takes
+    /// back.
     pub fn text(&self) -> String {
         text_of(&self.memory, |_, _| true)
     }
 
-    /// Adds the programs, locations and variables of a text to the memory, replacing those of the same names. Nothing is changed if any line
-    /// is wrong.
+    /// Adds the programs, locations and variables of a text to the memory, replacing those of the
+    /// same names. Nothing is changed if any line is wrong.
     ///
     /// # Errors
     /// The first line that does not fit.
@@ -63,8 +64,13 @@ impl Emulator {
         self.floppy.insert(name.to_ascii_uppercase(), text);
     }
 
-    /// `STORE file[=name,...]`: everything, or only programs, locations or variables, or only those named.
-    pub(super) fn store(&mut self, kind: Option<Kind>, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    /// `STORE file[=name,...]`: everything, or only programs, locations or variables, or only those
+    /// named.
+    pub(super) fn store(
+        &mut self,
+        kind: Option<Kind>,
+        cursor: &mut Cursor<'_>,
+    ) -> Result<(), Fault> {
         let file = cursor.name()?;
         check_name(&file, &self.profile)?;
         let mut names = Vec::new();
@@ -84,8 +90,9 @@ impl Emulator {
         if !names.iter().all(there) {
             return Err(Message::UndefinedValue.into());
         }
-        let wanted =
-            |k: Kind, name: &str| of_kind(k) && (names.is_empty() || names.iter().any(|n| n == name));
+        let wanted = |k: Kind, name: &str| {
+            of_kind(k) && (names.is_empty() || names.iter().any(|n| n == name))
+        };
         let text = text_of(&self.memory, wanted);
         if self.floppy.len() >= self.profile.max_entries && !self.floppy.contains_key(&file) {
             return Err(Message::File.into());
@@ -100,18 +107,27 @@ impl Emulator {
     }
 
     /// `LOAD file`: everything in it, or only its programs, locations or variables.
-    pub(super) fn load(&mut self, kind: Option<Kind>, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    pub(super) fn load(
+        &mut self,
+        kind: Option<Kind>,
+        cursor: &mut Cursor<'_>,
+    ) -> Result<(), Fault> {
         let file = cursor.name()?;
         cursor.expect_end()?;
         let text = self.floppy.get(&file).ok_or(Message::File)?;
-        self.memory = parsed(text, kind, self.memory.clone(), &self.profile).map_err(|error| error.fault)?;
+        self.memory =
+            parsed(text, kind, self.memory.clone(), &self.profile).map_err(|error| error.fault)?;
         Ok(())
     }
 }
 
 fn text_of(memory: &Memory, wanted: impl Fn(Kind, &str) -> bool) -> String {
     let mut text = String::new();
-    for (name, program) in memory.programs.iter().filter(|(n, _)| wanted(Kind::Program, n)) {
+    for (name, program) in memory
+        .programs
+        .iter()
+        .filter(|(n, _)| wanted(Kind::Program, n))
+    {
         text.push_str(&format!(".PROGRAM {name}\n"));
         for step in &program.steps {
             text.push_str(&format!(" {}\n", step.text));
@@ -153,7 +169,8 @@ enum Section {
     Reals,
 }
 
-/// `memory` with what a text holds added: all of it, or what is of one kind. The rest of the text must be sound all the same.
+/// `memory` with what a text holds added: all of it, or what is of one kind. The rest of the text
+/// must be sound all the same.
 fn parsed(
     text: &str,
     kind: Option<Kind>,
@@ -162,10 +179,12 @@ fn parsed(
 ) -> Result<Memory, TextError> {
     let mut section = Section::None;
     for (index, line) in text.lines().enumerate() {
-        take_line(line.trim(), &mut section, kind, &mut memory, profile).map_err(|fault| TextError {
-            line: index + 1,
-            fault,
-            text: line.chars().take(80).collect(),
+        take_line(line.trim(), &mut section, kind, &mut memory, profile).map_err(|fault| {
+            TextError {
+                line: index + 1,
+                fault,
+                text: line.chars().take(80).collect(),
+            }
         })?;
     }
     match section {
@@ -202,7 +221,9 @@ fn take_line(
         Section::None => {
             *section = match words[..] {
                 [] => return Ok(()),
-                [".PROGRAM", name] => Section::Program(sound_name(name, profile)?, Program::default()),
+                [".PROGRAM", name] => {
+                    Section::Program(sound_name(name, profile)?, Program::default())
+                }
                 [".LOCATIONS"] => Section::Locations,
                 [".REALS"] => Section::Reals,
                 _ => return Err(Message::InvalidArgument.into()),
@@ -263,7 +284,13 @@ fn number(text: &str) -> Result<f64, Fault> {
 /// A name as it is kept, possibly with an index.
 fn sound_name(name: &str, profile: &Profile) -> Result<String, Fault> {
     let plain = match name.split_once('[') {
-        Some((plain, index)) if index.strip_suffix(']').is_some_and(|i| i.parse::<u16>().is_ok()) => plain,
+        Some((plain, index))
+            if index
+                .strip_suffix(']')
+                .is_some_and(|i| i.parse::<u16>().is_ok()) =>
+        {
+            plain
+        }
         Some(_) => return Err(Message::InvalidArgument.into()),
         None => name,
     };

@@ -31,7 +31,8 @@ pub(super) enum Instruction {
     Delay(Expr),
     Ready,
     Nest,
-    /// `OPEN`, `CLOSE` (with the next motion) and `OPENI`, `CLOSEI` (at once), `RELAX`, `RELAXI`, `GRASP`.
+    /// `OPEN`, `CLOSE` (with the next motion) and `OPENI`, `CLOSEI` (at once), `RELAX`, `RELAXI`,
+    /// `GRASP`.
     Hand {
         to: Gripper,
         at_once: bool,
@@ -42,7 +43,8 @@ pub(super) enum Instruction {
         unit: SpeedUnit,
         always: bool,
     },
-    /// `COARSE`, `FINE`, `NULL`, `NONULL`, `INTON`, `INTOFF`: accepted; the emulated servos settle exactly.
+    /// `COARSE`, `FINE`, `NULL`, `NONULL`, `INTON`, `INTOFF`: accepted; the emulated servos settle
+    /// exactly.
     Settling,
     Break,
     Signal(Vec<Expr>),
@@ -161,9 +163,15 @@ const WORDS: [(&str, Word); 64] = [
     ("GOTO", Parse(|c| Ok(Instruction::Goto(label(c)?)))),
     ("GRASP", Parse(|c| hand(c, Gripper::Closed, true))),
     ("HALT", Plain(|| Instruction::Halt)),
-    ("HERE", Parse(|c| Ok(Instruction::Here(PlaceName::parse(c)?)))),
+    (
+        "HERE",
+        Parse(|c| Ok(Instruction::Here(PlaceName::parse(c)?))),
+    ),
     ("IF", Parse(condition)),
-    ("IGNORE", Parse(|c| Ok(Instruction::Ignore(Expr::parse(c)?)))),
+    (
+        "IGNORE",
+        Parse(|c| Ok(Instruction::Ignore(Expr::parse(c)?))),
+    ),
     ("INTOFF", Parse(settling)),
     ("INTON", Parse(settling)),
     (
@@ -197,7 +205,10 @@ const WORDS: [(&str, Word); 64] = [
         Plain(|| Instruction::Posture(Posture::Side(ArmSide::Righty))),
     ),
     ("SET", Parse(set)),
-    ("SIGNAL", Parse(|c| Ok(Instruction::Signal(expressions(c)?)))),
+    (
+        "SIGNAL",
+        Parse(|c| Ok(Instruction::Signal(expressions(c)?))),
+    ),
     ("SPEED", Parse(speed)),
     ("STOP", Plain(|| Instruction::Stop)),
     ("TOOL", Parse(tool)),
@@ -293,7 +304,8 @@ fn motion(cursor: &mut Cursor<'_>, straight: bool, with_hand: bool) -> Result<In
 }
 
 fn hand(cursor: &mut Cursor<'_>, to: Gripper, at_once: bool) -> Result<Instruction, Fault> {
-    // A servoed hand takes an opening in millimetres; the emulated one is pneumatic and only checks that it is a number.
+    // A servoed hand takes an opening in millimetres; the emulated one is pneumatic and only checks
+    // that it is a number.
     Expr::parse_optional(cursor)?;
     Ok(Instruction::Hand { to, at_once })
 }
@@ -428,7 +440,9 @@ fn prompt(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
 
 fn label(cursor: &mut Cursor<'_>) -> Result<u32, Fault> {
     match cursor.next() {
-        Some(Token::Number(number)) if number.fract() == 0.0 && (0.0..=65535.0).contains(number) => {
+        Some(Token::Number(number))
+            if number.fract() == 0.0 && (0.0..=65535.0).contains(number) =>
+        {
             Ok(*number as u32)
         }
         _ => Err(Message::InvalidArgument.into()),

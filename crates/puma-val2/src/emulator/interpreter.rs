@@ -13,7 +13,11 @@ use super::{Emulator, Event, Fault, Message, display};
 use crate::{Gripper, Joint, Joints};
 
 impl Emulator {
-    pub(super) fn carry_out(&mut self, instruction: &Instruction, job: &mut Job) -> Result<Flow, Fault> {
+    pub(super) fn carry_out(
+        &mut self,
+        instruction: &Instruction,
+        job: &mut Job,
+    ) -> Result<Flow, Fault> {
         if self.arm.moving() && needs_standing_arm(instruction) {
             return Ok(Flow::WhenStanding);
         }
@@ -84,7 +88,11 @@ impl Emulator {
                 return Ok(Flow::Wait(Wait::Until(self.now + self.profile.hand_time)));
             }
             Instruction::Posture(posture) => self.arm.set_posture_next(*posture),
-            Instruction::Speed { value, unit, always } => {
+            Instruction::Speed {
+                value,
+                unit,
+                always,
+            } => {
                 let speed = Speed::new(number(value)?, *unit)?;
                 if *always {
                     self.arm.program_speed = speed;
@@ -190,7 +198,8 @@ impl Emulator {
         } else {
             self.arm.check_ready()?;
             let joints = self.arm.resolve(to)?;
-            self.arm.start_joints(joints, None, self.now, &self.profile)?;
+            self.arm
+                .start_joints(joints, None, self.now, &self.profile)?;
         }
         self.motion_started(before);
         Ok(())
@@ -217,7 +226,8 @@ impl Emulator {
         }
         to.0[joint.index()] -= short.to_radians();
         let before = self.arm.gripper;
-        self.arm.start_joints(to, Some(speed), self.now, &self.profile)?;
+        self.arm
+            .start_joints(to, Some(speed), self.now, &self.profile)?;
         self.motion_started(before);
         Ok(())
     }
@@ -232,7 +242,10 @@ impl Emulator {
 
     pub(super) fn set_base(&mut self, [dx, dy, dz, turn]: [f64; 4]) {
         let shift = nalgebra::Vector3::new(dx, dy, dz) / 1000.0;
-        let turn = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), turn.to_radians());
+        let turn = nalgebra::UnitQuaternion::from_axis_angle(
+            &nalgebra::Vector3::z_axis(),
+            turn.to_radians(),
+        );
         self.arm.frames.base = nalgebra::Isometry3::from_parts(shift.into(), turn);
     }
 
@@ -261,7 +274,9 @@ impl Emulator {
                 Item::Value(value) => {
                     let value = value.value(&self.scope())?;
                     match format {
-                        Some((width, decimals)) => text.push_str(&display::number(value, width, decimals)),
+                        Some((width, decimals)) => {
+                            text.push_str(&display::number(value, width, decimals))
+                        }
                         None => text.push_str(&format!(" {}", display::plain(value))),
                     }
                 }

@@ -181,7 +181,8 @@ impl Emulator {
         })
     }
 
-    /// Goes on with a program that was paused, aborted or refused, at its next step or (`again`) at the one it stopped in.
+    /// Goes on with a program that was paused, aborted or refused, at its next step or (`again`) at
+    /// the one it stopped in.
     pub(super) fn resume_program(&mut self, again: bool, single: bool) -> Result<(), Fault> {
         let mut job = self.paused.take().ok_or(Message::NotRunning)?;
         if again && let Some(frame) = job.frames.last_mut() {
@@ -296,7 +297,9 @@ impl Emulator {
         if due(self).is_none_or(|at| at > self.now) {
             return;
         }
-        let Some(mut job) = self.job.take() else { return };
+        let Some(mut job) = self.job.take() else {
+            return;
+        };
         if let Some(how) = job.ending {
             return self.end_job(job, how);
         }

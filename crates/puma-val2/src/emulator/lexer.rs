@@ -12,7 +12,8 @@ pub(super) enum Token {
 }
 
 const SIGNS: [&str; 20] = [
-    "==", "<>", "<=", ">=", "=<", "=>", "<", ">", "=", "+", "-", "*", "/", "^", "(", ")", "[", "]", ":", ",",
+    "==", "<>", "<=", ">=", "=<", "=>", "<", ">", "=", "+", "-", "*", "/", "^", "(", ")", "[", "]",
+    ":", ",",
 ];
 
 /// Cuts a line into tokens; a comment after `;` is dropped.
@@ -28,7 +29,9 @@ pub(super) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
                 found.push(Token::Text(inner[..end].to_owned()));
                 rest = &inner[end + 1..];
             }
-            c if c.is_ascii_digit() || (c == '.' && rest[1..].starts_with(|d: char| d.is_ascii_digit())) => {
+            c if c.is_ascii_digit()
+                || (c == '.' && rest[1..].starts_with(|d: char| d.is_ascii_digit())) =>
+            {
                 let end = rest
                     .find(|d: char| !(d.is_ascii_digit() || d == '.'))
                     .unwrap_or(rest.len());
@@ -179,7 +182,11 @@ impl<'a> Cursor<'a> {
 }
 
 /// The one entry of `words` that `typed` names: itself, or the only one that it abbreviates.
-pub(super) fn keyword<T: Copy>(typed: &str, words: &[(&str, T)], unknown: Message) -> Result<T, Fault> {
+pub(super) fn keyword<T: Copy>(
+    typed: &str,
+    words: &[(&str, T)],
+    unknown: Message,
+) -> Result<T, Fault> {
     if let Some((_, found)) = words.iter().find(|(word, _)| *word == typed) {
         return Ok(*found);
     }

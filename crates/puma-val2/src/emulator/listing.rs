@@ -17,7 +17,11 @@ impl Emulator {
     }
 
     pub(super) fn list(&mut self, command: Command, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
-        let of_names = [Command::ListLocations, Command::ListReals, Command::ListPrograms];
+        let of_names = [
+            Command::ListLocations,
+            Command::ListReals,
+            Command::ListPrograms,
+        ];
         if !of_names.contains(&command) {
             cursor.expect_end()?;
         }
@@ -35,8 +39,9 @@ impl Emulator {
             Command::Directory => self.memory.programs.keys().cloned().collect(),
             Command::FileDirectory => self.floppy.keys().cloned().collect(),
             Command::Switch => {
-                let line =
-                    |(name, on): (&String, &bool)| format!("{name:<16}{}", if *on { "ON" } else { "OFF" });
+                let line = |(name, on): (&String, &bool)| {
+                    format!("{name:<16}{}", if *on { "ON" } else { "OFF" })
+                };
                 self.switches.iter().map(line).collect()
             }
             Command::Io => self.signal_lines(),
@@ -50,13 +55,28 @@ impl Emulator {
     }
 
     fn location_lines(&self, names: &[String]) -> Result<Vec<String>, Fault> {
-        let mut lines = vec![format!("{:16}{}", "", display::place_heading(&self.profile))];
-        let line = |name: &str, place| format!("{name:<16}{}", display::place_values(place, &self.profile));
+        let mut lines = vec![format!(
+            "{:16}{}",
+            "",
+            display::place_heading(&self.profile)
+        )];
+        let line = |name: &str, place| {
+            format!("{name:<16}{}", display::place_values(place, &self.profile))
+        };
         if names.is_empty() {
-            lines.extend(self.memory.places.iter().map(|(name, place)| line(name, place)));
+            lines.extend(
+                self.memory
+                    .places
+                    .iter()
+                    .map(|(name, place)| line(name, place)),
+            );
         }
         for name in names {
-            let place = self.memory.places.get(name).ok_or(Message::UndefinedValue)?;
+            let place = self
+                .memory
+                .places
+                .get(name)
+                .ok_or(Message::UndefinedValue)?;
             lines.push(line(name, place));
         }
         Ok(lines)
@@ -79,7 +99,11 @@ impl Emulator {
         let names = if names.is_empty() { &all } else { names };
         let mut lines = Vec::new();
         for name in names {
-            let program = self.memory.programs.get(name).ok_or(Message::UndefinedProgram)?;
+            let program = self
+                .memory
+                .programs
+                .get(name)
+                .ok_or(Message::UndefinedProgram)?;
             lines.push(format!(".PROGRAM {name}"));
             lines.extend(
                 program
@@ -101,7 +125,12 @@ impl Emulator {
                 .map(|on| if on { "1" } else { "0" })
                 .collect();
             let groups: Vec<_> = states.chunks(8).map(<[&str]>::concat).collect();
-            format!("{:>4}-{:<4} {}", BANKS[bank], BANKS[bank] + 31, groups.join(" "))
+            format!(
+                "{:>4}-{:<4} {}",
+                BANKS[bank],
+                BANKS[bank] + 31,
+                groups.join(" ")
+            )
         };
         (0..3).map(row).collect()
     }
@@ -109,7 +138,10 @@ impl Emulator {
     fn status_lines(&self) -> Vec<String> {
         let mut lines = vec![
             format!("MONITOR SPEED {}", display::plain(self.arm.monitor_speed)),
-            format!("PROGRAM SPEED {}", display::plain(self.arm.program_speed.shown())),
+            format!(
+                "PROGRAM SPEED {}",
+                display::plain(self.arm.program_speed.shown())
+            ),
         ];
         let job = self.job.as_ref().filter(|job| job.is_program());
         match job.and_then(|job| job.at().map(|at| (job, at))) {

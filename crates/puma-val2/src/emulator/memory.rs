@@ -15,14 +15,24 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    pub(super) fn set_place(&mut self, key: String, place: Place, profile: &Profile) -> Result<(), Fault> {
+    pub(super) fn set_place(
+        &mut self,
+        key: String,
+        place: Place,
+        profile: &Profile,
+    ) -> Result<(), Fault> {
         if !place.val().iter().all(|v| v.is_finite()) {
             return Err(Message::ArithmeticError.into());
         }
         insert(&mut self.places, key, place, profile)
     }
 
-    pub(super) fn set_real(&mut self, key: String, value: f64, profile: &Profile) -> Result<(), Fault> {
+    pub(super) fn set_real(
+        &mut self,
+        key: String,
+        value: f64,
+        profile: &Profile,
+    ) -> Result<(), Fault> {
         insert(&mut self.reals, key, value, profile)
     }
 
@@ -36,7 +46,12 @@ impl Memory {
     }
 }
 
-fn insert<T>(map: &mut BTreeMap<String, T>, key: String, value: T, profile: &Profile) -> Result<(), Fault> {
+fn insert<T>(
+    map: &mut BTreeMap<String, T>,
+    key: String,
+    value: T,
+    profile: &Profile,
+) -> Result<(), Fault> {
     if map.len() >= profile.max_entries && !map.contains_key(&key) {
         return Err(Message::OutOfMemory.into());
     }

@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::Joint;
 
-/// A message of the controller, by its meaning. The wording is the profile's: the classes are known, the texts mostly are not.
+/// A message of the controller, by its meaning. The wording is the profile's: the classes are
+/// known, the texts mostly are not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Message {
@@ -123,7 +124,10 @@ impl Fault {
 
 impl From<Message> for Fault {
     fn from(message: Message) -> Self {
-        Self { message, joint: None }
+        Self {
+            message,
+            joint: None,
+        }
     }
 }
 

@@ -1,4 +1,5 @@
-//! The emulated controller: a VAL II monitor, its programs and its arm, without threads and without a clock of its own.
+//! The emulated controller: a VAL II monitor, its programs and its arm, without threads and without
+//! a clock of its own.
 
 mod arm;
 mod control;
@@ -85,7 +86,8 @@ pub enum Event {
 /// Most events kept until they are taken; older ones are dropped.
 const EVENT_LIMIT: usize = 1024;
 
-/// Most steps of its own that the emulator takes in one call; [`Emulator::next_deadline`] then says that more is due.
+/// Most steps of its own that the emulator takes in one call; [`Emulator::next_deadline`] then says
+/// that more is due.
 const STEPS_PER_CALL: usize = 20_000;
 
 /// What a sensor is connected to: a function of the arm's joint angles.
@@ -93,10 +95,12 @@ type Sense = Box<dyn FnMut(&Joints) -> bool + Send>;
 
 /// An emulated VAL II controller with a PUMA 560.
 ///
-/// Bytes from the terminal go in through [`Emulator::feed`], bytes to the terminal come out of it and of [`Emulator::poll`]. The time is the
-/// caller's: a duration since an origin of the caller's choice, which never runs backwards (an earlier time counts as the latest seen).
-/// [`Emulator::next_deadline`] says when something will happen of itself. Whoever waits that long runs in real time, whoever calls
-/// [`Emulator::poll`] with that time at once runs as fast as the machine.
+/// Bytes from the terminal go in through [`Emulator::feed`], bytes to the terminal come out of it
+/// and of [`Emulator::poll`]. The time is the caller's: a duration since an origin of the caller's
+/// choice, which never runs backwards (an earlier time counts as the latest seen).
+/// [`Emulator::next_deadline`] says when something will happen of itself. Whoever waits that long
+/// runs in real time, whoever calls [`Emulator::poll`] with that time at once runs as fast as the
+/// machine.
 ///
 /// ```
 /// use puma_val2::{Emulator, Profile, PumaParams};
@@ -145,7 +149,8 @@ impl fmt::Debug for Emulator {
 }
 
 impl Emulator {
-    /// A controller that has just been switched on: the first start-up question is ready to be fetched with [`Emulator::poll`].
+    /// A controller that has just been switched on: the first start-up question is ready to be
+    /// fetched with [`Emulator::poll`].
     pub fn new(params: PumaParams, profile: Profile) -> Self {
         let mut emulator = Self {
             arm: Arm::new(params, &profile),
@@ -326,7 +331,8 @@ impl Emulator {
         self.arm.power
     }
 
-    /// The ARM POWER button, or the emergency stop. Without power a motion stops at once and the brakes hold the arm.
+    /// The ARM POWER button, or the emergency stop. Without power a motion stops at once and the
+    /// brakes hold the arm.
     pub fn set_arm_power(&mut self, on: bool) {
         self.panel_used = true;
         self.switch_power(on);
@@ -343,15 +349,16 @@ impl Emulator {
         }
     }
 
-    /// A servo that cannot follow: the motion stops at once with an envelope error of `joint`, and arm power goes off.
+    /// A servo that cannot follow: the motion stops at once with an envelope error of `joint`, and
+    /// arm power goes off.
     pub fn envelope_error(&mut self, joint: crate::Joint) {
         self.arm.break_off(self.now, Duration::ZERO);
         self.switch_power(false);
         self.fail_job(Fault::at(Message::EnvelopeError, joint));
     }
 
-    /// Switches the controller off and on again: the arm stands where it was, memory is kept, calibration is lost and the start-up
-    /// dialogue begins.
+    /// Switches the controller off and on again: the arm stands where it was, memory is kept,
+    /// calibration is lost and the start-up dialogue begins.
     pub fn restart(&mut self) {
         let (joints, gripper) = (self.arm.joints(), self.arm.gripper);
         self.arm = Arm::new(self.arm.params, &self.profile);
@@ -367,7 +374,8 @@ impl Emulator {
         self.note(Event::Started);
     }
 
-    /// Writes text to the terminal that nobody asked for, as a fault or a second operator would cause it.
+    /// Writes text to the terminal that nobody asked for, as a fault or a second operator would
+    /// cause it.
     pub fn interject(&mut self, text: &str) {
         self.terminal.print(text, self.now);
     }
@@ -390,8 +398,9 @@ impl Emulator {
         Ok(())
     }
 
-    /// Connects a sensor to an input: `sense` is asked every trajectory tick while the arm moves, when it has come to a stand, and before a
-    /// step of a program or a line of the monitor is worked on.
+    /// Connects a sensor to an input: `sense` is asked every trajectory tick while the arm moves,
+    /// when it has come to a stand, and before a step of a program or a line of the monitor is
+    /// worked on.
     ///
     /// # Errors
     /// [`Message::IllegalSignal`] for a number that no signal has.

@@ -131,7 +131,11 @@ impl Emulator {
         self.carry_out_command(command, &mut cursor)
     }
 
-    fn carry_out_command(&mut self, command: Command, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    fn carry_out_command(
+        &mut self,
+        command: Command,
+        cursor: &mut Cursor<'_>,
+    ) -> Result<(), Fault> {
         match command {
             Command::Where => {
                 cursor.expect_end()?;
@@ -153,7 +157,8 @@ impl Emulator {
             Command::Calibrate => {
                 cursor.expect_end()?;
                 if !self.arm.power
-                    && (self.panel_used || self.profile.start_power != super::StartPower::OnAtCalibration)
+                    && (self.panel_used
+                        || self.profile.start_power != super::StartPower::OnAtCalibration)
                 {
                     return Err(Message::ArmPowerOff.into());
                 }
@@ -202,7 +207,9 @@ impl Emulator {
                 cursor.expect_end()?;
                 self.signals.reset_outputs();
             }
-            Command::Enable | Command::Disable => self.set_switch(cursor, command == Command::Enable)?,
+            Command::Enable | Command::Disable => {
+                self.set_switch(cursor, command == Command::Enable)?
+            }
             Command::Execute => return self.execute(cursor),
             Command::Abort | Command::Panic => {
                 cursor.expect_end()?;
@@ -283,11 +290,15 @@ impl Emulator {
         Ok(())
     }
 
-    /// `EXECUTE [program][,cycles][,step]`; negative cycles run for ever, no name the program executed last.
+    /// `EXECUTE [program][,cycles][,step]`; negative cycles run for ever, no name the program
+    /// executed last.
     fn execute(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let name = match cursor.peek() {
             Some(Token::Name(_)) => cursor.name()?,
-            _ => self.executed_last.clone().ok_or(Message::UndefinedProgram)?,
+            _ => self
+                .executed_last
+                .clone()
+                .ok_or(Message::UndefinedProgram)?,
         };
         let mut numbers = [1, 1];
         for number in &mut numbers {
@@ -365,7 +376,11 @@ impl Emulator {
         let old = cursor.name()?;
         cursor.expect_end()?;
         check_name(&new, &self.profile)?;
-        let program = self.memory.programs.get(&old).ok_or(Message::UndefinedProgram)?;
+        let program = self
+            .memory
+            .programs
+            .get(&old)
+            .ok_or(Message::UndefinedProgram)?;
         if self.memory.programs.contains_key(&new) {
             return Err(Message::InvalidArgument.into());
         }

@@ -10,7 +10,8 @@ use crate::{Joints, PumaParams};
 pub(super) struct Motion {
     knots: Vec<Joints>,
     start: Duration,
-    /// Greatest speed and acceleration along the path, whose length is 1; per second, per second squared.
+    /// Greatest speed and acceleration along the path, whose length is 1; per second, per second
+    /// squared.
     speed: f64,
     acceleration: f64,
     /// How it comes to a stand before its end.
@@ -41,7 +42,8 @@ pub(super) struct Pace {
 }
 
 impl Motion {
-    /// All joints start together, stop together, and none exceeds its limits; the joint that needs longest sets the pace.
+    /// All joints start together, stop together, and none exceeds its limits; the joint that needs
+    /// longest sets the pace.
     pub(super) fn joint_interpolated(
         from: Joints,
         to: Joints,
@@ -117,7 +119,8 @@ impl Motion {
         self.stop.is_some()
     }
 
-    /// Brings the arm to a stand within `time`, on the path. One that is slowing down already does so more sharply, if that is sooner.
+    /// Brings the arm to a stand within `time`, on the path. One that is slowing down already does
+    /// so more sharply, if that is sooner.
     pub(super) fn break_off(&mut self, now: Duration, time: Duration) {
         let end = now.saturating_add(time);
         if self
@@ -192,7 +195,13 @@ mod tests {
     fn motion() -> Motion {
         let from = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
         let to = Joints::from_degrees([80.0, -60.0, 90.0, 0.0, -30.0, 0.0]);
-        Motion::joint_interpolated(from, to, Duration::from_secs(5), PACE, &PumaParams::unimation())
+        Motion::joint_interpolated(
+            from,
+            to,
+            Duration::from_secs(5),
+            PACE,
+            &PumaParams::unimation(),
+        )
     }
 
     #[test]

@@ -58,7 +58,11 @@ impl PlaceName {
     /// The name under which the value is kept; that of a precision point begins with `#`.
     pub(super) fn key(&self, scope: &Scope<'_>) -> Result<String, Fault> {
         let key = expr::key(&self.name, self.index.as_deref(), scope)?;
-        Ok(if self.precision { format!("#{key}") } else { key })
+        Ok(if self.precision {
+            format!("#{key}")
+        } else {
+            key
+        })
     }
 }
 
@@ -177,7 +181,9 @@ impl Term {
                 Place::Transformation(Xyzoat::from_val(values(arguments, scope)?).pose())
             }
             Self::Ppoint(_) if !scope.has_ppoint() => return Err(Message::InvalidArgument.into()),
-            Self::Ppoint(arguments) => Place::PrecisionPoint(Joints::from_degrees(values(arguments, scope)?)),
+            Self::Ppoint(arguments) => {
+                Place::PrecisionPoint(Joints::from_degrees(values(arguments, scope)?))
+            }
             Self::Shift(of, by) => {
                 let by = Vector3::from(values(by, scope)?) / 1000.0;
                 let mut pose = of.transformation(scope)?;
@@ -198,7 +204,9 @@ impl Term {
 }
 
 /// Up to `N` arguments between commas; what is left out is zero.
-pub(super) fn arguments<const N: usize>(cursor: &mut Cursor<'_>) -> Result<[Option<Expr>; N], Fault> {
+pub(super) fn arguments<const N: usize>(
+    cursor: &mut Cursor<'_>,
+) -> Result<[Option<Expr>; N], Fault> {
     let mut found = [const { None }; N];
     for (i, place) in found.iter_mut().enumerate() {
         if i > 0 && !cursor.sign(",") {
@@ -223,7 +231,8 @@ pub(super) fn values<const N: usize>(
     Ok(found)
 }
 
-/// A frame with its x axis from `a` to `b`, its xy plane through `c` (on the side of positive y) and its origin at `d`.
+/// A frame with its x axis from `a` to `b`, its xy plane through `c` (on the side of positive y)
+/// and its origin at `d`.
 fn frame(
     a: Vector3<f64>,
     b: Vector3<f64>,
@@ -231,7 +240,9 @@ fn frame(
     d: Vector3<f64>,
 ) -> Result<Isometry3<f64>, Fault> {
     let too_close = Fault::from(Message::InvalidArgument);
-    let x = (b - a).try_normalize(1e-9).ok_or_else(|| too_close.clone())?;
+    let x = (b - a)
+        .try_normalize(1e-9)
+        .ok_or_else(|| too_close.clone())?;
     let z = x.cross(&(c - a)).try_normalize(1e-12).ok_or(too_close)?;
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
     Ok(Isometry3::from_parts(

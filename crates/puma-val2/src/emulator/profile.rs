@@ -31,15 +31,16 @@ pub enum StartPower {
     Off,
     /// On.
     On,
-    /// Off until `CALIBRATE` is answered with yes, as if somebody stood at the panel and pressed the button then. Once the panel has been
-    /// used, power stays as it was set there.
+    /// Off until `CALIBRATE` is answered with yes, as if somebody stood at the panel and pressed
+    /// the button then. Once the panel has been used, power stays as it was set there.
     OnAtCalibration,
 }
 
 /// What of an emulated controller may differ from one machine, release or source to another.
 ///
-/// The wire protocol of VAL II is documented in fragments only. What two independent sources agree on is built in; everything else is here,
-/// so that a client can be tried against controllers that answer otherwise. Defaults are those of [`Profile::val2`].
+/// The wire protocol of VAL II is documented in fragments only. What two independent sources agree
+/// on is built in; everything else is here, so that a client can be tried against controllers that
+/// answer otherwise. Defaults are those of [`Profile::val2`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// Name for messages and for choosing it on a command line.
@@ -86,22 +87,26 @@ pub struct Profile {
     pub messages: BTreeMap<Message, String>,
     /// Longest name of a program, location or variable (default: 15).
     pub max_name: usize,
-    /// Longest line (default: 128). Further characters are refused with a bell and the line with a message, for its beginning alone may mean something
-    /// else; a program's step in a file cannot be longer either.
+    /// Longest line (default: 128). Further characters are refused with a bell and the line with a
+    /// message, for its beginning alone may mean something else; a program's step in a file cannot
+    /// be longer either.
     pub max_line: usize,
-    /// Most entries of each kind (programs, locations, variables) and most steps of a program (default: 1000).
+    /// Most entries of each kind (programs, locations, variables) and most steps of a program
+    /// (default: 1000).
     pub max_entries: usize,
-    /// Time one character takes on the line in either direction (default: none); 9600 baud: 10/9600 s.
+    /// Time one character takes on the line in either direction (default: none); 9600 baud: 10/9600
+    /// s.
     pub char_time: Option<Duration>,
-    /// Time the monitor takes to digest a line (default: 0). Characters that arrive meanwhile wait in `input_buffer`.
+    /// Time the monitor takes to digest a line (default: 0). Characters that arrive meanwhile wait
+    /// in `input_buffer`.
     pub line_time: Duration,
-    /// Characters that can wait behind a line that the monitor has not come to (default: 256), those lines and their ends counted; further ones are
-    /// lost.
+    /// Characters that can wait behind a line that the monitor has not come to (default: 256),
+    /// those lines and their ends counted; further ones are lost.
     pub input_buffer: usize,
     /// Time one program step takes (default: 2 ms), at least 0.1 ms.
     pub step_time: Duration,
-    /// Whether Ctrl-C cancels a line or the running command, Ctrl-U deletes the line, DEL and BS a character, Ctrl-S and Ctrl-Q hold and release
-    /// the output, Ctrl-O drops it (default: yes).
+    /// Whether Ctrl-C cancels a line or the running command, Ctrl-U deletes the line, DEL and BS a
+    /// character, Ctrl-S and Ctrl-Q hold and release the output, Ctrl-O drops it (default: yes).
     pub control_characters: bool,
     /// Arm power at start (default: on at calibration).
     pub start_power: StartPower,
@@ -109,7 +114,8 @@ pub struct Profile {
     pub start_calibrated: bool,
     /// Joint angles at start (default: READY).
     pub start: Joints,
-    /// Where `NEST` goes. The real pose is not known; this is an assumption: the arm folded above the shoulder.
+    /// Where `NEST` goes. The real pose is not known; this is an assumption: the arm folded above
+    /// the shoulder.
     pub nest: Joints,
     /// Time in which a joint reaches its full speed (default: 0.25 s).
     pub acceleration_time: Duration,
@@ -121,16 +127,20 @@ pub struct Profile {
     pub line_turn: f64,
     /// Time of a full opening or closing of the hand (default: 0.3 s).
     pub hand_time: Duration,
-    /// Period at which sensors and armed reactions are looked at during a motion (default: 28 ms, VAL's trajectory period).
+    /// Period at which sensors and armed reactions are looked at during a motion (default: 28 ms,
+    /// VAL's trajectory period).
     pub tick: Duration,
     /// Whether the arm stands, and is shown, at whole encoder counts only (default: no).
     pub encoder_counts: bool,
-    /// Whether a straight line is checked over its whole length before it starts (default: no: the arm stops where the line leaves its reach).
+    /// Whether a straight line is checked over its whole length before it starts (default: no: the
+    /// arm stops where the line leaves its reach).
     pub check_line_ahead: bool,
-    /// Whether a joint-interpolated move to a transformation is refused when the present posture cannot reach it, though another could
-    /// (default: no). From a pose between two postures, READY for instance, the nearer one is taken in either case.
+    /// Whether a joint-interpolated move to a transformation is refused when the present posture
+    /// cannot reach it, though another could (default: no). From a pose between two postures, READY
+    /// for instance, the nearer one is taken in either case.
     pub keeps_posture: bool,
-    /// Whether `DRIVE` ends a little short, by this many degrees (default: 0); a fault for trying out clients.
+    /// Whether `DRIVE` ends a little short, by this many degrees (default: 0); a fault for trying
+    /// out clients.
     pub drive_error_degrees: f64,
 }
 
@@ -193,8 +203,10 @@ impl Profile {
         }
     }
 
-    /// Only what a client for a real PUMA 260 controller has relied on: no `#PPOINT`, no control characters, no reactions from the monitor, no ear for
-    /// `PANIC` while `DO` blocks, six-character names, at most 100 % speed. Arm power is on, as that client asks a person to see to.
+    /// Only what a client for a real PUMA 260 controller has relied on: no `#PPOINT`, no control
+    /// characters, no reactions from the monitor, no ear for `PANIC` while `DO` blocks,
+    /// six-character names, at most 100 % speed. Arm power is on, as that client asks a person to
+    /// see to.
     pub fn val2_strict_miz() -> Self {
         Self {
             name: "val2_strict_miz",
@@ -209,8 +221,8 @@ impl Profile {
         }
     }
 
-    /// The wear of a real line and arm on top of [`Profile::val2`]: 9600 baud, a slow monitor with a small input buffer, joint angles in whole
-    /// encoder counts.
+    /// The wear of a real line and arm on top of [`Profile::val2`]: 9600 baud, a slow monitor with
+    /// a small input buffer, joint angles in whole encoder counts.
     pub fn val2_hardware() -> Self {
         Self {
             name: "val2_hardware",
@@ -247,7 +259,8 @@ impl Default for Profile {
     }
 }
 
-/// Time of one character (start bit, eight data bits, stop bit) at `baud` bits per second; at least one baud is assumed.
+/// Time of one character (start bit, eight data bits, stop bit) at `baud` bits per second; at least
+/// one baud is assumed.
 pub fn char_time(baud: u32) -> Duration {
     Duration::from_secs(10) / baud.max(1)
 }

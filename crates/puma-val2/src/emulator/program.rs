@@ -66,8 +66,9 @@ impl Program {
             .ok_or(Message::UndefinedLabel.into())
     }
 
-    /// The control word that belongs to the one at `step` and comes next at its level: from `IF` the `ELSE` or `END`, from `CASE` or `VALUE`
-    /// the next `VALUE`, `ANY` or `END`, from `DO` the `UNTIL`, from the others the `END`.
+    /// The control word that belongs to the one at `step` and comes next at its level: from `IF`
+    /// the `ELSE` or `END`, from `CASE` or `VALUE` the next `VALUE`, `ANY` or `END`, from `DO` the
+    /// `UNTIL`, from the others the `END`.
     pub(super) fn next_part(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, later) in self.steps.iter().enumerate().skip(step + 1) {
@@ -83,7 +84,9 @@ impl Program {
                     }
                     depth -= 1;
                 }
-                Instruction::Else | Instruction::Value(_) | Instruction::Any if depth == 0 => return Ok(i),
+                Instruction::Else | Instruction::Value(_) | Instruction::Any if depth == 0 => {
+                    return Ok(i);
+                }
                 _ => {}
             }
         }
@@ -138,7 +141,9 @@ impl Program {
                     true
                 }
                 Instruction::Else => matches!(open.last(), Some(Instruction::IfThen(_))),
-                Instruction::Value(_) | Instruction::Any => matches!(open.last(), Some(Instruction::Case(_))),
+                Instruction::Value(_) | Instruction::Any => {
+                    matches!(open.last(), Some(Instruction::Case(_)))
+                }
                 Instruction::Until(_) => matches!(open.pop(), Some(Instruction::Do)),
                 Instruction::End => !matches!(open.pop(), None | Some(Instruction::Do)),
                 _ => true,

@@ -43,7 +43,9 @@ impl Emulator {
             self.prompt();
         }
         match (&mut self.job, called) {
-            (Some(job), Ok(frame)) if job.kind == JobKind::Program && job.frames.len() < CALL_DEPTH => {
+            (Some(job), Ok(frame))
+                if job.kind == JobKind::Program && job.frames.len() < CALL_DEPTH =>
+            {
                 if matches!(job.wait, Wait::Until(_) | Wait::Condition(_) | Wait::Answer) {
                     // What was waited for is waited for again after the reaction.
                     if let Some(waiting) = job.frames.last_mut() {
@@ -60,7 +62,9 @@ impl Emulator {
                 }
                 job.next_step = self.now;
             }
-            (Some(job), Ok(_)) if job.kind == JobKind::Program => self.fail_job(Message::OutOfMemory.into()),
+            (Some(job), Ok(_)) if job.kind == JobKind::Program => {
+                self.fail_job(Message::OutOfMemory.into())
+            }
             (Some(_), Ok(_)) => {}
             (None, Ok(_)) => {}
             (_, Err(fault)) => self.fail_job(fault),

@@ -1,4 +1,5 @@
-//! The controller's end of the line: characters in, lines out; text in, characters out, each in its time.
+//! The controller's end of the line: characters in, lines out; text in, characters out, each in its
+//! time.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -109,7 +110,8 @@ impl Terminal {
                 if profile.echo {
                     self.print(profile.eol, now);
                 } else {
-                    // The terminal's own local echo is off too: the cursor still stands behind the prompt.
+                    // The terminal's own local echo is off too: the cursor still stands behind the
+                    // prompt.
                     self.at_line_start = false;
                 }
                 let line = Line {
@@ -181,7 +183,8 @@ impl Terminal {
         self.too_long = false;
     }
 
-    /// Whether a further character can wait behind the lines that do, each of which takes its characters and its end.
+    /// Whether a further character can wait behind the lines that do, each of which takes its
+    /// characters and its end.
     fn has_room(&self, profile: &Profile) -> bool {
         let waiting: usize = self.lines.iter().map(|line| line.text.len() + 1).sum();
         self.lines.is_empty() || waiting + self.typed.len() < profile.input_buffer
@@ -242,7 +245,10 @@ impl Terminal {
     /// When the next character goes out, if output waits.
     pub(super) fn next_departure(&self, profile: &Profile) -> Option<Duration> {
         let waits = !self.sending.is_empty() && !self.held;
-        waits.then(|| self.sent_at.saturating_add(profile.char_time.unwrap_or_default()))
+        waits.then(|| {
+            self.sent_at
+                .saturating_add(profile.char_time.unwrap_or_default())
+        })
     }
 
     /// What has gone out by `now`.
@@ -254,7 +260,9 @@ impl Terminal {
             return self.sending.drain(..).collect();
         };
         let due = now.saturating_sub(self.sent_at).as_nanos() / time.as_nanos();
-        let count = usize::try_from(due).unwrap_or(usize::MAX).min(self.sending.len());
+        let count = usize::try_from(due)
+            .unwrap_or(usize::MAX)
+            .min(self.sending.len());
         self.sent_at += time * u32::try_from(count).unwrap_or(u32::MAX);
         self.sending.drain(..count).collect()
     }

@@ -23,9 +23,11 @@ pub struct DriveTrain {
 impl DriveTrain {
     /// The PUMA 560.
     ///
-    /// Gears as in the Robotics Toolbox (Corke and Armstrong-Hélouvry), except joint 2, where the scale factors of a Trident Robotics
-    /// controller and the comp.robotics FAQ agree on 107.36 instead of 107.815. Counts per motor turn are the spacing of the index pulses in
-    /// the calibration table of a real arm. The wrist coupling is that of the Trident driver: 1/71.92, -1/76.69, 13/72.
+    /// Gears as in the Robotics Toolbox (Corke and Armstrong-Hélouvry), except joint 2, where the
+    /// scale factors of a Trident Robotics controller and the comp.robotics FAQ agree on 107.36
+    /// instead of 107.815. Counts per motor turn are the spacing of the index pulses in the
+    /// calibration table of a real arm. The wrist coupling is that of the Trident driver: 1/71.92,
+    /// -1/76.69, 13/72.
     pub fn puma560() -> Self {
         Self {
             gear: [62.6111, 107.36, 53.7063, 76.0364, 71.923, 76.686],
@@ -41,7 +43,8 @@ impl DriveTrain {
         std::array::from_fn(|i| TAU / (self.gear[i] * self.counts_per_motor_turn[i]))
     }
 
-    /// Encoder counts of the six motors for the given joint angles, coupling included. Zero at `JT` = 0.
+    /// Encoder counts of the six motors for the given joint angles, coupling included. Zero at `JT`
+    /// = 0.
     pub fn counts(&self, joints: &Joints) -> [f64; 6] {
         let [a, b, c, j4, j5, j6] = joints.0;
         let m5 = j5 - self.coupling_4_to_5 * j4;
@@ -82,7 +85,9 @@ mod tests {
 
     #[test]
     fn a_count_is_some_thousandths_of_a_degree() {
-        let degrees = DriveTrain::puma560().radians_per_count().map(f64::to_degrees);
+        let degrees = DriveTrain::puma560()
+            .radians_per_count()
+            .map(f64::to_degrees);
         for (got, wanted) in degrees
             .iter()
             .zip([0.00575, 0.00419, 0.00670, 0.00474, 0.00501, 0.00939])

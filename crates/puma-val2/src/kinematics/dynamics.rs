@@ -18,7 +18,8 @@ pub struct LinkDynamics {
     pub motor_inertia: f64,
     /// Viscous friction at the motor shaft, N m s.
     pub viscous: f64,
-    /// Coulomb friction at the motor shaft when the joint turns in its positive and in its negative direction, N m.
+    /// Coulomb friction at the motor shaft when the joint turns in its positive and in its negative
+    /// direction, N m.
     pub coulomb: [f64; 2],
     /// Motor turns per joint turn.
     pub gear: f64,
@@ -26,8 +27,9 @@ pub struct LinkDynamics {
 
 /// The dynamics of the arm.
 ///
-/// Link frames are those of the standard Denavit–Hartenberg description with rows (alpha, a, d) of (90, 0, base), (0, `a2`, 0), (-90, -`a3`, `d2`),
-/// (90, 0, `d4`), (-90, 0, 0), (0, 0, 0), whose angles are VAL's with 180 degrees added to `JT2` and taken from `JT3`.
+/// Link frames are those of the standard Denavit–Hartenberg description with rows (alpha, a, d) of
+/// (90, 0, base), (0, `a2`, 0), (-90, -`a3`, `d2`), (90, 0, `d4`), (-90, 0, 0), (0, 0, 0), whose
+/// angles are VAL's with 180 degrees added to `JT2` and taken from `JT3`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ArmDynamics {
@@ -38,7 +40,8 @@ pub struct ArmDynamics {
 }
 
 impl ArmDynamics {
-    /// The values of Armstrong, Khatib and Burdick (1986) as edited by Corke and Armstrong-Hélouvry (1994) for the Robotics Toolbox.
+    /// The values of Armstrong, Khatib and Burdick (1986) as edited by Corke and Armstrong-Hélouvry
+    /// (1994) for the Robotics Toolbox.
     pub fn corke() -> Self {
         let link = |mass, centre, inertia, motor_inertia, viscous, coulomb, gear| LinkDynamics {
             mass,
@@ -123,7 +126,8 @@ impl ArmDynamics {
         self.newton_euler(arm, joints, [0.0; 6], [0.0; 6], self.gravity)
     }
 
-    /// Torques (N m) at the joints for the given speeds (rad/s) and accelerations (rad/s²): links and motors, without friction.
+    /// Torques (N m) at the joints for the given speeds (rad/s) and accelerations (rad/s²): links
+    /// and motors, without friction.
     pub fn inverse(
         &self,
         arm: &PumaParams,
@@ -132,13 +136,15 @@ impl ArmDynamics {
         accelerations: [f64; 6],
     ) -> [f64; 6] {
         let mut torques = self.newton_euler(arm, joints, speeds, accelerations, self.gravity);
-        for ((torque, link), acceleration) in torques.iter_mut().zip(&self.links).zip(accelerations) {
+        for ((torque, link), acceleration) in torques.iter_mut().zip(&self.links).zip(accelerations)
+        {
             *torque += link.motor_inertia * link.gear * link.gear * acceleration;
         }
         torques
     }
 
-    /// Torques (N m) that friction takes at the joints at the given speeds (rad/s): viscous and Coulomb. None at rest.
+    /// Torques (N m) that friction takes at the joints at the given speeds (rad/s): viscous and
+    /// Coulomb. None at rest.
     pub fn friction(&self, speeds: [f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| {
             let (link, speed) = (&self.links[i], speeds[i]);
@@ -206,7 +212,10 @@ impl ArmDynamics {
             let centre = Vector3::from(link.centre);
             let inertia = Matrix3::from_diagonal(&Vector3::from(link.inertia));
             let at_centre = wd.cross(&centre) + w.cross(&w.cross(&centre)) + vd;
-            forces[i] = (at_centre * link.mass, inertia * wd + w.cross(&(inertia * w)));
+            forces[i] = (
+                at_centre * link.mass,
+                inertia * wd + w.cross(&(inertia * w)),
+            );
             frames[i] = (rotation, arm_of_link);
         }
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
@@ -232,7 +241,8 @@ mod tests {
 
     #[test]
     fn gravity_is_the_slope_of_the_potential_energy() {
-        // The horizontal upper arm needs the greatest shoulder torque, the upright arm next to none.
+        // The horizontal upper arm needs the greatest shoulder torque, the upright arm next to
+        // none.
         let (arm, dynamics) = (PumaParams::corke(), ArmDynamics::corke());
         let torque = |degrees| dynamics.gravity_torques(&arm, &Joints::from_degrees(degrees));
         let stretched = torque([0.0, 0.0, 90.0, 0.0, 0.0, 0.0]);

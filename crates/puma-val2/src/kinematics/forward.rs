@@ -18,8 +18,8 @@ impl PumaParams {
         self.wrist(joints) * Translation3::new(0.0, 0.0, self.d6)
     }
 
-    /// The pose of the hand frame at the wrist centre: the intersection of the axes of `JT4`, `JT5` and `JT6`, z along the
-    /// tool axis. [`PumaParams::forward`] lies `d6` further along z.
+    /// The pose of the hand frame at the wrist centre: the intersection of the axes of `JT4`, `JT5`
+    /// and `JT6`, z along the tool axis. [`PumaParams::forward`] lies `d6` further along z.
     pub fn wrist(&self, joints: &Joints) -> Isometry3<f64> {
         let (s, c) = (joints.0.map(f64::sin), joints.0.map(f64::cos));
         // Rz(theta) Tz(d) Tx(a) Rx(alpha) for each joint, with alpha a multiple of a quarter turn.
@@ -48,7 +48,8 @@ impl PumaParams {
                 cos_alpha,
             );
         }
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         Isometry3::from_parts(position.into(), rotation)
     }
 }

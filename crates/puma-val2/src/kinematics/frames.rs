@@ -30,7 +30,8 @@ impl Frames {
         self.base * arm.forward(joints) * self.tool
     }
 
-    /// The flange in the arm's own frame, for [`PumaParams::inverse`], when the hand is at `hand` in the world.
+    /// The flange in the arm's own frame, for [`PumaParams::inverse`], when the hand is at `hand`
+    /// in the world.
     pub fn flange(&self, hand: &Isometry3<f64>) -> Isometry3<f64> {
         self.base.inverse() * hand * self.tool.inverse()
     }

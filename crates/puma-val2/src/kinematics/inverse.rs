@@ -131,10 +131,11 @@ pub enum Unreachable {
 }
 
 impl PumaParams {
-    /// All postures that put the flange at `flange` (world frame, metres): eight inside the working space, none outside.
+    /// All postures that put the flange at `flange` (world frame, metres): eight inside the working
+    /// space, none outside.
     ///
-    /// At a wrist singularity (`JT5` = 0) the sum of `JT4` and `JT6` is all that counts: `JT4` is given as 0 then.
-    /// Joint ranges are not looked at; [`PumaParams::inverse_near`] does.
+    /// At a wrist singularity (`JT5` = 0) the sum of `JT4` and `JT6` is all that counts: `JT4` is
+    /// given as 0 then. Joint ranges are not looked at; [`PumaParams::inverse_near`] does.
     ///
     /// # Errors
     /// [`Unreachable`], never its `Limit`.
@@ -152,7 +153,8 @@ impl PumaParams {
             });
         }
         let forward = forward2.sqrt();
-        // x' = a2 c2 + a3 c23 + d4 s23 and z' = p.z span the arm's plane; k = a3 c3 + d4 s3, n = d4 c3 - a3 s3.
+        // x' = a2 c2 + a3 c23 + d4 s23 and z' = p.z span the arm's plane; k = a3 c3 + d4 s3, n = d4
+        // c3 - a3 s3.
         let forearm2 = self.a3 * self.a3 + self.d4 * self.d4;
         let distance2 = forward2 + p.z * p.z;
         let k = (distance2 - self.a2 * self.a2 - forearm2) / (2.0 * self.a2);
@@ -163,7 +165,8 @@ impl PumaParams {
             return Err(Unreachable::TooFar { by: by.max(0.0) });
         }
         let lever = lever2.sqrt();
-        // One arc tangent each serves all postures: they differ in signs and by half a turn. Sines and cosines are had without any.
+        // One arc tangent each serves all postures: they differ in signs and by half a turn. Sines
+        // and cosines are had without any.
         let azimuth = p.y.atan2(p.x);
         let lateral = self.d2.atan2(forward);
         let elevation = (-p.z).atan2(forward);
@@ -187,7 +190,11 @@ impl PumaParams {
                     Elbow::Below => -sign,
                 };
                 let n = up * lever;
-                let t3 = if up > 0.0 { bend_above } else { PI - bend_above } - elbow_offset;
+                let t3 = if up > 0.0 {
+                    bend_above
+                } else {
+                    PI - bend_above
+                } - elbow_offset;
                 let t2 = ahead + up * raised;
                 let m = self.a2 + k;
                 let (c2, s2) = ((m * x + n * p.z) / distance2, (n * x - m * p.z) / distance2);
@@ -213,7 +220,8 @@ impl PumaParams {
                     let straight = (0.0, if w22 > 0.0 { 0.0 } else { PI }, w10.atan2(w11));
                     [straight, (PI, straight.1, straight.2 + PI)]
                 };
-                for (wrist, (t4, t5, t6)) in [(Wrist::NoFlip, (t4, t5, t6)), (Wrist::Flip, flipped)] {
+                for (wrist, (t4, t5, t6)) in [(Wrist::NoFlip, (t4, t5, t6)), (Wrist::Flip, flipped)]
+                {
                     found.items[found.len] = Solution {
                         joints: Joints([t1, t2, t3, t4, t5, t6].map(wrap)),
                         configuration: Configuration { side, elbow, wrist },
@@ -232,7 +240,11 @@ impl PumaParams {
         let righty = reach <= 0.0;
         let lever = self.d4 * t3.cos() - self.a3 * t3.sin();
         Configuration {
-            side: if righty { ArmSide::Righty } else { ArmSide::Lefty },
+            side: if righty {
+                ArmSide::Righty
+            } else {
+                ArmSide::Lefty
+            },
             elbow: if (lever >= 0.0) == righty {
                 Elbow::Above
             } else {
@@ -246,21 +258,25 @@ impl PumaParams {
         }
     }
 
-    /// The joint angles within their ranges that reach `flange` and lie nearest to `near`, in the posture `configuration` or, with
-    /// `None`, in any.
+    /// The joint angles within their ranges that reach `flange` and lie nearest to `near`, in the
+    /// posture `configuration` or, with `None`, in any.
     ///
-    /// Of the turns that a joint's range leaves open (`JT4` and `JT6` have more than one) the nearest is taken. "Nearest" is the
-    /// largest joint travel measured in time at full joint speed.
+    /// Of the turns that a joint's range leaves open (`JT4` and `JT6` have more than one) the
+    /// nearest is taken. "Nearest" is the largest joint travel measured in time at full joint
+    /// speed.
     ///
     /// # Errors
-    /// [`Unreachable`] says what is missing; with several postures `Limit` names the joint of the one that misses its range by least.
+    /// [`Unreachable`] says what is missing; with several postures `Limit` names the joint of the
+    /// one that misses its range by least.
     pub fn inverse_near(
         &self,
         flange: &Isometry3<f64>,
         near: &Joints,
         configuration: Option<Configuration>,
     ) -> Result<Joints, Unreachable> {
-        self.inverse_among(flange, near, |c| configuration.is_none_or(|wanted| wanted == c))
+        self.inverse_among(flange, near, |c| {
+            configuration.is_none_or(|wanted| wanted == c)
+        })
     }
 
     /// As [`PumaParams::inverse_near`], in any of the postures that `allowed` accepts.
@@ -302,8 +318,13 @@ impl PumaParams {
         }
     }
 
-    /// The turns of `joints` that lie in range and nearest to `near`, or the joint that has none and by how much it misses.
-    fn place_in_ranges(&self, joints: &Joints, near: &Joints) -> Result<Joints, (f64, Unreachable)> {
+    /// The turns of `joints` that lie in range and nearest to `near`, or the joint that has none
+    /// and by how much it misses.
+    fn place_in_ranges(
+        &self,
+        joints: &Joints,
+        near: &Joints,
+    ) -> Result<Joints, (f64, Unreachable)> {
         let slack = 1e-9;
         let mut placed = *joints;
         for joint in Joint::ALL {
@@ -315,9 +336,11 @@ impl PumaParams {
                 .min_by(|a, b| (a - near.0[i]).abs().total_cmp(&(b - near.0[i]).abs()));
             let Some(angle) = inside else {
                 let excess = |a: f64| (range.min - a).max(a - range.max);
-                let wanted = turns
-                    .into_iter()
-                    .fold(joints.0[i], |a, b| if excess(b) < excess(a) { b } else { a });
+                let wanted =
+                    turns.into_iter().fold(
+                        joints.0[i],
+                        |a, b| if excess(b) < excess(a) { b } else { a },
+                    );
                 return Err((
                     excess(wanted),
                     Unreachable::Limit {
@@ -343,7 +366,8 @@ const EMPTY: Solution = Solution {
     },
 };
 
-/// An angle in [-pi, pi). What is reached here lies within three turns, so steps are cheaper than a remainder.
+/// An angle in [-pi, pi). What is reached here lies within three turns, so steps are cheaper than a
+/// remainder.
 fn wrap(mut angle: f64) -> f64 {
     if !angle.is_finite() || angle.abs() > 100.0 {
         return (angle + PI).rem_euclid(TAU) - PI;
@@ -386,7 +410,9 @@ mod tests {
         assert!(
             matches!(arm.inverse(&at(0.0, 0.1, 0.3)), Err(Unreachable::TooClose { by }) if (by - 0.04909).abs() < 1e-12)
         );
-        assert!(matches!(arm.inverse(&at(1.2, 0.0, 0.3)), Err(Unreachable::TooFar { by }) if by > 0.3));
+        assert!(
+            matches!(arm.inverse(&at(1.2, 0.0, 0.3)), Err(Unreachable::TooFar { by }) if by > 0.3)
+        );
         assert_eq!(
             arm.inverse(&at(f64::NAN, 0.0, 0.3)).unwrap_err(),
             Unreachable::NotFinite

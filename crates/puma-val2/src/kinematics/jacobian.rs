@@ -22,13 +22,16 @@ impl fmt::Display for Singularity {
         f.write_str(match self {
             Self::Wrist => "the wrist is straight: JT4 and JT6 turn about one axis",
             Self::Elbow => "the elbow is straight: the wrist cannot move away from the shoulder",
-            Self::Shoulder => "the wrist is over the waist: it cannot move sideways of the upper arm",
+            Self::Shoulder => {
+                "the wrist is over the waist: it cannot move sideways of the upper arm"
+            }
         })
     }
 }
 
 impl PumaParams {
-    /// The 6 by 6 Jacobian of the flange in the world frame: rows vx vy vz (metres per radian) wx wy wz, one column per joint.
+    /// The 6 by 6 Jacobian of the flange in the world frame: rows vx vy vz (metres per radian) wx
+    /// wy wz, one column per joint.
     pub fn jacobian(&self, joints: &Joints) -> Matrix6<f64> {
         let [t1, t2, t3, t4, t5, _] = joints.0;
         let ((s1, c1), (s2, c2), (s23, c23)) = (t1.sin_cos(), t2.sin_cos(), (t2 + t3).sin_cos());
@@ -43,8 +46,8 @@ impl PumaParams {
             )
         };
         let shoulder_axis = Vector3::new(-s1, c1, 0.0);
-        let elbow =
-            Vector3::new(c1 * self.a2 * c2, s1 * self.a2 * c2, -self.a2 * s2) + shoulder_axis * self.d2;
+        let elbow = Vector3::new(c1 * self.a2 * c2, s1 * self.a2 * c2, -self.a2 * s2)
+            + shoulder_axis * self.d2;
         let wrist = elbow + forearm(Vector3::new(self.a3, 0.0, self.d4));
         let tool_axis = forearm(Vector3::new(c4 * s5, s4 * s5, c5));
         let flange = wrist + tool_axis * self.d6;
@@ -75,8 +78,9 @@ impl PumaParams {
         jacobian
     }
 
-    /// The first singularity that the arm is nearer to than `margin`: the sine of `JT5`, the sine of the elbow's angle away from straight, or
-    /// the wrist's distance ahead of the shoulder in units of the stretched arm. 0.02 is about a degree.
+    /// The first singularity that the arm is nearer to than `margin`: the sine of `JT5`, the sine
+    /// of the elbow's angle away from straight, or the wrist's distance ahead of the shoulder in
+    /// units of the stretched arm. 0.02 is about a degree.
     ///
     /// READY is at the wrist's singularity and 2.7 degrees off the elbow's.
     pub fn singularity(&self, joints: &Joints, margin: f64) -> Option<Singularity> {
@@ -133,7 +137,10 @@ mod tests {
             ([0.0, -45.0, 180.0, 0.0, 45.0, 0.0], None),
         ];
         for (degrees, wanted) in cases {
-            assert_eq!(arm.singularity(&Joints::from_degrees(degrees), 0.02), wanted);
+            assert_eq!(
+                arm.singularity(&Joints::from_degrees(degrees), 0.02),
+                wanted
+            );
         }
         // d4 cos JT3 = a3 sin JT3
         let t3 = (arm.d4).atan2(arm.a3);
@@ -143,7 +150,10 @@ mod tests {
         // A wrist straight above the shoulder.
         let over = arm.inverse(&nalgebra::Isometry3::from_parts(
             nalgebra::Translation3::new(0.0, arm.d2 + arm.d6, 0.6),
-            nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2),
+            nalgebra::UnitQuaternion::from_axis_angle(
+                &Vector3::x_axis(),
+                -std::f64::consts::FRAC_PI_2,
+            ),
         ));
         let over = over.unwrap()[0].joints;
         assert_eq!(arm.singularity(&over, 0.02), Some(Singularity::Shoulder));

@@ -16,10 +16,11 @@ pub struct JointRange {
 
 /// Geometry and limits of a PUMA 560, in VAL's joint angles.
 ///
-/// Standard Denavit–Hartenberg rows (alpha, a, d) of VAL's description (Fu, Gonzalez, Lee, *Robotics*, 1987):
-/// (-90, 0, 0), (0, `a2`, `d2`), (+90, `a3`, 0), (-90, 0, `d4`), (+90, 0, 0), (0, 0, `d6`). The base frame is VAL's
-/// world frame: its origin is the intersection of the axes of `JT1` and `JT2`, z points up, and at `JT1` = 0 the arm reaches
-/// along +x with the upper arm displaced by `d2` to +y.
+/// Standard Denavit–Hartenberg rows (alpha, a, d) of VAL's description (Fu, Gonzalez, Lee,
+/// *Robotics*, 1987): (-90, 0, 0), (0, `a2`, `d2`), (+90, `a3`, 0), (-90, 0, `d4`), (+90, 0, 0),
+/// (0, 0, `d6`). The base frame is VAL's world frame: its origin is the intersection of the axes of
+/// `JT1` and `JT2`, z points up, and at `JT1` = 0 the arm reaches along +x with the upper arm
+/// displaced by `d2` to +y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PumaParams {
@@ -40,9 +41,10 @@ pub struct PumaParams {
 impl PumaParams {
     /// The lengths used with VAL itself (431.8, -20.32, 149.09, 433.07, 56.25 mm).
     ///
-    /// Joint ranges are the classical ones of Fu, Gonzalez, Lee (-160..160, -225..45, -45..225, -110..170, -100..100,
-    /// -266..266 degrees); sources disagree about joints 2 to 4. The speeds (82, 74, 122, 228, 241, 228 degrees per second) are the
-    /// commonly quoted ones and are not confirmed by a primary source.
+    /// Joint ranges are the classical ones of Fu, Gonzalez, Lee (-160..160, -225..45, -45..225,
+    /// -110..170, -100..100, -266..266 degrees); sources disagree about joints 2 to 4. The speeds
+    /// (82, 74, 122, 228, 241, 228 degrees per second) are the commonly quoted ones and are not
+    /// confirmed by a primary source.
     pub fn unimation() -> Self {
         Self {
             a2: 0.4318,
@@ -54,7 +56,8 @@ impl PumaParams {
         }
     }
 
-    /// The lengths of Corke and Armstrong-Hélouvry (431.8, -20.3, 150.05, 431.8 mm, no flange), as used by the Robotics Toolbox.
+    /// The lengths of Corke and Armstrong-Hélouvry (431.8, -20.3, 150.05, 431.8 mm, no flange), as
+    /// used by the Robotics Toolbox.
     pub fn corke() -> Self {
         Self {
             a2: 0.4318,

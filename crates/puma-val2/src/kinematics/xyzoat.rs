@@ -6,9 +6,10 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 /// A hand pose as VAL writes it: a position and the angles O, A, T.
 ///
-/// The rotation is `Rz(o) R0 Ry(a) Rz(t)` with `R0 = [[0,1,0],[0,0,-1],[-1,0,0]]` (Fu, Gonzalez, Lee, *Robotics*, 1987, chapter 2): with
-/// all three angles zero the tool axis points along -y and the line from finger to finger along x. These are *not* the ZYZ angles that
-/// V+ and AS call by similar letters: the unit rotation is (90, -90, 0) here.
+/// The rotation is `Rz(o) R0 Ry(a) Rz(t)` with `R0 = [[0,1,0],[0,0,-1],[-1,0,0]]` (Fu, Gonzalez,
+/// Lee, *Robotics*, 1987, chapter 2): with all three angles zero the tool axis points along -y and
+/// the line from finger to finger along x. These are *not* the ZYZ angles that V+ and AS call by
+/// similar letters: the unit rotation is (90, -90, 0) here.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Xyzoat {
@@ -52,7 +53,8 @@ impl Xyzoat {
         ]
     }
 
-    /// The six numbers of a pose. Where the tool axis is vertical, O and T are not told apart: T is 0 then.
+    /// The six numbers of a pose. Where the tool axis is vertical, O and T are not told apart: T is
+    /// 0 then.
     pub fn from_pose(pose: &Isometry3<f64>) -> Self {
         let r = pose.rotation.to_rotation_matrix().into_inner();
         let (ax, ay, az) = (r[(0, 2)], r[(1, 2)], r[(2, 2)]);
@@ -100,7 +102,8 @@ impl Xyzoat {
 }
 
 impl fmt::Display for Xyzoat {
-    /// Millimetres with two decimals, degrees with three: `X 75.14 Y 164.64 Z 915.57 O 100.000 A -80.000 T 0.000`.
+    /// Millimetres with two decimals, degrees with three:
+    /// `X 75.14 Y 164.64 Z 915.57 O 100.000 A -80.000 T 0.000`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z, o, a, t] = self.val();
         write!(f, "X {x:.2} Y {y:.2} Z {z:.2} O {o:.3} A {a:.3} T {t:.3}")

@@ -20,7 +20,8 @@ use crate::{Emulator, Gripper, Joints};
 /// Most output that waits for a terminal that does not read; older output is dropped beyond it.
 const PENDING_LIMIT: usize = 256 * 1024;
 
-/// An emulated controller on a pseudo-terminal: any program that opens its path as a serial port can talk to it, close it and open it again.
+/// An emulated controller on a pseudo-terminal: any program that opens its path as a serial port
+/// can talk to it, close it and open it again.
 ///
 /// The thread that serves it ends, and the link is removed, when this is dropped.
 #[derive(Debug)]
@@ -43,7 +44,8 @@ impl PtyServer {
         unlockpt(&master)?;
         let name = ptsname(&master, Vec::new())?;
         let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
-        // As long as somebody holds the terminal's side open, a client that closes it does not break the line.
+        // As long as somebody holds the terminal's side open, a client that closes it does not
+        // break the line.
         let held = open(
             &path,
             OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC,

@@ -46,7 +46,11 @@ pub(super) struct Turn {
 }
 
 impl Station {
-    pub(super) fn new(emulator: Emulator, realtime: bool, transcript: Option<Box<dyn Write + Send>>) -> Self {
+    pub(super) fn new(
+        emulator: Emulator,
+        realtime: bool,
+        transcript: Option<Box<dyn Write + Send>>,
+    ) -> Self {
         let realtime = realtime.then(|| (Instant::now(), emulator.now()));
         Self(Arc::new(Mutex::new(State {
             emulator,
@@ -60,9 +64,11 @@ impl Station {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Hands over input, which may be none, lets the emulator do what is due and says how long it can wait then.
+    /// Hands over input, which may be none, lets the emulator do what is due and says how long it
+    /// can wait then.
     ///
-    /// In virtual time a turn without input jumps to the next thing that happens, unless `blocked`: output still has to be fetched.
+    /// In virtual time a turn without input jumps to the next thing that happens, unless `blocked`:
+    /// output still has to be fetched.
     pub(super) fn turn(&self, input: &[u8], blocked: bool) -> Turn {
         let mut state = self.lock();
         let mut now = state.now();
@@ -73,13 +79,20 @@ impl Station {
         let output = state.emulator.feed(input, now);
         if let Some(transcript) = &mut state.transcript {
             // A transcript that cannot be written does not stop the line.
-            let _ = transcript.sent(input).and_then(|()| transcript.received(&output));
+            let _ = transcript
+                .sent(input)
+                .and_then(|()| transcript.received(&output));
         }
-        let wait = state.emulator.next_deadline().map(|at| match state.realtime {
-            // Rounded up to what a poll can wait, lest it wakes up too early over and over.
-            Some(_) => at.saturating_sub(state.now()).max(Duration::from_micros(200)),
-            None => Duration::ZERO,
-        });
+        let wait = state
+            .emulator
+            .next_deadline()
+            .map(|at| match state.realtime {
+                // Rounded up to what a poll can wait, lest it wakes up too early over and over.
+                Some(_) => at
+                    .saturating_sub(state.now())
+                    .max(Duration::from_micros(200)),
+                None => Duration::ZERO,
+            });
         Turn { output, wait }
     }
 

@@ -11,10 +11,12 @@ use super::ServeConfig;
 use super::station::Station;
 use crate::{Emulator, Gripper, Joints};
 
-/// Longest time after which a change made through [`TcpServer::with_emulator`] reaches the terminal.
+/// Longest time after which a change made through [`TcpServer::with_emulator`] reaches the
+/// terminal.
 const NAP: Duration = Duration::from_millis(20);
 
-/// An emulated controller on a TCP socket, one terminal at a time; the next one finds the controller as the last one left it.
+/// An emulated controller on a TCP socket, one terminal at a time; the next one finds the
+/// controller as the last one left it.
 ///
 /// The thread that serves it ends when this is dropped.
 #[derive(Debug)]
@@ -26,11 +28,16 @@ pub struct TcpServer {
 }
 
 impl TcpServer {
-    /// Listens at `addr` (`127.0.0.1:0` for any free port of this machine alone) and serves `emulator` there. `config.link` is of no use here.
+    /// Listens at `addr` (`127.0.0.1:0` for any free port of this machine alone) and serves
+    /// `emulator` there. `config.link` is of no use here.
     ///
     /// # Errors
     /// The address cannot be listened at.
-    pub fn spawn(addr: impl ToSocketAddrs, emulator: Emulator, config: ServeConfig) -> io::Result<Self> {
+    pub fn spawn(
+        addr: impl ToSocketAddrs,
+        emulator: Emulator,
+        config: ServeConfig,
+    ) -> io::Result<Self> {
         let listener = TcpListener::bind(addr)?;
         let address = listener.local_addr()?;
         let station = Station::new(emulator, config.realtime, config.transcript);
@@ -112,7 +119,9 @@ fn serve(station: &Station, mut stream: &TcpStream, over: &AtomicBool) -> io::Re
             Ok(0) => return Ok(()),
             Ok(count) => count,
             Err(error) => match error.kind() {
-                io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted => 0,
+                io::ErrorKind::WouldBlock
+                | io::ErrorKind::TimedOut
+                | io::ErrorKind::Interrupted => 0,
                 _ => return Err(error),
             },
         };

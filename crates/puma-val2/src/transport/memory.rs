@@ -6,7 +6,8 @@ use std::time::Duration;
 use super::Transport;
 use crate::Emulator;
 
-/// An emulated controller as a line: no thread, no clock. Time passes only while the other side waits, and then as fast as the machine.
+/// An emulated controller as a line: no thread, no clock. Time passes only while the other side
+/// waits, and then as fast as the machine.
 #[derive(Debug)]
 pub struct MemoryLine {
     emulator: Emulator,

@@ -24,8 +24,9 @@ pub trait Transport {
     /// The line is closed or broken.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits until something comes and puts it at the start of `buffer`: `Some(count)` with at least one byte, or `None` if nothing came within
-    /// `timeout`. With a timeout of zero only what is already there is taken.
+    /// Waits until something comes and puts it at the start of `buffer`: `Some(count)` with at
+    /// least one byte, or `None` if nothing came within `timeout`. With a timeout of zero only what
+    /// is already there is taken.
     ///
     /// # Errors
     /// The line is closed or broken; its end is [`io::ErrorKind::UnexpectedEof`].
@@ -65,7 +66,9 @@ fn received(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
         )),
         Ok(count) => Ok(Some(count)),
         Err(error) => match error.kind() {
-            io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(None),
+            io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => {
+                Ok(None)
+            }
             _ => Err(error),
         },
     }

@@ -8,7 +8,8 @@ use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 use super::{Transport, received};
 use crate::ArmError;
 
-/// A serial port, or a pseudo-terminal opened as one: 8 data bits, no parity, 1 stop bit, no flow control.
+/// A serial port, or a pseudo-terminal opened as one: 8 data bits, no parity, 1 stop bit, no flow
+/// control.
 pub struct SerialLine {
     port: Box<dyn SerialPort>,
     name: String,
@@ -24,7 +25,8 @@ impl std::fmt::Debug for SerialLine {
 }
 
 impl SerialLine {
-    /// Opens the port at `path` (`/dev/ttyUSB0`, `COM3`, the path of an emulator's pseudo-terminal); PUMA controllers speak 9600 baud.
+    /// Opens the port at `path` (`/dev/ttyUSB0`, `COM3`, the path of an emulator's
+    /// pseudo-terminal); PUMA controllers speak 9600 baud.
     ///
     /// # Errors
     /// [`ArmError::Open`]: no such port, no permission, or another program holds it.
@@ -40,7 +42,8 @@ impl SerialLine {
                 port: path.to_owned(),
                 source: error.into(),
             })?;
-        // A real adapter signals that a terminal is there; a pseudo-terminal has no such wires and says so.
+        // A real adapter signals that a terminal is there; a pseudo-terminal has no such wires and
+        // says so.
         let _ = port.write_data_terminal_ready(true);
         let _ = port.write_request_to_send(true);
         Ok(Self {

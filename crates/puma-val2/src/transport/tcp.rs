@@ -16,7 +16,8 @@ pub struct TcpLine {
 }
 
 impl TcpLine {
-    /// Connects to `addr` (`host:port`), trying each address that the name stands for, each for up to `timeout`.
+    /// Connects to `addr` (`host:port`), trying each address that the name stands for, each for up
+    /// to `timeout`.
     ///
     /// # Errors
     /// [`ArmError::Open`].

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use super::Transport;
 
-/// Writes down what passes on a line: `< ` begins what went to the controller, `> ` what came from it. Line ends are shown by line ends, other
-/// control characters as `^C`, bytes beyond ASCII as `\xNN`.
+/// Writes down what passes on a line: `< ` begins what went to the controller, `> ` what came from
+/// it. Line ends are shown by line ends, other control characters as `^C`, bytes beyond ASCII as
+/// `\xNN`.
 #[derive(Debug)]
 pub(crate) struct Transcript<W> {
     out: W,
@@ -15,7 +16,10 @@ pub(crate) struct Transcript<W> {
 
 impl<W: Write> Transcript<W> {
     pub(crate) fn new(out: W) -> Self {
-        Self { out, direction: None }
+        Self {
+            out,
+            direction: None,
+        }
     }
 
     pub(crate) fn sent(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -70,7 +74,8 @@ pub struct Recorded<T, W> {
 }
 
 impl<T: Transport, W: Write> Recorded<T, W> {
-    /// Writes what passes on `line` to `out`: `< ` begins what was sent, `> ` what was received; control characters as `^C`.
+    /// Writes what passes on `line` to `out`: `< ` begins what was sent, `> ` what was received;
+    /// control characters as `^C`.
     pub fn new(line: T, out: W) -> Self {
         Self {
             line,

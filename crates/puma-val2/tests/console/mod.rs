@@ -44,8 +44,8 @@ impl Console {
         console
     }
 
-    /// Types a line and returns what follows on the screen until nothing more is due within a minute, or for a tenth of a second where
-    /// something goes on and on.
+    /// Types a line and returns what follows on the screen until nothing more is due within a
+    /// minute, or for a tenth of a second where something goes on and on.
     pub fn line(&mut self, line: &str) -> String {
         let before = self.screen.len();
         let said = self.emulator.feed(format!("{line}\r").as_bytes(), self.now);

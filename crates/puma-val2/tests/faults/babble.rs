@@ -4,11 +4,12 @@ use std::io;
 use std::time::Duration;
 
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, Joint, JointDelta, Manipulator, MemoryLine, MoveWay, Profile,
-    PumaParams, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, Joint, JointDelta, Manipulator, MemoryLine, MoveWay,
+    Profile, PumaParams, Transport, Val2Client,
 };
 
-/// A line on which, from some time on, these bytes come again and again, one every so often, whatever is sent.
+/// A line on which, from some time on, these bytes come again and again, one every so often,
+/// whatever is sent.
 struct Babbling {
     inner: MemoryLine,
     words: &'static [u8],
@@ -72,7 +73,9 @@ type Call = (
 const CALLS: [Call; 9] = [
     ("joints", |c| c.joints().map(drop)),
     ("set_speed", |c| c.set_speed(30.0)),
-    ("move_by", |c| c.move_by(JointDelta::of(Joint::J1, 0.3)).map(drop)),
+    ("move_by", |c| {
+        c.move_by(JointDelta::of(Joint::J1, 0.3)).map(drop)
+    }),
     ("drive", |c| c.drive(Joint::J2, 0.3, 50.0).map(drop)),
     ("set_gripper", |c| c.set_gripper(Gripper::Closed)),
     ("signal", |c| c.signal(1001).map(drop)),
@@ -141,7 +144,10 @@ fn connecting_to_a_line_that_babbles_ends_in_time() {
         line.from = Some(Duration::ZERO);
         let outcome = Val2Client::connect(line, ClientConfig::default()).map(drop);
         assert!(
-            matches!(outcome, Err(ArmError::Garbled { .. } | ArmError::Silence { .. })),
+            matches!(
+                outcome,
+                Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
+            ),
             "{words:?}: {outcome:?}"
         );
     }

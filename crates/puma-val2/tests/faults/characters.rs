@@ -1,6 +1,8 @@
 //! Characters damaged in a move of the joints.
 
-use puma_val2::{ArmError, ClientConfig, Emulator, Manipulator, MoveWay, Profile, PumaParams, Val2Client};
+use puma_val2::{
+    ArmError, ClientConfig, Emulator, Manipulator, MoveWay, Profile, PumaParams, Val2Client,
+};
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
 use crate::harness::{STEP, Subject, Tally, client, config, judge, truth};
@@ -76,7 +78,8 @@ fn noise_on_the_line() {
     );
 }
 
-/// A call that gives up with its line typed and not ended leaves nothing behind that the next line could be added to.
+/// A call that gives up with its line typed and not ended leaves nothing behind that the next line
+/// could be added to.
 #[test]
 fn a_half_typed_line_is_not_added_to_the_next() {
     let config = ClientConfig {
@@ -88,7 +91,10 @@ fn a_half_typed_line_is_not_added_to_the_next() {
     client
         .line_mut()
         .strike(Way::FromController, 3, Damage::Flipped(0));
-    assert!(matches!(client.set_speed(30.0), Err(ArmError::Garbled { .. })));
+    assert!(matches!(
+        client.set_speed(30.0),
+        Err(ArmError::Garbled { .. })
+    ));
     assert!(client.line().struck);
     client.joints().unwrap();
 }

@@ -53,9 +53,13 @@ fn strike_everywhere(profile: &Profile, direction: Way, damage: &dyn Fn(usize) -
             continue;
         };
         assert_eq!(client.echoes(), profile.echo, "{context}");
-        client.calibrate().unwrap_or_else(|e| panic!("{context}: {e}"));
+        client
+            .calibrate()
+            .unwrap_or_else(|e| panic!("{context}: {e}"));
         let start = client.joints().unwrap_or_else(|e| panic!("{context}: {e}"));
-        client.move_by(STEP).unwrap_or_else(|e| panic!("{context}: {e}"));
+        client
+            .move_by(STEP)
+            .unwrap_or_else(|e| panic!("{context}: {e}"));
         let there = line.borrow().inner.emulator().joints();
         assert!(off(there, start + STEP) < 0.013, "{context}");
         if !struck {

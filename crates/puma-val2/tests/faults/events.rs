@@ -1,13 +1,15 @@
 //! Things that happen to the controller.
 
 use puma_val2::{
-    ArmError, Emulator, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile, PumaParams, Val2Client,
+    ArmError, Emulator, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile, PumaParams,
+    Val2Client,
 };
 
 use crate::harness::{Client, STEP, assert_knows_where, client, config, judge, truth};
 use crate::line::FaultyLine;
 
-/// Runs a move during which something happens to the controller as soon as the arm has begun to move.
+/// Runs a move during which something happens to the controller as soon as the arm has begun to
+/// move.
 fn disturbed(
     way: MoveWay,
     disturb: impl FnOnce(&mut Emulator) + 'static,
@@ -51,7 +53,10 @@ fn envelope_error_in_mid_move() {
 fn the_controller_restarts_in_mid_move() {
     for way in WAYS {
         let (mut client, outcome) = disturbed(way, Emulator::restart);
-        assert!(matches!(outcome, Err(ArmError::Restarted { .. })), "{outcome:?}");
+        assert!(
+            matches!(outcome, Err(ArmError::Restarted { .. })),
+            "{outcome:?}"
+        );
         assert!(matches!(client.joints(), Err(ArmError::Restarted { .. })));
         client.reconnect().unwrap();
         client.calibrate().unwrap();
@@ -65,10 +70,16 @@ fn the_controller_restarts_in_mid_move() {
 fn the_controller_restarts_between_commands() {
     let mut client = client(Profile::val2(), MoveWay::Automatic);
     client.line_mut().inner.emulator_mut().restart();
-    assert!(matches!(client.move_by(STEP), Err(ArmError::Restarted { .. })));
+    assert!(matches!(
+        client.move_by(STEP),
+        Err(ArmError::Restarted { .. })
+    ));
     client.reconnect().unwrap();
     // It knows its position again only after calibration, and says so.
-    assert!(matches!(client.move_by(STEP), Err(ArmError::Refused { .. })));
+    assert!(matches!(
+        client.move_by(STEP),
+        Err(ArmError::Refused { .. })
+    ));
     client.calibrate().unwrap();
     client.move_by(STEP).unwrap();
 }
@@ -143,7 +154,10 @@ fn a_motion_that_never_ends_is_stopped() {
     client.set_speed(0.05).unwrap();
     let start = truth(&client);
     let outcome = client.move_by(STEP);
-    assert!(matches!(outcome, Err(ArmError::Silence { .. })), "{outcome:?}");
+    assert!(
+        matches!(outcome, Err(ArmError::Silence { .. })),
+        "{outcome:?}"
+    );
     judge(&mut client, start, &outcome, "slow");
     assert_knows_where(&client);
 }

@@ -1,13 +1,15 @@
 //! Moves that a signal may stop.
 
 use puma_val2::{
-    ArmError, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile, ProximitySensor, PumaParams, Xyzoat,
+    ArmError, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile, ProximitySensor,
+    PumaParams, Xyzoat,
 };
 
 use crate::harness::{Client, STEP, Subject, Tally, assert_knows_where, client, judge, off, truth};
 use crate::line::{CHARACTERS, Damage};
 
-/// An object beside the path of joint 1 that the sensors see in passing, between these angles in degrees.
+/// An object beside the path of joint 1 that the sensors see in passing, between these angles in
+/// degrees.
 fn put_object(client: &mut Client, from: f64, to: f64) {
     client
         .line_mut()
@@ -32,7 +34,9 @@ fn proximity_stops_a_move_and_uses_the_guard_up() {
         let start = truth(&client);
         let outcome = client.move_by(STEP);
         let Err(ArmError::ProximityStop {
-            signal: 1001, joints, ..
+            signal: 1001,
+            joints,
+            ..
         }) = outcome
         else {
             panic!("{}: {outcome:?}", profile.name)
@@ -111,7 +115,9 @@ fn every_motion_is_guarded() {
                 .unwrap();
             c.ready()
         }),
-        ("move_hand", |c| c.move_hand(&beyond(), false).map(|l| l.joints)),
+        ("move_hand", |c| {
+            c.move_hand(&beyond(), false).map(|l| l.joints)
+        }),
         ("move_hand straight", |c| {
             c.move_hand(&beyond(), true).map(|l| l.joints)
         }),
@@ -143,7 +149,10 @@ fn every_motion_is_guarded() {
             client.arm_proximity(1001).unwrap();
             if name != "ready" {
                 let reached = motion(&mut client).unwrap_or_else(|e| panic!("{context}: {e}"));
-                assert!((reached.degrees()[0] - 20.0).abs() < 0.05, "{context}: {reached}");
+                assert!(
+                    (reached.degrees()[0] - 20.0).abs() < 0.05,
+                    "{context}: {reached}"
+                );
             }
         }
     }
@@ -176,7 +185,10 @@ fn what_cannot_be_guarded_is_refused_and_nothing_is_sent() {
         .unwrap();
     client.arm_proximity(1001).unwrap();
     let before = client.line().inner.traffic();
-    assert!(matches!(client.execute("MINE"), Err(ArmError::Setting { .. })));
+    assert!(matches!(
+        client.execute("MINE"),
+        Err(ArmError::Setting { .. })
+    ));
     assert!(matches!(client.calibrate(), Err(ArmError::Setting { .. })));
     assert!(matches!(
         client.resident().map(drop),
@@ -225,12 +237,16 @@ fn damage_anywhere_in_a_guarded_move() {
     assert!(sum.injected > 200, "{sum:?}");
 }
 
-/// A move that the signal stops, on a damaged line: it never passes for one that has arrived, and the arm does not go on.
+/// A move that the signal stops, on a damaged line: it never passes for one that has arrived, and
+/// the arm does not go on.
 #[test]
 fn damage_anywhere_in_a_move_that_is_stopped() {
     let mut sum = Tally::default();
     for damage in CHARACTERS {
-        for direction in [crate::line::Way::ToController, crate::line::Way::FromController] {
+        for direction in [
+            crate::line::Way::ToController,
+            crate::line::Way::FromController,
+        ] {
             let mut client = client(Profile::val2(), MoveWay::Automatic);
             for at in (0..).step_by(5) {
                 let context = format!("stopped {direction:?} {:?} at {at}", damage(at));

@@ -65,7 +65,8 @@ fn damage_anywhere_in_a_guarded_move_of_the_hand() {
     );
 }
 
-/// A digit changed on its way is not found out by an echo that is not there, but before the hand moves all the same.
+/// A digit changed on its way is not found out by an echo that is not there, but before the hand
+/// moves all the same.
 #[test]
 fn without_an_echo_the_pose_is_compared_before_the_hand_moves() {
     let goal = Joints::from_degrees([20.0, -45.0, 180.0, 0.0, 45.0, 0.0]);

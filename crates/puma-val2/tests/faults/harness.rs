@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile, PumaParams,
-    Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile,
+    PumaParams, Transport, Val2Client,
 };
 
 use crate::line::{Damage, FaultyLine, Way};
@@ -106,7 +106,8 @@ pub(crate) fn judge(
         line.cut || line.closed || !line.inner.emulator().moving(),
         "{context}: the arm was left moving by {outcome:?}"
     );
-    // What the arm was doing goes on to its end; it must not have been told to go further than it was sent.
+    // What the arm was doing goes on to its end; it must not have been told to go further than it
+    // was sent.
     while let Ok(Some(_)) = client
         .line_mut()
         .inner
@@ -119,7 +120,10 @@ pub(crate) fn judge(
     );
     let stands = emulator.joints();
     for joint in Joint::ALL {
-        let (from, to) = (start[joint].min(target[joint]), start[joint].max(target[joint]));
+        let (from, to) = (
+            start[joint].min(target[joint]),
+            start[joint].max(target[joint]),
+        );
         // A pose of the hand is shown in hundredths of a millimetre.
         let slack = 0.03_f64.to_radians();
         assert!(
@@ -134,7 +138,9 @@ pub(crate) fn judge(
             assert!(worst < 0.05, "{context}: {stands} instead of {target}");
             true
         }
-        Err(ArmError::JointLimit { .. } | ArmError::NotFinite { .. } | ArmError::Setting { .. }) => {
+        Err(
+            ArmError::JointLimit { .. } | ArmError::NotFinite { .. } | ArmError::Setting { .. },
+        ) => {
             panic!("{context}: blames the caller: {outcome:?}")
         }
         Err(_) => false,
@@ -185,7 +191,11 @@ impl<'a> Subject<'a> {
     }
 
     /// Strikes at one character after another until a call stays unhurt.
-    pub(crate) fn strike_everywhere(&self, direction: Way, damage: &dyn Fn(usize) -> Damage) -> Tally {
+    pub(crate) fn strike_everywhere(
+        &self,
+        direction: Way,
+        damage: &dyn Fn(usize) -> Damage,
+    ) -> Tally {
         let mut tally = Tally::default();
         let fresh = || client(self.profile.clone(), self.way);
         let mut client = fresh();

@@ -156,7 +156,9 @@ impl Transport for FaultyLine {
             };
             let mut passed = self.pass(&buffer[..count], Way::FromController);
             if let Some((from, to)) = self.forge
-                && let Some(at) = passed.windows(from.len()).position(|w| w == from.as_bytes())
+                && let Some(at) = passed
+                    .windows(from.len())
+                    .position(|w| w == from.as_bytes())
             {
                 passed[at..at + to.len()].copy_from_slice(to.as_bytes());
                 self.forge = None;

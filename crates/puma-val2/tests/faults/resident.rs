@@ -1,8 +1,8 @@
 //! The program that stays in the controller.
 
 use puma_val2::{
-    ArmError, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile, PumaParams,
-    Val2Client,
+    ArmError, Emulator, Gripper, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile,
+    PumaParams, Val2Client,
 };
 
 use crate::harness::{
@@ -71,14 +71,18 @@ fn damage_anywhere_while_the_program_is_stored_and_started() {
 /// The controller stops the arm in mid-move: the client does not go on from where the move began.
 #[test]
 fn a_refused_move_leaves_no_stale_position_behind() {
-    let disturbances: [fn(&mut Emulator); 2] = [|e| e.envelope_error(Joint::J2), |e| e.set_arm_power(false)];
+    let disturbances: [fn(&mut Emulator); 2] =
+        [|e| e.envelope_error(Joint::J2), |e| e.set_arm_power(false)];
     for disturb in disturbances {
         let mut client = client(Profile::val2(), MoveWay::Automatic);
         let start = truth(&client);
         let mut resident = client.resident().unwrap();
         resident.line_mut().disturb = Some(Box::new(disturb));
         let outcome = resident.move_by(STEP);
-        assert!(matches!(outcome, Err(ArmError::Refused { .. })), "{outcome:?}");
+        assert!(
+            matches!(outcome, Err(ArmError::Refused { .. })),
+            "{outcome:?}"
+        );
         // It has ended with that, and says so.
         assert!(matches!(resident.joints(), Err(ArmError::Setting { .. })));
         assert!(matches!(
@@ -121,8 +125,14 @@ fn the_controller_restarts_under_the_program() {
     let mut resident = client.resident().unwrap();
     resident.line_mut().disturb = Some(Box::new(Emulator::restart));
     let outcome = resident.move_by(STEP);
-    assert!(matches!(outcome, Err(ArmError::Restarted { .. })), "{outcome:?}");
-    assert!(matches!(resident.move_by(STEP), Err(ArmError::Setting { .. })));
+    assert!(
+        matches!(outcome, Err(ArmError::Restarted { .. })),
+        "{outcome:?}"
+    );
+    assert!(matches!(
+        resident.move_by(STEP),
+        Err(ArmError::Setting { .. })
+    ));
     drop(resident);
     judge(&mut client, start, &outcome, "restart");
     assert!(client.last_known().is_none());
@@ -148,7 +158,9 @@ fn unasked_messages_between_and_during_its_moves() {
         let mut resident = client.resident().unwrap();
         resident.line_mut().inner.emulator_mut().interject(text);
         resident.joints().unwrap();
-        resident.line_mut().disturb = Some(Box::new(move |emulator: &mut Emulator| emulator.interject(text)));
+        resident.line_mut().disturb = Some(Box::new(move |emulator: &mut Emulator| {
+            emulator.interject(text)
+        }));
         let outcome = resident.move_by(STEP);
         drop(resident);
         assert!(outcome.is_ok(), "{text:?}: {outcome:?}");
@@ -156,7 +168,8 @@ fn unasked_messages_between_and_during_its_moves() {
     }
 }
 
-/// A digit changed in the one line that shows the angles is not believed, neither at the start nor after a move.
+/// A digit changed in the one line that shows the angles is not believed, neither at the start nor
+/// after a move.
 #[test]
 fn angles_that_were_shown_once_are_not_believed() {
     let by = JointDelta::from_degrees([0.0, 2.0, 0.0, 0.0, 0.0, 0.0]);

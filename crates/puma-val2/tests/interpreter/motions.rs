@@ -64,9 +64,16 @@ fn moves_of_the_hand() {
     console.line("DO MOVE SHIFT(P BY ,,12)");
     assert!(near(hand(&console), [x, y, z + 12.0, o, a, t]));
     console.line("DO MOVE TRANS(400,200,300,60,70,10)");
-    assert!(near(hand(&console), [400.0, 200.0, 300.0, 60.0, 70.0, 10.0]));
+    assert!(near(
+        hand(&console),
+        [400.0, 200.0, 300.0, 60.0, 70.0, 10.0]
+    ));
     console.line("DO ALIGN");
-    assert!((hand(&console)[4] - 90.0).abs() < 1e-6, "{:?}", hand(&console));
+    assert!(
+        (hand(&console)[4] - 90.0).abs() < 1e-6,
+        "{:?}",
+        hand(&console)
+    );
     console.line("DO SET Q = INVERSE(P):P");
     let Some(Place::Transformation(unit)) = console.emulator.place("Q") else {
         panic!("Q is no transformation")
@@ -77,7 +84,9 @@ fn moves_of_the_hand() {
         panic!("F is no transformation")
     };
     assert!((frame * nalgebra::Vector3::x() - nalgebra::Vector3::y()).amax() < 1e-12);
-    assert!((frame.translation.vector * 1000.0 - nalgebra::Vector3::new(1.0, 2.0, 3.0)).amax() < 1e-12);
+    assert!(
+        (frame.translation.vector * 1000.0 - nalgebra::Vector3::new(1.0, 2.0, 3.0)).amax() < 1e-12
+    );
 }
 
 #[test]
@@ -101,7 +110,10 @@ fn a_straight_line_is_straight_and_keeps_its_direction() {
         last = now.translation.vector;
         seen += 1;
     }
-    assert!(seen > 20 && fastest < 0.505 && fastest > 0.4, "{seen} {fastest}");
+    assert!(
+        seen > 20 && fastest < 0.505 && fastest > 0.4,
+        "{seen} {fastest}"
+    );
 }
 
 #[test]
@@ -109,7 +121,11 @@ fn a_straight_line_that_leaves_the_reach_stops_there_or_does_not_start() {
     // Straight through the column: both ends are reachable, the middle is not.
     let steps = "DO MOVE TRANS(500,50,300,90,90,0)\nDO MOVES TRANS(-500,50,300,90,90,0)";
     let mut console = Console::ready();
-    assert!(console.lines(steps).contains("*Location"), "{}", console.screen);
+    assert!(
+        console.lines(steps).contains("*Location"),
+        "{}",
+        console.screen
+    );
     assert!(hand(&console)[0] < 499.0);
     let profile = Profile {
         check_line_ahead: true,
@@ -184,7 +200,8 @@ fn hands_open_and_close_at_once_or_with_the_next_motion() {
     assert_eq!(console.emulator.gripper(), Gripper::Closed);
     console.line("DO MOVET #PPOINT(0,-90,90),50");
     assert_eq!(console.emulator.gripper(), Gripper::Open);
-    console.lines("DO MOVE #PPOINT(0,-45,180,0,45,0)\nDO HERE P\nDO MOVEST P:TRANS(10,0,0,90,-90),0");
+    console
+        .lines("DO MOVE #PPOINT(0,-45,180,0,45,0)\nDO HERE P\nDO MOVEST P:TRANS(10,0,0,90,-90),0");
     assert_eq!(console.emulator.gripper(), Gripper::Closed);
 }
 
@@ -210,7 +227,9 @@ fn speeds_multiply() {
     console.line("DO SPEED 10 ALWAYS");
     assert!(duration(&mut console, "DO DRIVE 1,-8.2,10") > 2.0);
     assert!(duration(&mut console, "DO MOVE #PPOINT(0,-90,90)") > 15.0);
-    console.lines("SPEED 100\nDO SPEED 100 ALWAYS\nDO MOVE #PPOINT(0,-45,180,0,45,0)\nDO SPEED 50 MMPS");
+    console.lines(
+        "SPEED 100\nDO SPEED 100 ALWAYS\nDO MOVE #PPOINT(0,-45,180,0,45,0)\nDO SPEED 50 MMPS",
+    );
     let line = duration(&mut console, "DO DRAW ,,100");
     assert!((line - 2.0).abs() < 0.3, "{line}");
     console.line("DO SPEED 2 IPS");

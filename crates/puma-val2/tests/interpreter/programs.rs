@@ -5,7 +5,9 @@ use crate::console::Console;
 /// What a program typed, one string a line.
 fn typed(steps: &str) -> Vec<String> {
     let said = Console::ready().run(steps);
-    let end = said.find("Program completed").unwrap_or_else(|| panic!("{said}"));
+    let end = said
+        .find("Program completed")
+        .unwrap_or_else(|| panic!("{said}"));
     said[..end]
         .lines()
         .skip(1)
@@ -67,7 +69,10 @@ fn variables_and_arrays() {
         "DECOMPOSE A[1] = TRANS(1,2,3,40,50,60)\nTYPE A[1],A[2],A[3],A[4],A[5],A[6]",
         &["1 2 3 40 50 60"],
     );
-    assert_types("DECOMPOSE Q = #PPOINT(1,2,3,4,5,6)\nTYPE Q[0],Q[5]", &["1 6"]);
+    assert_types(
+        "DECOMPOSE Q = #PPOINT(1,2,3,4,5,6)\nTYPE Q[0],Q[5]",
+        &["1 6"],
+    );
 }
 
 #[test]
@@ -80,7 +85,10 @@ fn type_and_its_formats() {
 
 #[test]
 fn branches_and_loops() {
-    assert_types("N = 1\n10 TYPE N\nN = N+1\nIF N <= 3 GOTO 10", &["1", "2", "3"]);
+    assert_types(
+        "N = 1\n10 TYPE N\nN = N+1\nIF N <= 3 GOTO 10",
+        &["1", "2", "3"],
+    );
     assert_types("GOTO 20\nTYPE 1\n20 TYPE 2", &["2"]);
     assert_types(
         "IF 1 THEN\nTYPE 1\nELSE\nTYPE 2\nEND\nIF 0 THEN\nTYPE 3\nELSE\nTYPE 4\nEND",
@@ -99,8 +107,11 @@ fn branches_and_loops() {
     );
     assert_types("N = 0\nWHILE N < 2 DO\nN = N+1\nTYPE N\nEND", &["1", "2"]);
     assert_types("N = 0\nDO\nN = N+1\nTYPE N\nUNTIL N >= 2", &["1", "2"]);
-    let case =
-        |n| format!("N = {n}\nCASE N OF\nVALUE 1,2:\nTYPE 12\nVALUE 3:\nTYPE 3\nANY\nTYPE 0\nEND\nTYPE 99");
+    let case = |n| {
+        format!(
+            "N = {n}\nCASE N OF\nVALUE 1,2:\nTYPE 12\nVALUE 3:\nTYPE 3\nANY\nTYPE 0\nEND\nTYPE 99"
+        )
+    };
     assert_types(&case(2), &["12", "99"]);
     assert_types(&case(3), &["3", "99"]);
     assert_types(&case(7), &["0", "99"]);
@@ -113,7 +124,9 @@ fn calls_nest_and_return() {
     console.program("OUTER", "CALL INNER\nTYPE \"out\"");
     let said = console.line("EXECUTE OUTER");
     assert!(
-        said.contains("in\r\n") && said.contains("out\r\nProgram completed\r\n.") && !said.contains("never")
+        said.contains("in\r\n")
+            && said.contains("out\r\nProgram completed\r\n.")
+            && !said.contains("never")
     );
     console.program("ENDLESS", "CALL ENDLESS");
     assert!(console.line("EX ENDLESS").contains("*Out of memory*"));
@@ -140,10 +153,17 @@ fn cycles_and_ends() {
             .contains("Program halted at DEAD, step 3\r\n.")
     );
     for again in ["PROCEED", "RETRY", "NEXT"] {
-        assert!(console.line(again).contains("*No program executing*"), "{again}");
+        assert!(
+            console.line(again).contains("*No program executing*"),
+            "{again}"
+        );
     }
     console.program("NAP", "TYPE 1\nPAUSE\nTYPE 2");
-    assert!(console.line("EXECUTE NAP").contains("Program paused at NAP"));
+    assert!(
+        console
+            .line("EXECUTE NAP")
+            .contains("Program paused at NAP")
+    );
     assert!(console.line("PROCEED").contains(" 2\r\nProgram completed"));
     assert!(console.line("EXECUTE NAP").contains("paused"));
     assert!(console.line("NEXT").contains(" 2\r\nProgram paused"));
@@ -154,7 +174,11 @@ fn cycles_and_ends() {
             .contains("*Undefined value*\r\nProgram aborted at OOPS")
     );
     console.line("DO LATER = 22");
-    assert!(console.line("RETRY").contains(" 22\r\n 3\r\nProgram completed"));
+    assert!(
+        console
+            .line("RETRY")
+            .contains(" 22\r\n 3\r\nProgram completed")
+    );
 }
 
 #[test]

@@ -11,12 +11,10 @@ fn signals_are_set_waited_for_and_reacted_to() {
     let mut console = Console::ready();
     console.line("DO SIGNAL 3,-4,2001");
     assert!(console.emulator.signal(3).unwrap() && console.emulator.signal(2001).unwrap());
-    assert!(
-        console
-            .emulator
-            .take_events()
-            .contains(&Event::Output { signal: 3, on: true })
-    );
+    assert!(console.emulator.take_events().contains(&Event::Output {
+        signal: 3,
+        on: true
+    }));
     console.line("RESET");
     assert!(!console.emulator.signal(3).unwrap());
     console.program("WAITING", "WAIT SIG(1001) AND SIG(-1002)\nTYPE \"came\"");
@@ -86,7 +84,12 @@ fn a_sensor_stops_a_move_of_the_monitor() {
     let stands = console.degrees()[0];
     assert!((30.0..40.0).contains(&stands), "{stands}");
     assert!(console.line("DO TYPE SIG(1005)").contains(" -1\r\n"));
-    assert!(console.emulator.take_events().contains(&Event::MotionBrokenOff));
+    assert!(
+        console
+            .emulator
+            .take_events()
+            .contains(&Event::MotionBrokenOff)
+    );
 }
 
 #[test]
@@ -102,9 +105,17 @@ fn a_reaction_while_values_are_asked_for_does_not_skip_them() {
         console.emulator.set_signal(1001, true).unwrap();
         console.wait(Duration::from_millis(100));
         // The terminal is the monitor's meanwhile.
-        assert!(console.line_now("SPEED 90").ends_with('*'), "{}", console.screen);
+        assert!(
+            console.line_now("SPEED 90").ends_with('*'),
+            "{}",
+            console.screen
+        );
         console.settle();
-        assert!(console.screen.contains("hit\r\n"), "{word}: {}", console.screen);
+        assert!(
+            console.screen.contains("hit\r\n"),
+            "{word}: {}",
+            console.screen
+        );
         assert!(
             console.screen.ends_with("how many? "),
             "{word}: {}",
@@ -142,7 +153,11 @@ fn prompt_reads_numbers() {
     console.program("ASK", "PROMPT \"angles? \",A,B\nTYPE A+B");
     assert!(console.line("EXECUTE ASK").ends_with("angles? "));
     assert!(console.line("two").contains("*Invalid argument*"));
-    assert!(console.line("2,-0.5").contains(" 1.5\r\nProgram completed\r\n."));
+    assert!(
+        console
+            .line("2,-0.5")
+            .contains(" 1.5\r\nProgram completed\r\n.")
+    );
     assert!(console.line("DO PROMPT N").ends_with('\n') || console.screen.ends_with('\n'));
     console.line("7");
     assert_eq!(console.emulator.real("N"), Some(7.0));

@@ -7,13 +7,19 @@ use crate::console::Console;
 #[test]
 fn text_goes_out_and_in_unchanged() {
     let mut console = Console::ready();
-    console.program("A", "10 TYPE \"Hello; World\" ; greet\nIF N > 2 GOTO 10\nMOVE P");
+    console.program(
+        "A",
+        "10 TYPE \"Hello; World\" ; greet\nIF N > 2 GOTO 10\nMOVE P",
+    );
     console.lines("DO SET P = TRANS(1,2,3,4,5,6)\nDO HERE #Q\nDO N = 2.5\nDO B[3] = -1");
     let text = console.emulator.text();
     let mut other = Console::ready();
     other.emulator.load_text(&text).unwrap();
     assert_eq!(other.emulator.text(), text);
-    let error = other.emulator.load_text(".PROGRAM X\n FROB\n.END").unwrap_err();
+    let error = other
+        .emulator
+        .load_text(".PROGRAM X\n FROB\n.END")
+        .unwrap_err();
     assert_eq!(
         (error.line, error.fault.message),
         (2, Message::UnknownInstruction)
@@ -37,7 +43,8 @@ fn a_bad_value_in_a_file_is_refused_and_nothing_is_half_loaded() {
         "#P 1,2,3,4,5,6,",
         "P 1,2,3,4,5",
     ] {
-        let text = format!(".PROGRAM GOOD\n TYPE 1\n.END\n.LOCATIONS\nQ 1,2,3,4,5,6\n{bad}\n.END\n");
+        let text =
+            format!(".PROGRAM GOOD\n TYPE 1\n.END\n.LOCATIONS\nQ 1,2,3,4,5,6\n{bad}\n.END\n");
         let error = console.emulator.load_text(&text).unwrap_err();
         assert_eq!(
             (error.line, error.fault.message),
@@ -46,7 +53,10 @@ fn a_bad_value_in_a_file_is_refused_and_nothing_is_half_loaded() {
         );
         assert_eq!(console.emulator.text(), before);
         console.emulator.insert_file("DISK", text);
-        assert!(console.line("LOAD DISK").contains("*Invalid argument*"), "{bad}");
+        assert!(
+            console.line("LOAD DISK").contains("*Invalid argument*"),
+            "{bad}"
+        );
         assert_eq!(console.emulator.text(), before);
     }
     for bad in ["N one", "N nan", "N infinity", "N"] {
@@ -56,7 +66,8 @@ fn a_bad_value_in_a_file_is_refused_and_nothing_is_half_loaded() {
     }
 }
 
-/// Expressions as deep as they are long, in a text and at the terminal, whatever line length the profile allows.
+/// Expressions as deep as they are long, in a text and at the terminal, whatever line length the
+/// profile allows.
 #[test]
 fn lines_without_end_are_refused() {
     let lines = |n: usize| {
@@ -143,7 +154,11 @@ fn a_line_longer_than_the_buffer_is_refused_in_every_dialogue() {
     );
     console.line("");
     console.line("CAL");
-    assert!(console.line(&"Y".repeat(30)).ends_with("Are you sure (Y/N)? "));
+    assert!(
+        console
+            .line(&"Y".repeat(30))
+            .ends_with("Are you sure (Y/N)? ")
+    );
     console.line("N");
     console.line("DO PROMPT N");
     assert!(
@@ -155,7 +170,8 @@ fn a_line_longer_than_the_buffer_is_refused_in_every_dialogue() {
     assert_eq!(console.emulator.real("N"), Some(4.0));
 }
 
-/// What is typed while the monitor is busy waits in a buffer of so many characters, line ends counted; a line that is typed while none waits does not.
+/// What is typed while the monitor is busy waits in a buffer of so many characters, line ends
+/// counted; a line that is typed while none waits does not.
 #[test]
 fn the_input_buffer_holds_what_it_says() {
     let mut console = Console::ready_with(Profile {
@@ -175,9 +191,13 @@ fn the_input_buffer_holds_what_it_says() {
     };
     // Longer than the buffer, but nothing waits before it.
     console.line("DO X = 1 ; longer than the input buffer");
-    assert_eq!((lost(&mut console), console.emulator.real("X")), (0, Some(1.0)));
+    assert_eq!(
+        (lost(&mut console), console.emulator.real("X")),
+        (0, Some(1.0))
+    );
     console.wait(std::time::Duration::from_secs(1));
-    // The first is worked on at once, three lines of seven characters and an end fill the buffer, the fourth is lost.
+    // The first is worked on at once, three lines of seven characters and an end fill the buffer,
+    // the fourth is lost.
     console.line_now("DO X = 2");
     for name in ["A", "B", "C"] {
         console.line_now(&format!("DO {name}=11"));
@@ -205,7 +225,9 @@ fn files_by_kind() {
     console.lines("DO SET P = TRANS(1,2,3,4,5,6)\nDO HERE #Q\nDO N = 2.5");
     console.lines("STORE ALL\nSTOREP PROGS\nSTOREL PLACES\nSTORER REALS\nSTOREL ONE=#Q");
     let disk = console.emulator.floppy().clone();
-    let holds = |file: &str| [".PROGRAM A", "\nP 1", "\n#Q ", ".REALS"].map(|part| disk[file].contains(part));
+    let holds = |file: &str| {
+        [".PROGRAM A", "\nP 1", "\n#Q ", ".REALS"].map(|part| disk[file].contains(part))
+    };
     assert_eq!(holds("ALL"), [true; 4]);
     assert_eq!(holds("PROGS"), [true, false, false, false]);
     assert_eq!(holds("PLACES"), [false, true, true, false]);
@@ -213,7 +235,10 @@ fn files_by_kind() {
     assert_eq!(holds("ONE"), [false, false, true, false]);
 
     for refused in ["STORE BAD=NOBODY", "STOREP BAD=A,P", "STORER BAD=#Q"] {
-        assert!(console.line(refused).contains("*Undefined value*"), "{refused}");
+        assert!(
+            console.line(refused).contains("*Undefined value*"),
+            "{refused}"
+        );
     }
     assert!(!console.emulator.floppy().contains_key("BAD"));
 
@@ -268,7 +293,11 @@ fn values_that_are_typed_may_have_a_sign() {
     let mut console = Console::ready();
     console.lines("POINT #Q\n+10,-85,+95");
     console.line("");
-    assert!(console.line("LISTL #Q").contains("10.000   -85.000    95.000"));
+    assert!(
+        console
+            .line("LISTL #Q")
+            .contains("10.000   -85.000    95.000")
+    );
     console.lines("DO PROMPT A,B\n+5,-6");
     assert_eq!(
         [console.emulator.real("A"), console.emulator.real("B")],

@@ -9,12 +9,13 @@ use crate::validated::validated;
 use crate::{Error, Policy, QTable, Schedule, Value};
 
 /// Double Q-learning (van Hasselt 2010). Two tables A and B; a coin decides which one learns:
-/// `A(s,a) <- A(s,a) + α (r + γ B(s', argmax over b of A(s',b)) - A(s,a))`, or the same with A and B exchanged.
+/// `A(s,a) <- A(s,a) + α (r + γ B(s', argmax over b of A(s',b)) - A(s,a))`, or the same with A and
+/// B exchanged.
 ///
-/// One table chooses the next action and the other one values it, so that a value overestimated by chance is not
-/// chosen for being overestimated. The caller's table shows the mean of both, and the policy acts on it; A and B
-/// begin as copies of it and are kept here. An α by visits goes by those of the table that learns. There are no
-/// defaults.
+/// One table chooses the next action and the other one values it, so that a value overestimated by
+/// chance is not chosen for being overestimated. The caller's table shows the mean of both, and the
+/// policy acts on it; A and B begin as copies of it and are kept here. An α by visits goes by those
+/// of the table that learns. There are no defaults.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -61,10 +62,15 @@ impl<V: Value> Learner<V> for DoubleQLearning<V> {
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = *experience;
         check(table, state, action, &step)?;
-        let tables = self.tables.get_or_insert_with(|| [table.clone(), table.clone()]);
+        let tables = self
+            .tables
+            .get_or_insert_with(|| [table.clone(), table.clone()]);
         table.check_shape(
             "the table of Double Q-learning",
             tables[0].states(),
@@ -72,9 +78,9 @@ impl<V: Value> Learner<V> for DoubleQLearning<V> {
         )?;
         let (learning, valuing) = if rng.random() { (0, 1) } else { (1, 0) };
         let choice = tables[learning].best(step.observation);
-        let target = self
-            .rates
-            .target(&step, || tables[valuing].value(step.observation, choice).to_f64());
+        let target = self.rates.target(&step, || {
+            tables[valuing].value(step.observation, choice).to_f64()
+        });
         let alpha = self.rates.alpha(&tables[learning], state, action);
         let old = tables[learning].value(state, action).to_f64();
         let error = target - old;

@@ -7,12 +7,13 @@ use serde::{Deserialize, Serialize};
 use super::{Experience, Learner, QLearning};
 use crate::{Error, ModelEstimate, Policy, QTable, Schedule, Value};
 
-/// Dyna-Q (Sutton 1990): one-step Q-learning on each real step, then on k steps drawn from a model: a pair tried
-/// before, each as likely as the other, and one of its outcomes, as often as it was seen.
+/// Dyna-Q (Sutton 1990): one-step Q-learning on each real step, then on k steps drawn from a model:
+/// a pair tried before, each as likely as the other, and one of its outcomes, as often as it was
+/// seen.
 ///
-/// In Sutton's deterministic worlds an outcome is the last one seen; drawing from all of them is the same there and
-/// right in a stochastic world too. Imagined steps use the α of the present, and count neither as visits nor for
-/// the schedule. Default: k = 5.
+/// In Sutton's deterministic worlds an outcome is the last one seen; drawing from all of them is
+/// the same there and right in a stochastic world too. Imagined steps use the α of the present, and
+/// count neither as visits nor for the schedule. Default: k = 5.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct DynaQ {
@@ -64,7 +65,10 @@ impl<V: Value> Learner<V> for DynaQ {
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = experience;
         let error = self.real.update(table, *state, *action, step)?;
         if self.model.is_none() {

@@ -11,14 +11,20 @@ use crate::error::check_setting;
 use crate::validated::validated;
 use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Value};
 
-/// n-step Q-learning: `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n max over b of Q(sn,b) - Q(s0,a0))`.
+/// n-step Q-learning:
+/// `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n max over b of Q(sn,b) - Q(s0,a0))`.
 ///
-/// A return is closed early when the episode ends, and, after Watkins (1989), before an exploratory action: what
-/// comes after that is not what the greedy policy would have met. [`uncut`](NStepQ::uncut) lets it run on (as in
-/// Mnih and others 2016): quicker while much is explored, biased as long as it is. Default: n = 4, cut. A pair is
-/// updated up to n steps after its visit.
+/// A return is closed early when the episode ends, and, after Watkins (1989), before an exploratory
+/// action: what comes after that is not what the greedy policy would have met.
+/// [`uncut`](NStepQ::uncut) lets it run on (as in Mnih and others 2016): quicker while much is
+/// explored, biased as long as it is. Default: n = 4, cut. A pair is updated up to n steps after
+/// its visit.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct NStepQ {
     rates: Rates,
     n: usize,
@@ -59,13 +65,20 @@ impl NStepQ {
         Ok(self)
     }
 
-    /// Updates the oldest pending pair with its rewards and the value of what follows the last of them.
-    fn close_oldest<V: Value>(&mut self, table: &mut QTable<V>, following: f64) -> Result<(), Error> {
+    /// Updates the oldest pending pair with its rewards and the value of what follows the last of
+    /// them.
+    fn close_oldest<V: Value>(
+        &mut self,
+        table: &mut QTable<V>,
+        following: f64,
+    ) -> Result<(), Error> {
         let target = self
             .pending
             .iter()
             .rev()
-            .fold(following, |rest, &(.., reward)| reward + self.rates.gamma * rest);
+            .fold(following, |rest, &(.., reward)| {
+                reward + self.rates.gamma * rest
+            });
         if let Some((state, action, _)) = self.pending.pop_front() {
             table.check(state, action)?;
             self.rates.learn(table, state, action, target)?;
@@ -73,7 +86,11 @@ impl NStepQ {
         Ok(())
     }
 
-    fn close_all<V: Value>(&mut self, table: &mut QTable<V>, end: Option<State>) -> Result<(), Error> {
+    fn close_all<V: Value>(
+        &mut self,
+        table: &mut QTable<V>,
+        end: Option<State>,
+    ) -> Result<(), Error> {
         while !self.pending.is_empty() {
             // Asked anew each time: the update before may have changed it.
             self.close_oldest(table, end.map_or(0.0, |state| table.max(state).to_f64()))?;
@@ -97,13 +114,18 @@ impl<V: Value> Learner<V> for NStepQ {
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = *experience;
         check(table, state, action, &step)?;
         if self.cut && !is_greedy(table, state, action) {
             self.close_all(table, Some(state))?;
         }
-        let target = self.rates.target(&step, || table.max(step.observation).to_f64());
+        let target = self
+            .rates
+            .target(&step, || table.max(step.observation).to_f64());
         let error = target - table.value(state, action).to_f64();
         self.pending.push_back((state, action, step.reward));
         match step.status {

@@ -11,9 +11,9 @@ use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Step, Value}
 /// One-step Q-learning (Watkins and Dayan 1992; the paper's Eq. 3):
 /// `Q(s,a) <- (1 - α) Q(s,a) + α (r + γ max over b of Q(s',b))`.
 ///
-/// Learns the optimal policy whatever policy acts, as long as that one keeps trying everything. The term in γ is
-/// left out when the step *terminated* the episode and kept when it was only *truncated*. There are no defaults;
-/// the paper has γ = 0.9 and [`Schedule::paper_alpha`].
+/// Learns the optimal policy whatever policy acts, as long as that one keeps trying everything. The
+/// term in γ is left out when the step *terminated* the episode and kept when it was only
+/// *truncated*. There are no defaults; the paper has γ = 0.9 and [`Schedule::paper_alpha`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct QLearning {
@@ -31,12 +31,12 @@ impl QLearning {
         })
     }
 
-    /// Learns from one step: `action` taken in `state` led to `step`. Counts the visit and returns the error
-    /// `r + γ max Q(s',·) - Q(s,a)` as it was before the update.
+    /// Learns from one step: `action` taken in `state` led to `step`. Counts the visit and returns
+    /// the error `r + γ max Q(s',·) - Q(s,a)` as it was before the update.
     ///
     /// # Errors
-    /// A state or action out of range or forbidden, a reward that is not finite, or a value that would not be.
-    /// The table is unchanged then.
+    /// A state or action out of range or forbidden, a reward that is not finite, or a value that
+    /// would not be. The table is unchanged then.
     #[inline(always)]
     pub fn update<V: Value>(
         &mut self,
@@ -46,19 +46,25 @@ impl QLearning {
         step: &Step,
     ) -> Result<f64, Error> {
         table.check_state(step.observation)?;
-        let target = self.rates.target(step, || table.max(step.observation).to_f64());
-        // A reward that is not finite makes a value that is not, which is refused; only its name is to be found.
+        let target = self
+            .rates
+            .target(step, || table.max(step.observation).to_f64());
+        // A reward that is not finite makes a value that is not, which is refused; only its name is
+        // to be found.
         match self.rates.learn(table, state, action, target) {
-            Err(Error::ValueNotFinite { .. }) if !step.reward.is_finite() => Err(Error::RewardNotFinite {
-                state,
-                action,
-                reward: step.reward,
-            }),
+            Err(Error::ValueNotFinite { .. }) if !step.reward.is_finite() => {
+                Err(Error::RewardNotFinite {
+                    state,
+                    action,
+                    reward: step.reward,
+                })
+            }
             learned => learned,
         }
     }
 
-    /// Learns from a step that did not really happen: no visit is counted, and the clock stands still.
+    /// Learns from a step that did not really happen: no visit is counted, and the clock stands
+    /// still.
     pub(super) fn update_imagined<V: Value>(
         &self,
         table: &mut QTable<V>,
@@ -67,7 +73,9 @@ impl QLearning {
         step: &Step,
     ) -> Result<(), Error> {
         check(table, state, action, step)?;
-        let target = self.rates.target(step, || table.max(step.observation).to_f64());
+        let target = self
+            .rates
+            .target(step, || table.max(step.observation).to_f64());
         let old = table.value(state, action).to_f64();
         table.store(
             state,
@@ -100,11 +108,11 @@ impl<V: Value> Learner<V> for QLearning {
     }
 }
 
-/// SARSA (Rummery and Niranjan 1994): `Q(s,a) <- Q(s,a) + α (r + γ Q(s',a') - Q(s,a))` with the action `a'` that the
-/// policy really takes next.
+/// SARSA (Rummery and Niranjan 1994): `Q(s,a) <- Q(s,a) + α (r + γ Q(s',a') - Q(s,a))` with the
+/// action `a'` that the policy really takes next.
 ///
-/// Learns the value of the policy that acts, exploration included, and so keeps away from cliffs. There are no
-/// defaults.
+/// Learns the value of the policy that acts, exploration included, and so keeps away from cliffs.
+/// There are no defaults.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Sarsa {
@@ -136,7 +144,10 @@ impl<V: Value> Learner<V> for Sarsa {
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = experience;
         check(table, *state, *action, step)?;
         let next = next_value(table, experience)?;
@@ -148,8 +159,8 @@ impl<V: Value> Learner<V> for Sarsa {
 /// Expected SARSA (van Seijen and others 2009):
 /// `Q(s,a) <- Q(s,a) + α (r + γ Σ p(b|s') Q(s',b) - Q(s,a))`, with p from the policy that acts.
 ///
-/// As SARSA, without the chance in the next action. There are no defaults. It needs a policy that tells its
-/// probabilities, as all of this crate do.
+/// As SARSA, without the chance in the next action. There are no defaults. It needs a policy that
+/// tells its probabilities, as all of this crate do.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ExpectedSarsa {
@@ -199,12 +210,17 @@ impl<V: Value> Learner<V> for ExpectedSarsa {
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = experience;
         check(table, *state, *action, step)?;
         let next = match step.status {
             Status::Terminated => 0.0,
-            Status::Continuing | Status::Truncated => self.expected(table, step.observation, policy)?,
+            Status::Continuing | Status::Truncated => {
+                self.expected(table, step.observation, policy)?
+            }
         };
         let target = self.rates.target(step, || next);
         self.rates.learn(table, *state, *action, target)

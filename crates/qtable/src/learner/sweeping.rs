@@ -11,13 +11,19 @@ use crate::error::{check_gamma, check_setting};
 use crate::validated::validated;
 use crate::{Action, Error, ModelEstimate, Policy, QTable, State, Status, Value};
 
-/// Prioritized sweeping (Moore and Atkeson 1993): after each real step the model is brought up to date and up to k
-/// pairs, those first whose value would change most, get their full backup under the model,
-/// `Q(s,a) <- Σ p(s'|s,a) (r + γ max over b of Q(s',b))`. The pairs that lead to a changed state are queued in turn.
+/// Prioritized sweeping (Moore and Atkeson 1993): after each real step the model is brought up to
+/// date and up to k pairs, those first whose value would change most, get their full backup under
+/// the model, `Q(s,a) <- Σ p(s'|s,a) (r + γ max over b of Q(s',b))`. The pairs that lead to a
+/// changed state are queued in turn.
 ///
-/// There is no α: the model's counts do the averaging. Default: k = 5, changes below 1e-4 are not queued.
+/// There is no α: the model's counts do the averaging. Default: k = 5, changes below 1e-4 are not
+/// queued.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct PrioritizedSweeping {
     gamma: f64,
     backups: u32,
@@ -65,7 +71,12 @@ impl PrioritizedSweeping {
 
     fn restore(self) -> Result<Self, Error> {
         check_gamma(self.gamma)?;
-        check_setting("backups", f64::from(self.backups), self.backups > 0, "at least 1")?;
+        check_setting(
+            "backups",
+            f64::from(self.backups),
+            self.backups > 0,
+            "at least 1",
+        )?;
         let positive = self.threshold.is_finite() && self.threshold > 0.0;
         check_setting("threshold", self.threshold, positive, "positive and finite")?;
         let needed = self
@@ -80,7 +91,12 @@ impl PrioritizedSweeping {
                 found,
             });
         }
-        if let Some(&priority) = self.queue.priorities.iter().find(|p| !p.is_finite() || **p < 0.0) {
+        if let Some(&priority) = self
+            .queue
+            .priorities
+            .iter()
+            .find(|p| !p.is_finite() || **p < 0.0)
+        {
             check_setting("a priority", priority, false, "finite and not negative")?;
         }
         Ok(self)
@@ -98,7 +114,10 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = *experience;
         check(table, state, action, &step)?;
         let next = match step.status {
@@ -113,15 +132,21 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
             Some(model) => model,
             None => ModelEstimate::new(table.states(), table.actions())?,
         };
-        // The experience fits the table, and the table the model: from here on only a backup can fail.
+        // The experience fits the table, and the table the model: from here on only a backup can
+        // fail.
         model.observe(state, action, &step)?;
         table.visit(state, action)?;
 
         let change = |table: &QTable<V>, state, action| {
             model
                 .backup(state, action, self.gamma, |next| table.max(next).to_f64())
-                // A change that is not finite is the most urgent; its backup is refused if its value is not.
-                .map(|value| (value - table.value(state, action).to_f64()).abs().min(f64::MAX))
+                // A change that is not finite is the most urgent; its backup is refused if its
+                // value is not.
+                .map(|value| {
+                    (value - table.value(state, action).to_f64())
+                        .abs()
+                        .min(f64::MAX)
+                })
         };
         let mut outcome = Ok(error);
         self.queue.raise(
@@ -159,8 +184,8 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
     }
 }
 
-/// Pairs by the change that their backup would make. Of equal changes the lower pair comes first, so that the
-/// order does not depend on how the queue grew.
+/// Pairs by the change that their backup would make. Of equal changes the lower pair comes first,
+/// so that the order does not depend on how the queue grew.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(
     feature = "serde",
@@ -170,8 +195,8 @@ impl<V: Value> Learner<V> for PrioritizedSweeping {
 struct Queue {
     /// Priority of each pair, 0 for those not queued.
     priorities: Vec<f64>,
-    /// Bits of the priority (ordered as the positive number itself) and the pair; outdated entries stay until
-    /// they are met.
+    /// Bits of the priority (ordered as the positive number itself) and the pair; outdated entries
+    /// stay until they are met.
     heap: BinaryHeap<(u64, std::cmp::Reverse<usize>)>,
 }
 
@@ -213,7 +238,8 @@ impl Queue {
         let Some(change) = change.filter(|&change| change > threshold) else {
             return;
         };
-        self.priorities.resize(model.states() * model.actions(), 0.0);
+        self.priorities
+            .resize(model.states() * model.actions(), 0.0);
         let pair = state.0 * model.actions() + action.0;
         if change > self.priorities[pair] {
             self.priorities[pair] = change;
@@ -225,7 +251,10 @@ impl Queue {
         while let Some((bits, std::cmp::Reverse(pair))) = self.heap.pop() {
             if self.priorities[pair].to_bits() == bits {
                 self.priorities[pair] = 0.0;
-                return Some((State(pair / model.actions()), Action(pair % model.actions())));
+                return Some((
+                    State(pair / model.actions()),
+                    Action(pair % model.actions()),
+                ));
             }
         }
         None

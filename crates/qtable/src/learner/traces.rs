@@ -12,9 +12,14 @@ use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Value};
 /// Traces smaller than this are dropped.
 const SMALLEST_TRACE: f64 = 1e-6;
 
-/// Replacing traces (Singh and Sutton 1996): a visit sets the pair's trace to 1, time lets it decay by γλ.
+/// Replacing traces (Singh and Sutton 1996): a visit sets the pair's trace to 1, time lets it decay
+/// by γλ.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 struct Traces {
     lambda: f64,
     /// Pairs with a trace, from the longest ago to the last.
@@ -53,8 +58,9 @@ impl Traces {
 
     /// Moves every pair by `amount` times its trace: all of them, or none and an error.
     fn spread<V: Value>(&self, table: &mut QTable<V>, amount: f64) -> Result<(), Error> {
-        let moved =
-            |table: &QTable<V>, state, action, trace| table.value(state, action).to_f64() + amount * trace;
+        let moved = |table: &QTable<V>, state, action, trace| {
+            table.value(state, action).to_f64() + amount * trace
+        };
         for &(state, action, trace) in &self.recent {
             table.check(state, action)?;
             table.check_value(state, action, moved(table, state, action, trace))?;
@@ -76,8 +82,8 @@ impl Traces {
 
 validated!(Traces);
 
-/// One update of a trace learner: the present pair moves toward `target`, earlier ones by how far the target is from
-/// what was `expected` of the state.
+/// One update of a trace learner: the present pair moves toward `target`, earlier ones by how far
+/// the target is from what was `expected` of the state.
 fn learn_along<V: Value>(
     rates: &mut Rates,
     traces: &mut Traces,
@@ -87,7 +93,10 @@ fn learn_along<V: Value>(
     expected: f64,
 ) -> Result<f64, Error> {
     let Experience {
-        state, action, step, ..
+        state,
+        action,
+        step,
+        ..
     } = *experience;
     let old = table.value(state, action).to_f64();
     let error = target - old;
@@ -106,15 +115,17 @@ fn learn_along<V: Value>(
     Ok(error)
 }
 
-/// Q(λ) with replacing traces: the error of Q-learning, `δ = r + γ max over b of Q(s',b) - Q(s,a)`, moves every pair
-/// on the way by `α δ e`, where the trace e is 1 for the present pair and decays by γλ with each step.
+/// Q(λ) with replacing traces: the error of Q-learning, `δ = r + γ max over b of Q(s',b) - Q(s,a)`,
+/// moves every pair on the way by `α δ e`, where the trace e is 1 for the present pair and decays
+/// by γλ with each step.
 ///
-/// After Watkins (1989): an exploratory action cuts all traces, because what follows it is not what the greedy
-/// policy would have met. [`uncut`](QLambda::uncut) is the form of Peng and Williams (1996), quicker while much is
-/// explored, with a bias toward the policy that acts. Default: λ = 0.8, cut. Traces below 1e-6 are dropped.
+/// After Watkins (1989): an exploratory action cuts all traces, because what follows it is not what
+/// the greedy policy would have met. [`uncut`](QLambda::uncut) is the form of Peng and Williams
+/// (1996), quicker while much is explored, with a bias toward the policy that acts. Default: λ =
+/// 0.8, cut. Traces below 1e-6 are dropped.
 ///
-/// (The "naive" form, Watkins's without the cut, is not offered: on the cliff problem its values grow without
-/// bound.)
+/// (The "naive" form, Watkins's without the cut, is not offered: on the cliff problem its values
+/// grow without bound.)
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct QLambda {
@@ -147,9 +158,10 @@ impl QLambda {
         })
     }
 
-    /// Lets the traces live through exploratory actions, after Peng and Williams: earlier pairs are moved by the
-    /// error from the state's best value, `r + γ max over b of Q(s',b) - max over b of Q(s,b)`, and only the present
-    /// pair by δ, so that the price of exploring is charged to the action that explored.
+    /// Lets the traces live through exploratory actions, after Peng and Williams: earlier pairs are
+    /// moved by the error from the state's best value,
+    /// `r + γ max over b of Q(s',b) - max over b of Q(s,b)`, and only the present pair by δ, so
+    /// that the price of exploring is charged to the action that explored.
     pub fn uncut(self) -> Self {
         Self { cut: false, ..self }
     }
@@ -168,10 +180,15 @@ impl<V: Value> Learner<V> for QLambda {
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let Experience {
-            state, action, step, ..
+            state,
+            action,
+            step,
+            ..
         } = experience;
         check(table, *state, *action, step)?;
-        let target = self.rates.target(step, || table.max(step.observation).to_f64());
+        let target = self
+            .rates
+            .target(step, || table.max(step.observation).to_f64());
         if self.cut && !is_greedy(table, *state, *action) {
             self.traces.recent.clear();
         }
@@ -187,8 +204,9 @@ impl<V: Value> Learner<V> for QLambda {
     }
 }
 
-/// SARSA(λ) with replacing traces (Singh and Sutton 1996): the error of SARSA, `δ = r + γ Q(s',a') - Q(s,a)`, moves
-/// every pair on the way by `α δ e`, where the trace e is 1 for the present pair and decays by γλ with each step.
+/// SARSA(λ) with replacing traces (Singh and Sutton 1996): the error of SARSA,
+/// `δ = r + γ Q(s',a') - Q(s,a)`, moves every pair on the way by `α δ e`, where the trace e is 1
+/// for the present pair and decays by γλ with each step.
 ///
 /// Default: λ = 0.8. Traces below 1e-6 are dropped.
 #[derive(Clone, Debug, PartialEq)]

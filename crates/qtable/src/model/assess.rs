@@ -4,8 +4,8 @@ use super::Model;
 use crate::error::{check_gamma, check_setting};
 use crate::{Action, Error, QTable, State, Step, Value};
 
-/// What a policy achieves within a limited number of steps, from a distribution of first states. These are exact
-/// expectations, not samples.
+/// What a policy achieves within a limited number of steps, from a distribution of first states.
+/// These are exact expectations, not samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assessment {
     /// Probability that the episode ends in success.
@@ -32,12 +32,12 @@ pub struct Comparison {
 impl Model {
     /// What a deterministic policy achieves.
     ///
-    /// `start` gives the probability of each first state; `limit` is the number of steps after which an episode is
-    /// truncated; `succeeded` tells which last step is a success.
+    /// `start` gives the probability of each first state; `limit` is the number of steps after
+    /// which an episode is truncated; `succeeded` tells which last step is a success.
     ///
     /// # Errors
-    /// A policy of the wrong length or with an action that is not offered, a first state out of range, probabilities
-    /// that do not sum to 1, γ outside `0..=1`, or a limit of 0.
+    /// A policy of the wrong length or with an action that is not offered, a first state out of
+    /// range, probabilities that do not sum to 1, γ outside `0..=1`, or a limit of 0.
     pub fn assess(
         &self,
         policy: &[Action],
@@ -55,7 +55,11 @@ impl Model {
         let (mut steps_of_successes, mut discount) = (0.0, 1.0);
         for taken in 1..=limit {
             next.fill(0.0);
-            for (state, &share) in present.iter().enumerate().filter(|&(_, &share)| share > 0.0) {
+            for (state, &share) in present
+                .iter()
+                .enumerate()
+                .filter(|&(_, &share)| share > 0.0)
+            {
                 sums.steps += share;
                 for outcome in self.outcomes(State(state), policy[state]) {
                     let share = share * outcome.probability;
@@ -79,7 +83,8 @@ impl Model {
         Ok(sums)
     }
 
-    /// The greedy policy of a table beside an optimal policy for γ, both assessed as by [`Model::assess`].
+    /// The greedy policy of a table beside an optimal policy for γ, both assessed as by
+    /// [`Model::assess`].
     ///
     /// # Errors
     /// As [`Model::assess`] and [`Model::value_iteration`].
@@ -109,7 +114,12 @@ impl Model {
                 });
             }
             let valid = (0.0..=1.0).contains(&probability);
-            check_setting("the probability of a first state", probability, valid, "in 0..=1")?;
+            check_setting(
+                "the probability of a first state",
+                probability,
+                valid,
+                "in 0..=1",
+            )?;
             spread[state.0] += probability;
         }
         let sum: f64 = spread.iter().sum();

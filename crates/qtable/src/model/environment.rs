@@ -10,10 +10,14 @@ use crate::{Action, Environment, Error, QTable, State, Status, Step, Value};
 
 /// An [`Environment`] that draws from a [`Model`]: problems of which the optimum is known.
 ///
-/// Before the first `reset` it stands in the first of its first states. An action that the present state does not
-/// offer changes nothing and pays nothing.
+/// Before the first `reset` it stands in the first of its first states. An action that the present
+/// state does not offer changes nothing and pays nothing.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct ModelEnvironment {
     model: Model,
     start: Vec<(State, f64)>,
@@ -37,7 +41,8 @@ impl ModelEnvironment {
         .restore()
     }
 
-    /// Counts every termination as a success, for problems that end in success only but pay nothing for it.
+    /// Counts every termination as a success, for problems that end in success only but pay nothing
+    /// for it.
     pub fn with_success_at_any_termination(self) -> Self {
         Self {
             any_termination_succeeds: true,
@@ -66,16 +71,25 @@ impl ModelEnvironment {
     /// As there.
     pub fn assess(&self, policy: &[Action], gamma: f64, limit: u64) -> Result<Assessment, Error> {
         self.model
-            .assess(policy, &self.start, gamma, limit, |step| self.succeeded(step))
+            .assess(policy, &self.start, gamma, limit, |step| {
+                self.succeeded(step)
+            })
     }
 
     /// The greedy policy of a table beside an optimal one: [`Model::compare`].
     ///
     /// # Errors
     /// As there.
-    pub fn compare<V: Value>(&self, table: &QTable<V>, gamma: f64, limit: u64) -> Result<Comparison, Error> {
+    pub fn compare<V: Value>(
+        &self,
+        table: &QTable<V>,
+        gamma: f64,
+        limit: u64,
+    ) -> Result<Comparison, Error> {
         self.model
-            .compare(table, &self.start, gamma, limit, |step| self.succeeded(step))
+            .compare(table, &self.start, gamma, limit, |step| {
+                self.succeeded(step)
+            })
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -111,7 +125,12 @@ impl Environment for ModelEnvironment {
     /// As a slice does if the action is out of range.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step {
         let outcomes = self.model.outcomes(self.state, action);
-        let step = match draw(outcomes.iter().map(|outcome| (outcome, outcome.probability)), rng) {
+        let step = match draw(
+            outcomes
+                .iter()
+                .map(|outcome| (outcome, outcome.probability)),
+            rng,
+        ) {
             Some(outcome) => outcome.step(),
             None => Step {
                 observation: self.state,
@@ -134,8 +153,8 @@ impl Environment for ModelEnvironment {
     }
 }
 
-/// One of several things by their probabilities, which sum to 1; the last one if rounding leaves a crumb. A single
-/// thing takes nothing from the generator.
+/// One of several things by their probabilities, which sum to 1; the last one if rounding leaves a
+/// crumb. A single thing takes nothing from the generator.
 fn draw<T: Copy>(choices: impl ExactSizeIterator<Item = (T, f64)>, rng: &mut dyn Rng) -> Option<T> {
     let mut rest = if choices.len() > 1 { rng.random() } else { 0.0 };
     let mut drawn = None;

@@ -11,7 +11,11 @@ use crate::{Action, Error, State, Status, Step};
 
 /// How often each action led to what: the maximum-likelihood model of an environment.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct ModelEstimate {
     actions: usize,
     /// The outcomes seen of each pair.
@@ -84,7 +88,8 @@ impl ModelEstimate {
         if outcomes.is_empty() {
             self.tried.push(pair);
         }
-        let same = |seen: &&mut Seen| seen.next == step.observation && seen.terminated == terminated;
+        let same =
+            |seen: &&mut Seen| seen.next == step.observation && seen.terminated == terminated;
         if let Some(seen) = outcomes.iter_mut().find(same) {
             seen.count = seen.count.saturating_add(1);
             // Halved, so that no difference of finite rewards overflows.
@@ -127,8 +132,9 @@ impl ModelEstimate {
             .sum()
     }
 
-    /// The model as far as it is known. A pair never tried is taken to end the episode with the reward `untried`:
-    /// a high one makes a planner curious (the R-max of Brafman and Tennenholtz 2002), a low one careful.
+    /// The model as far as it is known. A pair never tried is taken to end the episode with the
+    /// reward `untried`: a high one makes a planner curious (the R-max of Brafman and Tennenholtz
+    /// 2002), a low one careful.
     ///
     /// # Errors
     /// [`Error::RewardNotFinite`] for an `untried` that is not finite.
@@ -159,7 +165,8 @@ impl ModelEstimate {
         (State(index / self.actions), Action(index % self.actions))
     }
 
-    /// A pair tried before, each as likely as the other, and one of its outcomes, as often as it was seen.
+    /// A pair tried before, each as likely as the other, and one of its outcomes, as often as it
+    /// was seen.
     pub(crate) fn draw(&self, rng: &mut dyn Rng) -> Option<(State, Action, Step)> {
         if self.tried.is_empty() {
             return None;
@@ -231,10 +238,16 @@ impl ModelEstimate {
         }
         let mut listed = self.tried.clone();
         listed.sort_unstable();
-        let tried: Vec<usize> = (0..needed).filter(|&pair| !self.seen[pair].is_empty()).collect();
+        let tried: Vec<usize> = (0..needed)
+            .filter(|&pair| !self.seen[pair].is_empty())
+            .collect();
         if listed != tried {
             let (what, needed, found) = ("the list of tried pairs", tried.len(), listed.len());
-            return Err(Error::WrongLength { what, needed, found });
+            return Err(Error::WrongLength {
+                what,
+                needed,
+                found,
+            });
         }
         self.sources = vec![Vec::new(); states];
         for &index in &tried {

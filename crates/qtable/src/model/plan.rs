@@ -14,19 +14,21 @@ pub struct Plan {
     pub table: QTable,
     /// Sweeps over all states that it took.
     pub sweeps: u64,
-    /// Largest change of a value in the last sweep. For γ < 1 no value is further than `change γ / (1 - γ)` from
-    /// the optimum.
+    /// Largest change of a value in the last sweep. For γ < 1 no value is further than
+    /// `change γ / (1 - γ)` from the optimum.
     pub change: f64,
 }
 
 impl Model {
-    /// Value iteration (Bellman 1957), in place: sweeps `Q(s,a) <- Σ p (r + γ max over b of Q(s',b))` until no value
-    /// changes by more than `tolerance`, in units of the values.
+    /// Value iteration (Bellman 1957), in place: sweeps
+    /// `Q(s,a) <- Σ p (r + γ max over b of Q(s',b))` until no value changes by more than
+    /// `tolerance`, in units of the values.
     ///
     /// γ = 1 is allowed; it converges where every policy worth having reaches an end.
     ///
     /// # Errors
-    /// γ outside `0..=1`, a tolerance that is not positive, values that overflow, or [`Error::NotConverged`].
+    /// γ outside `0..=1`, a tolerance that is not positive, values that overflow, or
+    /// [`Error::NotConverged`].
     pub fn value_iteration(&self, gamma: f64, tolerance: f64) -> Result<Plan, Error> {
         check_limits(gamma, tolerance)?;
         let mut table = self.empty_table()?;
@@ -50,10 +52,11 @@ impl Model {
         })
     }
 
-    /// Policy iteration (Howard 1960): values the present policy, makes it greedy for these values, and so on until
-    /// it stays. The valuations are iterative, to `tolerance`.
+    /// Policy iteration (Howard 1960): values the present policy, makes it greedy for these values,
+    /// and so on until it stays. The valuations are iterative, to `tolerance`.
     ///
-    /// At γ = 1 a policy met on the way may never end; then it does not converge and value iteration is the way.
+    /// At γ = 1 a policy met on the way may never end; then it does not converge and value
+    /// iteration is the way.
     ///
     /// # Errors
     /// As [`Model::value_iteration`].
@@ -97,9 +100,14 @@ impl Model {
     /// The value of each state under a deterministic policy, to `tolerance`.
     ///
     /// # Errors
-    /// A policy of the wrong length or with an action that is not offered, γ outside `0..=1`, a tolerance that is
-    /// not positive, or [`Error::NotConverged`].
-    pub fn evaluate(&self, policy: &[Action], gamma: f64, tolerance: f64) -> Result<Vec<f64>, Error> {
+    /// A policy of the wrong length or with an action that is not offered, γ outside `0..=1`, a
+    /// tolerance that is not positive, or [`Error::NotConverged`].
+    pub fn evaluate(
+        &self,
+        policy: &[Action],
+        gamma: f64,
+        tolerance: f64,
+    ) -> Result<Vec<f64>, Error> {
         check_limits(gamma, tolerance)?;
         self.check_policy(policy)?;
         self.value_policy(policy, gamma, tolerance)

@@ -11,12 +11,18 @@ use crate::validated::validated;
 use crate::{Action, Error, QTable, Schedule, State, Value};
 
 /// The Boltzmann distribution over the action values (the paper's Eq. 4), also called softmax:
-/// `p(a | s) = exp(Q(s,a)/T) / sum over b of exp(Q(s,b)/T)`, over the actions that the state offers.
+/// `p(a | s) = exp(Q(s,a)/T) / sum over b of exp(Q(s,b)/T)`, over the actions that the state
+/// offers.
 ///
-/// The row's maximum is subtracted first, so that nothing overflows for any finite values and any temperature:
-/// the best action has weight 1 and the sum is never 0. Equal values have equal probabilities.
+/// The row's maximum is subtracted first, so that nothing overflows for any finite values and any
+/// temperature: the best action has weight 1 and the sum is never 0. Equal values have equal
+/// probabilities.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Boltzmann {
     temperature: Schedule,
     choices: u64,
@@ -50,7 +56,12 @@ impl Boltzmann {
 
     /// Refuses a schedule that leaves the allowed temperatures.
     pub(crate) fn check_temperature(temperature: &Schedule) -> Result<(), Error> {
-        temperature.check("the temperature", Self::COLDEST, Self::HOTTEST, "in 1e-6..=1e6")
+        temperature.check(
+            "the temperature",
+            Self::COLDEST,
+            Self::HOTTEST,
+            "in 1e-6..=1e6",
+        )
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -87,7 +98,8 @@ impl<V: Value> Policy<V> for Boltzmann {
     }
 }
 
-/// Writes `exp((Q - max Q) / T)` for each action (0 below `exp(-700)`), 0 for forbidden ones, and returns the sum.
+/// Writes `exp((Q - max Q) / T)` for each action (0 below `exp(-700)`), 0 for forbidden ones, and
+/// returns the sum.
 fn boltzmann_weights<V: Value>(
     table: &QTable<V>,
     state: State,

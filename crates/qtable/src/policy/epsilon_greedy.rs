@@ -8,10 +8,14 @@ use super::{Policy, Ties};
 use crate::validated::validated;
 use crate::{Action, Error, QTable, Schedule, State, Value};
 
-/// A random offered action with probability ε, the best one otherwise. Of equals the lowest index, unless
-/// [`with_ties`](EpsilonGreedy::with_ties) says otherwise.
+/// A random offered action with probability ε, the best one otherwise. Of equals the lowest index,
+/// unless [`with_ties`](EpsilonGreedy::with_ties) says otherwise.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct EpsilonGreedy {
     epsilon: Schedule,
     ties: Ties,
@@ -59,9 +63,9 @@ impl<V: Value> Policy<V> for EpsilonGreedy {
         if rng.random::<f64>() >= epsilon {
             return match self.ties {
                 Ties::Lowest => table.best(state),
-                Ties::Random => self
-                    .ties
-                    .pick(table, state, rng, |action| table.value(state, action).to_f64()),
+                Ties::Random => self.ties.pick(table, state, rng, |action| {
+                    table.value(state, action).to_f64()
+                }),
             };
         }
         if table.mask().is_none() {
@@ -82,7 +86,10 @@ impl<V: Value> Policy<V> for EpsilonGreedy {
             Ties::Lowest => action == table.best(state),
             Ties::Random => table.value(state, action) >= table.max(state),
         };
-        let equals = table.offered(state).filter(|&action| is_best(action)).count();
+        let equals = table
+            .offered(state)
+            .filter(|&action| is_best(action))
+            .count();
         for action in table.offered(state) {
             let greedy = if is_best(action) {
                 (1.0 - epsilon) / equals as f64

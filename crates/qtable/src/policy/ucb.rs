@@ -10,22 +10,27 @@ use crate::error::check_setting;
 use crate::validated::validated;
 use crate::{Action, Error, QTable, State, Value};
 
-/// The action with the highest upper confidence bound `Q(s,a) + c sqrt(ln N(s) / N(s,a))` (Auer, Cesa-Bianchi and
-/// Fischer 2002, state by state), where N counts the table's visits. Actions never tried come first.
+/// The action with the highest upper confidence bound `Q(s,a) + c sqrt(ln N(s) / N(s,a))` (Auer,
+/// Cesa-Bianchi and Fischer 2002, state by state), where N counts the table's visits. Actions never
+/// tried come first.
 ///
 /// The visits are those that a learner counts in the table. Of equals the lowest index, unless
-/// [`with_ties`](Ucb::with_ties) says otherwise; with [`Ties::Random`] the actions never tried come in random
-/// order.
+/// [`with_ties`](Ucb::with_ties) says otherwise; with [`Ties::Random`] the actions never tried come
+/// in random order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(remote = "Self"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
 pub struct Ucb {
     width: f64,
     ties: Ties,
 }
 
 impl Ucb {
-    /// With `c`, in units of the values: about the spread of the returns; `sqrt(2)` times it for the bound of the
-    /// paper by Auer and others. At 0 it is greedy once everything was tried.
+    /// With `c`, in units of the values: about the spread of the returns; `sqrt(2)` times it for
+    /// the bound of the paper by Auer and others. At 0 it is greedy once everything was tried.
     ///
     /// # Errors
     /// [`Error::Setting`] if `c` is negative or not finite.
@@ -42,10 +47,19 @@ impl Ucb {
         Self { ties, ..self }
     }
 
-    fn bound<V: Value>(&self, table: &QTable<V>, state: State, log_visits: f64, action: Action) -> f64 {
+    fn bound<V: Value>(
+        &self,
+        table: &QTable<V>,
+        state: State,
+        log_visits: f64,
+        action: Action,
+    ) -> f64 {
         match table.visits(state, action) {
             0 => f64::INFINITY,
-            n => table.value(state, action).to_f64() + self.width * (log_visits / f64::from(n)).sqrt(),
+            n => {
+                table.value(state, action).to_f64()
+                    + self.width * (log_visits / f64::from(n)).sqrt()
+            }
         }
     }
 
@@ -78,7 +92,10 @@ impl<V: Value> Policy<V> for Ucb {
     fn probabilities(&self, table: &QTable<V>, state: State, probabilities: &mut [f64]) -> bool {
         let log_visits = log_visits(table, state);
         let bound = |action| self.bound(table, state, log_visits, action);
-        let highest = table.offered(state).map(bound).fold(f64::NEG_INFINITY, f64::max);
+        let highest = table
+            .offered(state)
+            .map(bound)
+            .fold(f64::NEG_INFINITY, f64::max);
         let mut winners: Vec<Action> = table
             .offered(state)
             .filter(|&action| bound(action) >= highest)

@@ -17,12 +17,14 @@ const OPEN_TO_THE_EAST: [[bool; 4]; 5] = [
     [false, true, false, true],
 ];
 
-/// Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with walls.
+/// Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with
+/// walls.
 ///
-/// States are numbered by [`taxi_state`]. Actions: 0 south, 1 north, 2 east, 3 west, 4 pick up, 5 drop off; a move
-/// into a wall stays. Every action pays -1, an impossible pick-up or drop-off -10, the drop-off at the destination
-/// 20 and ends the episode. A drop-off at another stand leaves the passenger there. The 300 first states, with the
-/// passenger at a stand other than the destination, are equally likely.
+/// States are numbered by [`taxi_state`]. Actions: 0 south, 1 north, 2 east, 3 west, 4 pick up, 5
+/// drop off; a move into a wall stays. Every action pays -1, an impossible pick-up or drop-off -10,
+/// the drop-off at the destination 20 and ends the episode. A drop-off at another stand leaves the
+/// passenger there. The 300 first states, with the passenger at a stand other than the destination,
+/// are equally likely.
 ///
 /// # Errors
 /// None for this map; the type is that of all toys.
@@ -42,8 +44,8 @@ pub fn taxi() -> Result<ModelEnvironment, Error> {
     ModelEnvironment::new(model, &start)
 }
 
-/// The state `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at stand 0 to 3, or 4 for
-/// in the taxi.
+/// The state `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at stand 0
+/// to 3, or 4 for in the taxi.
 pub fn taxi_state(row: usize, column: usize, passenger: usize, destination: usize) -> State {
     State(((row * 5 + column) * 5 + passenger) * 4 + destination)
 }
@@ -52,7 +54,9 @@ fn outcome(state: State, action: Action) -> Outcome {
     let (place, passenger, destination) = (state.0 / 20, state.0 / 4 % 5, state.0 % 4);
     let (row, column) = (place / 5, place % 5);
     let stand = TAXI_STANDS.iter().position(|&stand| stand == (row, column));
-    let at = |row, column| Outcome::certain(taxi_state(row, column, passenger, destination), -1.0, false);
+    let at = |row, column| {
+        Outcome::certain(taxi_state(row, column, passenger, destination), -1.0, false)
+    };
     let with = |passenger, reward, terminated| {
         Outcome::certain(
             taxi_state(row, column, passenger, destination),

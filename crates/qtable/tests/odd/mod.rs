@@ -42,7 +42,10 @@ pub(crate) fn step(observation: usize, reward: f64, status: Status) -> Step {
     }
 }
 
-pub(crate) fn trained(environment: &mut dyn Environment, config: &TrainConfig) -> Result<QTable, Error> {
+pub(crate) fn trained(
+    environment: &mut dyn Environment,
+    config: &TrainConfig,
+) -> Result<QTable, Error> {
     let mut table = QTable::new(environment.states(), environment.actions())?;
     train(environment, &mut table, config, &mut rng(0), &mut |_| {})?;
     Ok(table)
