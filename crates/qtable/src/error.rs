@@ -1,6 +1,6 @@
 //! What can go wrong between a table, a policy, a learner and an environment.
 
-use crate::{Action, ScheduleError, State};
+use crate::index::{Action, State};
 
 /// An error of tables, models, policies, learners and training. Whatever failed: a table never
 /// holds a value that is not finite.
@@ -171,6 +171,46 @@ pub enum Error {
     Schedule(#[from] ScheduleError),
 }
 
+/// A schedule that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScheduleError {
+    /// A value that is NaN or infinite.
+    #[error("a schedule value is {value}: it must be finite")]
+    NotFinite {
+        /// The value.
+        value: f64,
+    },
+    /// An exponential schedule through zero or a negative value.
+    #[error("an exponential schedule goes from {start} to {end}: both must be positive")]
+    NotPositive {
+        /// Value at step 0.
+        start: f64,
+        /// Last value.
+        end: f64,
+    },
+    /// A change within no steps.
+    #[error("a schedule that changes needs at least one step to do so")]
+    NoSteps,
+    /// A scale that is not a positive number.
+    #[error("the scale is {scale} visits: it must be positive and finite")]
+    Scale {
+        /// The scale.
+        scale: f64,
+    },
+    /// A piecewise schedule without points.
+    #[error("a piecewise schedule needs at least one point")]
+    NoPoints,
+    /// Points that do not ascend.
+    #[error("point {index} is at step {step}, not after the one before it")]
+    PointsNotAscending {
+        /// Position among the points.
+        index: usize,
+        /// Its step.
+        step: u64,
+    },
+}
+
 /// Checks a setting against a range given in words.
 pub(crate) fn check_setting(
     name: &'static str,
@@ -192,4 +232,9 @@ pub(crate) fn check_setting(
 /// Checks a discount factor γ.
 pub(crate) fn check_gamma(gamma: f64) -> Result<(), Error> {
     check_setting("gamma", gamma, (0.0..=1.0).contains(&gamma), "in 0..=1")
+}
+
+/// Refuses a count of 0.
+pub(crate) fn check_count(name: &'static str, count: u64) -> Result<(), Error> {
+    check_setting(name, count as f64, count > 0, "at least 1")
 }

@@ -75,58 +75,39 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-mod blocks;
-mod cached;
-mod check_env;
-mod course;
-mod curve;
-mod discretise;
 mod elementary;
-mod environment;
 mod error;
-mod evaluate;
+#[cfg(feature = "serde")]
+mod files;
 mod index;
 mod learner;
-mod mask;
 mod model;
-#[cfg(feature = "serde")]
-mod persist;
 mod policy;
+mod problem;
 mod schedule;
 mod scratch;
-mod seeds;
 mod table;
-mod text;
-mod time_limit;
 pub mod toys;
-mod train;
 mod training;
 mod validated;
 
 pub use rand;
 
-pub use blocks::{TrainingInBlocks, train_in_blocks};
-pub use cached::CachedBoltzmann;
-pub use check_env::{EnvironmentFault, EnvironmentReport, check_env};
-pub use curve::Record;
-pub use discretise::{DiscretiseError, Intervals, Product};
-pub use environment::{Environment, Status, Step};
-pub use error::Error;
-pub use evaluate::{Evaluation, evaluate};
+pub use error::{Error, ScheduleError};
+#[cfg(feature = "serde")]
+pub use files::{PersistError, Problem, decode, encode, load, save};
 pub use index::{Action, State};
 pub use learner::{
     DoubleQLearning, DynaQ, ExpectedSarsa, Experience, Learner, NStepQ, PrioritizedSweeping,
     QLambda, QLearning, Sarsa, SarsaLambda,
 };
-pub use mask::ActionMask;
 pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, Outcome, Plan};
-#[cfg(feature = "serde")]
-pub use persist::{PersistError, Problem, decode, encode, load, save};
 pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
-pub use schedule::{Schedule, ScheduleError};
-pub use seeds::{Estimate, over_seeds};
-pub use table::{QTable, Value};
-pub use text::CsvError;
-pub use time_limit::TimeLimit;
-pub use train::{Progress, TrainConfig, TrainReport, train};
-pub use training::{Training, Until};
+pub use problem::{DiscretiseError, Environment, Intervals, Product, Status, Step, TimeLimit};
+pub use schedule::Schedule;
+pub use table::{ActionMask, CsvError, QTable, Value};
+pub use training::{
+    CachedBoltzmann, EnvironmentFault, EnvironmentReport, Estimate, Evaluation, Progress, Record,
+    TrainConfig, TrainReport, Training, TrainingInBlocks, Until, check_env, evaluate, over_seeds,
+    train, train_in_blocks,
+};

@@ -4,8 +4,8 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::elementary::{exp, ln};
+use crate::error::{Error, ScheduleError};
 use crate::validated::validated;
 
 /// The value of a quantity after a number of steps (actions taken, or visits of one state-action
@@ -61,46 +61,6 @@ pub enum Schedule {
     Piecewise {
         /// Steps, strictly ascending, and the values there.
         points: Vec<(u64, f64)>,
-    },
-}
-
-/// A schedule that cannot be.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScheduleError {
-    /// A value that is NaN or infinite.
-    #[error("a schedule value is {value}: it must be finite")]
-    NotFinite {
-        /// The value.
-        value: f64,
-    },
-    /// An exponential schedule through zero or a negative value.
-    #[error("an exponential schedule goes from {start} to {end}: both must be positive")]
-    NotPositive {
-        /// Value at step 0.
-        start: f64,
-        /// Last value.
-        end: f64,
-    },
-    /// A change within no steps.
-    #[error("a schedule that changes needs at least one step to do so")]
-    NoSteps,
-    /// A scale that is not a positive number.
-    #[error("the scale is {scale} visits: it must be positive and finite")]
-    Scale {
-        /// The scale.
-        scale: f64,
-    },
-    /// A piecewise schedule without points.
-    #[error("a piecewise schedule needs at least one point")]
-    NoPoints,
-    /// Points that do not ascend.
-    #[error("point {index} is at step {step}, not after the one before it")]
-    PointsNotAscending {
-        /// Position among the points.
-        index: usize,
-        /// Its step.
-        step: u64,
     },
 }
 

@@ -4,9 +4,12 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, Rates, check};
+use crate::error::Error;
+use crate::learner::rule::{Experience, Learner, Rates, check};
+use crate::policy::Policy;
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Error, Policy, QTable, Schedule, Value};
 
 /// Double Q-learning (van Hasselt 2010). Two tables A and B; a coin decides which one learns:
 /// `A(s,a) <- A(s,a) + α (r + γ B(s', argmax over b of A(s',b)) - A(s,a))`, or the same with A and

@@ -4,8 +4,13 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, QLearning};
-use crate::{Error, ModelEstimate, Policy, QTable, Schedule, Value};
+use crate::error::Error;
+use crate::learner::one_step::QLearning;
+use crate::learner::rule::{Experience, Learner};
+use crate::model::ModelEstimate;
+use crate::policy::Policy;
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
 
 /// Dyna-Q (Sutton 1990): one-step Q-learning on each real step, then on k steps drawn from a model:
 /// a pair tried before, each as likely as the other, and one of its outcomes, as often as it was

@@ -6,10 +6,14 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, Rates, check, is_greedy};
-use crate::error::check_setting;
+use crate::error::{Error, check_setting};
+use crate::index::{Action, State};
+use crate::learner::rule::{Experience, Learner, Rates, check, is_greedy};
+use crate::policy::Policy;
+use crate::problem::Status;
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Value};
 
 /// n-step Q-learning:
 /// `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n max over b of Q(sn,b) - Q(s0,a0))`.

@@ -4,9 +4,14 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, Rates, check, next_value};
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::learner::rule::{Experience, Learner, Rates, check, next_value};
+use crate::policy::Policy;
+use crate::problem::{Status, Step};
+use crate::schedule::Schedule;
 use crate::scratch::Scratch;
-use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Step, Value};
+use crate::table::{QTable, Value};
 
 /// One-step Q-learning (Watkins and Dayan 1992; the paper's Eq. 3):
 /// `Q(s,a) <- (1 - α) Q(s,a) + α (r + γ max over b of Q(s',b))`.

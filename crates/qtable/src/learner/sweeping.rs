@@ -6,10 +6,14 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, check};
-use crate::error::{check_gamma, check_setting};
+use crate::error::{Error, check_gamma, check_setting};
+use crate::index::{Action, State};
+use crate::learner::rule::{Experience, Learner, check};
+use crate::model::ModelEstimate;
+use crate::policy::Policy;
+use crate::problem::Status;
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Error, ModelEstimate, Policy, QTable, State, Status, Value};
 
 /// Prioritized sweeping (Moore and Atkeson 1993): after each real step the model is brought up to
 /// date and up to k pairs, those first whose value would change most, get their full backup under

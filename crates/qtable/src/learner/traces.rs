@@ -4,10 +4,14 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, Rates, check, is_greedy, next_value};
-use crate::error::check_setting;
+use crate::error::{Error, check_setting};
+use crate::index::{Action, State};
+use crate::learner::rule::{Experience, Learner, Rates, check, is_greedy, next_value};
+use crate::policy::Policy;
+use crate::problem::Status;
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Error, Policy, QTable, Schedule, State, Status, Value};
 
 /// Traces smaller than this are dropped.
 const SMALLEST_TRACE: f64 = 1e-6;

@@ -1,8 +1,10 @@
 //! How good a policy is under a known model: exactly, not by trying.
 
-use super::Model;
-use crate::error::{check_gamma, check_setting};
-use crate::{Action, Error, QTable, State, Step, Value};
+use crate::error::{Error, check_gamma, check_setting};
+use crate::index::{Action, State};
+use crate::model::dynamics::Model;
+use crate::problem::Step;
+use crate::table::{QTable, Value};
 
 /// What a policy achieves within a limited number of steps, from a distribution of first states.
 /// These are exact expectations, not samples.

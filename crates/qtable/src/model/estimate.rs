@@ -4,10 +4,12 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Model, Outcome};
-use crate::mask::checked_entries;
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::model::dynamics::{Model, Outcome};
+use crate::problem::{Status, Step};
+use crate::table::checked_entries;
 use crate::validated::validated;
-use crate::{Action, Error, State, Status, Step};
 
 /// How often each action led to what: the maximum-likelihood model of an environment.
 #[derive(Clone, Debug, PartialEq)]

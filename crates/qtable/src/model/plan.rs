@@ -1,8 +1,9 @@
 //! The optimum of a known model, by dynamic programming.
 
-use super::Model;
-use crate::error::{check_gamma, check_setting};
-use crate::{Action, Error, QTable, State};
+use crate::error::{Error, check_gamma, check_setting};
+use crate::index::{Action, State};
+use crate::model::dynamics::Model;
+use crate::table::QTable;
 
 /// Sweeps after which a computation is given up.
 const MOST_SWEEPS: u64 = 1_000_000;

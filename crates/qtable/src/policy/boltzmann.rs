@@ -4,11 +4,14 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::Policy;
 use crate::elementary::exp_within;
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::policy::rule::Policy;
+use crate::schedule::Schedule;
 use crate::scratch::Scratch;
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Error, QTable, Schedule, State, Value};
 
 /// The Boltzmann distribution over the action values (the paper's Eq. 4), also called softmax:
 /// `p(a | s) = exp(Q(s,a)/T) / sum over b of exp(Q(s,b)/T)`, over the actions that the state

@@ -4,9 +4,12 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Policy, Ties};
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::policy::rule::{Policy, Ties};
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Error, QTable, Schedule, State, Value};
 
 /// A random offered action with probability ε, the best one otherwise. Of equals the lowest index,
 /// unless [`with_ties`](EpsilonGreedy::with_ties) says otherwise.

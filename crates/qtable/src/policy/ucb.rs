@@ -4,11 +4,12 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Policy, Ties};
 use crate::elementary::ln;
-use crate::error::check_setting;
+use crate::error::{Error, check_setting};
+use crate::index::{Action, State};
+use crate::policy::rule::{Policy, Ties};
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Error, QTable, State, Value};
 
 /// The action with the highest upper confidence bound `Q(s,a) + c sqrt(ln N(s) / N(s,a))` (Auer,
 /// Cesa-Bianchi and Fischer 2002, state by state), where N counts the table's visits. Actions never

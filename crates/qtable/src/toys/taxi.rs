@@ -1,6 +1,8 @@
 //! Taxi-v4.
 
-use crate::{Action, Error, Model, ModelEnvironment, Outcome, State};
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::model::{Model, ModelEnvironment, Outcome};
 
 /// Row and column of the four stands: 0 red, 1 green, 2 yellow, 3 blue.
 pub const TAXI_STANDS: [(usize, usize); 4] = [(0, 0), (0, 4), (4, 0), (4, 3)];

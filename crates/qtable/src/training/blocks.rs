@@ -5,13 +5,16 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::course::{Actor, Course, check_count, fit};
-use crate::train::Reporter;
+use crate::error::{Error, check_count};
+use crate::index::{Action, State};
+use crate::problem::{Environment, Step};
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
+use crate::training::cached::CachedBoltzmann;
+use crate::training::course::{Actor, Course, fit};
+use crate::training::curve::Record;
+use crate::training::plain::{Progress, Reporter, TrainConfig, TrainReport};
 use crate::validated::validated;
-use crate::{
-    Action, CachedBoltzmann, Environment, Error, Progress, QTable, Record, Schedule, State, Step,
-    TrainConfig, TrainReport, Value,
-};
 
 /// Learns a table as [`train`](crate::train) does, several times faster: α and the temperature
 /// stand still within each of `blocks` equal parts of the run, at what their schedules say of its

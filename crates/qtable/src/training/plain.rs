@@ -4,8 +4,14 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::course::{Course, Pair, check_count, fit};
-use crate::{Boltzmann, Environment, Error, QLearning, QTable, Record, Schedule, Value};
+use crate::error::{Error, check_count};
+use crate::learner::QLearning;
+use crate::policy::Boltzmann;
+use crate::problem::Environment;
+use crate::schedule::Schedule;
+use crate::table::{QTable, Value};
+use crate::training::course::{Course, Pair, fit};
+use crate::training::curve::Record;
 
 /// Settings of [`train`] and [`train_in_blocks`](crate::train_in_blocks).
 #[derive(Clone, Debug, PartialEq)]

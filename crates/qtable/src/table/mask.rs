@@ -3,8 +3,10 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::problem::Environment;
 use crate::validated::validated;
-use crate::{Action, Environment, Error, State};
 
 /// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by
 /// `actions` truth values with at least one `true` in every row.

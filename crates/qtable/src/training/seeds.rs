@@ -3,7 +3,7 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::Record;
+use crate::training::curve::Record;
 
 /// Runs an experiment once for every seed and returns the results in the order of the seeds.
 ///

@@ -4,8 +4,10 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::course::check_count;
-use crate::{Environment, Error, Policy, QTable, Status, Value};
+use crate::error::{Error, check_count};
+use crate::policy::Policy;
+use crate::problem::{Environment, Status};
+use crate::table::{QTable, Value};
 
 /// What a policy achieved in a number of episodes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,9 +4,13 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use super::{Assessment, Comparison, Model};
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::model::assess::{Assessment, Comparison};
+use crate::model::dynamics::Model;
+use crate::problem::{Environment, Status, Step};
+use crate::table::{QTable, Value};
 use crate::validated::validated;
-use crate::{Action, Environment, Error, QTable, State, Status, Step, Value};
 
 /// An [`Environment`] that draws from a [`Model`]: problems of which the optimum is known.
 ///

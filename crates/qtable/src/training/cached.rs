@@ -5,8 +5,11 @@ use std::f64::consts::LOG2_E;
 use rand::Rng;
 
 use crate::elementary::{PARTS, exp2_parts};
-use crate::error::check_setting;
-use crate::{Action, Boltzmann, Error, QTable, State, Status, Step, Value};
+use crate::error::{Error, check_setting};
+use crate::index::{Action, State};
+use crate::policy::Boltzmann;
+use crate::problem::{Status, Step};
+use crate::table::{QTable, Value};
 
 /// Actions that lie together, and blocks that a row is divided into: what is compared at once.
 const GROUP: usize = 16;

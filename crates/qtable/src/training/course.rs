@@ -4,13 +4,14 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::curve::{Record, Tally};
-use crate::error::check_setting;
+use crate::error::{Error, check_count};
+use crate::index::{Action, State};
+use crate::learner::{Experience, Learner};
+use crate::policy::Policy;
+use crate::problem::{Environment, Status, Step};
+use crate::table::{ActionMask, QTable, Value};
+use crate::training::curve::{Record, Tally};
 use crate::validated::validated;
-use crate::{
-    Action, ActionMask, Environment, Error, Experience, Learner, Policy, QTable, State, Status,
-    Step, Value,
-};
 
 /// Counters of a run, which stop at their largest number, the episode that is going on, and what
 /// has not yet been recorded.
@@ -222,11 +223,6 @@ impl<V: Value, L: Learner<V>, P: Policy<V>> Actor for Pair<'_, V, L, P> {
             next_action,
         ))
     }
-}
-
-/// Refuses a count of 0.
-pub(crate) fn check_count(name: &'static str, count: u64) -> Result<(), Error> {
-    check_setting(name, count as f64, count > 0, "at least 1")
 }
 
 /// Checks that a table fits an environment, and has it take over the environment's mask if there is

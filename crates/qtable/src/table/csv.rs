@@ -3,7 +3,10 @@
 use std::fmt::{Display, Write};
 use std::str::FromStr;
 
-use crate::{Action, ActionMask, Error, QTable, State, Value};
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::table::mask::ActionMask;
+use crate::table::qtable::{QTable, Value};
 
 const HEADER: &str = "state,action,value,visits,offered";
 

@@ -4,9 +4,10 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::course::check_count;
+use crate::error::{Error, check_count};
+use crate::index::{Action, State};
+use crate::problem::environment::{Environment, Status, Step};
 use crate::validated::validated;
-use crate::{Action, Environment, Error, State, Status, Step};
 
 /// An environment whose episodes are truncated after a number of steps.
 #[derive(Clone, Debug, PartialEq)]

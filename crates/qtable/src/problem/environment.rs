@@ -2,7 +2,7 @@
 
 use rand::Rng;
 
-use crate::{Action, State};
+use crate::index::{Action, State};
 
 /// Whether an episode goes on, and if not, why not. The two endings mean different things to a
 /// learner: nothing comes after termination, while truncation only stops the clock.

@@ -3,7 +3,7 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::State;
+use crate::index::State;
 use crate::validated::validated;
 
 /// A discretisation that cannot be, or a value that has no place in it.

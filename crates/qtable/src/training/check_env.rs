@@ -3,8 +3,10 @@
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::course::check_count;
-use crate::{Action, ActionMask, Environment, Error, QTable, Status, Step};
+use crate::error::{Error, check_count};
+use crate::index::Action;
+use crate::problem::{Environment, Status, Step};
+use crate::table::{ActionMask, QTable};
 
 /// What is wrong with an environment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,0 +1,220 @@
+//! Known dynamics: what every action leads to, and how likely.
+
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+use crate::index::{Action, State};
+use crate::problem::{Status, Step};
+use crate::table::{ActionMask, checked_entries};
+use crate::validated::validated;
+
+/// One possible outcome of an action.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct Outcome {
+    /// Its probability, `0..=1`.
+    pub probability: f64,
+    /// The state it leads to.
+    pub next: State,
+    /// Its reward, finite.
+    pub reward: f64,
+    /// Whether it ends the episode.
+    pub terminated: bool,
+}
+
+impl Outcome {
+    /// The outcome that is certain.
+    pub fn certain(next: State, reward: f64, terminated: bool) -> Self {
+        Self {
+            probability: 1.0,
+            next,
+            reward,
+            terminated,
+        }
+    }
+
+    /// The outcome as an environment would report it.
+    pub fn step(&self) -> Step {
+        let status = if self.terminated {
+            Status::Terminated
+        } else {
+            Status::Continuing
+        };
+        Step {
+            observation: self.next,
+            reward: self.reward,
+            status,
+        }
+    }
+}
+
+/// A finite Markov decision process whose probabilities are known.
+///
+/// ```
+/// use qtable::{Action, Model, Outcome, State};
+///
+/// // Two cells; action 1 goes right and ends with reward 1, action 0 stays.
+/// let model = Model::new(2, 2, |state, action| match action {
+///     Action(0) => vec![Outcome::certain(state, 0.0, false)],
+///     _ => vec![Outcome::certain(State(1), 1.0, true)],
+/// })?;
+/// let plan = model.value_iteration(0.9, 1e-12)?;
+/// assert_eq!(plan.table.best(State(0)), Action(1));
+/// assert!((plan.table.value(State(0), Action(0)) - 0.9).abs() < 1e-9);
+/// # Ok::<(), qtable::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(Serialize, Deserialize),
+    serde(remote = "Self")
+)]
+pub struct Model {
+    pub(super) states: usize,
+    pub(super) actions: usize,
+    /// Where the outcomes of each pair begin, and one more for the end.
+    starts: Vec<usize>,
+    outcomes: Vec<Outcome>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(super) mask: Option<ActionMask>,
+}
+
+impl Model {
+    /// Asks `outcomes` for every pair, state by state. A pair without outcomes is one that the
+    /// state does not offer.
+    ///
+    /// # Errors
+    /// An empty shape or one that does not fit into memory, a state that offers nothing, a next
+    /// state out of range, a reward that is not finite, or probabilities that are not a
+    /// distribution (to 1e-9).
+    pub fn new(
+        states: usize,
+        actions: usize,
+        mut outcomes: impl FnMut(State, Action) -> Vec<Outcome>,
+    ) -> Result<Self, Error> {
+        let entries = checked_entries(states, actions)?;
+        let mut starts = Vec::new();
+        starts
+            .try_reserve_exact(entries + 1)
+            .map_err(|_| Error::TooLarge { states, actions })?;
+        starts.push(0);
+        let mut all = Vec::new();
+        for pair in 0..entries {
+            all.extend(outcomes(State(pair / actions), Action(pair % actions)));
+            starts.push(all.len());
+        }
+        Self {
+            states,
+            actions,
+            starts,
+            outcomes: all,
+            mask: None,
+        }
+        .restore()
+    }
+
+    /// Number of states.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+
+    /// Number of actions.
+    pub fn actions(&self) -> usize {
+        self.actions
+    }
+
+    /// The outcomes of an action; none if the state does not offer it.
+    ///
+    /// # Panics
+    /// As a slice does if the pair is out of range.
+    pub fn outcomes(&self, state: State, action: Action) -> &[Outcome] {
+        let row = &self.starts[state.0 * self.actions..][..=self.actions];
+        &self.outcomes[row[action.0]..row[action.0 + 1]]
+    }
+
+    /// The actions that each state offers, or `None` if all are offered everywhere.
+    pub fn mask(&self) -> Option<&ActionMask> {
+        self.mask.as_ref()
+    }
+
+    /// The expected `r + γ value(s')` of a pair, without the second term where the episode ends.
+    pub(super) fn backup(
+        &self,
+        state: State,
+        action: Action,
+        gamma: f64,
+        value: impl Fn(State) -> f64,
+    ) -> f64 {
+        self.outcomes(state, action)
+            .iter()
+            .map(|outcome| {
+                let next = if outcome.terminated {
+                    0.0
+                } else {
+                    gamma * value(outcome.next)
+                };
+                outcome.probability * (outcome.reward + next)
+            })
+            .sum()
+    }
+
+    fn restore(mut self) -> Result<Self, Error> {
+        let (states, actions) = (self.states, self.actions);
+        let needed = checked_entries(states, actions)? + 1;
+        let found = self.starts.len();
+        if found != needed {
+            return Err(Error::WrongLength {
+                what: "the model",
+                needed,
+                found,
+            });
+        }
+        let in_order = self.starts[0] == 0 && self.starts.is_sorted();
+        if !in_order || self.starts[needed - 1] != self.outcomes.len() {
+            return Err(Error::WrongLength {
+                what: "the model's outcomes",
+                needed: self.starts[needed - 1],
+                found: self.outcomes.len(),
+            });
+        }
+        for pair in 0..needed - 1 {
+            self.check_pair(State(pair / actions), Action(pair % actions))?;
+        }
+        let mask = ActionMask::new(states, actions, |state, action| {
+            !self.outcomes(state, action).is_empty()
+        })?;
+        self.mask = mask.restricts().then_some(mask);
+        Ok(self)
+    }
+
+    fn check_pair(&self, state: State, action: Action) -> Result<(), Error> {
+        let outcomes = self.outcomes(state, action);
+        for outcome in outcomes {
+            if outcome.next.0 >= self.states {
+                return Err(Error::StateOutOfRange {
+                    state: outcome.next,
+                    states: self.states,
+                });
+            }
+            if !outcome.reward.is_finite() {
+                return Err(Error::RewardNotFinite {
+                    state,
+                    action,
+                    reward: outcome.reward,
+                });
+            }
+        }
+        let sum: f64 = outcomes.iter().map(|outcome| outcome.probability).sum();
+        let each_valid = outcomes
+            .iter()
+            .all(|outcome| (0.0..=1.0).contains(&outcome.probability));
+        if outcomes.is_empty() || (each_valid && (sum - 1.0).abs() <= 1e-9) {
+            Ok(())
+        } else {
+            Err(Error::NotADistribution { state, action, sum })
+        }
+    }
+}
+
+validated!(Model);
