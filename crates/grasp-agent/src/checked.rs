@@ -23,3 +23,11 @@ macro_rules! checked {
 }
 
 pub(crate) use checked;
+
+/// Refuses a quantity that must be a size and is none, by its name.
+pub(crate) fn above_zero(name: &str, value: f64) -> Result<(), String> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(format!("{name} is {value}; it must be finite and above 0"))
+}

@@ -105,79 +105,57 @@
 //! # }
 //! ```
 
-mod agent;
-mod arm_plane;
 mod behaviour;
-mod camera_model;
 mod checked;
-mod config;
 mod controller;
+mod controllers;
 mod error;
-mod event;
-#[cfg(feature = "serde")]
-mod export;
-#[cfg(feature = "serde")]
-mod export_policy;
-mod eye;
-mod grip_across;
-mod gripper;
-mod hybrid;
-mod learned;
-mod log;
-#[cfg(feature = "serde")]
-mod numbers;
-mod object;
+mod limits;
 mod percept;
-mod preset;
-mod recovery;
-mod reward;
+mod record;
 mod run;
-#[cfg(feature = "serde")]
-mod saved_controller;
-#[cfg(feature = "serde")]
-mod saved_run;
-mod search;
-mod servo;
-mod spec;
-mod supervision;
-mod task;
-mod taught_goal;
-mod watch;
+mod sight;
 
 pub use hough_heuristic;
 pub use nalgebra;
 pub use puma_val2;
 pub use qtable;
 
-pub use agent::{Agent, Outcome};
-pub use arm_plane::ArmPlane;
-pub use behaviour::{Behaviour, Episode};
-pub use camera_model::CameraModel;
-pub use config::{AgentConfig, ApproachLimit};
-pub use controller::{Consequence, Controller, JointLimits, Situation, StepLimits};
+pub use behaviour::policy::{Behaviour, Episode};
+pub use behaviour::preset::{BehaviourPair, YGoal};
+pub use behaviour::reward::{Reward, RewardTerm};
+pub use behaviour::spec::{BehaviourSpec, GoalInterval, JointSteps};
+pub use behaviour::task::BehaviourTask;
+pub use controller::{Consequence, Controller, GaveUp, Situation};
+pub use controllers::grip_across::GripAcross;
+pub use controllers::hybrid::belief::{Belief, Prior};
+pub use controllers::hybrid::controller::{Hybrid, HybridSettings};
+pub use controllers::learned::{Learned, OnlineLearning};
+pub use controllers::servo::fuzzy::Fuzzy;
+pub use controllers::servo::image_based::{ImageBased, JacobianAt};
+pub use controllers::servo::look_ahead::LookAhead;
+pub use controllers::servo::position_based::PositionBased;
+pub use controllers::servo::settings::ServoSettings;
+pub use controllers::taught_goal::{Retargeted, TaughtGoal};
 pub use error::{AgentError, BehaviourError};
-pub use event::{Event, EventKind, GaveUp, Order, Phase};
-pub use eye::{CameraEye, Eye, Look, Sighting};
-pub use grip_across::GripAcross;
-pub use gripper::{GripEnd, GripperActivation, Hand, Went};
-pub use hybrid::{Belief, Hybrid, HybridSettings, Prior};
-pub use learned::{Learned, OnlineLearning};
-pub use log::{EventLog, LoggedEvent};
-pub use object::{BallFeatures, EggFeatures, EggLimits, ObjectFeatures};
-pub use percept::{Input, Percept, theta3};
-pub use preset::{BehaviourPair, YGoal};
-pub use recovery::{Recovery, RecoveryMoves};
-pub use reward::{Reward, RewardTerm};
+pub use limits::{JointLimits, StepLimits};
+pub use percept::{Input, Percept, Sighting, theta3};
+pub use record::log::{EventLog, LoggedEvent};
 #[cfg(feature = "serde")]
-pub use saved_controller::SavedController;
+pub use record::saved_controller::SavedController;
 #[cfg(feature = "serde")]
-pub use saved_run::{Replayed, SavedRun};
-pub use search::{LastLook, PoseSearch, Search, Viewpoint};
-pub use servo::{Fuzzy, ImageBased, JacobianAt, LookAhead, PositionBased, ServoSettings};
-pub use spec::{BehaviourSpec, GoalInterval, JointSteps};
-pub use supervision::{Arrival, Guard, Supervision, Verdict};
-pub use task::BehaviourTask;
-pub use taught_goal::{Retargeted, TaughtGoal};
+pub use record::saved_run::{Replayed, SavedRun};
+pub use run::agent::Agent;
+pub use run::config::{AgentConfig, ApproachLimit};
+pub use run::event::{Event, EventKind, Order, Outcome, Phase};
+pub use run::gripper::{GripEnd, GripperActivation, Hand, Went};
+pub use run::recovery::{Recovery, RecoveryMoves};
+pub use run::search::{LastLook, PoseSearch, Search, Viewpoint};
+pub use run::supervision::{Arrival, Guard, Supervision, Verdict};
+pub use sight::arm_plane::ArmPlane;
+pub use sight::camera_model::CameraModel;
+pub use sight::eye::{CameraEye, Eye, Look};
+pub use sight::target::{BallFeatures, EggFeatures, EggLimits, ObjectFeatures};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

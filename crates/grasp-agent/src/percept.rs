@@ -1,7 +1,21 @@
 //! What the controller perceives at one moment.
 
-use hough_heuristic::Features;
+use hough_heuristic::{Detection, Features};
 use puma_val2::{Joint, Joints};
+
+/// A ball in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sighting {
+    /// The circle in pixels of the frame, with its score.
+    pub detection: Detection,
+    /// The same in feature units.
+    pub features: Features,
+    /// Where the longer axis of its outline points in the image, radians from x toward y; `None`
+    /// for what is round, or where that is not known.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub long_axis: Option<f64>,
+}
 
 /// The ball in the image and the elbow: everything a behaviour decides by.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,177 @@
+//! Both behaviours together, with the paper's values and with ours.
+
+use qtable::DiscretiseError;
+
+use crate::behaviour::reward::Reward;
+use crate::behaviour::spec::{BehaviourSpec, GoalInterval};
+
+/// The two behaviours of the paper, as data: what a [`Learned`](crate::Learned) controller is
+/// taught.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BehaviourPair {
+    /// x and r decide on `JT1`.
+    pub centering: BehaviourSpec,
+    /// y, r and theta 3 decide on `JT2` and `JT3`.
+    pub approaching: BehaviourSpec,
+}
+
+/// The two goal intervals that the paper gives for y.
+///
+/// Everything here uses that of Eq. 6 unless told otherwise: its middle is the 78 that the reward
+/// of the same equation aims at, and from anywhere in it the paper's fixed turn of the fifth joint
+/// brings the gripper to within 6.3 mm of the ball. The other one is wider, is reached in fewer
+/// moves, and leaves the gripper up to 10.6 mm beside the ball.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum YGoal {
+    /// 74 to 82, as in Eq. 6.
+    #[default]
+    Equation6,
+    /// 74 to 92, as in section 4.
+    Section4,
+}
+
+impl YGoal {
+    /// Lowest and highest good y, feature units.
+    pub fn ends(self) -> (f64, f64) {
+        match self {
+            Self::Equation6 => (74.0, 82.0),
+            Self::Section4 => (74.0, 92.0),
+        }
+    }
+}
+
+impl BehaviourPair {
+    /// The paper as it is printed: 42 states by 9 actions, 90 by 81, the rewards of Eq. 5 and 6.
+    /// They do not teach the goal, see [`Reward`].
+    pub fn paper_literal() -> Self {
+        Self {
+            centering: BehaviourSpec::centering().with_reward(Reward::centering_literal()),
+            approaching: BehaviourSpec::approaching().with_reward(Reward::approaching_literal()),
+        }
+    }
+
+    /// The same with both mends of [`Reward::mended`].
+    pub fn paper_mended() -> Self {
+        Self {
+            centering: BehaviourSpec::centering(),
+            approaching: BehaviourSpec::approaching(),
+        }
+    }
+
+    /// [`BehaviourPair::paper_mended`] with 540 states for approaching, and a lost ball that stays
+    /// lost ([`BehaviourSpec::approaching_fine`]).
+    pub fn fine() -> Self {
+        Self {
+            approaching: BehaviourSpec::approaching_fine(),
+            ..Self::paper_mended()
+        }
+    }
+
+    /// The same with the goal interval of y that is asked for.
+    ///
+    /// # Errors
+    /// Intervals of approaching into which that goal does not fit; those of the presets take both.
+    pub fn with_y_goal(self, goal: YGoal) -> Result<Self, DiscretiseError> {
+        let (low, high) = goal.ends();
+        Ok(Self {
+            approaching: self.approaching.with_y_goal(low, high)?,
+            ..self
+        })
+    }
+
+    /// Where both behaviours want to be: the goal of the [`AgentConfig`](crate::AgentConfig) that
+    /// they work under.
+    pub fn goal(&self) -> Vec<GoalInterval> {
+        [&self.centering, &self.approaching]
+            .into_iter()
+            .flat_map(|spec| spec.goal.iter().copied())
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::percept::Input;
+    use crate::run::config::AgentConfig;
+    use crate::sight::camera_model::CameraModel;
+    use hough_heuristic::Features;
+    use puma_val2::Joints;
+
+    #[test]
+    fn the_presets_differ_in_what_their_names_say() {
+        let [literal, mended, fine] = [
+            BehaviourPair::paper_literal(),
+            BehaviourPair::paper_mended(),
+            BehaviourPair::fine(),
+        ];
+        for (pair, states) in [(&literal, 90), (&mended, 90), (&fine, 540)] {
+            assert_eq!((pair.centering.states(), pair.centering.actions()), (42, 9));
+            assert_eq!(
+                (pair.approaching.states(), pair.approaching.actions()),
+                (states, 81)
+            );
+        }
+        assert!(!literal.approaching.reward.absorbing && mended.approaching.reward.absorbing);
+        assert_eq!(literal.approaching.space, mended.approaching.space);
+        let lost = mended.approaching.reward.lost;
+        assert_eq!(
+            fine.approaching.reward,
+            Reward {
+                lost: 10.0 * lost,
+                ..mended.approaching.reward
+            }
+        );
+    }
+
+    /// From the gripper to the ball after the paper's turn of the fifth joint, at the worst place
+    /// of the goal, metres.
+    fn worst_miss(goal: YGoal) -> f64 {
+        let model = CameraModel::paper();
+        let (low, high) = goal.ends();
+        let mut worst: f64 = 0.0;
+        for (x, y, r) in [99.0, 108.0]
+            .into_iter()
+            .flat_map(|x| [low, high].map(|y| (x, y)))
+            .flat_map(|(x, y)| [32.0, 34.0].map(|r| (x, y, r)))
+        {
+            let pose = |jt5| Joints::from_degrees([0.0, -53.0, 186.2, 0.0, jt5, 0.0]);
+            let ball = model.locate(&pose(45.0), &Features { x, y, r }).unwrap();
+            worst = worst.max((model.tool_point(&pose(45.0 - 18.01)) - ball).norm());
+        }
+        worst
+    }
+
+    #[test]
+    fn the_gripper_comes_nearer_with_the_narrower_goal() {
+        let (narrow, wide) = (worst_miss(YGoal::Equation6), worst_miss(YGoal::Section4));
+        assert!(narrow < 0.0065, "{narrow}");
+        assert!((0.0100..0.0110).contains(&wide), "{wide}");
+    }
+
+    #[test]
+    fn both_goals_of_y_fit_every_preset_and_the_agent() {
+        for pair in [
+            BehaviourPair::paper_literal(),
+            BehaviourPair::paper_mended(),
+            BehaviourPair::fine(),
+        ] {
+            let states = pair.approaching.states();
+            for goal in [YGoal::Equation6, YGoal::Section4] {
+                let pair = pair.clone().with_y_goal(goal).unwrap();
+                assert!(pair.approaching.states() <= states);
+                let of_y: Vec<_> = pair
+                    .goal()
+                    .into_iter()
+                    .filter(|i| i.input == Input::Y)
+                    .map(|i| (i.low, i.high))
+                    .collect();
+                assert_eq!(of_y, [goal.ends()]);
+            }
+        }
+        let config = AgentConfig::paper([Joints::default()]);
+        assert_eq!(BehaviourPair::paper_mended().goal(), config.goal);
+    }
+}

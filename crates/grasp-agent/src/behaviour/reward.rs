@@ -1,0 +1,197 @@
+//! The reward module (section 3.2 of the paper, Eq. 5 and 6).
+
+use crate::checked::checked;
+use crate::percept::{Input, Percept};
+
+/// A reward of the paper's form, as data.
+///
+/// Arriving at the goal pays `goal`, losing the ball pays `lost`. Any other step pays the sum of
+/// `weight / |value - target|` over all terms when at least one of them came closer to its target,
+/// and nothing otherwise. With one term (x, 100, 103) that is Eq. 5, with the two terms (y, 20, 78)
+/// and (r, 50, 33) it is Eq. 6.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
+pub struct Reward {
+    /// For arriving at the goal \[100\].
+    pub goal: f64,
+    /// For losing the ball \[-100\].
+    pub lost: f64,
+    /// What pays for coming closer.
+    pub terms: Vec<RewardTerm>,
+    /// Least denominator of a term, in the units of its input \[1; literally 0\].
+    ///
+    /// At 0 the reward grows without bound near a target, and is infinite on it.
+    pub floor: f64,
+    /// Whether the goal, once reached, is kept \[true; literally false\].
+    ///
+    /// A goal that merely ends the episode is worth 100, and near it going away and coming back
+    /// pays more than that for ever; a goal that is kept pays 100 at every step to come, 100 / (1 -
+    /// gamma) in all.
+    pub absorbing: bool,
+}
+
+/// One term of a [`Reward`]: `weight / |input - target|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RewardTerm {
+    /// The quantity that should come closer.
+    pub input: Input,
+    /// What closeness pays.
+    pub weight: f64,
+    /// Where the quantity should go.
+    pub target: f64,
+}
+
+impl RewardTerm {
+    fn distance(&self, percept: &Percept) -> f64 {
+        (self.input.of(percept) - self.target).abs()
+    }
+}
+
+checked!(Reward);
+
+impl Reward {
+    /// Eq. 5 of the paper as printed.
+    pub fn centering_literal() -> Self {
+        Self::literal(vec![RewardTerm {
+            input: Input::X,
+            weight: 100.0,
+            target: 103.0,
+        }])
+    }
+
+    /// Eq. 6 of the paper as printed.
+    pub fn approaching_literal() -> Self {
+        Self::literal(vec![
+            RewardTerm {
+                input: Input::Y,
+                weight: 20.0,
+                target: 78.0,
+            },
+            RewardTerm {
+                input: Input::R,
+                weight: 50.0,
+                target: 33.0,
+            },
+        ])
+    }
+
+    fn literal(terms: Vec<RewardTerm>) -> Self {
+        Self {
+            goal: 100.0,
+            lost: -100.0,
+            terms,
+            floor: 0.0,
+            absorbing: false,
+        }
+    }
+
+    /// The same reward with the two mends that make it teach the goal: denominators of at least 1
+    /// and an absorbing goal.
+    #[must_use]
+    pub fn mended(self) -> Self {
+        Self {
+            floor: 1.0,
+            absorbing: true,
+            ..self
+        }
+    }
+
+    /// Whether it is a reward; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let of_terms = self
+            .terms
+            .iter()
+            .flat_map(|term| [term.weight, term.target]);
+        if let Some(number) = of_terms
+            .chain([self.goal, self.lost, self.floor])
+            .find(|number| !number.is_finite())
+        {
+            return Err(format!("its reward has {number} in it"));
+        }
+        if self.floor < 0.0 {
+            return Err(format!(
+                "the floor of its reward is {}, below 0",
+                self.floor
+            ));
+        }
+        if self.terms.is_empty() {
+            return Err("its reward has no terms: nothing pays for coming closer".into());
+        }
+        Ok(())
+    }
+
+    /// What arriving at the goal is worth under the discount factor `gamma`.
+    pub fn arrival(&self, gamma: f64) -> f64 {
+        if self.absorbing {
+            self.goal / (1.0 - gamma)
+        } else {
+            self.goal
+        }
+    }
+
+    /// What a step from `before` to `after`, neither of them lost nor at the goal, pays.
+    pub fn step(&self, before: &Percept, after: &Percept) -> f64 {
+        if self
+            .terms
+            .iter()
+            .any(|term| term.distance(after) < term.distance(before))
+        {
+            self.terms
+                .iter()
+                .map(|term| term.weight / term.distance(after).max(self.floor))
+                .sum()
+        } else {
+            0.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hough_heuristic::Features;
+
+    fn percept(x: f64, y: f64, r: f64) -> Percept {
+        Percept {
+            features: Features { x, y, r },
+            theta3: 0.0,
+        }
+    }
+
+    #[test]
+    fn equation_5_pays_for_coming_closer_only() {
+        let reward = Reward::centering_literal();
+        let near = |x| percept(x, 0.0, 0.0);
+        assert!((reward.step(&near(60.0), &near(78.0)) - 4.0).abs() < 1e-12);
+        assert!(reward.step(&near(78.0), &near(60.0)).abs() < 1e-12);
+        assert!(reward.step(&near(78.0), &near(78.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn equation_6_pays_both_terms_when_either_comes_closer() {
+        let reward = Reward::approaching_literal();
+        let pays = reward.step(&percept(0.0, 40.0, 20.0), &percept(0.0, 38.0, 23.0));
+        assert!((pays - (20.0 / 40.0 + 50.0 / 10.0)).abs() < 1e-12);
+        let away = reward.step(&percept(0.0, 40.0, 20.0), &percept(0.0, 30.0, 10.0));
+        assert!(away.abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_literal_reward_has_poles_and_the_mended_one_has_none() {
+        let (before, on_target) = (percept(0.0, 60.0, 20.0), percept(0.0, 78.0, 20.0));
+        assert!(
+            Reward::approaching_literal()
+                .step(&before, &on_target)
+                .is_infinite()
+        );
+        let mended = Reward::approaching_literal().mended();
+        assert!((mended.step(&before, &on_target) - (20.0 + 50.0 / 13.0)).abs() < 1e-12);
+        assert!((mended.arrival(0.9) - 1000.0).abs() < 1e-9);
+    }
+}

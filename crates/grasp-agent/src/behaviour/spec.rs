@@ -1,0 +1,438 @@
+//! A behaviour as data: its states, its actions, its goal and its reward, with the paper's values
+//! as presets.
+
+use puma_val2::{Joint, JointDelta};
+use qtable::{Action, DiscretiseError, Intervals, Product, State};
+
+use crate::behaviour::reward::Reward;
+use crate::checked::checked;
+use crate::percept::{Input, Percept};
+
+/// Everything that defines a behaviour, but for what it has learned.
+///
+/// The state is the product of intervals of some inputs; the action is the product of angle steps
+/// of some joints. Both behaviours of the paper, and finer ones, are values of this type.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
+pub struct BehaviourSpec {
+    /// What it is called, in files and messages.
+    pub name: String,
+    /// The inputs, in the order of the intervals of `space`.
+    pub inputs: Vec<Input>,
+    /// The intervals of each input.
+    pub space: Product,
+    /// The joints that it moves, and by which steps.
+    pub moves: Vec<JointSteps>,
+    /// Where it wants to be: every one of these intervals must hold.
+    pub goal: Vec<GoalInterval>,
+    /// What it is taught by.
+    pub reward: Reward,
+}
+
+/// The steps that a behaviour can make with one joint, in degrees.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
+pub struct JointSteps {
+    /// The joint.
+    pub joint: Joint,
+    /// Its steps, degrees.
+    pub degrees: Vec<f64>,
+}
+
+checked!(JointSteps);
+
+#[cfg(feature = "serde")]
+impl JointSteps {
+    /// Whether there are steps; if not, why.
+    fn check(&self) -> Result<(), String> {
+        let Self { joint, degrees } = self;
+        if degrees.is_empty() {
+            return Err(format!("{joint} has no steps"));
+        }
+        match degrees.iter().find(|step| !step.is_finite()) {
+            Some(step) => Err(format!("{joint} has a step of {step} degrees")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A goal interval of one input, closed at both ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
+pub struct GoalInterval {
+    /// The input.
+    pub input: Input,
+    /// Lowest value that is still good.
+    pub low: f64,
+    /// Highest value that is still good.
+    pub high: f64,
+}
+
+checked!(GoalInterval);
+
+impl GoalInterval {
+    /// Whether `percept` lies in the interval.
+    pub fn holds(&self, percept: &Percept) -> bool {
+        (self.low..=self.high).contains(&self.input.of(percept))
+    }
+
+    /// Whether anything can lie in it; if not, why.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self { input, low, high } = self;
+        if low.is_finite() && high.is_finite() && low <= high {
+            return Ok(());
+        }
+        Err(format!("the goal of {input:?} is from {low} to {high}"))
+    }
+}
+
+/// Edges of the radius, common to both behaviours; the goal is \[32, 34\].
+const R_EDGES: [f64; 5] = [14.0, 22.0, 32.0, 34.0, 47.0];
+
+checked!(BehaviourSpec);
+
+impl BehaviourSpec {
+    /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq.
+    /// 5 with both mends.
+    ///
+    /// The goal interval \[99, 108\] and the steps of 5 and 1 degrees are the paper's; it does not
+    /// print the others.
+    pub fn centering() -> Self {
+        Self {
+            name: "centering".into(),
+            inputs: vec![Input::X, Input::R],
+            space: product([(&[50.0, 82.0, 99.0, 108.0, 125.0, 157.0], 3), (&R_EDGES, 3)]),
+            moves: vec![JointSteps {
+                joint: Joint::J1,
+                degrees: vec![-5.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 5.0],
+            }],
+            goal: vec![GoalInterval {
+                input: Input::X,
+                low: 99.0,
+                high: 108.0,
+            }],
+            reward: Reward::centering_literal().mended(),
+        }
+    }
+
+    /// The paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90 states), 9
+    /// steps of J2 by 9 of J3 (81 actions), Eq. 6 with both mends.
+    ///
+    /// The goal (y in \[74, 82\], r in \[32, 34\]) and the steps of 20, 6 and 16, 5 degrees are the
+    /// paper's; it does not print the others.
+    pub fn approaching() -> Self {
+        Self {
+            name: "approaching".into(),
+            inputs: vec![Input::Y, Input::R, Input::Theta3],
+            space: product([
+                (&[43.0, 74.0, 82.0, 98.0], 2),
+                (&[15.0, 27.0, 32.0, 34.0, 50.0], 3),
+                (&[6.0, 27.0], NO_GOAL),
+            ]),
+            moves: vec![
+                JointSteps {
+                    joint: Joint::J2,
+                    degrees: vec![-20.0, -6.0, -2.0, -0.6, 0.0, 0.6, 2.0, 6.0, 20.0],
+                },
+                JointSteps {
+                    joint: Joint::J3,
+                    degrees: vec![-16.0, -5.0, -1.6, -0.5, 0.0, 0.5, 1.6, 5.0, 16.0],
+                },
+            ],
+            goal: vec![
+                GoalInterval {
+                    input: Input::Y,
+                    low: 74.0,
+                    high: 82.0,
+                },
+                GoalInterval {
+                    input: Input::R,
+                    low: 32.0,
+                    high: 34.0,
+                },
+            ],
+            reward: Reward::approaching_literal().mended(),
+        }
+    }
+
+    /// Approaching on 540 states: 9 intervals of y by 10 of r by 6 of theta 3, otherwise as
+    /// [`BehaviourSpec::approaching`], but that a lost ball stays lost as the goal stays reached:
+    /// it costs 100 / (1 - gamma) with the paper's gamma of 0.9.
+    ///
+    /// In regions as small as these the long actions lose the ball from a corner only, and one
+    /// penalty of 100 is too little, on average over the region, to keep them from it.
+    pub fn approaching_fine() -> Self {
+        let approaching = Self::approaching();
+        Self {
+            name: "approaching_fine".into(),
+            reward: Reward {
+                lost: -1000.0,
+                ..approaching.reward
+            },
+            space: product([
+                (&[20.0, 40.0, 60.0, 74.0, 82.0, 96.0, 114.0, 130.0], 4),
+                (&[9.5, 12.0, 16.0, 21.0, 27.0, 32.0, 34.0, 40.0, 50.0], 6),
+                (&[-3.0, 5.0, 15.0, 25.0, 33.0], NO_GOAL),
+            ]),
+            ..approaching
+        }
+    }
+
+    /// The same behaviour with another goal interval of y: section 4 of the paper gives \[74, 92\]
+    /// where its Eq. 6 has \[74, 82\].
+    ///
+    /// The interval replaces the goal bin in the state space too; edges that it swallows are
+    /// dropped. Specifications without y stay as they are.
+    ///
+    /// # Errors
+    /// Edges that do not increase: ends that are not finite or not in order.
+    pub fn with_y_goal(mut self, low: f64, high: f64) -> Result<Self, DiscretiseError> {
+        let mut axes = self.space.quantities().to_vec();
+        for (input, axis) in self.inputs.iter().zip(&mut axes) {
+            let Some(bin) = axis.goal() else {
+                continue;
+            };
+            if *input == Input::Y {
+                // All edges but the two of the goal.
+                let others = axis.edges().iter().enumerate();
+                let others = others
+                    .filter(|(i, _)| *i != bin && i + 1 != bin)
+                    .map(|(_, edge)| edge);
+                let below = others.clone().filter(|edge| **edge < low).copied();
+                let above = others.filter(|edge| **edge > high).copied();
+                let edges: Vec<f64> = below.chain([low, high]).chain(above).collect();
+                let bin = edges
+                    .iter()
+                    .position(|edge| *edge >= low)
+                    .map_or(1, |i| i + 1);
+                *axis = Intervals::new(&edges)?.with_goal(bin)?;
+            }
+        }
+        self.space = Product::new(axes)?;
+        for interval in self
+            .goal
+            .iter_mut()
+            .filter(|interval| interval.input == Input::Y)
+        {
+            (interval.low, interval.high) = (low, high);
+        }
+        Ok(self)
+    }
+
+    /// The same behaviour taught by another reward.
+    #[must_use]
+    pub fn with_reward(self, reward: Reward) -> Self {
+        Self { reward, ..self }
+    }
+
+    /// How many states it tells apart.
+    pub fn states(&self) -> usize {
+        self.space.len()
+    }
+
+    /// How many actions it chooses from; the largest number there is if they are more.
+    pub fn actions(&self) -> usize {
+        self.moves.iter().fold(1, |actions: usize, steps| {
+            actions.saturating_mul(steps.degrees.len())
+        })
+    }
+
+    /// The state that `percept` falls into.
+    ///
+    /// # Errors
+    /// An input that is NaN, with its position.
+    pub fn state(&self, percept: &Percept) -> Result<State, DiscretiseError> {
+        let axes = self.space.quantities();
+        if axes.len() != self.inputs.len() {
+            return Err(DiscretiseError::WrongCount {
+                needed: axes.len(),
+                found: self.inputs.len(),
+            });
+        }
+        let mut state = 0;
+        for (quantity, (input, axis)) in self.inputs.iter().zip(axes).enumerate() {
+            let bin = axis
+                .index(input.of(percept))
+                .map_err(|_| DiscretiseError::NotANumber { quantity })?;
+            state = state * axis.bins() + bin;
+        }
+        Ok(State(state))
+    }
+
+    /// The joint move that `action` stands for: a mixed-radix number, the last joint's step varying
+    /// fastest.
+    ///
+    /// An action of [`BehaviourSpec::actions`] or beyond counts from the beginning again.
+    pub fn delta(&self, action: Action) -> JointDelta {
+        let mut degrees = [0.0; 6];
+        let mut rest = action.0;
+        for steps in self
+            .moves
+            .iter()
+            .rev()
+            .filter(|steps| !steps.degrees.is_empty())
+        {
+            degrees[steps.joint.index()] = steps.degrees[rest % steps.degrees.len()];
+            rest /= steps.degrees.len();
+        }
+        JointDelta::from_degrees(degrees)
+    }
+
+    /// Whether a program could run it; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let axes = self.space.quantities().len();
+        if self.inputs.len() != axes {
+            return Err(format!(
+                "there are {} inputs and intervals for {axes}",
+                self.inputs.len()
+            ));
+        }
+        if self.moves.is_empty() {
+            return Err("it moves no joint".into());
+        }
+        for (i, steps) in self.moves.iter().enumerate() {
+            if self.moves[..i]
+                .iter()
+                .any(|before| before.joint == steps.joint)
+            {
+                return Err(format!("{} is moved twice", steps.joint));
+            }
+            steps.check()?;
+        }
+        if self.goal.is_empty() {
+            return Err("it has no goal".into());
+        }
+        self.goal.iter().try_for_each(GoalInterval::check)?;
+        self.reward.check()
+    }
+
+    /// The first part in which two specifications differ.
+    #[cfg(feature = "serde")]
+    pub(crate) fn difference(&self, other: &Self) -> &'static str {
+        match () {
+            () if self.name != other.name => "name",
+            () if self.inputs != other.inputs || self.space != other.space => "state space",
+            () if self.moves != other.moves => "set of actions",
+            () if self.goal != other.goal => "goal",
+            () => "reward",
+        }
+    }
+
+    /// Whether `percept` is where the behaviour wants to be.
+    pub fn at_goal(&self, percept: &Percept) -> bool {
+        self.goal.iter().all(|interval| interval.holds(percept))
+    }
+}
+
+const NO_GOAL: usize = usize::MAX;
+
+/// The product of intervals with the given edges and goal bins.
+fn product<const N: usize>(axes: [(&[f64], usize); N]) -> Product {
+    let intervals = axes.into_iter().map(|(edges, goal)| {
+        let intervals = Intervals::new(edges)?;
+        if goal == NO_GOAL {
+            Ok(intervals)
+        } else {
+            intervals.with_goal(goal)
+        }
+    });
+    intervals
+        .collect::<Result<Vec<_>, _>>()
+        .and_then(Product::new)
+        .expect("the edges of the presets increase strictly and their goals exist")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hough_heuristic::Features;
+
+    fn percept(x: f64, y: f64, r: f64, theta3: f64) -> Percept {
+        Percept {
+            features: Features { x, y, r },
+            theta3,
+        }
+    }
+
+    #[test]
+    fn the_presets_have_the_papers_sizes() {
+        let (centering, approaching) = (BehaviourSpec::centering(), BehaviourSpec::approaching());
+        assert_eq!((centering.states(), centering.actions()), (42, 9));
+        assert_eq!((approaching.states(), approaching.actions()), (90, 81));
+    }
+
+    #[test]
+    fn goal_intervals_are_closed_in_state_and_test_alike() {
+        let spec = BehaviourSpec::centering();
+        let inside = spec.state(&percept(103.0, 0.0, 33.0, 0.0)).unwrap();
+        for (x, at_goal) in [
+            (99.0, true),
+            (108.0, true),
+            (98.999, false),
+            (108.001, false),
+        ] {
+            let p = percept(x, 0.0, 33.0, 0.0);
+            assert_eq!(spec.at_goal(&p), at_goal, "x = {x}");
+            assert_eq!(spec.state(&p).unwrap() == inside, at_goal, "x = {x}");
+        }
+    }
+
+    #[test]
+    fn the_goal_of_y_can_be_that_of_section_4() {
+        let spec = BehaviourSpec::approaching()
+            .with_y_goal(74.0, 92.0)
+            .unwrap();
+        assert_eq!(spec.states(), 90);
+        assert!(
+            spec.at_goal(&percept(0.0, 91.0, 33.0, 10.0))
+                && !spec.at_goal(&percept(0.0, 93.0, 33.0, 10.0))
+        );
+        let inside = spec.state(&percept(0.0, 80.0, 33.0, 10.0)).unwrap();
+        assert!(spec.space.is_goal(inside));
+        assert_eq!(spec.state(&percept(0.0, 92.0, 33.0, 10.0)).unwrap(), inside);
+        assert!(
+            BehaviourSpec::approaching()
+                .with_y_goal(92.0, 74.0)
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn more_actions_than_can_be_counted_are_no_panic() {
+        let mut spec = BehaviourSpec::centering();
+        let two = JointSteps {
+            joint: Joint::J1,
+            degrees: vec![-1.0, 1.0],
+        };
+        spec.moves = vec![two; 65];
+        assert_eq!(spec.actions(), usize::MAX);
+    }
+
+    #[test]
+    fn every_action_is_another_move() {
+        let spec = BehaviourSpec::approaching();
+        let moves: Vec<[f64; 6]> = (0..spec.actions())
+            .map(|a| spec.delta(Action(a)).degrees())
+            .collect();
+        assert!((moves[0][1] + 20.0).abs() < 1e-9 && (moves[0][2] + 16.0).abs() < 1e-9);
+        assert!(moves[40].iter().all(|d| d.abs() < 1e-12));
+        assert!((moves[41][2] - 0.5).abs() < 1e-9 && moves[41][1].abs() < 1e-12);
+        for (i, a) in moves.iter().enumerate() {
+            let same = |b: &[f64; 6]| a.iter().zip(b).all(|(p, q)| (p - q).abs() < 1e-9);
+            assert!(!moves[..i].iter().any(same), "action {i} repeats");
+        }
+    }
+}

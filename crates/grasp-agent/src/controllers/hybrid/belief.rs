@@ -1,0 +1,291 @@
+//! What is believed of camera, ball and gears: thirteen numbers and how sure they are.
+
+use hough_heuristic::Features;
+use nalgebra::{Matrix3, Point3};
+use puma_val2::Joints;
+
+#[cfg(feature = "serde")]
+use crate::checked::above_zero;
+use crate::checked::checked;
+use crate::controllers::hybrid::numbers::{
+    Information, LEARNED, Numbers, corrected, sensitivity, vector,
+};
+#[cfg(feature = "serde")]
+use crate::error::BehaviourError;
+use crate::sight::camera_model::CameraModel;
+
+/// How wrong a cell may be before anything is known of it: standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(remote = "Self")
+)]
+pub struct Prior {
+    /// Of the logarithm of the focal length \[0.3\].
+    pub focal: f64,
+    /// Of the principal point, feature units \[5\].
+    pub centre: f64,
+    /// Of roll, pitch and yaw of the camera, radians \[0.17\].
+    pub turn: f64,
+    /// Of the camera's place along each of its axes, metres \[0.015\].
+    pub shift: f64,
+    /// Of the logarithm of the ball's radius \[0.15\].
+    pub radius: f64,
+    /// Of the play in each of the first three joints, whole width, radians \[0.015\].
+    pub play: f64,
+}
+
+checked!(Prior);
+
+impl Prior {
+    /// A cell that was set up by eye: the values in the brackets of the fields.
+    pub fn by_eye() -> Self {
+        Self {
+            focal: 0.3,
+            centre: 5.0,
+            turn: 0.17,
+            shift: 0.015,
+            radius: 0.15,
+            play: 0.015,
+        }
+    }
+
+    /// Whether each of them is a number above zero.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let deviations = self.deviations();
+        deviations
+            .iter()
+            .try_for_each(|s| above_zero("a standard deviation of the prior", *s))
+    }
+
+    fn deviations(&self) -> Numbers {
+        let Self {
+            focal,
+            centre,
+            turn,
+            shift,
+            radius,
+            play,
+        } = *self;
+        Numbers::from_column_slice(&[
+            focal, centre, centre, turn, turn, turn, shift, shift, shift, radius, play, play, play,
+        ])
+    }
+}
+
+/// A normal distribution over what is wrong with the nominal model.
+///
+/// Thirteen numbers: logarithm of the focal length over the nominal one; shift of the principal
+/// point (units); turn of the camera about its x, y and z axes (radians) and shift along them
+/// (metres); logarithm of the ball's radius over the nominal one; play in `JT1`, `JT2` and `JT3`
+/// (whole width, radians).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Unchecked")
+)]
+pub struct Belief {
+    mean: Vec<f64>,
+    /// Inverse of the covariance, by columns.
+    information: Vec<f64>,
+    /// Standard deviation of what is seen about what is expected, feature units.
+    noise: f64,
+}
+
+/// The same as it comes from a file.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    mean: Vec<f64>,
+    information: Vec<f64>,
+    noise: f64,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for Belief {
+    type Error = BehaviourError;
+
+    fn try_from(unchecked: Unchecked) -> Result<Self, BehaviourError> {
+        let Unchecked {
+            mean,
+            information,
+            noise,
+        } = unchecked;
+        let mut numbers = mean.iter().chain(&information);
+        let sound = mean.len() == LEARNED
+            && information.len() == LEARNED * LEARNED
+            && numbers.all(|v| v.is_finite())
+            && noise.is_finite()
+            && noise > 0.0;
+        if sound {
+            Ok(Self {
+                mean,
+                information,
+                noise,
+            })
+        } else {
+            Err(BehaviourError::Text {
+                what: "not thirteen finite numbers and what is known of them".into(),
+            })
+        }
+    }
+}
+
+/// Noise assumed before anything is known, feature units.
+const FIRST_NOISE: f64 = 1.0;
+
+impl Belief {
+    /// Nothing is known but the prior.
+    pub fn new(prior: &Prior) -> Self {
+        let precisions = prior.deviations().map(|s| 1.0 / (s * s).max(1e-18));
+        Self::of(
+            Numbers::zeros(),
+            Information::from_diagonal(&precisions),
+            FIRST_NOISE,
+        )
+    }
+
+    pub(crate) fn of(mean: Numbers, information: Information, noise: f64) -> Self {
+        Self {
+            mean: mean.as_slice().to_vec(),
+            information: information.as_slice().to_vec(),
+            noise,
+        }
+    }
+
+    /// The thirteen numbers as they are believed.
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// The standard deviation of each of them.
+    pub fn deviations(&self) -> Vec<f64> {
+        let covariance = self.information_matrix().try_inverse();
+        (0..LEARNED)
+            .map(|i| covariance.map_or(f64::INFINITY, |c| c[(i, i)].max(0.0).sqrt()))
+            .collect()
+    }
+
+    /// Standard deviation of what is seen about what is expected, feature units.
+    pub fn noise(&self) -> f64 {
+        self.noise
+    }
+
+    /// The same after a time in which camera, ball and gears may have changed by `share` of what
+    /// `prior` allows for: as much is believed, and less firmly.
+    pub(crate) fn loosened(self, prior: &Prior, share: f64) -> Self {
+        if share.abs() < f64::MIN_POSITIVE {
+            // Exactly the same, without the rounding of two inversions.
+            return self;
+        }
+        let change = (prior.deviations() * share).map(|s| s * s);
+        let information = self.information_matrix().try_inverse();
+        let information =
+            information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());
+        let Some(information) = information.filter(|i| i.iter().all(|v| v.is_finite())) else {
+            return self.clone();
+        };
+        Self::of(
+            self.numbers(),
+            0.5 * (information + information.transpose()),
+            self.noise,
+        )
+    }
+
+    /// What is believed once a ball, known to be at `ball` but for `unsure` metres along each axis,
+    /// has shown as `features` with the arm at `joints`; the same as before where that cannot be.
+    pub(crate) fn having_seen(
+        self,
+        nominal: &CameraModel,
+        joints: &Joints,
+        (ball, unsure): (&Point3<f64>, f64),
+        features: &Features,
+    ) -> Self {
+        const ITERATIONS: usize = 10;
+        let (before, prior) = (self.numbers(), self.information_matrix());
+        let view =
+            |numbers: &Numbers, ball: &Point3<f64>| corrected(nominal, numbers).view(joints, ball);
+        let (mut numbers, mut information) = (before, prior);
+        for _ in 0..ITERATIONS {
+            let Some((expected, by_all)) = sensitivity(&numbers, ball, view) else {
+                return self;
+            };
+            let by_numbers = by_all.fixed_columns::<LEARNED>(0);
+            let by_place = by_all.fixed_columns::<3>(LEARNED);
+            let spread = Matrix3::identity() * self.noise.powi(2)
+                + by_place * by_place.transpose() * unsure.powi(2);
+            let Some(weight) = spread.try_inverse() else {
+                return self;
+            };
+            let off = vector(features) - vector(&expected);
+            information = prior + by_numbers.transpose() * weight * by_numbers;
+            let gradient = by_numbers.transpose() * weight * off - prior * (numbers - before);
+            let Some(step) = information.cholesky().map(|c| c.solve(&gradient)) else {
+                return self;
+            };
+            numbers += step;
+        }
+        let finite = numbers
+            .iter()
+            .chain(information.iter())
+            .all(|v| v.is_finite());
+        if finite {
+            Self::of(numbers, information, self.noise)
+        } else {
+            self
+        }
+    }
+
+    pub(crate) fn with_noise(self, noise: f64) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// `nominal`, put right by what is believed.
+    pub fn corrected(&self, nominal: &CameraModel) -> CameraModel {
+        corrected(nominal, &self.numbers())
+    }
+
+    pub(crate) fn numbers(&self) -> Numbers {
+        Numbers::from_iterator(
+            self.mean
+                .iter()
+                .copied()
+                .chain(std::iter::repeat(0.0))
+                .take(LEARNED),
+        )
+    }
+
+    pub(crate) fn information_matrix(&self) -> Information {
+        let values = self
+            .information
+            .iter()
+            .copied()
+            .chain(std::iter::repeat(0.0));
+        Information::from_iterator(values.take(LEARNED * LEARNED))
+    }
+}
+
+#[cfg(feature = "serde")]
+impl Belief {
+    const FILE_KIND: &str = "grasp-agent belief/1";
+
+    /// Writes the belief to `path`, whole or not at all.
+    ///
+    /// # Errors
+    /// What kept the file from being written.
+    pub fn save(&self, path: &std::path::Path) -> Result<(), BehaviourError> {
+        Ok(qtable::save(path, Self::FILE_KIND, self)?)
+    }
+
+    /// Reads a belief that [`Belief::save`] wrote.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged or is none of ours; numbers that are too few, too
+    /// many or not finite.
+    pub fn load(path: &std::path::Path) -> Result<Self, BehaviourError> {
+        Ok(qtable::load(path, Self::FILE_KIND)?)
+    }
+}

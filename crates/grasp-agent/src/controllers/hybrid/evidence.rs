@@ -1,0 +1,121 @@
+//! What was seen, from where, and where the links really stood then.
+
+use hough_heuristic::Features;
+use nalgebra::Point3;
+use puma_val2::Joints;
+
+use crate::controllers::hybrid::numbers::{Numbers, at};
+use crate::sight::camera_model::CameraModel;
+
+/// The poses the arm went through in one run, and what was seen of a ball that lay still in the
+/// meantime.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Evidence {
+    /// Joint angles as the arm reported them, first three, radians, in the order they were taken.
+    path: Vec<Joints>,
+    sightings: Vec<(usize, Features)>,
+}
+
+impl Evidence {
+    pub(crate) fn arm_at(&mut self, joints: &Joints) {
+        self.path.push(*joints);
+    }
+
+    /// Notes what is seen from where the arm stands.
+    pub(crate) fn saw(&mut self, features: Features) {
+        if let Some(last) = self.path.len().checked_sub(1) {
+            self.sightings.push((last, features));
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.sightings.len()
+    }
+
+    /// Forgets what was seen, but not how the arm has come to where it is.
+    pub(crate) fn forget_sightings(&mut self) {
+        self.sightings.clear();
+    }
+
+    /// Where the links stood at each sighting, and what was seen.
+    pub(crate) fn views(&self, numbers: &Numbers) -> Vec<(Joints, Features)> {
+        let mut links = Links::new(numbers);
+        let mut views = Vec::with_capacity(self.sightings.len());
+        let mut next = self.sightings.iter().peekable();
+        for (index, motors) in self.path.iter().enumerate() {
+            links.follow(motors);
+            while let Some((_, features)) = next.next_if(|(seen_at, _)| *seen_at == index) {
+                views.push((links.stand, *features));
+            }
+        }
+        views
+    }
+
+    /// The links, where they stand now.
+    pub(crate) fn links(&self, numbers: &Numbers) -> Links {
+        let mut links = Links::new(numbers);
+        for motors in &self.path {
+            links.follow(motors);
+        }
+        links
+    }
+}
+
+/// The links of the first three joints, which follow their motors as soon as the play of the gears
+/// is used up.
+#[derive(Clone, Debug)]
+pub(crate) struct Links {
+    half: [f64; 3],
+    stand: Joints,
+    begun: bool,
+}
+
+impl Links {
+    fn new(numbers: &Numbers) -> Self {
+        Self {
+            half: std::array::from_fn(|i| 0.5 * numbers[at::PLAY + i].max(0.0)),
+            stand: Joints::default(),
+            begun: false,
+        }
+    }
+
+    /// The motors have turned to `motors`.
+    pub(crate) fn follow(&mut self, motors: &Joints) {
+        for i in 0..6 {
+            let half = if i < 3 { self.half[i] } else { 0.0 };
+            let motor = motors.0[i];
+            // Not `max` and `min`, which make a number of NaN.
+            self.stand.0[i] = match self.stand.0[i] {
+                _ if !self.begun || motor.is_nan() => motor,
+                at if at < motor - half => motor - half,
+                at if at > motor + half => motor + half,
+                at => at,
+            };
+        }
+        self.begun = true;
+    }
+
+    /// Where the links stand.
+    pub(crate) fn stand(&self) -> &Joints {
+        &self.stand
+    }
+
+    /// Where the motors must turn so that the links come to stand at `target`.
+    pub(crate) fn motors_for(&self, target: &Joints, motors: &Joints) -> Joints {
+        Joints(std::array::from_fn(|i| {
+            let way = target.0[i] - self.stand.0[i];
+            if i >= 3 {
+                target.0[i]
+            } else if way.abs() < 1e-9 {
+                motors.0[i]
+            } else {
+                target.0[i] + self.half[i].copysign(way)
+            }
+        }))
+    }
+}
+
+/// A first guess of where the ball is, from one sighting.
+pub(crate) fn first_guess(model: &CameraModel, view: &(Joints, Features)) -> Option<Point3<f64>> {
+    model.locate(&view.0, &view.1)
+}

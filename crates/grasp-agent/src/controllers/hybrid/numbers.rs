@@ -1,0 +1,95 @@
+//! The thirteen learned numbers: their order, the model they stand for, and its derivatives.
+
+use hough_heuristic::Features;
+use nalgebra::{
+    Isometry3, Point3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
+};
+
+use crate::sight::camera_model::CameraModel;
+
+/// How many numbers are learned.
+pub(crate) const LEARNED: usize = 13;
+
+/// Position of each number in the vector.
+pub(crate) mod at {
+    pub(crate) const FOCAL: usize = 0;
+    pub(crate) const CENTRE: usize = 1;
+    pub(crate) const TURN: usize = 3;
+    pub(crate) const SHIFT: usize = 6;
+    pub(crate) const RADIUS: usize = 9;
+    pub(crate) const PLAY: usize = 10;
+}
+
+pub(crate) type Numbers = SVector<f64, LEARNED>;
+pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
+
+/// The learned numbers and the three coordinates of one ball.
+pub(crate) const WITH_BALL: usize = LEARNED + 3;
+
+/// Steps for numerical derivatives, of each number and of a coordinate.
+pub(crate) const STEPS: [f64; LEARNED] = [
+    1e-5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5,
+];
+pub(crate) const METRE_STEP: f64 = 1e-6;
+
+pub(crate) type ThreeBy<const N: usize> = SMatrix<f64, 3, N>;
+
+/// `nominal` with the camera and the ball as `numbers` say; the play of the joints is not part of a
+/// model.
+pub(crate) fn corrected(nominal: &CameraModel, numbers: &Numbers) -> CameraModel {
+    let three = |i: usize| Vector3::new(numbers[i], numbers[i + 1], numbers[i + 2]);
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_scaled_axis(three(at::TURN)));
+    CameraModel {
+        focal: nominal.focal * numbers[at::FOCAL].exp(),
+        centre: [
+            nominal.centre[0] + numbers[at::CENTRE],
+            nominal.centre[1] + numbers[at::CENTRE + 1],
+        ],
+        mount: nominal.mount * Isometry3::from_parts(Translation3::from(three(at::SHIFT)), turn),
+        ball_radius: nominal.ball_radius * numbers[at::RADIUS].exp(),
+        ..*nominal
+    }
+}
+
+pub(crate) fn vector(f: &Features) -> Vector3<f64> {
+    Vector3::new(f.x, f.y, f.r)
+}
+
+/// How what would be seen changes with the numbers and the ball's place, by differences; `None`
+/// where nothing would be seen.
+pub(crate) fn sensitivity(
+    numbers: &Numbers,
+    ball: &Point3<f64>,
+    mut view: impl FnMut(&Numbers, &Point3<f64>) -> Option<Features>,
+) -> Option<(Features, ThreeBy<WITH_BALL>)> {
+    let here = view(numbers, ball)?;
+    let mut by_all = ThreeBy::<WITH_BALL>::zeros();
+    for i in 0..WITH_BALL {
+        let (mut other, mut place) = (*numbers, *ball);
+        let step = match i.checked_sub(LEARNED) {
+            None => {
+                other[i] += STEPS[i];
+                STEPS[i]
+            }
+            Some(axis) => {
+                place[axis] += METRE_STEP;
+                METRE_STEP
+            }
+        };
+        by_all.set_column(
+            i,
+            &((vector(&view(&other, &place)?) - vector(&here)) / step),
+        );
+    }
+    Some((here, by_all))
+}
+
+/// Standard deviations of x, y and r as they will be seen, from the covariance of numbers and ball.
+pub(crate) fn deviations(
+    by_all: &ThreeBy<WITH_BALL>,
+    covariance: &SMatrix<f64, WITH_BALL, WITH_BALL>,
+) -> SVector<f64, 3> {
+    (by_all * covariance * by_all.transpose())
+        .diagonal()
+        .map(|v| v.max(0.0).sqrt())
+}

@@ -1,0 +1,352 @@
+//! The paper's controller: two learned behaviours side by side, and learning that goes on while
+//! they work.
+
+use puma_val2::{JointDelta, Joints};
+use qtable::rand::rngs::Xoshiro256PlusPlus;
+use qtable::rand::{RngExt, SeedableRng};
+use qtable::{Action, QTable, State};
+
+use crate::behaviour::policy::{Behaviour, Episode};
+use crate::behaviour::spec::BehaviourSpec;
+use crate::controller::{Consequence, Controller, GaveUp, Situation};
+use crate::error::BehaviourError;
+use crate::limits::JointLimits;
+use crate::percept::Percept;
+
+/// Centering and approaching (section 3 of the paper), each choosing for its own joints in every
+/// cycle.
+///
+/// Frozen unless [`Learned::learning`] is asked for. Learning is one-step Q-learning on what really
+/// happens, by the rewards of the specifications; moves out of the working limits are never tried.
+#[derive(Clone, Debug)]
+pub struct Learned {
+    centering: Half,
+    approaching: Half,
+    learning: Option<(OnlineLearning, Xoshiro256PlusPlus)>,
+}
+
+/// How learning goes on at work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Untested")
+)]
+pub struct OnlineLearning {
+    gamma: f64,
+    alpha: f64,
+    temperature: f64,
+    seed: u64,
+}
+
+/// The same as it comes from a file.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Untested {
+    gamma: f64,
+    alpha: f64,
+    temperature: f64,
+    seed: u64,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Untested> for OnlineLearning {
+    type Error = BehaviourError;
+
+    fn try_from(untested: Untested) -> Result<Self, BehaviourError> {
+        let Untested {
+            gamma,
+            alpha,
+            temperature,
+            seed,
+        } = untested;
+        Self::new(gamma, alpha, temperature, seed)
+    }
+}
+
+impl OnlineLearning {
+    /// With a discount factor, a learning rate, a Boltzmann temperature in units of Q, and the seed
+    /// of what is tried.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Learning`] for a `gamma` that is not in 0..1 (at 1 a goal that is kept
+    /// would be worth infinitely much), an `alpha` that is not in 0..=1, a `temperature` that is
+    /// not a finite number above zero.
+    pub fn new(
+        gamma: f64,
+        alpha: f64,
+        temperature: f64,
+        seed: u64,
+    ) -> Result<Self, BehaviourError> {
+        let sound = [
+            (
+                "gamma",
+                gamma,
+                (0.0..1.0).contains(&gamma),
+                "0 or above, and below 1",
+            ),
+            ("alpha", alpha, (0.0..=1.0).contains(&alpha), "from 0 to 1"),
+            (
+                "temperature",
+                temperature,
+                temperature.is_finite() && temperature > 0.0,
+                "a finite number above 0",
+            ),
+        ];
+        match sound.into_iter().find(|(_, _, sound, _)| !sound) {
+            Some((quantity, value, _, allowed)) => Err(BehaviourError::Learning {
+                quantity,
+                value,
+                allowed,
+            }),
+            None => Ok(Self {
+                gamma,
+                alpha,
+                temperature,
+                seed,
+            }),
+        }
+    }
+
+    /// Discount factor 0.9, learning rate 0.1, temperature 0.3: careful enough that what was
+    /// learned in simulation is not forgotten.
+    pub fn careful(seed: u64) -> Self {
+        Self {
+            gamma: 0.9,
+            alpha: 0.1,
+            temperature: 0.3,
+            seed,
+        }
+    }
+
+    /// Discount factor, in 0..1.
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// Learning rate, in 0..=1.
+    pub fn alpha(&self) -> f64 {
+        self.alpha
+    }
+
+    /// Boltzmann temperature in units of Q, above zero; the higher, the more is tried.
+    pub fn temperature(&self) -> f64 {
+        self.temperature
+    }
+
+    /// Seed of what is tried.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+}
+
+impl Learned {
+    /// Loop breaker of centering unless set otherwise, in units of Q.
+    pub const CENTERING_KAPPA: f64 = 20.0;
+    /// Loop breaker of approaching unless set otherwise, in units of Q.
+    pub const APPROACHING_KAPPA: f64 = 20.0;
+
+    /// Two behaviours, frozen, with the loop breaker at [`Learned::CENTERING_KAPPA`] and
+    /// [`Learned::APPROACHING_KAPPA`].
+    pub fn new(centering: Behaviour, approaching: Behaviour) -> Self {
+        Self {
+            centering: Half::new(centering, Self::CENTERING_KAPPA),
+            approaching: Half::new(approaching, Self::APPROACHING_KAPPA),
+            learning: None,
+        }
+    }
+
+    /// The same with another loop breaker: what choosing an action again in the same state costs,
+    /// see [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a finite number above
+    /// zero counts as 0.
+    #[must_use]
+    pub fn with_kappa(mut self, centering: f64, approaching: f64) -> Self {
+        let sound = |kappa: f64| {
+            if kappa.is_finite() {
+                kappa.max(0.0)
+            } else {
+                0.0
+            }
+        };
+        (self.centering.kappa, self.approaching.kappa) = (sound(centering), sound(approaching));
+        self
+    }
+
+    /// The loop breakers of centering and approaching, units of Q.
+    pub fn kappa(&self) -> (f64, f64) {
+        (self.centering.kappa, self.approaching.kappa)
+    }
+
+    /// The same, learning from what happens.
+    #[must_use]
+    pub fn learning(mut self, settings: OnlineLearning) -> Self {
+        self.learning = Some((settings, Xoshiro256PlusPlus::seed_from_u64(settings.seed)));
+        self
+    }
+
+    /// The same, learning nothing more.
+    #[must_use]
+    pub fn frozen(mut self) -> Self {
+        self.learning = None;
+        self
+    }
+
+    /// Centering as it is now.
+    pub fn centering(&self) -> &Behaviour {
+        &self.centering.behaviour
+    }
+
+    /// Approaching as it is now.
+    pub fn approaching(&self) -> &Behaviour {
+        &self.approaching.behaviour
+    }
+
+    /// The two behaviours, to be saved for example.
+    pub fn into_behaviours(self) -> (Behaviour, Behaviour) {
+        (self.centering.behaviour, self.approaching.behaviour)
+    }
+}
+
+impl Controller for Learned {
+    fn name(&self) -> &str {
+        "learned"
+    }
+
+    fn begin(&mut self) {
+        self.centering.begin();
+        self.approaching.begin();
+    }
+
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        let percept = now.percept();
+        let admitted = |delta: JointDelta| limits.admit(&(now.joints + delta));
+        let mut explore = self
+            .learning
+            .as_mut()
+            .map(|(settings, rng)| (settings.temperature, rng));
+        let turn = self.centering.decide(
+            &percept,
+            explore.as_mut().map(|(t, rng)| (*t, &mut **rng)),
+            admitted,
+        )?;
+        let reach = self.approaching.decide(
+            &percept,
+            explore.as_mut().map(|(t, rng)| (*t, &mut **rng)),
+            admitted,
+        )?;
+        Ok(JointDelta(std::array::from_fn(|i| turn.0[i] + reach.0[i])))
+    }
+
+    fn judge(&mut self, consequence: &Consequence) {
+        if *consequence == Consequence::Missed {
+            // No action of theirs has come to this.
+            return;
+        }
+        for half in [&mut self.centering, &mut self.approaching] {
+            if let Some((settings, _)) = &self.learning {
+                half.learn(settings, consequence);
+            }
+            if !matches!(consequence, Consequence::Seen(_)) {
+                half.bar_last();
+            }
+        }
+    }
+
+    fn arm_at(&mut self, _joints: &Joints) {}
+}
+
+/// One behaviour during one run.
+#[derive(Clone, Debug)]
+struct Half {
+    behaviour: Behaviour,
+    kappa: f64,
+    episode: Episode,
+    /// What was perceived, and what was chosen then.
+    last: Option<(Percept, State, Action)>,
+}
+
+/// Temperature at work and the generator.
+type Exploring<'a> = Option<(f64, &'a mut Xoshiro256PlusPlus)>;
+
+impl Half {
+    fn new(behaviour: Behaviour, kappa: f64) -> Self {
+        Self {
+            episode: Episode::new(&behaviour),
+            behaviour,
+            kappa,
+            last: None,
+        }
+    }
+
+    fn begin(&mut self) {
+        self.episode = Episode::new(&self.behaviour);
+        self.last = None;
+    }
+
+    /// The move that the behaviour wants, none at its goal.
+    fn decide(
+        &mut self,
+        percept: &Percept,
+        exploring: Exploring<'_>,
+        admitted: impl Fn(JointDelta) -> bool,
+    ) -> Result<JointDelta, GaveUp> {
+        self.last = None;
+        let spec = self.behaviour.spec();
+        if spec.at_goal(percept) {
+            return Ok(JointDelta::default());
+        }
+        let state = spec.state(percept).map_err(|_| GaveUp::NoMoveLeft)?;
+        let allowed = |action| admitted(spec.delta(action));
+        let action = match exploring {
+            None => self
+                .behaviour
+                .choose(state, &self.episode, self.kappa, allowed),
+            Some((temperature, rng)) => self.behaviour.explore(
+                state,
+                &self.episode,
+                self.kappa,
+                temperature,
+                rng.random(),
+                allowed,
+            ),
+        };
+        let action = action.ok_or(GaveUp::NoMoveLeft)?;
+        self.last = Some((*percept, state, action));
+        self.episode.chose(state, action);
+        Ok(spec.delta(action))
+    }
+
+    /// The action chosen last is not chosen again in its state during this run.
+    fn bar_last(&mut self) {
+        if let Some((_, state, action)) = self.last {
+            self.episode.lost_by(state, action);
+        }
+    }
+
+    fn learn(&mut self, settings: &OnlineLearning, consequence: &Consequence) {
+        let Some((before, state, action)) = self.last else {
+            return;
+        };
+        let value = match consequence {
+            Consequence::Seen(now) => self.worth(settings.gamma, &before, &now.percept()),
+            Consequence::Lost | Consequence::TakenBack => Some(self.behaviour.spec().reward.lost),
+            Consequence::Missed => None,
+        };
+        let Some(value) = value else { return };
+        let old = self.behaviour.table().value(state, action);
+        self.behaviour
+            .teach(state, action, old + settings.alpha * (value - old));
+    }
+
+    /// The paper's Eq. 3 for a step that kept the ball in view: what it paid and what follows.
+    /// `None` where that is no number.
+    fn worth(&self, gamma: f64, before: &Percept, after: &Percept) -> Option<f64> {
+        let spec: &BehaviourSpec = self.behaviour.spec();
+        if spec.at_goal(after) {
+            return Some(spec.reward.arrival(gamma));
+        }
+        let table: &QTable = self.behaviour.table();
+        let next = spec.state(after).ok()?;
+        Some(spec.reward.step(before, after) + gamma * table.max(next))
+    }
+}

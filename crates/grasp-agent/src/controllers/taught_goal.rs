@@ -1,0 +1,291 @@
+//! A goal that was shown on the arm.
+
+use hough_heuristic::Features;
+use puma_val2::{JointDelta, Joints};
+
+use crate::behaviour::spec::GoalInterval;
+use crate::controller::{Consequence, Controller, GaveUp, Situation};
+use crate::limits::JointLimits;
+use crate::percept::Input;
+
+/// What the camera shows where the gripper's turn brings the jaws around the ball, found by showing
+/// it once.
+///
+/// The paper's goal intervals (x 99..108, y 74..82, r 32..34) do not lie in the middle of the
+/// image: they are what *its* camera shows there. Another camera, or the same one mounted
+/// otherwise, shows something else. To teach the goal, the ball is put between the open jaws, the
+/// gripper's turn is taken back, and the arm looks. Nothing need be known of the camera for that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Read")
+)]
+pub struct TaughtGoal {
+    untaught: Features,
+    taught: Features,
+    from: Joints,
+    grip: JointDelta,
+}
+
+/// A goal as it is read, before it is known to be one.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Read {
+    untaught: Features,
+    taught: Features,
+    from: Joints,
+    grip: JointDelta,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Read> for TaughtGoal {
+    type Error = &'static str;
+
+    fn try_from(
+        Read {
+            untaught,
+            taught,
+            from,
+            grip,
+        }: Read,
+    ) -> Result<Self, Self::Error> {
+        let goal = Self {
+            untaught,
+            taught,
+            from,
+            grip,
+        };
+        goal.checked().ok_or(
+            "a taught goal with a radius that is none, or an angle or place that is not finite",
+        )
+    }
+}
+
+impl TaughtGoal {
+    /// The goal that shows as `seen` with the arm at `from`, from where `grip` brings the jaws
+    /// around the ball, in the place of the one that `intervals` have in their middle. `None` where
+    /// they do not say what x, y and r should be, and for a radius that is none. Nor is there one
+    /// of a pose or a grip that is not finite.
+    pub fn new(
+        intervals: &[GoalInterval],
+        seen: Features,
+        from: Joints,
+        grip: JointDelta,
+    ) -> Option<Self> {
+        let middle = |input: Input| {
+            let interval = intervals.iter().find(|interval| interval.input == input)?;
+            Some(0.5 * (interval.low + interval.high))
+        };
+        let untaught = Features {
+            x: middle(Input::X)?,
+            y: middle(Input::Y)?,
+            r: middle(Input::R)?,
+        };
+        Self {
+            untaught,
+            taught: seen,
+            from,
+            grip,
+        }
+        .checked()
+    }
+
+    fn checked(self) -> Option<Self> {
+        let Self {
+            untaught,
+            taught,
+            from,
+            grip,
+        } = self;
+        let shows =
+            |f: Features| f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0;
+        let finite = from.0.iter().chain(&grip.0).all(|angle| angle.is_finite());
+        (finite && shows(untaught) && shows(taught)).then_some(self)
+    }
+
+    /// The features of the ball at the goal.
+    pub fn features(&self) -> Features {
+        self.taught
+    }
+
+    /// The pose that it was seen from.
+    pub fn seen_from(&self) -> Joints {
+        self.from
+    }
+
+    /// The move from there that brings the jaws around the ball.
+    pub fn grip(&self) -> JointDelta {
+        self.grip
+    }
+
+    /// `intervals` about this goal: those of x and y moved, that of r scaled, others as they are.
+    pub fn intervals(&self, intervals: &[GoalInterval]) -> Vec<GoalInterval> {
+        let Self {
+            untaught, taught, ..
+        } = self;
+        let moved = |interval: &GoalInterval| {
+            let at = |value: f64| match interval.input {
+                Input::X => value + taught.x - untaught.x,
+                Input::Y => value + taught.y - untaught.y,
+                Input::R => value * taught.r / untaught.r,
+                Input::Theta3 => value,
+            };
+            GoalInterval {
+                input: interval.input,
+                low: at(interval.low),
+                high: at(interval.high),
+            }
+        };
+        intervals.iter().map(moved).collect()
+    }
+
+    /// What is seen, moved so that this goal is where the other one was.
+    fn as_untaught(&self, situation: &Situation) -> Situation {
+        let (
+            seen,
+            Self {
+                untaught, taught, ..
+            },
+        ) = (situation.features, self);
+        Situation {
+            features: Features {
+                x: seen.x + untaught.x - taught.x,
+                y: seen.y + untaught.y - taught.y,
+                r: seen.r * untaught.r / taught.r,
+            },
+            ..*situation
+        }
+    }
+}
+
+/// A controller whose goal is part of what it has learned, at work with a [`TaughtGoal`]: it is
+/// told what is seen as if that goal were its own.
+#[derive(Clone, Debug)]
+pub struct Retargeted<C> {
+    controller: C,
+    goal: TaughtGoal,
+}
+
+impl<C> Retargeted<C> {
+    /// `controller`, made for the goal that `goal` takes the place of.
+    pub fn new(controller: C, goal: TaughtGoal) -> Self {
+        Self { controller, goal }
+    }
+
+    /// The controller by itself.
+    pub fn into_inner(self) -> C {
+        self.controller
+    }
+}
+
+impl<C: Controller> Controller for Retargeted<C> {
+    fn name(&self) -> &str {
+        self.controller.name()
+    }
+
+    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+        self.controller.decide(&self.goal.as_untaught(now), limits)
+    }
+
+    fn judge(&mut self, consequence: &Consequence) {
+        self.controller.judge(&match consequence {
+            Consequence::Seen(now) => Consequence::Seen(self.goal.as_untaught(now)),
+            other => *other,
+        });
+    }
+
+    fn arm_at(&mut self, joints: &Joints) {
+        self.controller.arm_at(joints);
+    }
+
+    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
+        self.controller.grip(&self.goal.as_untaught(now), limits)
+    }
+
+    fn begin(&mut self) {
+        self.controller.begin();
+    }
+
+    fn end(&mut self) {
+        self.controller.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::percept::Percept;
+    use crate::run::config::AgentConfig;
+
+    #[test]
+    fn the_goal_moves_and_what_is_made_for_the_old_one_is_told_of_it() {
+        let paper = AgentConfig::paper([Joints::default()]);
+        let (intervals, grip) = (paper.goal.clone(), paper.grip);
+        let seen = Features {
+            x: 90.0,
+            y: 95.0,
+            r: 36.0,
+        };
+        let new = |intervals: &[_], seen| TaughtGoal::new(intervals, seen, Joints::default(), grip);
+        let goal = new(&intervals, seen).unwrap();
+        let situation = Situation {
+            features: seen,
+            joints: Joints::default(),
+            long_axis: None,
+        };
+        let moved = goal.intervals(&intervals);
+        let holds = |intervals: &[GoalInterval], situation: &Situation| {
+            let percept = Percept::new(situation.features, &situation.joints);
+            intervals.iter().all(|interval| interval.holds(&percept))
+        };
+        assert!(holds(&moved, &situation) && !holds(&intervals, &situation));
+        // Inside and outside agree, at every end of every interval.
+        for (dx, dy, dr) in [
+            (4.4, 3.9, 1.05),
+            (4.6, 0.0, 0.0),
+            (0.0, -4.1, 0.0),
+            (0.0, 0.0, -1.2),
+        ] {
+            let features = Features {
+                x: seen.x + dx,
+                y: seen.y + dy,
+                r: seen.r + dr,
+            };
+            let there = Situation {
+                features,
+                ..situation
+            };
+            assert_eq!(
+                holds(&moved, &there),
+                holds(&intervals, &goal.as_untaught(&there)),
+                "{features:?}"
+            );
+        }
+        assert!(new(&intervals[..2], seen).is_none());
+        assert!(new(&intervals, Features { r: 0.0, ..seen }).is_none());
+        let of = |from, grip| TaughtGoal::new(&intervals, seen, from, grip);
+        assert!(of(Joints([f64::NAN; 6]), grip).is_none());
+        assert!(of(Joints::default(), JointDelta([f64::INFINITY; 6])).is_none());
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn what_could_not_be_made_cannot_be_read() {
+        let paper = AgentConfig::paper([Joints::default()]);
+        let seen = Features {
+            x: 90.0,
+            y: 95.0,
+            r: 36.0,
+        };
+        let goal = TaughtGoal::new(&paper.goal, seen, Joints::default(), paper.grip).unwrap();
+        let text = serde_json::to_string(&goal).unwrap();
+        assert_eq!(serde_json::from_str::<TaughtGoal>(&text).unwrap(), goal);
+        for radius in ["0.0", "-36.0"] {
+            let changed = text.replace("36.0", radius);
+            assert_ne!(changed, text);
+            let refused = serde_json::from_str::<TaughtGoal>(&changed).unwrap_err();
+            assert!(refused.to_string().contains("radius"), "{refused}");
+        }
+    }
+}

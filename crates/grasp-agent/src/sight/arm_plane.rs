@@ -1,0 +1,130 @@
+//! Approaching without errors, quickly: the plane that the second and third joint move in.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use puma_val2::{Joint, JointDelta, Joints};
+
+use crate::limits::JointLimits;
+use crate::percept::Percept;
+use crate::percept::THETA3_ZERO;
+use crate::sight::camera_model::CameraModel;
+
+/// An exact simulator of approaching: what is perceived after a move of `JT2` and `JT3`.
+///
+/// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r, theta
+/// 3) is the whole state. It answers what [`CameraModel::after`] does, to rounding, in a tenth of
+/// the time: both joints turn about parallel axes, and the place of the ball behind the percept
+/// given last is remembered.
+#[derive(Clone, Debug)]
+pub struct ArmPlane {
+    model: CameraModel,
+    limits: JointLimits,
+    /// From the shoulder to the elbow, in a frame that turns with the upper arm.
+    elbow: Vector3<f64>,
+    /// The camera in a frame that turns with the forearm, with its origin in the elbow.
+    camera: Isometry3<f64>,
+    /// The percept given last, and where the ball is that shows so, from the elbow in the frame of
+    /// the upper arm.
+    last: Option<(Percept, Vector3<f64>)>,
+}
+
+impl ArmPlane {
+    /// The plane of the arm of `model`, with `JT5` at 45 degrees, as while reaching.
+    pub fn new(model: &CameraModel, limits: JointLimits) -> Self {
+        let stretched = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
+        let elbow = Vector3::new(model.arm.a2, model.arm.d2, 0.0);
+        let from_elbow =
+            Isometry3::translation(-elbow.x, -elbow.y, -elbow.z) * model.arm.wrist(&stretched);
+        Self {
+            model: *model,
+            limits,
+            elbow,
+            camera: from_elbow * model.mount,
+            last: None,
+        }
+    }
+
+    /// What is perceived after the move, in the frame or outside it. A move that leads `JT3` out of
+    /// its limits is not made; `None` where the ball has no image.
+    pub fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
+        let turned = delta[Joint::J3];
+        let theta3 = percept.theta3 + turned.to_degrees();
+        let jt3 = (theta3 + THETA3_ZERO).to_radians();
+        let (low, high) = self.limits.0[Joint::J3.index()];
+        if !(low..=high).contains(&jt3) {
+            return Some(*percept);
+        }
+        let ball = match &self.last {
+            Some((last, ball)) if last == percept => *ball,
+            _ => {
+                let seen = self.camera * self.model.in_camera(&percept.features)?;
+                about_y(&seen.coords, jt3 - turned)
+            }
+        };
+        let ball = about_y(&(ball + self.elbow), -delta[Joint::J2]) - self.elbow;
+        let before_camera = self
+            .camera
+            .inverse_transform_point(&Point3::from(about_y(&ball, -jt3)));
+        let features = self.model.outline(&before_camera)?;
+        let after = Percept { features, theta3 };
+        self.last = Some((after, ball));
+        Some(after)
+    }
+}
+
+/// `v` turned about the y axis.
+fn about_y(v: &Vector3<f64>, angle: f64) -> Vector3<f64> {
+    let (sin, cos) = angle.sin_cos();
+    Vector3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hough_heuristic::Features;
+
+    #[test]
+    fn it_answers_as_the_camera_model_does_along_walks_and_jumps() {
+        let (model, limits) = (CameraModel::paper(), JointLimits::paper());
+        let mut plane = ArmPlane::new(&model, limits);
+        let start = Percept {
+            features: Features {
+                x: 98.0,
+                y: 60.0,
+                r: 10.0,
+            },
+            theta3: 30.0,
+        };
+        let (mut percept, mut made) = (start, 0);
+        for step in 0_u32..400 {
+            let turn = |n: u32, of: [f64; 5]| of[(n as usize) % 5];
+            let delta = JointDelta::from_degrees([
+                0.0,
+                turn(step * 7 + step / 5, [6.0, -2.0, 0.6, -6.0, 2.0]),
+                turn(step * 3 + step / 11, [5.0, -1.6, 16.0, 0.5, -16.0]),
+                0.0,
+                0.0,
+                0.0,
+            ]);
+            let (quick, slow) = (
+                plane.after(&percept, &delta),
+                model.after(&percept, &delta, &limits),
+            );
+            let (Some(quick), Some(slow)) = (quick, slow) else {
+                assert!(quick.is_none() && slow.is_none());
+                percept = start;
+                continue;
+            };
+            let (a, b) = (quick.features, slow.features);
+            let off = [a.x - b.x, a.y - b.y, a.r - b.r, quick.theta3 - slow.theta3];
+            assert!(
+                off.iter().all(|off| off.abs() < 1e-6 * (1.0 + b.r)),
+                "step {step}: {quick:?} {slow:?}"
+            );
+            made += usize::from(quick != percept);
+            // Now and then the plane is asked about another ball than the last.
+            let far = !(5.0..68.0).contains(&a.r) || !(-50.0..200.0).contains(&a.y);
+            percept = if far || step % 13 == 0 { start } else { quick };
+        }
+        assert!(made > 100, "{made} moves");
+    }
+}

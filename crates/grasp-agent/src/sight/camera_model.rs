@@ -1,0 +1,314 @@
+//! What a controller believes of its camera: optics, place on the hand, size of the ball.
+
+use hough_heuristic::Features;
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+#[cfg(feature = "serde")]
+use nalgebra::{Quaternion, Vector4};
+use puma_val2::{Joint, JointDelta, Joints, PumaParams};
+
+#[cfg(feature = "serde")]
+use crate::checked::above_zero;
+use crate::limits::JointLimits;
+use crate::percept::Percept;
+use crate::percept::THETA3_ZERO;
+
+/// An arm with a camera on its hand, as a controller believes it to be, and the size of the ball.
+///
+/// It answers the two questions of visual servoing: what would be seen ([`CameraModel::view`]), and
+/// where is what is seen ([`CameraModel::locate`]). Lengths in metres, in VAL's world frame (origin
+/// at the shoulder, z up).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(into = "Written", try_from = "Written")
+)]
+pub struct CameraModel {
+    /// The arm.
+    pub arm: PumaParams,
+    /// Focal length, feature units (192 to the width of the frame).
+    pub focal: f64,
+    /// Where the optical axis meets the image, feature units.
+    pub centre: [f64; 2],
+    /// The camera frame (z along the optical axis, x right, y down in the image) in the hand frame
+    /// ([`PumaParams::wrist`]).
+    pub mount: Isometry3<f64>,
+    /// Radius of the ball, metres.
+    pub ball_radius: f64,
+    /// From the flange to the point between the finger pads, metres.
+    pub tool: f64,
+}
+
+impl CameraModel {
+    /// The paper's set-up: an 11.5 mm lens before a 2/3" CCD (8.8 mm wide), 60 mm above the tool
+    /// axis, 4.5 mm to its left and 20 mm past the wrist centre, looking along the tool axis; a
+    /// ball of 20 mm radius; a gripper of 126 mm.
+    pub fn paper() -> Self {
+        let axes = Matrix3::new(
+            0.0, 1.0, 0.0, //
+            -1.0, 0.0, 0.0, //
+            0.0, 0.0, 1.0,
+        );
+        Self {
+            arm: PumaParams::unimation(),
+            focal: 11.5 / 8.8 * Features::WIDTH,
+            centre: [0.5 * Features::WIDTH, 0.5 * Features::HEIGHT],
+            mount: Isometry3::from_parts(
+                Translation3::new(-0.060, 0.0045, 0.020),
+                UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)),
+            ),
+            ball_radius: 0.020,
+            tool: 0.126,
+        }
+    }
+
+    /// Whether something can be seen by it; if not, why.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let arm = &self.arm;
+        let mount = self.mount.to_homogeneous();
+        let lengths = [arm.a2, arm.a3, arm.d2, arm.d4, arm.d6, self.tool];
+        let mut numbers = lengths
+            .into_iter()
+            .chain(self.centre)
+            .chain(mount.iter().copied());
+        if !numbers.all(f64::is_finite) {
+            return Err("a length or an angle of the camera or the arm is not finite".into());
+        }
+        above_zero("the focal length", self.focal)?;
+        above_zero("the radius of the ball", self.ball_radius)
+    }
+
+    /// The ball's outline with the arm at `joints` and the ball's centre at `ball`, in the frame or
+    /// outside it; `None` where it has none, behind the camera for example.
+    pub fn view(&self, joints: &Joints, ball: &Point3<f64>) -> Option<Features> {
+        self.view_from(&(self.arm.wrist(joints) * self.mount), ball)
+    }
+
+    /// Where the ball is that shows as `features` with the arm at `joints`; `None` for features
+    /// that no ball has.
+    pub fn locate(&self, joints: &Joints, features: &Features) -> Option<Point3<f64>> {
+        Some(self.arm.wrist(joints) * self.mount * self.in_camera(features)?)
+    }
+
+    /// What would be perceived after a move, in the frame or outside it: an exact simulator of
+    /// approaching, in which the percept is the whole state. A move that leads out of `limits` is
+    /// not made; `None` where the ball has no image.
+    pub fn after(
+        &self,
+        percept: &Percept,
+        delta: &JointDelta,
+        limits: &JointLimits,
+    ) -> Option<Percept> {
+        // The plane of the upper arm and the forearm looks the same at every angle of the first two
+        // joints.
+        let joints =
+            Joints::from_degrees([0.0, -60.0, percept.theta3 + THETA3_ZERO, 0.0, 45.0, 0.0]);
+        let moved = joints + *delta;
+        let (low, high) = limits.0[Joint::J3.index()];
+        if !(low..=high).contains(&moved[Joint::J3]) {
+            return Some(*percept);
+        }
+        let ball = self.locate(&joints, &percept.features)?;
+        let features = self.view(&moved, &ball)?;
+        Some(Percept::new(features, &moved))
+    }
+
+    /// The point between the finger pads.
+    pub fn tool_point(&self, joints: &Joints) -> Point3<f64> {
+        self.arm.wrist(joints) * Point3::new(0.0, 0.0, self.arm.d6 + self.tool)
+    }
+
+    fn view_from(&self, camera: &Isometry3<f64>, ball: &Point3<f64>) -> Option<Features> {
+        self.outline(&camera.inverse_transform_point(ball))
+    }
+
+    /// The outline of the ball with its centre at `p` in the camera frame: centre and mean
+    /// semi-axis of the ellipse in which the image plane cuts the cone of rays that touch the ball.
+    pub(crate) fn outline(&self, p: &Point3<f64>) -> Option<Features> {
+        let depth2 = p.z * p.z;
+        let tangent2 = depth2 - self.ball_radius * self.ball_radius;
+        // The whole ball is in front of the lens.
+        if p.z.is_nan() || p.z <= self.ball_radius {
+            return None;
+        }
+        let scale = self.focal * p.z / tangent2;
+        let distance2 = p.coords.norm_squared();
+        let minor = self.focal * self.ball_radius / tangent2.sqrt();
+        let major = self.focal
+            * self.ball_radius
+            * (distance2 - self.ball_radius * self.ball_radius).sqrt()
+            / tangent2;
+        let features = Features {
+            x: self.centre[0] + scale * p.x,
+            y: self.centre[1] + scale * p.y,
+            r: 0.5 * (major + minor),
+        };
+        (features.x.is_finite() && features.y.is_finite() && features.r.is_finite())
+            .then_some(features)
+    }
+
+    /// The inverse of [`CameraModel::outline`].
+    pub(crate) fn in_camera(&self, features: &Features) -> Option<Point3<f64>> {
+        let wanted = [features.x, features.y, features.r];
+        if !wanted.iter().all(|v| v.is_finite()) || features.r <= 0.0 {
+            return None;
+        }
+        let ray = |x: f64, y: f64| {
+            Vector3::new(
+                (x - self.centre[0]) / self.focal,
+                (y - self.centre[1]) / self.focal,
+                1.0,
+            )
+        };
+        let depth = self.focal * self.ball_radius / features.r;
+        let mut p = Point3::from(ray(features.x, features.y) * depth.max(1.01 * self.ball_radius));
+        // The outline's centre lies nearly, not exactly, in the direction of the ball's: correct by
+        // what is left.
+        for _ in 0..30 {
+            let seen = self.outline(&p)?;
+            let z = (p.z * seen.r / features.r).max(1.001 * self.ball_radius);
+            let toward = p.coords / p.z + ray(features.x, features.y) - ray(seen.x, seen.y);
+            let next = Point3::from(toward * z);
+            let step = (next - p).norm();
+            p = next;
+            if step < 1e-12 {
+                break;
+            }
+        }
+        Some(p)
+    }
+}
+
+/// A [`CameraModel`] as it is written: the mount by the place of its origin, metres, and its turn,
+/// a unit quaternion (i, j, k, w).
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Written {
+    arm: PumaParams,
+    focal: f64,
+    centre: [f64; 2],
+    mount_at: [f64; 3],
+    mount_turn: [f64; 4],
+    ball_radius: f64,
+    tool: f64,
+}
+
+#[cfg(feature = "serde")]
+impl From<CameraModel> for Written {
+    fn from(model: CameraModel) -> Self {
+        Self {
+            arm: model.arm,
+            focal: model.focal,
+            centre: model.centre,
+            mount_at: model.mount.translation.vector.into(),
+            mount_turn: model.mount.rotation.coords.into(),
+            ball_radius: model.ball_radius,
+            tool: model.tool,
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Written> for CameraModel {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        let turn = Quaternion::from(Vector4::from(written.mount_turn));
+        let off = (turn.norm() - 1.0).abs();
+        if off.is_nan() || off > 1e-9 {
+            return Err(format!(
+                "mount_turn is {:?}; it must be a unit quaternion",
+                written.mount_turn
+            ));
+        }
+        let model = Self {
+            arm: written.arm,
+            focal: written.focal,
+            centre: written.centre,
+            // To the last digit what was written.
+            mount: Isometry3::from_parts(
+                Translation3::from(written.mount_at),
+                UnitQuaternion::new_unchecked(turn),
+            ),
+            ball_radius: written.ball_radius,
+            tool: written.tool,
+        };
+        model.check()?;
+        Ok(model)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn a_model_is_read_as_it_was_written_and_a_turn_that_is_none_is_refused() {
+        let model = CameraModel {
+            mount: Isometry3::from_parts(
+                Translation3::new(0.1, -0.2, 0.3),
+                UnitQuaternion::from_euler_angles(0.1, 0.7, -2.0),
+            ),
+            ..CameraModel::paper()
+        };
+        let text = serde_json::to_string(&model).unwrap();
+        assert_eq!(serde_json::from_str::<CameraModel>(&text).unwrap(), model);
+        let mut other: serde_json::Value = serde_json::from_str(&text).unwrap();
+        other["mount_turn"][0] = 2.0.into();
+        let refused = serde_json::from_value::<CameraModel>(other).unwrap_err();
+        assert!(refused.to_string().contains("unit quaternion"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_located_shows_as_it_was_seen() {
+        let model = CameraModel::paper();
+        let joints = Joints::from_degrees([10.0, -80.0, 195.0, 0.0, 45.0, 0.0]);
+        for (x, y, r) in [
+            (96.0, 72.0, 9.5),
+            (10.0, 130.0, 12.0),
+            (103.5, 78.0, 33.0),
+            (150.0, 20.0, 60.0),
+        ] {
+            let features = Features { x, y, r };
+            let ball = model.locate(&joints, &features).unwrap();
+            let seen = model.view(&joints, &ball).unwrap();
+            assert!(
+                (seen.x - x).abs() < 1e-6 && (seen.y - y).abs() < 1e-6 && (seen.r - r).abs() < 1e-6,
+                "{seen:?}"
+            );
+        }
+        assert!(
+            model
+                .locate(
+                    &joints,
+                    &Features {
+                        x: 96.0,
+                        y: f64::NAN,
+                        r: 10.0
+                    }
+                )
+                .is_none()
+        );
+        assert!(model.view(&joints, &Point3::new(-5.0, 0.0, 2.0)).is_none());
+    }
+
+    #[test]
+    fn at_the_goal_the_fifth_joint_alone_brings_the_gripper_to_the_ball() {
+        let model = CameraModel::paper();
+        let goal = Joints::from_degrees([0.0, -53.0, 186.2, 0.0, 45.0, 0.0]);
+        let ball = model
+            .locate(
+                &goal,
+                &Features {
+                    x: 103.5,
+                    y: 78.0,
+                    r: 33.0,
+                },
+            )
+            .unwrap();
+        let grip = Joints::from_degrees([0.0, -53.0, 186.2, 0.0, 26.99, 0.0]);
+        assert!((model.tool_point(&grip) - ball).norm() < 0.0005);
+    }
+}

@@ -1,0 +1,8 @@
+//! Eyes, and what they look for: targets in frames, the camera's model, a frozen camera.
+
+pub(crate) mod aiming;
+pub(crate) mod arm_plane;
+pub(crate) mod camera_model;
+pub(crate) mod eye;
+pub(crate) mod target;
+pub(crate) mod watch;
