@@ -18,66 +18,44 @@
 //! (0, 0) at the centre of the top-left pixel; *units* are the paper's 192x144
 //! ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
 
-mod ball;
-mod benchmark_kind;
-mod camera;
 mod cell;
-mod centre_model;
-mod distortion;
-mod ellipse;
+mod datasets;
+mod devices;
 mod error;
-mod errors;
-mod grasp;
-mod hand;
-mod least_squares;
-mod motion;
-mod mount;
-mod open_loop;
-mod optimum;
-mod overview;
-mod reach_form;
-mod reach_model;
-mod reach_noise;
-mod reach_refit;
+mod regression;
 mod render;
-mod samples;
-mod scene;
-mod scene_check;
-mod scene_kind;
-mod source;
-mod stored;
-mod workspace;
-mod y4m;
 
-pub use ball::{Ball, Holder};
-pub use benchmark_kind::BenchmarkKind;
-pub use camera::Camera;
-pub use cell::{Cell, SightRule, WorkingLimits};
-pub use centre_model::CentreModel;
-pub use distortion::Distortion;
-pub use ellipse::Ellipse;
+pub use cell::ball::{Ball, Holder};
+pub use cell::camera::Camera;
+pub use cell::distortion::Distortion;
+pub use cell::ellipse::Ellipse;
+pub use cell::errors::{ErrorLevel, Errors, UnknownName};
+pub use cell::geometry::{Cell, SightRule, WorkingLimits};
+pub use cell::grasp::{Contact, Grasp};
+pub use cell::hand::{Capsule, Hand};
+pub use cell::motion::{BallPath, Motion};
+pub use cell::mount::Mount;
+pub use cell::optimum::GoalBox;
+pub use cell::workspace::{Coverage, Workspace};
+pub use datasets::benchmark_kind::BenchmarkKind;
+pub use datasets::scene_kind::{SceneKind, Snapshot};
+pub use devices::source::{CellCamera, FeatureCamera, SharedCell, SimulatedArm};
+pub use devices::y4m::Y4mWriter;
 pub use error::{CameraError, ProjectionError, QuantityError, ReachError, SightError};
-pub use errors::{ErrorLevel, Errors, UnknownName};
-pub use grasp::{Contact, Grasp};
-pub use hand::{Capsule, Hand};
-pub use least_squares::{FitError, Quality};
-pub use motion::{BallPath, Motion};
-pub use mount::Mount;
-pub use open_loop::OpenLoopError;
-pub use optimum::GoalBox;
-pub use reach_form::ReachForm;
-pub use reach_model::ReachModel;
-pub use render::{Renderer, Round, Shot, Sighting};
-pub use samples::{
+pub use regression::centre_model::CentreModel;
+pub use regression::least_squares::{FitError, Quality};
+pub use regression::open_loop::OpenLoopError;
+pub use regression::reach_form::ReachForm;
+pub use regression::reach_model::ReachModel;
+pub use regression::samples::{
     CentreSample, MOST_SAMPLES, MoveLists, ReachSample, exploring_start, sample_moves,
     try_sample_moves, with_noise,
 };
-pub use scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
-pub use scene_kind::{SceneKind, Snapshot};
-pub use source::{CellCamera, FeatureCamera, SharedCell, SimulatedArm};
-pub use stored::StoredModelError;
-pub use workspace::{Coverage, Workspace};
-pub use y4m::Y4mWriter;
+pub use regression::stored::StoredModelError;
+pub use render::renderer::Renderer;
+pub use render::scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
+pub use render::shot::Shot;
+pub use render::truth::{Round, Sighting};
 
 pub use hough_heuristic::image;
 pub use nalgebra;

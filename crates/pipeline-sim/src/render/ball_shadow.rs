@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
+use crate::cell::ball::{Ball, Holder};
+use crate::render::scene::Scene;
 use crate::render::shadow::{table_light, toward};
-use crate::{Ball, Holder, Scene};
 
 /// The soft shadows of ball and holder on the table.
 #[derive(Clone, Debug)]
@@ -188,7 +189,7 @@ mod tests {
     use nalgebra::{Point2, Point3};
 
     use super::*;
-    use crate::Light;
+    use crate::render::scene::Light;
 
     /// Factors along the x-axis, one for each millimetre.
     fn along_x(scene: &Scene, ball: &Ball, holder: Option<Holder>) -> Vec<f32> {

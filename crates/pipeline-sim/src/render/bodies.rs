@@ -4,9 +4,9 @@ use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::render::canvas::Canvas;
+use crate::render::scene::{Look, Occluder, Scene, Shape, Thing};
 use crate::render::texture::Texture;
 use crate::render::view::View;
-use crate::{Look, Occluder, Scene, Shape, Thing};
 
 /// Everything a body's shading depends on.
 pub(super) struct Studio<'a> {

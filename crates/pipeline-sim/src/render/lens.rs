@@ -3,7 +3,7 @@
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Point2, Vector2};
 
-use crate::Camera;
+use crate::cell::camera::Camera;
 use crate::render::canvas::{Area, Canvas};
 
 /// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts
@@ -429,7 +429,7 @@ fn weigh_blocks<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Distortion;
+    use crate::cell::distortion::Distortion;
 
     /// How far pixels are taken from where the lens has them, at most.
     fn worst(camera: &Camera) -> f64 {

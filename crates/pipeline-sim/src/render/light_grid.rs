@@ -223,7 +223,7 @@ mod tests {
     use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
     use super::*;
-    use crate::Camera;
+    use crate::cell::camera::Camera;
 
     /// A strip of shadow 12 mm wide along y, with a penumbra of 4 mm.
     struct Strip;

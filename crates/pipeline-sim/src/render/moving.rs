@@ -4,13 +4,15 @@
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use puma_val2::Joints;
 
-use crate::render::Renderer;
+use crate::cell::camera::Camera;
+use crate::cell::geometry::Cell;
 use crate::render::canvas::{Area, Canvas};
 use crate::render::lens::soften;
 use crate::render::picture::{Item, fills_frame, table_plane};
+use crate::render::renderer::Renderer;
+use crate::render::scene::Shape;
 use crate::render::smear::{Smear, Sweep, affine, mapped};
 use crate::render::view::View;
-use crate::{Camera, Cell, Shape};
 
 /// A cell and the joints of its arm.
 pub(super) type Moment = (Cell, Joints);
@@ -380,8 +382,11 @@ mod tests {
     use rand::SeedableRng;
     use rand::rngs::Xoshiro256PlusPlus;
 
-    use crate::render::Renderer;
-    use crate::{BenchmarkKind, Scene, SceneKind, Sensor, Shot, Snapshot};
+    use crate::datasets::benchmark_kind::BenchmarkKind;
+    use crate::datasets::scene_kind::{SceneKind, Snapshot};
+    use crate::render::renderer::Renderer;
+    use crate::render::scene::{Scene, Sensor};
+    use crate::render::shot::Shot;
 
     /// The frame as it is taken, and as it is when 48 moments of every field are drawn; without
     /// noise.

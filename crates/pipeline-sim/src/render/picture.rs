@@ -2,14 +2,15 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::render::Renderer;
+use crate::cell::geometry::Cell;
 use crate::render::ball_shadow::BallShadow;
 use crate::render::bodies::{Studio, plane_row};
 use crate::render::canvas::Canvas;
 use crate::render::light_grid::Lighting;
+use crate::render::renderer::Renderer;
+use crate::render::scene::{Look, Thing};
 use crate::render::shadow::{ThingShadows, lamps, table_light};
 use crate::render::view::View;
-use crate::{Cell, Look, Thing};
 
 /// Near and far edge of the table along x, and its half width along y, metres.
 const TABLE: (f64, f64, f64) = (-0.45, 1.30, 1.15);

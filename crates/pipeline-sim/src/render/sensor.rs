@@ -5,9 +5,10 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::cell::camera::Camera;
 use crate::render::canvas::Canvas;
 use crate::render::lens::three_taps;
-use crate::{Camera, Sensor};
+use crate::render::scene::Sensor;
 
 const NOISES: usize = 1 << 16;
 const LEVELS: usize = 4096;

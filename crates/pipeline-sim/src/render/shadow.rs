@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::render::scene::{Light, Scene, Shape, Thing};
 use crate::render::texture::CoarseMap;
-use crate::{Light, Scene, Shape, Thing};
 
 /// Directions toward points of a lamp's disc.
 const LAMP_POINTS: usize = 24;
@@ -274,7 +274,7 @@ fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Look;
+    use crate::render::scene::Look;
 
     #[test]
     fn the_gloom_at_the_foot_of_a_box_has_the_shape_of_the_box() {

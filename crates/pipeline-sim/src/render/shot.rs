@@ -3,9 +3,10 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::Joints;
 
+use crate::cell::geometry::Cell;
 use crate::render::lens::soften;
 use crate::render::moving::Exposed;
-use crate::{Cell, Renderer};
+use crate::render::renderer::Renderer;
 
 /// How a frame is taken while things move.
 #[derive(Clone, Copy, Debug, PartialEq)]

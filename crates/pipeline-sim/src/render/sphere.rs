@@ -3,9 +3,9 @@
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Point3, Vector3};
 
-use crate::Look;
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
+use crate::render::scene::Look;
 
 impl Studio<'_> {
     /// Draws a sphere.

@@ -3,14 +3,16 @@
 use nalgebra::{Point2, Point3, Vector3};
 use puma_val2::Joints;
 
-use crate::camera::unit_outline;
-use crate::render::Renderer;
+use crate::cell::camera::unit_outline;
+use crate::cell::ellipse::Ellipse;
+use crate::cell::geometry::Cell;
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
 use crate::render::picture::Item;
+use crate::render::renderer::Renderer;
+use crate::render::scene::{Scene, Shape};
 use crate::render::shadow::lamps;
 use crate::render::view::View;
-use crate::{Cell, Ellipse, Scene, Shape};
 
 /// What a round outline belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

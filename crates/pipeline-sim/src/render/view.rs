@@ -3,7 +3,7 @@
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector2, Vector3};
 
-use crate::Camera;
+use crate::cell::camera::Camera;
 
 /// A camera at a place.
 #[derive(Clone, Debug)]

@@ -9,11 +9,16 @@ use nalgebra::{Point2, Point3};
 use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 
-use crate::scene_kind::lamps;
-use crate::{
-    Ball, Camera, CameraError, Cell, Look, Occluder, Scene, Sensor, Shape, Shot, Snapshot, Thing,
-    UnknownName, Workspace,
-};
+use crate::cell::ball::Ball;
+use crate::cell::camera::Camera;
+use crate::cell::errors::UnknownName;
+use crate::cell::geometry::Cell;
+use crate::cell::workspace::Workspace;
+use crate::datasets::scene_kind::Snapshot;
+use crate::datasets::scene_kind::lamps;
+use crate::error::CameraError;
+use crate::render::scene::{Look, Occluder, Scene, Sensor, Shape, Thing};
+use crate::render::shot::Shot;
 
 /// One difficulty for a circle detector.
 ///

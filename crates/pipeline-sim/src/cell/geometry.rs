@@ -4,7 +4,12 @@ use hough_heuristic::{Circle, Features};
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joint, Joints, PumaParams};
 
-use crate::{Ball, Camera, Capsule, Ellipse, Hand, Holder, Mount, ReachError, SightError};
+use crate::cell::ball::{Ball, Holder};
+use crate::cell::camera::Camera;
+use crate::cell::ellipse::Ellipse;
+use crate::cell::hand::{Capsule, Hand};
+use crate::cell::mount::Mount;
+use crate::error::{ReachError, SightError};
 
 /// When a ball counts as seen.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,10 +2,14 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Entry, Fit, Hold, Rows, ridge_strength};
-use crate::reach_noise::{Misfit, Noise, Shares, widening};
-use crate::stored::{Reader, Writer};
-use crate::{CentreSample, FitError, Quality, QuantityError, SightRule, StoredModelError};
+use crate::cell::geometry::SightRule;
+use crate::error::QuantityError;
+use crate::regression::least_squares::{Entry, Fit, Hold, Rows, ridge_strength};
+use crate::regression::least_squares::{FitError, Quality};
+use crate::regression::reach_noise::{Misfit, Noise, Shares, widening};
+use crate::regression::samples::CentreSample;
+use crate::regression::stored::StoredModelError;
+use crate::regression::stored::{Reader, Writer};
 
 /// Terms 1, d1, r d1 of the longest move of the list at the goal's radius: what one unit of a ridge
 /// is measured in.
@@ -328,7 +332,7 @@ mod stored {
     //! The model in serde's terms. What comes back is believed only after it has been checked.
 
     use super::{CentreModel, Fit, Noise, Quality, StoredModelError};
-    use crate::stored::{VERSION, known};
+    use crate::regression::stored::{VERSION, known};
 
     #[derive(serde::Serialize, serde::Deserialize)]
     pub(super) struct CentreModelData {

@@ -5,8 +5,10 @@ use puma_val2::{Joint, Joints};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::cell::geometry::Cell;
+use crate::cell::workspace::Workspace;
+use crate::error::QuantityError;
 use crate::error::finite;
-use crate::{Cell, QuantityError, Workspace};
 
 /// A path of the ball's centre over time.
 #[derive(Clone, Debug, PartialEq)]

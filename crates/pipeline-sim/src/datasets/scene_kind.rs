@@ -9,10 +9,17 @@ use nalgebra::{Point2, Vector3};
 use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 
-use crate::{
-    Ball, Camera, CameraError, Cell, Distortion, Light, Look, Occluder, Renderer, Scene, Sensor,
-    Shape, Shot, Sighting, Thing, UnknownName, Workspace,
-};
+use crate::cell::ball::Ball;
+use crate::cell::camera::Camera;
+use crate::cell::distortion::Distortion;
+use crate::cell::errors::UnknownName;
+use crate::cell::geometry::Cell;
+use crate::cell::workspace::Workspace;
+use crate::error::CameraError;
+use crate::render::renderer::Renderer;
+use crate::render::scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
+use crate::render::shot::Shot;
+use crate::render::truth::Sighting;
 
 /// What makes a frame difficult.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

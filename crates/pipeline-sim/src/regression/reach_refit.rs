@@ -2,10 +2,13 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Fit, Hold, Rows, ridge_strength};
-use crate::reach_model::push;
-use crate::reach_noise::Misfit;
-use crate::{FitError, ReachForm, ReachModel, ReachSample};
+use crate::regression::least_squares::FitError;
+use crate::regression::least_squares::{Fit, Hold, Rows, ridge_strength};
+use crate::regression::reach_form::ReachForm;
+use crate::regression::reach_model::ReachModel;
+use crate::regression::reach_model::push;
+use crate::regression::reach_noise::Misfit;
+use crate::regression::samples::ReachSample;
 
 impl ReachModel {
     /// The model fitted anew to samples of another plant, held toward this one: what N real moves

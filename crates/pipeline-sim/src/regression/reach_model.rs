@@ -3,13 +3,16 @@
 
 use hough_heuristic::Features;
 
-use crate::least_squares::{Entry, Fit, Rows};
-use crate::reach_noise::{Noise, widening};
-use crate::samples;
-use crate::stored::{Reader, Writer};
-use crate::{
-    FitError, Quality, QuantityError, ReachForm, ReachSample, SightRule, StoredModelError,
-};
+use crate::cell::geometry::SightRule;
+use crate::error::QuantityError;
+use crate::regression::least_squares::{Entry, Fit, Rows};
+use crate::regression::least_squares::{FitError, Quality};
+use crate::regression::reach_form::ReachForm;
+use crate::regression::reach_noise::{Noise, widening};
+use crate::regression::samples;
+use crate::regression::samples::ReachSample;
+use crate::regression::stored::StoredModelError;
+use crate::regression::stored::{Reader, Writer};
 
 /// A regression simulator of the approaching behaviour, fitted to samples of real or simulated
 /// moves.
@@ -431,7 +434,7 @@ mod stored {
     //! The model in serde's terms. What comes back is believed only after it has been checked.
 
     use super::{Fit, Noise, Quality, ReachForm, ReachModel, StoredModelError};
-    use crate::stored::{VERSION, known};
+    use crate::regression::stored::{VERSION, known};
 
     #[derive(serde::Serialize, serde::Deserialize)]
     pub(super) struct ReachModelData {

@@ -1,7 +1,9 @@
 //! Which quantity of a scene or a shot makes no sense.
 
+use crate::error::QuantityError;
 use crate::error::{amount, at_most, finite};
-use crate::{Look, QuantityError, Scene, Sensor, Shape, Shot};
+use crate::render::scene::{Look, Scene, Sensor, Shape};
+use crate::render::shot::Shot;
 
 impl Scene {
     /// Whether every quantity is one that a scene can have. [`crate::Renderer`] does not ask: it
@@ -132,7 +134,9 @@ mod tests {
     use rand::rngs::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::{BenchmarkKind, Light, Occluder, SceneKind, Snapshot};
+    use crate::datasets::benchmark_kind::BenchmarkKind;
+    use crate::datasets::scene_kind::{SceneKind, Snapshot};
+    use crate::render::scene::{Light, Occluder};
 
     type Spoil = fn(&mut Scene);
 

@@ -3,8 +3,10 @@
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta, Joints};
 
+use crate::cell::geometry::Cell;
+use crate::error::QuantityError;
 use crate::error::{ascending, finite};
-use crate::{Cell, MoveLists, QuantityError};
+use crate::regression::samples::MoveLists;
 
 /// Intervals of the image features in which the goal is reached, both ends included, feature units.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,10 @@ use std::str::FromStr;
 use puma_val2::{ArmError, Joints};
 use rand::{Rng, RngExt};
 
-use crate::{CameraError, Cell, Holder, Mount};
+use crate::cell::ball::Holder;
+use crate::cell::geometry::Cell;
+use crate::cell::mount::Mount;
+use crate::error::CameraError;
 
 /// The ways in which a real cell differs from the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]

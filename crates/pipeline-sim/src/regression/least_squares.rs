@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::QuantityError;
-use crate::reach_noise::{Misfit, pooled};
+use crate::error::QuantityError;
+use crate::regression::reach_noise::{Misfit, pooled};
 
 /// Why a regression has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -3,8 +3,10 @@
 use puma_val2::Joints;
 use rand::{Rng, RngExt};
 
+use crate::cell::ball::Ball;
+use crate::cell::geometry::Cell;
+use crate::error::QuantityError;
 use crate::error::ascending;
-use crate::{Ball, Cell, QuantityError};
 
 /// The part of the world in which balls lie: a sector of a ring around the waist axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

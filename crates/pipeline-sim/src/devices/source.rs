@@ -9,10 +9,17 @@ use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySen
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
+use crate::cell::errors::Drive;
+use crate::cell::errors::Errors;
+use crate::cell::geometry::Cell;
+use crate::cell::grasp::{Contact, Grasp};
+use crate::cell::motion::Motion;
+use crate::error::QuantityError;
 use crate::error::amount;
-use crate::errors::Drive;
-use crate::samples::NOISE;
-use crate::{Cell, Contact, Errors, Grasp, Motion, QuantityError, Renderer, Shot, with_noise};
+use crate::regression::samples::NOISE;
+use crate::regression::samples::with_noise;
+use crate::render::renderer::Renderer;
+use crate::render::shot::Shot;
 
 /// A cell that camera, arm and whoever pushes the ball have in common.
 ///

@@ -5,8 +5,10 @@ use std::fmt::Write as _;
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::Joints;
 
+use crate::cell::geometry::Cell;
+use crate::cell::workspace::Workspace;
+use crate::error::QuantityError;
 use crate::error::{ascending, at_most, finite};
-use crate::{Cell, QuantityError, Workspace};
 
 /// Width of the drawing, pixels.
 const WIDTH: f64 = 1120.0;
@@ -443,7 +445,7 @@ impl Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ball;
+    use crate::cell::ball::Ball;
 
     #[test]
     fn the_section_holds_what_the_workspace_holds_of_the_arms_plane() {

@@ -5,8 +5,11 @@ use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::cell::ball::Ball;
+use crate::cell::geometry::Cell;
+use crate::error::QuantityError;
 use crate::error::{amount, at_most};
-use crate::{Ball, Cell, FitError, QuantityError};
+use crate::regression::least_squares::FitError;
 
 /// What errors call the noise on features.
 pub(crate) const NOISE: &str = "standard deviation of the features' noise (units)";

@@ -3,7 +3,7 @@
 
 use hough_heuristic::Features;
 
-use crate::ReachForm;
+use crate::regression::reach_form::ReachForm;
 
 /// By how much each of the two causes of an error shows in one feature.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,9 +3,10 @@
 use std::fmt::{Debug, Write as _};
 use std::str::{FromStr, Lines};
 
-use crate::least_squares::Fit;
-use crate::reach_noise::Noise;
-use crate::{Quality, ReachForm};
+use crate::regression::least_squares::Fit;
+use crate::regression::least_squares::Quality;
+use crate::regression::reach_form::ReachForm;
+use crate::regression::reach_noise::Noise;
 
 /// Version of the stored form of models that is written, and the only one that is read.
 pub(crate) const VERSION: u32 = 1;

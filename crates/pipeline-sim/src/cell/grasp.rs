@@ -4,7 +4,8 @@ use hough_heuristic::Features;
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joints, PumaParams};
 
-use crate::{Cell, Holder};
+use crate::cell::ball::Holder;
+use crate::cell::geometry::Cell;
 
 /// What closing the jaws came to.
 #[derive(Clone, Copy, Debug, PartialEq)]

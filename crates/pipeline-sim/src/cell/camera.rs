@@ -3,7 +3,9 @@
 use hough_heuristic::Circle;
 use nalgebra::{Point2, Point3, Vector3};
 
-use crate::{CameraError, Distortion, Ellipse, ProjectionError};
+use crate::cell::distortion::Distortion;
+use crate::cell::ellipse::Ellipse;
+use crate::error::{CameraError, ProjectionError};
 
 /// A monochrome camera: a pinhole with square pixels, and the distortion of its lens.
 ///

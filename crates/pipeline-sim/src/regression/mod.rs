@@ -1,0 +1,11 @@
+//! Regression simulators: samples of moves, and the models fitted to them.
+
+pub(crate) mod centre_model;
+pub(crate) mod least_squares;
+pub(crate) mod open_loop;
+pub(crate) mod reach_form;
+pub(crate) mod reach_model;
+pub(crate) mod reach_noise;
+pub(crate) mod reach_refit;
+pub(crate) mod samples;
+pub(crate) mod stored;

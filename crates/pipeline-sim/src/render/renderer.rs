@@ -1,0 +1,185 @@
+//! The renderer: draws what the camera on the hand sees.
+
+use hough_heuristic::image::GrayImage;
+use puma_val2::Joints;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+
+use crate::cell::camera::Camera;
+use crate::cell::geometry::Cell;
+use crate::render::canvas::Canvas;
+use crate::render::lens::{Warp, defocus};
+use crate::render::light_grid::LightGrid;
+use crate::render::scene::Scene;
+use crate::render::sensor::Exposure;
+use crate::render::shadow::ThingShadows;
+use crate::render::smear::Smear;
+use crate::render::texture::{CoarseMap, Texture};
+use crate::render::view::View;
+
+/// Draws frames of a cell.
+///
+/// Owns its buffers: after the first frame nothing is allocated but small lists of corners. The
+/// scene's textures are made once, from the seed; the sensor's noise depends on the seed and on how
+/// many frames have been drawn, on nothing else.
+///
+/// ```
+/// use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
+///
+/// let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
+/// let mut renderer = Renderer::new(&Scene::laboratory(), 1);
+/// let pose = Workspace::paper().search_poses()[3];
+/// let frame = renderer.render(&cell, &pose);
+/// assert_eq!(frame.dimensions(), (768, 576));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Renderer {
+    pub(super) scene: Scene,
+    pub(super) seed: u64,
+    pub(super) frames: u64,
+    pub(super) wood: Texture,
+    /// Light on the table: stains and the shadows of the things.
+    pub(super) table: ThingShadows,
+    /// Brightness of the panels on the walls.
+    pub(super) walls: Vec<f32>,
+    pub(super) exposure: Exposure,
+    pub(super) light: LightGrid,
+    pub(super) canvas: Canvas,
+    /// The frame before distortion, and the distortion; unused without.
+    pub(super) ideal: Canvas,
+    pub(super) warp: Option<Warp>,
+    pub(super) spare: Vec<f32>,
+    /// Parts of a frame in motion, drawn larger than the frame.
+    pub(super) sharp: Canvas,
+    pub(super) layer: Canvas,
+    pub(super) smear: Smear,
+    /// Light of one field, and of both.
+    pub(super) exposed: Vec<f32>,
+    pub(super) woven: Vec<f32>,
+    pub(super) image: GrayImage,
+}
+
+impl Renderer {
+    /// A renderer for a scene.
+    pub fn new(scene: &Scene, seed: u64) -> Self {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let wood = Texture::wood(0.60, &mut rng);
+        let stains = 0.8 * scene.table.texture.clamp(0.0, 1.0) as f32;
+        let stains = CoarseMap::stains(601, (-0.6, -1.2), 2.4, stains, &mut rng);
+        let table = ThingShadows::new(stains, scene);
+        let walls = (0..48).map(|_| rng.random_range(0.12_f32..0.55)).collect();
+        let exposure = Exposure::new(scene.sensor, &mut rng);
+        Self {
+            scene: scene.clone(),
+            seed,
+            frames: 0,
+            wood,
+            table,
+            walls,
+            exposure,
+            light: LightGrid::default(),
+            canvas: Canvas::default(),
+            ideal: Canvas::default(),
+            warp: None,
+            spare: Vec::new(),
+            sharp: Canvas::default(),
+            layer: Canvas::default(),
+            smear: Smear::default(),
+            exposed: Vec::new(),
+            woven: Vec::new(),
+            image: GrayImage::new(0, 0),
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Frames drawn so far: the number of the next frame.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Draws what the camera of `cell` sees with the arm at `joints`.
+    ///
+    /// Joints or places that are not finite give a frame of noise without content.
+    pub fn render(&mut self, cell: &Cell, joints: &Joints) -> &GrayImage {
+        self.illuminate(cell, joints);
+        self.exposure.blurred = false;
+        self.develop(cell)
+    }
+
+    /// The light that reaches the sensor.
+    pub(super) fn illuminate(&mut self, cell: &Cell, joints: &Joints) {
+        let pose = cell.camera_pose(joints);
+        let numbers = pose
+            .translation
+            .vector
+            .iter()
+            .chain(pose.rotation.coords.iter());
+        let finite = numbers
+            .chain(cell.ball.centre.iter())
+            .all(|v| v.is_finite());
+        self.through_lens(&cell.camera, |this, canvas, camera| {
+            if finite {
+                this.draw(canvas, cell, &View::new(camera, pose));
+            } else {
+                canvas.light.fill(0.0);
+            }
+            true
+        });
+    }
+
+    /// Has `draw` draw what a camera without distortion sees, and distorts and blurs it as the lens
+    /// of `camera` does. Passes on what `draw` returns; after `false` there is no picture.
+    pub(super) fn through_lens(
+        &mut self,
+        camera: &Camera,
+        draw: impl FnOnce(&mut Self, &mut Canvas, &Camera) -> bool,
+    ) -> bool {
+        if self.warp.as_ref().is_none_or(|warp| !warp.is_for(camera)) {
+            self.warp = Warp::new(camera);
+        }
+        let (width, height) = camera.size();
+        let mut canvas = std::mem::take(&mut self.canvas);
+        canvas.resize(width as usize, height as usize);
+        let drawn = match self.warp.take() {
+            None => draw(self, &mut canvas, camera),
+            Some(warp) => {
+                let mut ideal = std::mem::take(&mut self.ideal);
+                let (width, height) = warp.ideal.size();
+                ideal.resize(width as usize, height as usize);
+                let drawn = draw(self, &mut ideal, &warp.ideal);
+                if drawn {
+                    warp.apply(&ideal, &mut canvas);
+                }
+                self.ideal = ideal;
+                self.warp = Some(warp);
+                drawn
+            }
+        };
+        if drawn {
+            defocus(&mut canvas, self.scene.sensor.defocus, &mut self.spare);
+        }
+        self.canvas = canvas;
+        drawn
+    }
+
+    /// Turns the light into the next frame.
+    pub(super) fn develop(&mut self, cell: &Cell) -> &GrayImage {
+        let (width, height) = cell.camera.size();
+        if self.image.dimensions() != (width, height) {
+            self.image = GrayImage::new(width, height);
+        }
+        self.exposure.expose(
+            &self.canvas,
+            &cell.camera,
+            self.seed,
+            self.frames,
+            &mut self.image,
+        );
+        self.frames += 1;
+        &self.image
+    }
+}
