@@ -3,18 +3,16 @@
 mod circle;
 mod ellipse;
 mod line;
-mod search;
 
 pub(crate) use circle::{circles_of_radius, longest_outline};
 pub use ellipse::Ellipse;
 pub use line::Line;
-pub use search::{CurveSearch, CurveSearchConfig, FoundCurve};
 
-use crate::EdgePixel;
+use crate::edges::EdgePixel;
 
 /// A curve `f(x, y, a1..an) = 0` that n pixels determine (section 2.1, equation 1).
 ///
-/// [`CurveSearch`] finds any such curve. The crate has [`Line`] (n = 2), [`Circle`](crate::Circle)
+/// [`CurveSearch`](crate::CurveSearch) finds any such curve. The crate has [`Line`] (n = 2), [`Circle`](crate::Circle)
 /// (n = 3) and [`Ellipse`] (n = 5).
 pub trait Curve: Sized {
     /// The number n of parameters, and of the pixels that determine them.

@@ -4,8 +4,11 @@ use std::time::Duration;
 
 use image::GrayImage;
 
-use crate::evidence::explained_band;
-use crate::{Circle, ConfigError, Curve, EdgeMap, EdgePixel, Trusted, TrustedConfig};
+use crate::acceptance::explained_band;
+use crate::circle::Circle;
+use crate::curve::Curve;
+use crate::edges::{EdgeMap, EdgePixel};
+use crate::error::ConfigError;
 
 /// A circle that a detector reports, with how far to trust it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,25 +120,4 @@ impl StageTimes {
     pub fn total(&self) -> Duration {
         self.edges + self.structure + self.search
     }
-}
-
-/// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
-///
-/// For one-off use: [`Trusted`] with the default settings, which reports up to 32 circles. For a
-/// stream of frames build a detector once.
-///
-/// # Errors
-/// [`ConfigError::RadiusRange`] if the range is empty, [`ConfigError::OutOfRange`] if its lower end
-/// is below 4.
-pub fn detect_circles(
-    frame: &GrayImage,
-    min_radius: f64,
-    max_radius: f64,
-) -> Result<Vec<Detection>, ConfigError> {
-    let config = TrustedConfig {
-        min_radius,
-        max_radius,
-        ..TrustedConfig::default()
-    };
-    Ok(Trusted::new(config)?.detect(frame))
 }

@@ -1,8 +1,12 @@
 //! Where frames come from.
 
+#[cfg(feature = "files")]
+mod files;
 mod stream;
 mod view;
 
+#[cfg(feature = "files")]
+pub use files::ImageFiles;
 pub use stream::{RawFrames, Y4mFrames};
 pub use view::GrayView;
 

@@ -67,48 +67,42 @@
 //! useful θ, and what is found there means little. A sphere far off the optical axis projects to an
 //! ellipse; a larger `tolerance` forgives a little of that.
 
-mod belonging;
+mod a_contrario;
+mod acceptance;
 mod circle;
 mod curve;
 mod detect;
 mod edges;
 mod error;
-mod evidence;
-#[cfg(feature = "files")]
-mod files;
-mod fit;
 mod frame;
-mod heuristic;
-mod randomized_hough;
 mod region;
 mod sampling;
 #[cfg(feature = "files")]
 mod stages;
-mod standard_hough;
-mod structure;
-mod trusted;
+mod transforms;
 
+pub use a_contrario::{Effort, Measurement, Trusted, TrustedConfig, detect_circles};
+pub use acceptance::Acceptance;
 pub use circle::{Circle, Features};
-pub use curve::{Curve, CurveSearch, CurveSearchConfig, Ellipse, FoundCurve, Line};
-pub use detect::{CircleDetector, Detection, StageTimes, Stages, detect_circles};
+pub use curve::{Curve, Ellipse, Line};
+pub use detect::{CircleDetector, Detection, StageTimes, Stages};
 pub use edges::{
     Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny,
 };
 pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
-pub use evidence::Acceptance;
 #[cfg(feature = "files")]
-pub use files::ImageFiles;
+pub use frame::ImageFiles;
 pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
-pub use heuristic::{Heuristic, HeuristicConfig};
 pub use image;
-pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use region::Region;
 pub use sampling::Sampling;
 #[cfg(feature = "files")]
 pub use stages::{StageError, write_stages};
-pub use standard_hough::{StandardHough, StandardHoughConfig};
-pub use trusted::{Effort, Measurement, Trusted, TrustedConfig};
+pub use transforms::{
+    CurveSearch, CurveSearchConfig, FoundCurve, Heuristic, HeuristicConfig, RandomizedHough,
+    RandomizedHoughConfig, StandardHough, StandardHoughConfig,
+};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,6 +1,7 @@
 //! Where in the frame a centre may lie.
 
-use crate::{Circle, ConfigError};
+use crate::circle::Circle;
+use crate::error::ConfigError;
 
 /// A rectangle of pixels of a frame, never empty: the *region of interest* for the centre of a
 /// circle.

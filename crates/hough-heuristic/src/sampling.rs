@@ -1,11 +1,16 @@
 //! How the random searches draw their pixels.
 
+pub(crate) mod structure;
+
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
+use crate::acceptance::Acceptance;
+use crate::circle::Circle;
+use crate::curve::Curve;
 use crate::curve::circles_of_radius;
-use crate::structure::Structure;
-use crate::{Acceptance, Circle, Curve, EdgePixel};
+use crate::edges::EdgePixel;
+use crate::sampling::structure::Structure;
 
 /// Where the pixels of a draw come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use image::{GrayImage, Rgb, RgbImage};
 
-use crate::{Circle, Curve, Detection, Stages};
+use crate::circle::Circle;
+use crate::curve::Curve;
+use crate::detect::{Detection, Stages};
 
 /// A picture could not be written.
 #[derive(Debug, thiserror::Error)]

@@ -1,5 +1,6 @@
 use super::{Curve, crowded, round};
-use crate::{Circle, EdgePixel};
+use crate::circle::Circle;
+use crate::edges::EdgePixel;
 
 impl Curve for Circle {
     const PARAMETERS: usize = 3;

@@ -1,5 +1,5 @@
 use super::{Curve, crowded, round};
-use crate::EdgePixel;
+use crate::edges::EdgePixel;
 
 /// An ellipse.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,5 @@
 use super::{Curve, crowded, round};
-use crate::EdgePixel;
+use crate::edges::EdgePixel;
 
 /// A straight line without ends, in Hesse's normal form `x cos φ + y sin φ = ρ`.
 ///

@@ -5,7 +5,7 @@ use image::GrayImage;
 use super::noise::{ROW_STEP, noise_deviation};
 use super::rows::{Candidate, MAX_REACH, Passes, Rows, STRONG, UNITS, WEAK, WEIGHT_SUM};
 use super::{EdgeDetector, EdgeMap, dispatch};
-use crate::ConfigError;
+use crate::error::ConfigError;
 use crate::error::require;
 
 /// The largest threshold: no gradient is steeper.
@@ -295,8 +295,8 @@ pub(super) fn noise_gain(weights: &[u16]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::plain;
     use super::*;
+    use crate::edges::plain;
     use proptest::prelude::*;
 
     #[test]

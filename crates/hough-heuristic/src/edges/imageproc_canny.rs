@@ -4,7 +4,7 @@ use image::GrayImage;
 
 use super::canny::check_thresholds;
 use super::{EdgeDetector, EdgeMap};
-use crate::ConfigError;
+use crate::error::ConfigError;
 
 /// Canny's operator of the crate `imageproc`: an independent second opinion, some thirty times as
 /// slow as [`Canny`].

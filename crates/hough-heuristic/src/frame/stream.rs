@@ -3,7 +3,7 @@ use std::io::{self, Read};
 use image::GrayImage;
 
 use super::{FrameError, FrameSource};
-use crate::ConfigError;
+use crate::error::ConfigError;
 
 /// The longest line of a Y4M header that is read, bytes.
 const MAX_LINE: usize = 1024;

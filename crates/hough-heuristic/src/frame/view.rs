@@ -1,6 +1,6 @@
 use image::GrayImage;
 
-use crate::ConfigError;
+use crate::error::ConfigError;
 
 /// A monochrome frame in a caller's memory, row by row, each row `stride` bytes after the one
 /// before.

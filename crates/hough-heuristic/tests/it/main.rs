@@ -12,6 +12,8 @@ mod scenes;
 #[path = "../../scenes/simple.rs"]
 mod simple;
 
+mod a_contrario;
+mod a_contrario_score;
 mod any_frame;
 mod curves;
 mod detectors;
@@ -21,5 +23,3 @@ mod refusals;
 mod serde;
 #[cfg(feature = "files")]
 mod stages;
-mod trusted;
-mod trusted_score;

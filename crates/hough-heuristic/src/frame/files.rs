@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use image::{GrayImage, ImageReader};
 
-use crate::{FrameError, FrameSource};
+use crate::frame::{FrameError, FrameSource};
 
 /// The endings that a folder is searched for, in lower case.
 const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "pgm"];

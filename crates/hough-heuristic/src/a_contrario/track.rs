@@ -3,7 +3,8 @@
 use image::GrayImage;
 
 use super::{LEAST_SIDE, Measurement, Trusted};
-use crate::{Circle, CircleDetector, Detection};
+use crate::circle::Circle;
+use crate::detect::{CircleDetector, Detection};
 
 impl Trusted {
     /// Looks for the circle `last` first, whose centre and radius may have changed by `reach`

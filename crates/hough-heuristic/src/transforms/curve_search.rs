@@ -1,11 +1,13 @@
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use super::Curve;
-use crate::belonging::{MAX_TOLERANCE, NearEdges};
+use super::belonging::NearEdges;
+use crate::acceptance::MAX_TOLERANCE;
+use crate::curve::Curve;
+use crate::edges::{EdgeMap, EdgePixel};
+use crate::error::ConfigError;
 use crate::error::require;
-use crate::structure::Structure;
-use crate::{ConfigError, EdgeMap, EdgePixel};
+use crate::sampling::structure::Structure;
 
 /// The settings of [`CurveSearch`].
 #[derive(Clone, Copy, Debug, PartialEq)]

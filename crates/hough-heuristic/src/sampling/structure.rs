@@ -3,7 +3,7 @@
 
 use rand::Rng;
 
-use crate::EdgePixel;
+use crate::edges::EdgePixel;
 
 /// Side of a cell, pixels: a window of a small ball spans a few cells, one of the whole frame a few
 /// dozen rows of cells.

@@ -1,7 +1,8 @@
 //! The settings of the trusted detector.
 
+use crate::error::ConfigError;
 use crate::error::{require, require_radii};
-use crate::{ConfigError, Region};
+use crate::region::Region;
 
 /// The settings of [`Trusted`](crate::Trusted).
 ///

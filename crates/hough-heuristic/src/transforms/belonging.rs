@@ -1,7 +1,9 @@
 //! The checking procedure: how many pixels of an estimated curve are edges.
 
+use crate::circle::Circle;
+use crate::curve::Curve;
 use crate::curve::{longest_outline, round};
-use crate::{Circle, Curve, EdgePixel};
+use crate::edges::EdgePixel;
 
 /// Answers for every pixel of a frame whether an edge pixel lies within the tolerance of it.
 ///
@@ -18,9 +20,6 @@ pub(crate) struct NearEdges {
     /// in a byte.
     disc: Vec<(i32, i32)>,
 }
-
-/// The largest tolerance, pixels, for which the counts fit in a byte.
-pub(crate) const MAX_TOLERANCE: f64 = 8.0;
 
 /// How many directions the first look has at most.
 const PROBES: usize = 32;

@@ -1,6 +1,6 @@
 //! The least-squares circle through many points.
 
-use crate::Circle;
+use crate::circle::Circle;
 
 /// Fits a circle to the points within `band` of it, starting from `start`: least squares of the
 /// distances to the curve.

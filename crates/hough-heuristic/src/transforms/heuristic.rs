@@ -5,14 +5,16 @@ use std::time::Instant;
 
 use image::GrayImage;
 
-use crate::belonging::Probes;
+use super::belonging::Probes;
+use super::evidence::{Evidence, rank};
+use crate::acceptance::Acceptance;
+use crate::circle::Circle;
+use crate::detect::{CircleDetector, Detection, StageTimes, Stages};
+use crate::edges::{Canny, EdgeDetector, EdgeMap};
+use crate::error::ConfigError;
 use crate::error::require;
-use crate::evidence::{Evidence, rank};
+use crate::region::Region;
 use crate::sampling::{Draw, Sampler, Sampling};
-use crate::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, EdgeDetector, EdgeMap,
-    Region, StageTimes, Stages,
-};
 
 /// The settings of [`Heuristic`].
 ///

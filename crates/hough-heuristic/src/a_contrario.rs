@@ -22,8 +22,10 @@ use image::GrayImage;
 
 pub use config::TrustedConfig;
 
+use crate::circle::Circle;
+use crate::detect::{CircleDetector, Detection};
 use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
-use crate::{Circle, CircleDetector, ConfigError, Detection};
+use crate::error::ConfigError;
 use budget::{Budget, MEASURING, Stage};
 use candidate::Collected;
 use directions::UnitCircle;
@@ -401,6 +403,27 @@ impl Measurement {
             score: self.score,
         }
     }
+}
+
+/// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
+///
+/// For one-off use: [`Trusted`] with the default settings, which reports up to 32 circles. For a
+/// stream of frames build a detector once.
+///
+/// # Errors
+/// [`ConfigError::RadiusRange`] if the range is empty, [`ConfigError::OutOfRange`] if its lower end
+/// is below 4.
+pub fn detect_circles(
+    frame: &GrayImage,
+    min_radius: f64,
+    max_radius: f64,
+) -> Result<Vec<Detection>, ConfigError> {
+    let config = TrustedConfig {
+        min_radius,
+        max_radius,
+        ..TrustedConfig::default()
+    };
+    Ok(Trusted::new(config)?.detect(frame))
 }
 
 /// Frames with a shorter side hold nothing, pixels.

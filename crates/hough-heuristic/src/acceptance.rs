@@ -1,0 +1,121 @@
+//! The rules by which the transforms report a circle.
+
+use crate::circle::Circle;
+use crate::detect::Detection;
+use crate::error::{ConfigError, require, require_radii};
+use crate::region::Region;
+
+/// The largest tolerance, pixels, for which the counts of near edge pixels fit in a byte.
+pub(crate) const MAX_TOLERANCE: f64 = 8.0;
+
+/// Which circles a detector reports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct Acceptance {
+    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more
+    /// hidden are found, and more circles that are none.
+    pub theta: f64,
+    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1;
+    /// 0..=8). Larger: rounder than round is forgiven, and texture matches more by chance.
+    pub tolerance: f64,
+    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a
+    /// tolerance of 1, corners and texture begin to pass for circles.
+    pub min_radius: f64,
+    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the
+    /// radius is known: two pixels then determine a circle, and only the centre is fitted.
+    pub max_radius: f64,
+    /// How many circles to look for (default 1; at least 1).
+    pub max_circles: usize,
+    /// The least distance between the centres of two circles found, pixels (default 8; at least 0).
+    /// 0 allows concentric ones.
+    pub min_distance: f64,
+    /// Where the centre may lie (default None: anywhere, even outside the frame).
+    pub region: Option<Region>,
+    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). The
+    /// Hough transforms, whose cells are coarse, fit a candidate once before they verify it in any
+    /// case.
+    pub refine: bool,
+}
+
+impl Default for Acceptance {
+    fn default() -> Self {
+        Self {
+            theta: 0.65,
+            tolerance: 1.0,
+            min_radius: 15.0,
+            max_radius: 300.0,
+            max_circles: 1,
+            min_distance: 8.0,
+            region: None,
+            refine: true,
+        }
+    }
+}
+
+impl Acceptance {
+    /// # Errors
+    /// The first parameter outside its range.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        let &Self {
+            theta,
+            tolerance,
+            min_distance,
+            ..
+        } = self;
+        require(
+            "theta",
+            theta,
+            "between 0 and 1, both excluded",
+            theta > 0.0 && theta < 1.0,
+        )?;
+        require_radii(self.min_radius, self.max_radius)?;
+        require(
+            "tolerance",
+            tolerance,
+            "0..=8 px",
+            (0.0..=MAX_TOLERANCE).contains(&tolerance),
+        )?;
+        require(
+            "max_circles",
+            self.max_circles as f64,
+            "at least 1",
+            self.max_circles > 0,
+        )?;
+        let usable = min_distance.is_finite() && min_distance >= 0.0;
+        require(
+            "min_distance",
+            min_distance,
+            "finite and at least 0 px",
+            usable,
+        )
+    }
+
+    /// # Errors
+    /// The region of interest, if it does not lie in such a frame.
+    pub(crate) fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+        self.region
+            .map_or(Ok(()), |region| region.check_frame(width, height))
+    }
+
+    /// The radius, if only one is allowed.
+    pub(crate) fn known_radius(&self) -> Option<f64> {
+        (self.min_radius >= self.max_radius).then_some(self.min_radius)
+    }
+
+    /// Whether this circle may be reported beside those found.
+    pub(crate) fn admits(&self, circle: &Circle, found: &[Detection]) -> bool {
+        (self.min_radius..=self.max_radius).contains(&circle.radius)
+            && self.region.is_none_or(|region| region.holds(circle))
+            && found.iter().all(|other| {
+                let (dx, dy) = (circle.x - other.circle.x, circle.y - other.circle.y);
+                dx * dx + dy * dy >= self.min_distance * self.min_distance
+            })
+    }
+}
+
+/// How far from an accepted circle the edge pixels lie that it explains, pixels: what matches it,
+/// and what the blur of the border and a ball that is not quite round leave beside it.
+pub(crate) fn explained_band(tolerance: f64, radius: f64) -> f64 {
+    tolerance + 1.5 + 0.01 * radius
+}
