@@ -92,7 +92,7 @@ struct Options {
     #[arg(long)]
     full_chain: bool,
 
-    /// How the circle is found in rendered frames: trusted, heuristic, rht, sht
+    /// How the circle is found in rendered frames: a-contrario, heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t, requires = "full_chain")]
     detector: BallDetector,
 

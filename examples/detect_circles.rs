@@ -20,9 +20,9 @@ use std::time::Duration;
 use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Acceptance, Canny, Circle, CircleDetector, Detection, FrameError, FrameSource, Heuristic,
-    HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig, Sampling, StageTimes,
-    StandardHough, StandardHoughConfig, Trusted, TrustedConfig, write_stages,
+    AContrario, AContrarioConfig, Acceptance, Canny, Circle, CircleDetector, Detection, FrameError,
+    FrameSource, Heuristic, HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig,
+    Sampling, StageTimes, StandardHough, StandardHoughConfig, write_stages,
 };
 
 use files::{writable_folder, write_png, write_whole};
@@ -39,7 +39,7 @@ mod overlay;
 #[derive(Parser, Debug)]
 struct Options {
     /// Which detector to use
-    #[arg(long, value_enum, default_value_t = DetectorName::Trusted)]
+    #[arg(long, value_enum, default_value_t = DetectorName::AContrario)]
     detector: DetectorName,
 
     /// Smallest radius, pixels
@@ -88,7 +88,8 @@ struct Options {
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum DetectorName {
     /// Pairs of edge points at several sizes, each circle proven against chance
-    Trusted,
+    #[value(alias = "trusted")]
+    AContrario,
     /// Three random edge pixels, belonging against a threshold (the paper's)
     Heuristic,
     /// The same, all three pixels from the whole image, as the paper samples
@@ -293,12 +294,12 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
         StandardHough::new(config, Canny::default())
     };
     let mut detector: Box<dyn CircleDetector> = match options.detector {
-        DetectorName::Trusted => Box::new(Trusted::new(TrustedConfig {
+        DetectorName::AContrario => Box::new(AContrario::new(AContrarioConfig {
             min_radius: accept.min_radius,
             max_radius: accept.max_radius,
             max_circles: accept.max_circles,
             seed: options.seed,
-            ..TrustedConfig::default()
+            ..AContrarioConfig::default()
         })?),
         DetectorName::Heuristic => Box::new(heuristic(Sampling::Near)?),
         DetectorName::HeuristicAnywhere => Box::new(heuristic(Sampling::Anywhere)?),

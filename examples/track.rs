@@ -82,7 +82,7 @@ struct Options {
     #[arg(long, value_enum, default_value_t = Fate::Push)]
     ball: Fate,
 
-    /// How the circle is found: trusted, heuristic, rht, sht
+    /// How the circle is found: a-contrario, heuristic, rht, sht
     #[arg(
         long,
         value_name = "NAME",

@@ -5,9 +5,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use hough_heuristic::{
-    Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, Heuristic, HeuristicConfig,
-    RandomizedHough, RandomizedHoughConfig, StandardHough, StandardHoughConfig, Trusted,
-    TrustedConfig,
+    AContrario, AContrarioConfig, Acceptance, Canny, CannyConfig, CircleDetector, ConfigError,
+    Heuristic, HeuristicConfig, RandomizedHough, RandomizedHoughConfig, StandardHough,
+    StandardHoughConfig,
 };
 use pipeline_sim::{Scene, Shape};
 
@@ -21,7 +21,7 @@ pub enum BallDetector {
     /// Pairs of edge points at several sizes, each circle proven against chance: goes beyond the
     /// paper.
     #[default]
-    Trusted,
+    AContrario,
     /// Three random edge pixels, belonging against a threshold: the paper's.
     Heuristic,
     /// The randomized Hough transform.
@@ -39,7 +39,7 @@ const THETA: f64 = 0.6;
 impl BallDetector {
     /// All of them.
     pub const ALL: [Self; 4] = [
-        Self::Trusted,
+        Self::AContrario,
         Self::Heuristic,
         Self::RandomizedHough,
         Self::StandardHough,
@@ -48,7 +48,7 @@ impl BallDetector {
     /// What it is called.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Trusted => "trusted",
+            Self::AContrario => "a-contrario",
             Self::Heuristic => "heuristic",
             Self::RandomizedHough => "rht",
             Self::StandardHough => "sht",
@@ -68,16 +68,16 @@ impl BallDetector {
             ..Acceptance::default()
         };
         Ok(match self {
-            Self::Trusted => {
-                let config = TrustedConfig {
+            Self::AContrario => {
+                let config = AContrarioConfig {
                     min_radius: RADII.0,
                     max_radius: RADII.1,
                     max_circles: 1,
                     min_score: MIN_SCORE,
                     seed,
-                    ..TrustedConfig::default()
+                    ..AContrarioConfig::default()
                 };
-                Box::new(Trusted::new(config)?)
+                Box::new(AContrario::new(config)?)
             }
             Self::Heuristic => {
                 let config = HeuristicConfig {
@@ -134,6 +134,12 @@ impl FromStr for BallDetector {
     type Err = UnknownDetector;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
+        // The name of the a contrario detector before it was called so.
+        let text = if text == "trusted" {
+            "a-contrario"
+        } else {
+            text
+        };
         Self::ALL
             .into_iter()
             .find(|detector| detector.name() == text)

@@ -45,7 +45,7 @@ struct Between<'a> {
 impl Between<'_> {
     fn nothing() -> Self {
         Self {
-            detector: BallDetector::Trusted.build(1).expect("valid settings"),
+            detector: BallDetector::AContrario.build(1).expect("valid settings"),
             camera: Box::new(|grabbed| grabbed),
             arm: Box::new(|delta| delta),
         }
@@ -222,7 +222,7 @@ fn a_camera_that_froze_with_the_ball_at_the_goal_brings_about_no_grip_in_the_nex
 #[test]
 fn garbage_in_the_place_of_frames_is_no_ball_for_any_detector() {
     let sizes = [(0, 0), (1, 1), (768, 1), (1, 576), (40, 30), (192, 144)];
-    for kind in [BallDetector::Trusted, BallDetector::Heuristic] {
+    for kind in [BallDetector::AContrario, BallDetector::Heuristic] {
         let (mut rig, mut agent) = (rig(IN_VIEW), agent());
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let (mut frames, mut between) = (0, Between::nothing());
@@ -332,7 +332,7 @@ fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
             .expect("away from the hand");
         let (mut agent, mut log, mut moves) = (agent(), EventLog::default(), 0);
         let mut server = Some(server);
-        let mut detector = BallDetector::Trusted.build(1).expect("valid settings");
+        let mut detector = BallDetector::AContrario.build(1).expect("valid settings");
         let end = rig.run_and_learn(&mut agent, &mut *detector, &mut |event| {
             log.note(event);
             moves += usize::from(matches!(event.kind, EventKind::Moved(_)));

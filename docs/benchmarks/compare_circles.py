@@ -339,7 +339,7 @@ def shown(value):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="*", metavar="FOLDER")
-    parser.add_argument("--detectors", default="trusted,heuristic", help="ours, as detect_circles names them [%(default)s]")
+    parser.add_argument("--detectors", default="a-contrario,heuristic", help="ours, as detect_circles names them [%(default)s]")
     parser.add_argument("--rivals", default="hough,hough-alt,ed,ed-unblurred", help="OpenCV's [%(default)s]")
     parser.add_argument("--min-radius", type=float, default=8, metavar="PX", help="[%(default)s]")
     parser.add_argument("--max-radius", type=float, default=280, metavar="PX", help="[%(default)s]")

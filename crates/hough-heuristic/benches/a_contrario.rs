@@ -1,4 +1,4 @@
-//! The trusted detector on whole frames, edges included, and following a circle.
+//! The a contrario detector on whole frames, edges included, and following a circle.
 
 #![allow(missing_docs)]
 
@@ -10,10 +10,10 @@ mod scenes;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use hough_heuristic::{CircleDetector, Trusted, TrustedConfig};
+use hough_heuristic::{AContrario, AContrarioConfig, CircleDetector};
 
 fn frames(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("trusted");
+    let mut group = criterion.benchmark_group("a contrario");
     group
         .sample_size(10)
         .warm_up_time(Duration::from_millis(300))
@@ -23,7 +23,7 @@ fn frames(criterion: &mut Criterion) {
         .filter(|round| !round.fixed_thresholds)
     {
         let (frame, balls) = round.scene.render();
-        let mut detector = Trusted::new(TrustedConfig::default()).expect("usable settings");
+        let mut detector = AContrario::new(AContrarioConfig::default()).expect("usable settings");
         let mut found = Vec::new();
         group.bench_function(round.name, |bencher| {
             bencher.iter(|| {

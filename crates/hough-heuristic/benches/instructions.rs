@@ -18,15 +18,15 @@ use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
 use hough_heuristic::image::GrayImage;
-use hough_heuristic::{Canny, CircleDetector, EdgeDetector, Trusted, TrustedConfig};
+use hough_heuristic::{AContrario, AContrarioConfig, Canny, CircleDetector, EdgeDetector};
 
 const SCENES: [&str; 3] = ["1 ball", "+20 distractors", "192x144, 1 ball"];
 /// The standard transform takes minutes under callgrind on a large frame.
 const SMALL_ONLY: &str = "SHT";
 const EDGES: &str = "edges";
-/// The trusted detector, which finds edges of its own: all of its work is counted, with its default
+/// The a contrario detector, which finds edges of its own: all of its work is counted, with its default
 /// settings.
-const TRUSTED: &str = "trusted, edges included";
+const A_CONTRARIO: &str = "a contrario, edges included";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -47,7 +47,7 @@ fn count_all() -> ExitCode {
     }
     println!("{:18} {:22} {:>14}", "scene", "what", "instructions");
     for scene in SCENES {
-        for case in [EDGES, TRUSTED].into_iter().chain(contest::DETECTORS) {
+        for case in [EDGES, A_CONTRARIO].into_iter().chain(contest::DETECTORS) {
             if case == SMALL_ONLY && !scene.starts_with("192x144") {
                 continue;
             }
@@ -99,9 +99,9 @@ fn run(scene: &str, case: &str) {
     let edges = canny.detect_edges(&frame).clone();
     if case == EDGES {
         measured(&frame, |frame| canny.detect_edges(frame).pixels().len());
-    } else if case == TRUSTED {
+    } else if case == A_CONTRARIO {
         count_circles(
-            &mut Trusted::new(TrustedConfig::default()).expect("usable settings"),
+            &mut AContrario::new(AContrarioConfig::default()).expect("usable settings"),
             &frame,
         );
     } else {

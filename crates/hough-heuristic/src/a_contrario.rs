@@ -20,7 +20,7 @@ mod twins;
 
 use image::GrayImage;
 
-pub use config::TrustedConfig;
+pub use config::AContrarioConfig;
 
 use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection};
@@ -69,21 +69,21 @@ use search::{Outline, Search};
 ///
 /// ```
 /// use hough_heuristic::image::{GrayImage, Luma};
-/// use hough_heuristic::{CircleDetector, Trusted, TrustedConfig};
+/// use hough_heuristic::{CircleDetector, AContrario, AContrarioConfig};
 ///
 /// let frame = GrayImage::from_fn(320, 240, |x, y| {
 ///     let inside = |cx: f64, cy: f64, r: f64| (f64::from(x) - cx).hypot(f64::from(y) - cy) < r;
 ///     Luma([if inside(100.0, 70.0, 28.0) || inside(220.5, 150.2, 14.0) { 40 } else { 200 }])
 /// });
-/// let mut detector = Trusted::new(TrustedConfig::default())?;
+/// let mut detector = AContrario::new(AContrarioConfig::default())?;
 /// assert_eq!(detector.detect(&frame).len(), 2);
 /// let ball = detector.measurements()[0];
 /// assert!((ball.circle.x - 100.0).abs() < 0.1 && ball.score > 0.8 && ball.centre_error < 0.1);
 /// # Ok::<(), hough_heuristic::ConfigError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Trusted {
-    config: TrustedConfig,
+pub struct AContrario {
+    config: AContrarioConfig,
     circle: UnitCircle,
     outline: Outline,
     /// Of the coarser sizes, one after the other, and of the finest.
@@ -97,11 +97,11 @@ pub struct Trusted {
     proofs: Vec<Proof>,
     measurements: Vec<Measurement>,
     budget: Budget,
-    /// What [`Trusted::track`] looks at.
+    /// What [`AContrario::track`] looks at.
     window: GrayImage,
 }
 
-/// All that is known of a circle found by [`Trusted`].
+/// All that is known of a circle found by [`AContrario`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Measurement {
@@ -134,12 +134,12 @@ pub struct Effort {
     pub ended_by_budget: bool,
 }
 
-impl Trusted {
+impl AContrario {
     /// A detector with these settings.
     ///
     /// # Errors
     /// The first parameter outside its range.
-    pub fn new(config: TrustedConfig) -> Result<Self, ConfigError> {
+    pub fn new(config: AContrarioConfig) -> Result<Self, ConfigError> {
         config.check()?;
         let circle = UnitCircle::new();
         Ok(Self {
@@ -159,7 +159,7 @@ impl Trusted {
     }
 
     /// The settings the detector was built with.
-    pub fn config(&self) -> &TrustedConfig {
+    pub fn config(&self) -> &AContrarioConfig {
         &self.config
     }
 
@@ -376,7 +376,7 @@ impl Trusted {
     }
 }
 
-impl CircleDetector for Trusted {
+impl CircleDetector for AContrario {
     fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
         found.clear();
         if self.check_frame(frame.width(), frame.height()).is_err() {
@@ -407,7 +407,7 @@ impl Measurement {
 
 /// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
 ///
-/// For one-off use: [`Trusted`] with the default settings, which reports up to 32 circles. For a
+/// For one-off use: [`AContrario`] with the default settings, which reports up to 32 circles. For a
 /// stream of frames build a detector once.
 ///
 /// # Errors
@@ -418,12 +418,12 @@ pub fn detect_circles(
     min_radius: f64,
     max_radius: f64,
 ) -> Result<Vec<Detection>, ConfigError> {
-    let config = TrustedConfig {
+    let config = AContrarioConfig {
         min_radius,
         max_radius,
-        ..TrustedConfig::default()
+        ..AContrarioConfig::default()
     };
-    Ok(Trusted::new(config)?.detect(frame))
+    Ok(AContrario::new(config)?.detect(frame))
 }
 
 /// Frames with a shorter side hold nothing, pixels.

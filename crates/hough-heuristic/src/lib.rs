@@ -26,7 +26,7 @@
 //!
 //! # Detectors
 //!
-//! * [`Trusted`]: for real photographs. An unknown number of circles, each proven against chance
+//! * [`AContrario`]: for real photographs. An unknown number of circles, each proven against chance
 //!   and measured with its standard error, in a bounded number of draws; goes beyond the paper.
 //!   [`detect_circles`] is a call of it.
 //! * [`Heuristic`]: a random search that needs no memory but the edges themselves. The detector of
@@ -60,7 +60,7 @@
 //!
 //! # Limitations
 //!
-//! [`Trusted`] finds what is round: lamps, wheels and letters too. The others go by β:
+//! [`AContrario`] finds what is round: lamps, wheels and letters too. The others go by β:
 //!
 //! β asks whether pixels of the circle are edges, not whether those edges run along it. Where edges
 //! cover more than a tenth of the picture, as in grass or gravel, chance alone lifts β above any
@@ -81,7 +81,7 @@ mod sampling;
 mod stages;
 mod transforms;
 
-pub use a_contrario::{Effort, Measurement, Trusted, TrustedConfig, detect_circles};
+pub use a_contrario::{AContrario, AContrarioConfig, Effort, Measurement, detect_circles};
 pub use acceptance::Acceptance;
 pub use circle::{Circle, Features};
 pub use curve::{Curve, Ellipse, Line};

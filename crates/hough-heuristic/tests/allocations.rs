@@ -11,8 +11,9 @@ use std::cell::Cell;
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Acceptance, Canny, CircleDetector, Detection, Heuristic, HeuristicConfig, RandomizedHough,
-    RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig, Trusted, TrustedConfig,
+    AContrario, AContrarioConfig, Acceptance, Canny, CircleDetector, Detection, Heuristic,
+    HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
+    StandardHoughConfig,
 };
 
 #[path = "../scenes/scenes.rs"]
@@ -127,8 +128,8 @@ fn edges(detector: &mut dyn CircleDetector, frame: &GrayImage) -> usize {
 }
 
 #[test]
-fn the_trusted_detector_allocates_nothing_after_the_first_frame_either() {
-    let mut detector = Trusted::new(TrustedConfig::default()).unwrap();
+fn the_a_contrario_detector_allocates_nothing_after_the_first_frame_either() {
+    let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
     let mut found = Vec::new();
     let crowded = frame(500, 400, 8, 25, 1);
     assert!(allocations(&mut detector, &crowded, &mut found) > 0);

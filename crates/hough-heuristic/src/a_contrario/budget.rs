@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::TrustedConfig;
+use super::AContrarioConfig;
 
 /// Looks that a draw takes, in the mean over dense texture; those of all draws are shared by what
 /// takes few and what takes many.
@@ -42,7 +42,7 @@ pub(super) struct Budget {
 
 impl Budget {
     /// For a frame with so many pixels.
-    pub(super) fn new(config: &TrustedConfig, pixels: usize) -> Self {
+    pub(super) fn new(config: &AContrarioConfig, pixels: usize) -> Self {
         let megapixels = pixels as f64 * 1e-6;
         let draws = f64::from(config.draws_per_megapixel) * megapixels.max(LEAST_MEGAPIXELS);
         let most_draws = draws.ceil() as u64;

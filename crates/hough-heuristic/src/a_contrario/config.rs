@@ -1,16 +1,16 @@
-//! The settings of the trusted detector.
+//! The settings of the a contrario detector.
 
 use crate::error::ConfigError;
 use crate::error::{require, require_radii};
 use crate::region::Region;
 
-/// The settings of [`Trusted`](crate::Trusted).
+/// The settings of [`AContrario`](crate::AContrario).
 ///
 /// The defaults are meant for every frame: there is no threshold to tune to a scene.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct TrustedConfig {
+pub struct AContrarioConfig {
     /// The smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame
     /// is searched too, which takes several times as long.
     pub min_radius: f64,
@@ -41,7 +41,7 @@ pub struct TrustedConfig {
     pub seed: u64,
 }
 
-impl Default for TrustedConfig {
+impl Default for AContrarioConfig {
     fn default() -> Self {
         Self {
             min_radius: 8.0,
@@ -57,7 +57,7 @@ impl Default for TrustedConfig {
     }
 }
 
-impl TrustedConfig {
+impl AContrarioConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         require_radii(self.min_radius, self.max_radius)?;
         require(

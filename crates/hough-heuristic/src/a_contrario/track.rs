@@ -2,11 +2,11 @@
 
 use image::GrayImage;
 
-use super::{LEAST_SIDE, Measurement, Trusted};
+use super::{AContrario, LEAST_SIDE, Measurement};
 use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection};
 
-impl Trusted {
+impl AContrario {
     /// Looks for the circle `last` first, whose centre and radius may have changed by `reach`
     /// pixels, and in the whole frame only if it is not there; true if it was.
     ///

@@ -42,7 +42,7 @@ proptest! {
             let points = maxima.find(frame.as_raw(), 160, 40.0, 4000);
             level.fill(160, 120, points);
             collected.clear(CANDIDATES);
-            let mut budget = Budget::new(&TrustedConfig::default(), frame.len());
+            let mut budget = Budget::new(&AContrarioConfig::default(), frame.len());
             let searching = Searching {
                 search: Search {
                     circle: &circle,

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{
-    Circle, CircleDetector, ConfigError, Trusted, TrustedConfig, detect_circles,
+    AContrario, AContrarioConfig, Circle, CircleDetector, ConfigError, detect_circles,
 };
 use proptest::prelude::*;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -26,16 +26,16 @@ pub(crate) const SCENE: Scene = Scene {
     seed: 5,
 };
 
-pub(crate) fn with(change: impl FnOnce(&mut TrustedConfig)) -> Trusted {
-    let mut config = TrustedConfig {
+pub(crate) fn with(change: impl FnOnce(&mut AContrarioConfig)) -> AContrario {
+    let mut config = AContrarioConfig {
         max_radius: 60.0,
-        ..TrustedConfig::default()
+        ..AContrarioConfig::default()
     };
     change(&mut config);
-    Trusted::new(config).unwrap()
+    AContrario::new(config).unwrap()
 }
 
-pub(crate) fn plain() -> Trusted {
+pub(crate) fn plain() -> AContrario {
     with(|_| ())
 }
 
@@ -115,7 +115,7 @@ fn the_seed_decides_the_order_and_little_else() {
 
 /// How many balls of a kind of scene are found to 2 px, and how many other circles.
 fn found_of(kind: &Kind, seed: u64, frames: u64) -> (usize, usize) {
-    let mut detector = Trusted::new(TrustedConfig::default()).unwrap();
+    let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
     let (mut hits, mut others) = (0, 0);
     for number in 0..frames {
         let (frame, balls) = kind.render((768, 576), seed, number);
@@ -272,10 +272,10 @@ fn no_pattern_takes_more_than_the_budget() {
 
 #[test]
 fn a_budget_that_allows_nothing_is_an_error_and_a_small_one_is_told() {
-    let refused = |change: fn(&mut TrustedConfig)| {
-        let mut config = TrustedConfig::default();
+    let refused = |change: fn(&mut AContrarioConfig)| {
+        let mut config = AContrarioConfig::default();
         change(&mut config);
-        Trusted::new(config).unwrap_err()
+        AContrario::new(config).unwrap_err()
     };
     for error in [
         refused(|config| config.draws_per_megapixel = 0),
@@ -390,7 +390,7 @@ fn detections_are_the_golden_ones() {
             writeln!(text, "{name}: {x:.2} {y:.2} {radius:.2} {:.3}", found.score).unwrap();
         }
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/trusted.txt");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/a_contrario.txt");
     if std::env::var_os("REGENERATE").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, &text).unwrap();

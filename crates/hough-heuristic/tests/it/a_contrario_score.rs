@@ -1,4 +1,4 @@
-//! What `Trusted` says of a circle: that its score and its standard errors hold, and what counts as
+//! What `AContrario` says of a circle: that its score and its standard errors hold, and what counts as
 //! round.
 
 use hough_heuristic::image::{GrayImage, Luma, imageops};

@@ -2,9 +2,9 @@
 
 use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{
-    Acceptance, Canny, CannyConfig, Circle, CircleDetector, Heuristic, HeuristicConfig,
-    ImageprocCanny, RandomizedHough, RandomizedHoughConfig, Region, Sampling, StandardHough,
-    StandardHoughConfig, Trusted, TrustedConfig,
+    AContrario, AContrarioConfig, Acceptance, Canny, CannyConfig, Circle, CircleDetector,
+    Heuristic, HeuristicConfig, ImageprocCanny, RandomizedHough, RandomizedHoughConfig, Region,
+    Sampling, StandardHough, StandardHoughConfig,
 };
 
 use crate::scenes::{Scene, same};
@@ -12,14 +12,17 @@ use crate::scenes::{Scene, same};
 /// All detectors with these settings, by name.
 pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
     let mut all = all_on(accept, CannyConfig::default());
-    let trusted = TrustedConfig {
+    let a_contrario = AContrarioConfig {
         min_radius: accept.min_radius,
         max_radius: accept.max_radius,
         max_circles: accept.max_circles,
         region: accept.region,
-        ..TrustedConfig::default()
+        ..AContrarioConfig::default()
     };
-    all.push(("trusted", Box::new(Trusted::new(trusted).unwrap())));
+    all.push((
+        "a contrario",
+        Box::new(AContrario::new(a_contrario).unwrap()),
+    ));
     all
 }
 

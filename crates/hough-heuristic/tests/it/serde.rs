@@ -1,9 +1,9 @@
 use std::fmt::Debug;
 
 use hough_heuristic::{
-    Acceptance, CannyConfig, Circle, CurveSearchConfig, Detection, Ellipse, Features, FoundCurve,
-    HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling, StandardHoughConfig,
-    TrustedConfig,
+    AContrarioConfig, Acceptance, CannyConfig, Circle, CurveSearchConfig, Detection, Ellipse,
+    Features, FoundCurve, HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling,
+    StandardHoughConfig,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -76,10 +76,10 @@ fn settings_come_back() {
         accept,
         ..StandardHoughConfig::default()
     });
-    comes_back(&TrustedConfig {
+    comes_back(&AContrarioConfig {
         region: accept.region,
         milliseconds_per_megapixel: Some(6.0),
-        ..TrustedConfig::default()
+        ..AContrarioConfig::default()
     });
 }
 
@@ -98,7 +98,7 @@ fn what_is_not_stored_is_the_default() {
     may_be_partial::<HeuristicConfig>();
     may_be_partial::<RandomizedHoughConfig>();
     may_be_partial::<StandardHoughConfig>();
-    may_be_partial::<TrustedConfig>();
+    may_be_partial::<AContrarioConfig>();
     let stored = r#"{"accept":{"theta":0.5,"max_circles":3},"cell":3.0}"#;
     let expected = StandardHoughConfig {
         accept: Acceptance {
