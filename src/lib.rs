@@ -54,7 +54,7 @@ pub use plane::{
 pub use rig::{PlaceError, Rig, RigError, RigParts};
 pub use setup::{BallDetector, UnknownDetector, bright_ball_scene};
 pub use surroundings::Contacts;
-pub use training::{LearnError, Lesson, Simulator, learn, learn_best, schedule};
+pub use training::{Simulator, learn, learn_best};
 pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]

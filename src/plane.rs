@@ -13,8 +13,7 @@ use qtable::{Action, Progress, TrainConfig};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
-use crate::training::learn_in;
-use crate::{LearnError, Lesson, schedule};
+use grasp_agent::{LearnError, Lesson, schedule};
 
 /// A simulator of approaching that makes no errors, and the starts to learn from.
 #[derive(Clone, Debug)]
@@ -143,7 +142,7 @@ impl ExactPlane {
             self.sight.sees_features(&after.features).then_some(after)
         };
         let start = |rng: &mut dyn Rng| self.start(rng);
-        learn_in(spec, simulate, start, trials, config, rng, on_progress)
+        grasp_agent::learn(spec, simulate, start, trials, config, rng, on_progress)
     }
 }
 

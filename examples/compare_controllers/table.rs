@@ -7,7 +7,7 @@ use grasp_agent::Outcome;
 use pipeline_sim::ErrorLevel;
 use plotters::prelude::*;
 
-use crate::wilson::wilson;
+use example_support::wilson::wilson;
 
 /// The runs of one controller at one level of errors.
 #[derive(Clone, Debug, Default)]

@@ -6,7 +6,7 @@ use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use puma_val2::{JointDelta, Joints};
 
-use crate::overlay::Overlay;
+use example_support::overlay::Overlay;
 
 /// Everything that was recorded of one run.
 pub(crate) struct RunRecord {

@@ -6,8 +6,8 @@ use image::imageops::{FilterType, replace, resize};
 use image::{Rgb, RgbImage};
 use serde::Serialize;
 
-use crate::overlay::{CAPTION, Overlay};
 use crate::record::{Picture, RunRecord};
+use example_support::overlay::{CAPTION, Overlay};
 
 /// What `summary.json` holds.
 #[derive(Serialize)]

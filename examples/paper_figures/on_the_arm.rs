@@ -13,7 +13,7 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use crate::plot::{Panel, drawn};
-use crate::wilson::wilson;
+use example_support::wilson::wilson;
 
 /// Moves on the arm after which the behaviours are looked at.
 const MOVES: [usize; 4] = [0, 500, 2_000, 10_000];

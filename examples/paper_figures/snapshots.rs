@@ -15,7 +15,7 @@ use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use crate::overlay::{CAPTION, Overlay};
+use example_support::overlay::{CAPTION, Overlay};
 
 /// Size of each picture, below its caption.
 const TILE: (u32, u32) = (384, 288);

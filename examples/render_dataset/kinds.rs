@@ -84,3 +84,49 @@ pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
         .and_then(|(width, height)| Some((number(width)?, number(height)?)))
         .ok_or_else(|| format!("{text} is not a size such as 768x576, from 16 to 8192 pixels each"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::Rng as _;
+
+    fn kinds_of(list: &str) -> Vec<Kind> {
+        let kinds = list
+            .split(',')
+            .map(|name| name.parse::<Kinds>().expect("known"));
+        kinds.flat_map(|k| k.0).collect()
+    }
+
+    #[test]
+    fn shares_sizes_and_kinds_that_make_no_sense_are_refused() {
+        for text in ["-0.1", "1.01", "nan", "inf", "much"] {
+            let refused = share(text).expect_err("no share");
+            assert!(refused.contains(text), "{refused}");
+        }
+        assert_eq!(share("0"), Ok(0.0));
+        assert_eq!(share("1"), Ok(1.0));
+        for text in ["768", "768x", "15x100", "100x8193", "-1x100"] {
+            let refused = size(text).expect_err("no size");
+            assert!(refused.contains(text), "{refused}");
+        }
+        assert_eq!(size("768x576"), Ok((768, 576)));
+        assert_eq!(repeated(&kinds_of("cell,benchmark")), None);
+        assert_eq!(repeated(&kinds_of("cell,plain")).as_deref(), Some("plain"));
+        assert_eq!(
+            repeated(&kinds_of("clean,many,clean")).as_deref(),
+            Some("clean")
+        );
+    }
+
+    #[test]
+    fn no_two_kinds_and_no_two_seeds_share_their_draws() {
+        let mut first: Vec<u64> = kinds_of("cell,benchmark")
+            .iter()
+            .flat_map(|kind| [1, 2].map(|seed| kind.generator(seed).next_u64()))
+            .collect();
+        let count = first.len();
+        first.sort_unstable();
+        first.dedup();
+        assert_eq!(first.len(), count);
+    }
+}

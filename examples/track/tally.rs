@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::wilson::wilson;
+use example_support::wilson::wilson;
 
 /// A run that counts.
 #[derive(Clone, Copy, Debug)]

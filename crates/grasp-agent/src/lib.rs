@@ -121,6 +121,7 @@ pub use nalgebra;
 pub use puma_val2;
 pub use qtable;
 
+pub use behaviour::learning::{LearnError, Lesson, learn, schedule};
 pub use behaviour::policy::{Behaviour, Episode};
 pub use behaviour::preset::{BehaviourPair, YGoal};
 pub use behaviour::reward::{Reward, RewardTerm};

@@ -5,6 +5,9 @@ use qtable::{Action, QTable, State};
 use crate::behaviour::spec::BehaviourSpec;
 use crate::error::BehaviourError;
 
+/// Weight of the loop breaker where no other is asked for.
+pub(crate) const KAPPA: f64 = 20.0;
+
 /// A behaviour with what it has learned: the Q-table over its states and actions.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(

@@ -6,7 +6,7 @@ use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::rand::{RngExt, SeedableRng};
 use qtable::{Action, QTable, State};
 
-use crate::behaviour::policy::{Behaviour, Episode};
+use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
 use crate::behaviour::spec::BehaviourSpec;
 use crate::controller::{Consequence, Controller, GaveUp, Situation};
 use crate::error::BehaviourError;
@@ -142,9 +142,9 @@ impl OnlineLearning {
 
 impl Learned {
     /// Loop breaker of centering unless set otherwise, in units of Q.
-    pub const CENTERING_KAPPA: f64 = 20.0;
+    pub const CENTERING_KAPPA: f64 = KAPPA;
     /// Loop breaker of approaching unless set otherwise, in units of Q.
-    pub const APPROACHING_KAPPA: f64 = 20.0;
+    pub const APPROACHING_KAPPA: f64 = KAPPA;
 
     /// Two behaviours, frozen, with the loop breaker at [`Learned::CENTERING_KAPPA`] and
     /// [`Learned::APPROACHING_KAPPA`].

@@ -25,18 +25,12 @@ use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percept
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use files::{writable_folder, write_whole};
-use program::ended;
+use example_support::files::{writable_folder, write_whole};
+use example_support::program::ended;
 use table::{Row, Tally};
 use world::World;
 
-#[allow(dead_code, reason = "shared with the examples that write pictures")]
-mod files;
-mod program;
-#[path = "compare_controllers/table.rs"]
 mod table;
-mod wilson;
-#[path = "compare_controllers/world.rs"]
 mod world;
 
 /// Compare controllers: drawn errors of arm and camera, drawn balls, the same for all. On the

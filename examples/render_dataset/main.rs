@@ -24,14 +24,7 @@
     reason = "a program for the terminal"
 )]
 
-#[allow(
-    dead_code,
-    reason = "shared with the examples that write pictures of another kind"
-)]
-mod files;
-#[path = "render_dataset/kinds.rs"]
 mod kinds;
-mod program;
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -41,12 +34,12 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
-use files::{writable_folder, write_whole};
+use example_support::files::{writable_folder, write_whole};
+use example_support::program::ended;
 use image::ImageFormat;
 use indicatif::{ProgressBar, ProgressStyle};
 use kinds::{Kind, Kinds, repeated, share, size};
 use pipeline_sim::{Camera, Renderer, Round, Scene, Sighting, Snapshot};
-use program::ended;
 use rand::RngExt;
 use rustix::time::{ClockId, clock_gettime};
 

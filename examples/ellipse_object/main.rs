@@ -37,19 +37,12 @@ use rand::{RngExt, SeedableRng};
 
 use detour::Detour;
 use egg::{Egg, EggCamera};
-use files::{writable_folder, write_png, write_whole};
-use overlay::Overlay;
-use program::ended;
+use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::overlay::Overlay;
+use example_support::program::ended;
 
-#[path = "ellipse_object/detour.rs"]
 mod detour;
-#[path = "ellipse_object/egg.rs"]
 mod egg;
-#[allow(dead_code, reason = "shared with the examples that write other files")]
-mod files;
-#[allow(dead_code, reason = "shared with the examples that draw circles")]
-mod overlay;
-mod program;
 
 /// Find, reach and grip eggs through rendered frames, ellipse detection and VAL II.
 ///

@@ -15,7 +15,7 @@ use crate::cpu::cpu_time;
 
 /// CPU time of this thread and time on the wall, by stage, of all cycles so far.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Stages(Rc<RefCell<Spent>>);
+pub struct Stages(Rc<RefCell<Spent>>);
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
@@ -30,7 +30,7 @@ struct Spent {
 
 impl Stages {
     /// `inner` with a stopwatch of these around it.
-    pub(crate) fn around<T>(&self, inner: T) -> Timed<T> {
+    pub fn around<T>(&self, inner: T) -> Timed<T> {
         Timed {
             inner,
             stages: self.clone(),
@@ -72,9 +72,11 @@ impl fmt::Display for Stages {
 
 /// Something with a stopwatch around it.
 #[derive(Clone, Debug)]
-pub(crate) struct Timed<T> {
-    pub(crate) inner: T,
-    pub(crate) stages: Stages,
+pub struct Timed<T> {
+    /// The measured part itself.
+    pub inner: T,
+    /// Times that the part adds to.
+    pub stages: Stages,
 }
 
 impl FrameSource for Timed<&mut dyn FrameSource> {

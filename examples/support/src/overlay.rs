@@ -10,11 +10,11 @@ use hough_heuristic::Circle;
 use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 
 /// Height of a caption, pixels.
-#[allow(dead_code, reason = "not every example that draws lays pictures out")]
-pub(crate) const CAPTION: u32 = 24;
+pub const CAPTION: u32 = 24;
 
 /// A frame to draw on.
-pub(crate) struct Overlay(RgbImage);
+#[derive(Clone, Debug)]
+pub struct Overlay(RgbImage);
 
 impl From<RgbImage> for Overlay {
     fn from(picture: RgbImage) -> Self {
@@ -23,21 +23,18 @@ impl From<RgbImage> for Overlay {
 }
 
 impl Overlay {
-    pub(crate) fn new(frame: &GrayImage) -> Self {
+    /// Returns a color copy of a gray frame to draw on.
+    pub fn new(frame: &GrayImage) -> Self {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
     }
 
     /// Draws on a picture that is in colour already.
-    #[allow(
-        dead_code,
-        reason = "not every example that draws begins with such a picture"
-    )]
-    pub(crate) fn over(picture: RgbImage) -> Self {
+    pub fn over(picture: RgbImage) -> Self {
         Self(picture)
     }
 
     /// A found circle: its outline and its centre. Parts outside the frame are cut off.
-    pub(crate) fn circle(&mut self, circle: &Circle) {
+    pub fn circle(&mut self, circle: &Circle) {
         let green = Rgb888::new(60, 255, 60);
         let centre = Point::new(circle.x.round() as i32, circle.y.round() as i32);
         let diameter = (2.0 * circle.radius).round().max(1.0) as u32;
@@ -53,22 +50,14 @@ impl Overlay {
     }
 
     /// A straight line.
-    #[allow(
-        dead_code,
-        reason = "only the examples that draw more than circles need it"
-    )]
-    pub(crate) fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
+    pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
         let at = |(x, y): (f64, f64)| Point::new(x.round() as i32, y.round() as i32);
         let style = PrimitiveStyle::with_stroke(colour, width);
         let Ok(()) = Line::new(at(from), at(to)).into_styled(style).draw(self);
     }
 
     /// A filled disc.
-    #[allow(
-        dead_code,
-        reason = "only the examples that draw more than circles need it"
-    )]
-    pub(crate) fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
+    pub fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
         let at = Point::new(centre.0.round() as i32, centre.1.round() as i32);
         let diameter = (2.0 * radius).round().max(1.0) as u32;
         let Ok(()) = Ring::with_center(at, diameter)
@@ -77,8 +66,7 @@ impl Overlay {
     }
 
     /// A closed curve, given as a function of an angle.
-    #[allow(dead_code, reason = "only the example with an ellipse draws one")]
-    pub(crate) fn closed(&mut self, point: impl Fn(f64) -> (f64, f64)) {
+    pub fn closed(&mut self, point: impl Fn(f64) -> (f64, f64)) {
         const CORNERS: u32 = 120;
         let at = |corner: u32| {
             let (x, y) = point(std::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS));
@@ -103,8 +91,7 @@ impl Overlay {
     }
 
     /// Words in a dark strip above the picture, which becomes higher by as much.
-    #[allow(dead_code, reason = "not every example that draws has words")]
-    pub(crate) fn captioned(self, words: &str) -> Self {
+    pub fn captioned(self, words: &str) -> Self {
         let mut higher = RgbImage::new(self.0.width(), self.0.height() + CAPTION);
         image::imageops::replace(&mut higher, &self.0, 0, i64::from(CAPTION));
         let mut captioned = Self(higher);
@@ -112,7 +99,8 @@ impl Overlay {
         captioned
     }
 
-    pub(crate) fn into_image(self) -> RgbImage {
+    /// Returns the picture.
+    pub fn into_image(self) -> RgbImage {
         self.0
     }
 }

@@ -25,13 +25,9 @@ use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use files::{writable_folder, write_png};
-use overlay::Overlay;
-use program::ended;
-
-mod files;
-mod overlay;
-mod program;
+use example_support::files::{writable_folder, write_png};
+use example_support::overlay::Overlay;
+use example_support::program::ended;
 
 /// Draw original, edges, structure D and the found circle of a rendered scene.
 #[derive(Parser, Debug)]

@@ -25,11 +25,8 @@ use hough_heuristic::{
     Sampling, StageTimes, StandardHough, StandardHoughConfig, write_stages,
 };
 
-use files::{writable_folder, write_png, write_whole};
-use overlay::Overlay;
-
-mod files;
-mod overlay;
+use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::overlay::Overlay;
 
 /// Find circles in images: PNG, JPEG or PGM files, colour turned to luma, or folders of them.
 ///

@@ -17,32 +17,23 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{Agent, BehaviourPair, EventKind, Learned, Percept, YGoal};
+use grasp_agent::{Agent, BehaviourPair, EventKind, LearnError, Learned, Lesson, Percept, YGoal};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{
-    ExactPlane, LearnError, Lesson, Simulator, TrialCell, learn_best, score, search_percepts,
-    search_starts,
+    ExactPlane, Simulator, TrialCell, learn_best, score, search_percepts, search_starts,
 };
 use qtable::Record;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use cpu::cpu_time;
-use files::{writable_folder, write_png, write_whole};
+use example_support::cpu::cpu_time;
+use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::program::ended;
 use plot::{Panel, drawn};
-use program::ended;
 
-mod cpu;
-mod files;
-#[path = "paper_figures/on_the_arm.rs"]
 mod on_the_arm;
-mod overlay;
-#[path = "paper_figures/plot.rs"]
 mod plot;
-mod program;
-#[path = "paper_figures/snapshots.rs"]
 mod snapshots;
-mod wilson;
 
 /// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut,
 /// Fig. 9 through the full chain; and what becomes of the behaviours when they are taken from

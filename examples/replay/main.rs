@@ -14,9 +14,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use grasp_agent::{LoggedEvent, Replayed, SavedRun};
 
-use program::ended;
-
-mod program;
+use example_support::program::ended;
 
 /// Make runs again that `grasp` (failures/, with --save-runs saved/), `track`,
 /// `compare_controllers` (--logs) or `ellipse_object` has kept, and say whether they come out the

@@ -20,38 +20,29 @@ use std::time::Instant;
 use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind,
-    JointLimits, Learned, OnlineLearning, Outcome, Percept, SavedController, SavedRun,
+    JointLimits, Learned, Lesson, OnlineLearning, Outcome, Percept, SavedController, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pipeline_sim::{Ball, Cell, ReachForm, Workspace, sample_moves};
 use puma_grasp::{
-    Lesson, Rig, RigError, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts,
+    Rig, RigError, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts,
 };
 use qtable::TrainReport;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-use files::{writable_folder, write_png, write_whole};
+use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::program::ended;
+use example_support::stages::{Stages, Timed};
 use options::{FormName, Options, RewardName};
-use program::ended;
 use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
-use stages::{Stages, Timed};
 
-mod cpu;
-mod files;
-#[path = "grasp/options.rs"]
 mod options;
-mod overlay;
-#[path = "grasp/plots.rs"]
 mod plots;
-mod program;
-#[path = "grasp/record.rs"]
 mod record;
-#[path = "grasp/results.rs"]
 mod results;
-mod stages;
 
 /// Moves sampled in the cell for the regression.
 const SAMPLES: usize = 2_500;

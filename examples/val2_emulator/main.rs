@@ -23,12 +23,8 @@ use clap::Parser;
 use puma_val2::PtyServer;
 use puma_val2::{Emulator, Profile, PumaParams, ServeConfig, TcpServer, char_time};
 
-use files::write_whole;
-use program::ended;
-
-#[allow(dead_code, reason = "shared with the examples that write pictures")]
-mod files;
-mod program;
+use example_support::files::write_whole;
+use example_support::program::ended;
 
 /// An emulated VAL II controller with a PUMA 560.
 #[derive(Debug, Parser)]

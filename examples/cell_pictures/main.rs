@@ -13,24 +13,17 @@
     reason = "a program for the terminal"
 )]
 
-#[allow(
-    dead_code,
-    reason = "shared with the examples that write pictures of another kind"
-)]
-mod files;
-mod program;
-
 use std::error::Error;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use files::{writable_folder, write_whole};
+use example_support::files::{writable_folder, write_whole};
+use example_support::program::ended;
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageFormat};
 use pipeline_sim::{Cell, Renderer, Scene, Sensor, Workspace, Y4mWriter};
-use program::ended;
 use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;

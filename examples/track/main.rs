@@ -30,24 +30,13 @@ use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use files::{writable_folder, write_whole};
-use program::ended;
-use stages::{Stages, Timed};
+use example_support::files::{writable_folder, write_whole};
+use example_support::program::ended;
+use example_support::stages::{Stages, Timed};
 use tally::{Counted, Tally};
 
-mod cpu;
-#[allow(
-    dead_code,
-    reason = "shared with the examples that write single pictures"
-)]
-mod files;
-mod program;
-#[path = "track/shortcut.rs"]
 mod shortcut;
-mod stages;
-#[path = "track/tally.rs"]
 mod tally;
-mod wilson;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// CPU time of this thread; time on the wall where the system does not tell.
-pub(crate) fn cpu_time() -> Duration {
+pub fn cpu_time() -> Duration {
     #[cfg(unix)]
     {
         let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);

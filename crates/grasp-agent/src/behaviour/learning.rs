@@ -1,0 +1,306 @@
+//! Learning a behaviour in a simulator, as the paper does in section 4.
+
+use puma_val2::{Joint, JointDelta};
+use qtable::{
+    Action, Progress, QTable, Record, Schedule, State, TrainConfig, TrainReport, train_in_blocks,
+};
+use rand::Rng;
+
+use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
+use crate::behaviour::spec::BehaviourSpec;
+use crate::behaviour::task::BehaviourTask;
+use crate::error::BehaviourError;
+use crate::percept::{Percept, THETA3_ZERO};
+
+/// Working range of `JT3`, degrees: a move beyond it is refused, and nothing changes.
+const ELBOW_RANGE: (f64, f64) = (120.0, 215.0);
+
+/// A behaviour just learned, and how that went.
+#[derive(Clone, Debug)]
+pub struct Lesson {
+    /// What was learned.
+    pub behaviour: Behaviour,
+    /// The learning curve.
+    pub report: TrainReport,
+    /// Actions after which the table was as it is in `behaviour`: all of them, or fewer where the
+    /// best table was kept.
+    pub learned_by: u64,
+}
+
+/// The paper's settings (section 4) for a number of actions, with the ends of the two courses,
+/// which it does not give, at 0.1 for alpha and 5 for the temperature.
+///
+/// Both are far above those of [`TrainConfig::paper`]: on states as coarse as these, values that
+/// are still moving and actions that are still tried find the policies that reach the goal from
+/// everywhere, where a colder end settles early on some that do not.
+///
+/// # Errors
+/// No actions to learn by.
+pub fn schedule(actions: u64) -> Result<TrainConfig, LearnError> {
+    let exponential =
+        |start, end| Schedule::exponential(start, end, actions).map_err(qtable::Error::from);
+    Ok(TrainConfig {
+        alpha: exponential(0.6, 0.1)?,
+        temperature: exponential(1000.0, 5.0)?,
+        ..TrainConfig::paper(actions)
+    })
+}
+
+/// Learns `spec` in a simulator: `simulate` gives what is perceived after a move, `None` where the
+/// ball is lost, and `start` draws where an episode begins.
+///
+/// With `trials` the best of the tables met on the way is kept: in the second half of the run, at
+/// every record of the learning curve, the greedy policy goes for the ball from each of them in the
+/// simulator, and the table that needs the fewest steps stays, with an action that lost the ball in
+/// a trial not chosen in its state any more. Without trials the last table is kept.
+///
+/// A table on coarse states is never at rest: with each update the policy may lose a way here and
+/// find one there.
+///
+/// # Errors
+/// A reward that is not a number (the literal Eq. 5 and 6 divide by zero on their targets).
+pub fn learn(
+    spec: BehaviourSpec,
+    mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+    mut start: impl FnMut(&mut dyn Rng) -> Percept,
+    trials: &[Percept],
+    config: &TrainConfig,
+    mut rng: &mut dyn Rng,
+    on_progress: &mut dyn FnMut(&Progress),
+) -> Result<Lesson, LearnError> {
+    /// Parts from record to record in which alpha and the temperature stand still.
+    const BLOCKS: u64 = 5;
+    let mut table = QTable::new(spec.states(), spec.actions())?;
+    let mut report = TrainReport::default();
+    let mut best: Option<(usize, u64, QTable)> = None;
+    while report.actions < config.actions {
+        let from = report.actions;
+        let to = from
+            .saturating_add(config.record_every.max(1))
+            .min(config.actions);
+        let part = TrainConfig {
+            alpha: between(&config.alpha, from, to)?,
+            temperature: between(&config.temperature, from, to)?,
+            actions: to - from,
+            record_every: to - from,
+            ..config.clone()
+        };
+        let mut task = BehaviourTask::new(&spec, config.gamma, &mut simulate, &mut start);
+        let done = train_in_blocks(&mut task, &mut table, &part, BLOCKS, &mut rng, &mut |_| ())?;
+        for record in done.curve {
+            let latest = Record {
+                actions: from + record.actions,
+                episodes: report.episodes + record.episodes,
+                ..record
+            };
+            report.curve.push(latest);
+            on_progress(&Progress {
+                actions: latest.actions,
+                of: config.actions,
+                latest,
+            });
+        }
+        report.actions = to;
+        report.episodes += done.episodes;
+        if !trials.is_empty() && 2 * to > config.actions {
+            let behaviour = Behaviour::new(spec.clone(), table.clone())?;
+            let fewest = best.as_ref().map_or(usize::MAX, |(fewest, ..)| *fewest);
+            let (tried, without) = without_losses(trials, behaviour, fewest, &mut simulate)?;
+            if tried.steps < fewest {
+                best = Some((tried.steps, to, without));
+            }
+        }
+    }
+    let (learned_by, table) = best.map_or((report.actions, table), |(_, by, table)| (by, table));
+    Ok(Lesson {
+        behaviour: Behaviour::new(spec, table)?,
+        report,
+        learned_by,
+    })
+}
+
+/// The part of a schedule from one action to another.
+fn between(schedule: &Schedule, from: u64, to: u64) -> Result<Schedule, qtable::Error> {
+    if matches!(schedule, Schedule::InverseVisits { .. }) {
+        return Ok(schedule.clone());
+    }
+    let (start, end) = (schedule.at(from), schedule.at(to));
+    Ok(Schedule::piecewise(&[(0, start), (to - from, end)])?)
+}
+
+/// What the greedy policy, with the loop breaker of approaching, came to from a number of starts
+/// together.
+#[derive(Debug, Default)]
+struct Trials {
+    /// Steps to the goal; a trial that did not reach it counts as [`Trials::FAILED`].
+    steps: usize,
+    /// The states and actions that lost the ball.
+    lost_by: Vec<(State, Action)>,
+}
+
+impl Trials {
+    const MOST: usize = 60;
+    /// More than any detour.
+    const FAILED: usize = 5 * Self::MOST;
+
+    fn of(
+        starts: &[Percept],
+        behaviour: &Behaviour,
+        mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+    ) -> Self {
+        let spec = behaviour.spec();
+        let deltas: Vec<JointDelta> = (0..spec.actions()).map(|a| spec.delta(Action(a))).collect();
+        let mut trials = Self::default();
+        let mut steps = |start: &Percept| {
+            let (mut now, mut episode) = (*start, Episode::new(behaviour));
+            for step in 0..Self::MOST {
+                if spec.at_goal(&now) {
+                    return Some(step);
+                }
+                let elbow = now.theta3 + THETA3_ZERO;
+                let admitted = |action: Action| {
+                    let turned = elbow + deltas[action.0][Joint::J3].to_degrees();
+                    (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
+                };
+                let state = spec.state(&now).ok()?;
+                let action = behaviour.choose(state, &episode, KAPPA, admitted)?;
+                episode.chose(state, action);
+                let Some(after) = simulate(&now, &deltas[action.0]) else {
+                    trials.lost_by.push((state, action));
+                    return None;
+                };
+                now = after;
+            }
+            None
+        };
+        trials.steps = starts
+            .iter()
+            .map(|start| steps(start).unwrap_or(Self::FAILED))
+            .sum();
+        trials
+    }
+
+    /// Steps that no table can save by losing no ball any more.
+    fn at_least(&self) -> usize {
+        self.steps
+            .saturating_sub(Self::FAILED.saturating_mul(self.lost_by.len()))
+    }
+}
+
+/// `table` without the actions by which its greedy policy loses the ball from `starts`, and what it
+/// comes to then.
+///
+/// A state is a region, and an action that is the best in nearly all of it may lose the ball from
+/// one of its corners: on average that costs too little to be noticed. Such an action gets the
+/// lowest value of its state. Not done where even without losses it would take `fewest` steps or
+/// more.
+fn without_losses(
+    starts: &[Percept],
+    mut behaviour: Behaviour,
+    fewest: usize,
+    mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+) -> Result<(Trials, QTable), LearnError> {
+    /// What takes the place of an action may lose the ball as well.
+    const ROUNDS: usize = 5;
+    let mut tried = Trials::of(starts, &behaviour, &mut simulate);
+    for _ in 0..ROUNDS {
+        if tried.lost_by.is_empty() || tried.at_least() >= fewest {
+            break;
+        }
+        let mut table = behaviour.table().clone();
+        for (state, action) in &tried.lost_by {
+            let lowest = table
+                .row(*state)
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min);
+            table.set(*state, *action, lowest)?;
+        }
+        behaviour = Behaviour::new(behaviour.spec().clone(), table)?;
+        tried = Trials::of(starts, &behaviour, &mut simulate);
+    }
+    Ok((tried, behaviour.into_table()))
+}
+
+/// Why a behaviour could not be learned.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LearnError {
+    /// Training could not go on.
+    #[error("training: {0}")]
+    Training(#[from] qtable::Error),
+    /// What was learned does not fit the behaviour.
+    #[error(transparent)]
+    Behaviour(#[from] BehaviourError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::JointLimits;
+    use crate::sight::arm_plane::ArmPlane;
+    use crate::sight::camera_model::CameraModel;
+    use hough_heuristic::Features;
+
+    #[test]
+    fn an_action_that_loses_the_ball_in_a_trial_is_not_chosen_in_its_state_any_more() {
+        let spec = BehaviourSpec::approaching_fine();
+        let seen = |y, r| Percept {
+            features: Features { x: 98.7, y, r },
+            theta3: 40.0,
+        };
+        // One state, from whose corner the longest move toward the ball loses it.
+        let (corner, inside) = (seen(73.2, 11.87), seen(67.0, 10.7));
+        let state = spec.state(&corner).expect("finite");
+        assert_eq!(spec.state(&inside).expect("finite"), state);
+        let actions = || (0..spec.actions()).map(Action);
+        let turns = |action: Action, j2: f64, j3: f64| {
+            let [_, a, b, ..] = spec.delta(action).degrees();
+            (a - j2).abs() < 1e-9 && (b - j3).abs() < 1e-9
+        };
+        let long = actions()
+            .find(|a| turns(*a, 20.0, -16.0))
+            .expect("the paper's");
+        let short = actions()
+            .find(|a| turns(*a, 6.0, -1.6))
+            .expect("the paper's");
+        let mut table = QTable::new(spec.states(), spec.actions()).expect("not empty");
+        table.set(state, long, 740.0).expect("in the table");
+        table.set(state, short, 700.0).expect("in the table");
+        let behaviour = Behaviour::new(spec, table).expect("fits");
+
+        let model = CameraModel::paper();
+        let mut plane = ArmPlane::new(&model, JointLimits::paper());
+        // Seen is what shows 60 % of its outline.
+        let seen = |f: &Features| {
+            let inside = (0..360).filter(|degree| {
+                let (sin, cos) = f64::from(*degree).to_radians().sin_cos();
+                let (x, y) = (f.x + f.r * cos, f.y + f.r * sin);
+                (0.0..192.0).contains(&x) && (0.0..144.0).contains(&y)
+            });
+            inside.count() >= 216
+        };
+        let mut simulate = |percept: &Percept, delta: &JointDelta| {
+            let after = plane.after(percept, delta)?;
+            seen(&after.features).then_some(after)
+        };
+        let lost_by =
+            |behaviour: &Behaviour,
+             start: Percept,
+             simulate: &mut dyn FnMut(&Percept, &JointDelta) -> Option<Percept>| {
+                Trials::of(&[start], behaviour, simulate).lost_by
+            };
+        assert!(lost_by(&behaviour, corner, &mut simulate).contains(&(state, long)));
+        assert!(!lost_by(&behaviour, inside, &mut simulate).contains(&(state, long)));
+        let starts = [corner, inside];
+        let (_, table) = without_losses(&starts, behaviour.clone(), usize::MAX, &mut simulate)
+            .expect("sets values");
+        let without = Behaviour::new(behaviour.spec().clone(), table).expect("fits");
+        let chosen = without.choose(state, &Episode::new(&without), 0.0, |_| true);
+        assert_eq!(chosen, Some(short));
+        // Where another table does better anyhow, nothing is changed.
+        let (_, table) =
+            without_losses(&starts, behaviour.clone(), 0, &mut simulate).expect("changes nothing");
+        assert_eq!(table, *behaviour.table());
+    }
+}

@@ -1,0 +1,83 @@
+//! Result files: written whole or not at all.
+
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+
+use image::RgbImage;
+
+/// Makes the folder if need be, and makes sure that files can be written into it.
+pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
+    let probe = folder.join(".writable.part");
+    fs::create_dir_all(folder)
+        .and_then(|()| fs::write(&probe, b""))
+        .and_then(|()| fs::remove_file(&probe))
+        .map_err(|error| format!("{}: cannot be written to: {error}", folder.display()).into())
+}
+
+/// Writes a file: first beside its place, then renamed into it. What is there and is no regular
+/// file (a device, a pipe) is written to as it is, never replaced; a link stays a link.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+    let failed = |error| format!("{}: cannot be written: {error}", path.display());
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(&target).is_ok_and(|there| !there.is_file()) {
+        return Ok(fs::write(&target, bytes).map_err(failed)?);
+    }
+    let mut beside = target.as_os_str().to_owned();
+    beside.push(".part");
+    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &target));
+    Ok(written.map_err(|error| {
+        let _ = fs::remove_file(&beside);
+        failed(error)
+    })?)
+}
+
+/// Writes a picture as PNG.
+pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Box<dyn Error>> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+    write_whole(path, bytes.get_ref())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole_and_a_link_stays_a_link() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("table.csv");
+        write_whole(&path, b"longer than what follows").expect("a new file");
+        #[cfg(unix)]
+        let path = {
+            let link = folder.path().join("link.csv");
+            std::os::unix::fs::symlink(&path, &link).expect("a link");
+            link
+        };
+        write_whole(&path, b"short").expect("a file that is there");
+        assert_eq!(
+            std::fs::read(folder.path().join("table.csv")).expect("written"),
+            b"short"
+        );
+        #[cfg(unix)]
+        assert!(path.is_symlink());
+        let left: Vec<_> = std::fs::read_dir(folder.path())
+            .expect("a folder")
+            .collect();
+        assert_eq!(left.len(), 1 + usize::from(cfg!(unix)), "{left:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_regular_file_is_not_replaced() {
+        use std::os::unix::fs::FileTypeExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("socket");
+        let _listening = std::os::unix::net::UnixListener::bind(&path).expect("a socket");
+        let refused =
+            write_whole(&path, b"text").expect_err("a socket is not written to like this");
+        assert!(refused.to_string().contains("socket"), "{refused}");
+        let there = std::fs::metadata(&path).expect("still there");
+        assert!(there.file_type().is_socket());
+    }
+}
