@@ -56,14 +56,12 @@ mod tests {
         };
         write_whole(&path, b"short").expect("a file that is there");
         assert_eq!(
-            std::fs::read(folder.path().join("table.csv")).expect("written"),
+            fs::read(folder.path().join("table.csv")).expect("written"),
             b"short"
         );
         #[cfg(unix)]
         assert!(path.is_symlink());
-        let left: Vec<_> = std::fs::read_dir(folder.path())
-            .expect("a folder")
-            .collect();
+        let left: Vec<_> = fs::read_dir(folder.path()).expect("a folder").collect();
         assert_eq!(left.len(), 1 + usize::from(cfg!(unix)), "{left:?}");
     }
 
@@ -77,7 +75,7 @@ mod tests {
         let refused =
             write_whole(&path, b"text").expect_err("a socket is not written to like this");
         assert!(refused.to_string().contains("socket"), "{refused}");
-        let there = std::fs::metadata(&path).expect("still there");
+        let there = fs::metadata(&path).expect("still there");
         assert!(there.file_type().is_socket());
     }
 }
