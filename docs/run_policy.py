@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Runs an exported policy in a simulation of its own: nothing but the policy's file and the standard library.
+"""Runs an exported policy in a simulation of its own, with the standard library only.
 
     cargo run --release --example grasp -- --export policy.json
     python3 docs/run_policy.py policy.json --balls 200
 
-It shows that the file says all that is needed. The arm's lengths and the camera are facts of the cell and not part of a policy, so they stand
-here: a PUMA 560, and a pinhole camera on its hand. Balls are drawn at random and looked for from the six search poses; the arm makes the moves that the
-policy chooses until both behaviours are at their goals.
+This shows that the file is complete. The arm's lengths and the camera are facts of the cell and not
+part of a policy, so they stand here: a PUMA 560, and a pinhole camera on its hand. Balls are drawn
+at random and searched from the six poses; the arm makes the moves that the policy chooses until
+both behaviours are at their goals.
 """
 
 import argparse
@@ -15,9 +16,17 @@ import math
 import random
 import sys
 
-# The arm: lengths in metres (a2, a3, d2, d4), and the axes of the six joints as Denavit-Hartenberg rows (alpha, a, d).
-LINKS = [(-90, 0, 0), (0, 0.4318, 0.14909), (90, -0.02032, 0), (-90, 0, 0.43307), (90, 0, 0), (0, 0, 0)]
-# The camera in the hand's frame: place in metres; its x axis (right in the image) along -y of the hand, its y axis (down) along x.
+# The arm: Denavit-Hartenberg rows (alpha in degrees, a and d in metres) of the six joints.
+LINKS = [
+    (-90, 0, 0),
+    (0, 0.4318, 0.14909),
+    (90, -0.02032, 0),
+    (-90, 0, 0.43307),
+    (90, 0, 0),
+    (0, 0, 0),
+]
+# Position of the camera in the hand's frame, metres. Its x axis (right in the image) lies along -y
+# of the hand, its y axis (down) along x.
 CAMERA = (-0.060, 0.0045, 0.020)
 FOCAL = 11.5 / 8.8  # in widths of the frame
 BALL_RADIUS = 0.020
@@ -33,9 +42,13 @@ def hand(joints):
         c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
         ca, sa = math.cos(math.radians(alpha)), math.sin(math.radians(alpha))
         along = (a * c, a * s, d)
-        position = [p + sum(row[k] * along[k] for k in range(3)) for p, row in zip(position, rotation)]
+        position = [
+            p + sum(row[k] * along[k] for k in range(3)) for p, row in zip(position, rotation)
+        ]
         link = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0, sa, ca]]
-        rotation = [[sum(row[k] * link[k][j] for k in range(3)) for j in range(3)] for row in rotation]
+        rotation = [
+            [sum(row[k] * link[k][j] for k in range(3)) for j in range(3)] for row in rotation
+        ]
     return rotation, position
 
 
@@ -63,12 +76,19 @@ class Behaviour:
     """One behaviour of the policy, in one run."""
 
     def __init__(self, document, kappa, lost_weight, limits):
-        self.document, self.kappa, self.lost_weight, self.limits = document, kappa, lost_weight, limits
+        self.document, self.kappa, self.lost_weight, self.limits = (
+            document,
+            kappa,
+            lost_weight,
+            limits,
+        )
         self.weights = {}
         self.last = None
 
     def at_goal(self, values):
-        return all(goal["low"] <= values[goal["input"]] <= goal["high"] for goal in self.document["goal"])
+        return all(
+            goal["low"] <= values[goal["input"]] <= goal["high"] for goal in self.document["goal"]
+        )
 
     def state(self, values):
         number = 0
@@ -89,7 +109,10 @@ class Behaviour:
         return steps
 
     def within_limits(self, joints, action):
-        return all(self.limits[j][0] <= joints[j] + step <= self.limits[j][1] for j, step in self.steps(action))
+        return all(
+            self.limits[j][0] <= joints[j] + step <= self.limits[j][1]
+            for j, step in self.steps(action)
+        )
 
     def choose(self, values, joints):
         """The steps to make now."""
@@ -113,10 +136,12 @@ class Behaviour:
 
 
 def run(policy, ball):
-    """How many moves it took to bring the ball to the goal; None if it was not reached, "unseen" if no search pose shows it."""
+    """Returns the moves to the goal, None if it is not reached, "unseen" if no pose shows the ball."""
     limits, breaker = policy["limits_degrees"], policy["loop_breaker"]
     names = ("centering", "approaching")
-    behaviours = [Behaviour(policy[name], breaker[name], breaker["lost_weight"], limits) for name in names]
+    behaviours = [
+        Behaviour(policy[name], breaker[name], breaker["lost_weight"], limits) for name in names
+    ]
     conventions = policy["approaching"]["conventions"]
     frame = conventions["frame"]
     joints = next((list(pose) for pose in SEARCH if see(pose, ball, frame)), None)
@@ -141,7 +166,9 @@ def run(policy, ball):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Run an exported policy in a simulation of its own.")
+    parser = argparse.ArgumentParser(
+        description="Run an exported policy in a simulation of its own."
+    )
     parser.add_argument("policy", help="JSON written by `grasp --export`")
     parser.add_argument("--balls", type=int, default=200, help="how many balls to go for [200]")
     parser.add_argument("--seed", type=int, default=1, help="seed of their places [1]")
@@ -160,7 +187,10 @@ def main():
         runs += 1
         if result is not None:
             moves.append(result)
-    print(f"reached {len(moves)} of {runs} balls, in {sum(moves) / max(len(moves), 1):.2f} moves on average")
+    print(
+        f"reached {len(moves)} of {runs} balls, "
+        f"in {sum(moves) / max(len(moves), 1):.2f} moves on average"
+    )
 
 
 if __name__ == "__main__":

@@ -1,36 +1,42 @@
 #!/usr/bin/env python3
-"""The circle detectors of this project beside those of OpenCV: same frames, same radius range, one run.
+"""Compares the circle detectors with those of OpenCV: same frames, same radii, one run.
 
     python3 -m venv venv && venv/bin/pip install numpy 'opencv-contrib-python-headless<5'
     cargo build --release --example detect_circles --example render_dataset
     venv/bin/python docs/benchmarks/compare_circles.py FOLDER... --csv circles.csv
-    venv/bin/python docs/benchmarks/compare_circles.py --scenes benchmark --sizes 192x144,768x576 --frames 20
+    venv/bin/python docs/benchmarks/compare_circles.py --scenes benchmark --frames 20
     cargo build --release -p hough-heuristic --example scenes
     venv/bin/python docs/benchmarks/compare_circles.py --scenes simple --frames 20
 
-A FOLDER is a set. It holds images and may hold the tables that `render_dataset` writes: truth.csv (file,cx,cy,r and any further columns;
-(0, 0) is the centre of the top-left pixel) with a row a circle, and frames.csv (file,scene) or files.txt (a name a line) with
-the frames that count. A frame without a row in truth.csv holds no circle; a folder without truth.csv holds none at all. With frames.csv every scene
-is a set of its own. `--scenes` renders sets of these kinds first, as `render_dataset` names them, or with `simple` those of the detector crate's
-example `scenes`.
+A FOLDER is a set. It holds images and may hold the tables that `render_dataset` writes: truth.csv
+(file,cx,cy,r and any further columns; (0, 0) is the centre of the top-left pixel) with a row for
+each circle, and frames.csv (file,scene) or files.txt (a name a line) with the frames that count. A
+frame without a row in truth.csv holds no circle; a folder without truth.csv holds none at all. With
+frames.csv every scene is a set. `--scenes` renders sets of these kinds first, as `render_dataset`
+names them, or with `simple` those of the example `scenes` of the detector's crate.
 
-Prints a Markdown table and writes CSV, a row for each set and detector, and a row `mean of sets` for each detector. Columns:
+Prints a Markdown table and writes CSV: a row for each set and detector, and a row `mean of sets`
+for each detector. Columns:
 
-    recall, precision   share of the true circles that were found, share of the found ones that are true; at an intersection over union
-                        (IoU) of the two discs of at least 0.8, and once more with centre and radius each within 2 px
-    average_precision   area under precision over recall as the score falls, over all frames of the set (IoU 0.8)
-    top1                share of the frames with circles whose best-scored detection is true (IoU 0.8)
+    recall, precision   share of the true circles that were found and of the found ones that are
+                        true; at an intersection over union (IoU) of the two discs of at least
+                        0.8, and once more with centre and radius each within 2 px
+    average_precision   area under precision over recall as the score falls, over all frames of
+                        the set (IoU 0.8)
+    top1                share of the frames with circles whose best detection is true (IoU 0.8)
     false_per_empty     false circles per frame that holds none
-    centre, radius      errors of the circles matched within 2 px: median and 95th percentile, pixels
-    cpu_ms              CPU time of one thread from grey image in memory to circles: the least of the repetitions of a
-                        frame, then median, 95th percentile and maximum over the frames
+    centre, radius      errors of the circles matched within 2 px: median and 95th percentile, px
+    cpu_ms              CPU time of one thread from gray image in memory to circles: the least of
+                        the repetitions of a frame, then median, 95th percentile and maximum
     cpu_ms_per_mpx      the worst frame's time by its size, ms per megapixel
 
-OpenCV's detectors are HoughCircles with HOUGH_GRADIENT (`hough`) and HOUGH_GRADIENT_ALT (`hough-alt`), whose votes serve as scores, and
-EdgeDrawing with detectEllipses, that is EDCircles, after a blur (`ed`) and without (`ed-unblurred`), which have no score: what they
-find is ranked as listed. Each has one setting for all frames. Times on a shared machine move: the repetitions are spread over
---rounds passes through all detectors, and only ratios within one run mean much.
+OpenCV's detectors are HoughCircles with HOUGH_GRADIENT (`hough`) and HOUGH_GRADIENT_ALT
+(`hough-alt`), whose votes serve as scores, and EdgeDrawing with detectEllipses, that is EDCircles,
+after a blur (`ed`) and without (`ed-unblurred`); these have no score and are ranked as listed. Each
+has one setting for all frames. Times on a shared machine move: the repetitions are spread over
+--rounds passes through all detectors. Compare ratios within one run only.
 """
+
 import argparse
 import csv
 import datetime
@@ -44,8 +50,9 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 
-# glibc hands the large blocks that HoughCircles needs for every frame back to the system, and the page faults then triple its time.
-# These settings keep the blocks. They are read when a program starts, so start again with them.
+# glibc returns the large blocks that HoughCircles needs for every frame to the system, and the page
+# faults then triple its time. These settings keep the blocks; a program reads them when it starts,
+# so this one starts again with them.
 ALLOCATOR = {"MALLOC_MMAP_THRESHOLD_": str(256 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30)}
 if __name__ == "__main__" and not ALLOCATOR.items() <= os.environ.items():
     os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **ALLOCATOR})
@@ -58,8 +65,8 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".pgm")
 
 @dataclass
 class Frame:
-    grey: np.ndarray
-    path: str  # the same grey levels as a file, for our program
+    gray: np.ndarray
+    path: str  # the same gray levels as a file, for our program
     truth: list  # of (x, y, r)
 
 
@@ -71,7 +78,7 @@ class Found:
     cpu: float = math.inf
 
 
-# ---- frames ----------------------------------------------------------------------------------------------------------
+# ---- frames ----
 
 
 def read_sets(folder, scratch, pad):
@@ -86,7 +93,11 @@ def read_sets(folder, scratch, pad):
         with open(plain) as file:
             members = [(line.strip(), name) for line in file if line.strip()]
     else:
-        images = (path for path in sorted(glob.glob(os.path.join(glob.escape(folder), "*"))) if path.lower().endswith(ENDINGS))
+        images = (
+            path
+            for path in sorted(glob.glob(os.path.join(glob.escape(folder), "*")))
+            if path.lower().endswith(ENDINGS)
+        )
         members = [(os.path.basename(path), name) for path in images]
     if not members:
         sys.exit(f"{folder}: no images")
@@ -94,42 +105,68 @@ def read_sets(folder, scratch, pad):
     if os.path.exists(os.path.join(folder, "truth.csv")):
         with open(os.path.join(folder, "truth.csv"), newline="") as file:
             for row in csv.DictReader(file):
-                truth.setdefault(row["file"], []).append((float(row["cx"]) + pad, float(row["cy"]) + pad, float(row["r"])))
+                truth.setdefault(row["file"], []).append(
+                    (float(row["cx"]) + pad, float(row["cy"]) + pad, float(row["r"]))
+                )
         strangers = truth.keys() - {file for file, _ in members}
         if strangers:
             sys.exit(f"{folder}/truth.csv: {min(strangers)} is not among the frames")
     sets = {}
     for number, (file, scene) in enumerate(members):
-        grey = cv2.imread(os.path.join(folder, file), cv2.IMREAD_GRAYSCALE)
-        if grey is None:
+        gray = cv2.imread(os.path.join(folder, file), cv2.IMREAD_GRAYSCALE)
+        if gray is None:
             sys.exit(f"{folder}/{file}: not an image that OpenCV reads")
         if pad:
-            grey = cv2.copyMakeBorder(grey, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
-        # Decoders differ by a grey level here and there: both sides get the very same bytes.
+            gray = cv2.copyMakeBorder(gray, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
+        # Decoders differ by a gray level here and there: both sides get the very same bytes.
         path = os.path.join(scratch, f"{number:05}.pgm")
-        cv2.imwrite(path, grey)
-        sets.setdefault(scene, []).append(Frame(grey, path, truth.get(file, [])))
+        cv2.imwrite(path, gray)
+        sets.setdefault(scene, []).append(Frame(gray, path, truth.get(file, [])))
     return sets
 
 
 def render(options, size, out):
     """Renders the scenes at a size, "WxH"."""
-    program = [options.simple_renderer] if options.scenes == "simple" else [options.renderer, "--kinds", options.scenes]
-    command = [*program, "--out", out, "--frames", str(options.frames), "--seed", str(options.seed), "--size", size]
+    program = (
+        [options.simple_renderer]
+        if options.scenes == "simple"
+        else [options.renderer, "--kinds", options.scenes]
+    )
+    command = [
+        *program,
+        "--out",
+        out,
+        "--frames",
+        str(options.frames),
+        "--seed",
+        str(options.seed),
+        "--size",
+        size,
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
-# ---- detectors -------------------------------------------------------------------------------------------------------
+# ---- detectors ----
 
 
 def hough(method, edge, votes):
-    def detect(grey, smallest, largest):
-        smooth = cv2.GaussianBlur(grey, (5, 5), 1.2)
+    def detect(gray, smallest, largest):
+        smooth = cv2.GaussianBlur(gray, (5, 5), 1.2)
         found = cv2.HoughCirclesWithAccumulator(
-            smooth, method, dp=1, minDist=max(6, 0.02 * grey.shape[1]), param1=edge, param2=votes,
-            minRadius=int(smallest), maxRadius=int(largest),
+            smooth,
+            method,
+            dp=1,
+            minDist=max(6, 0.02 * gray.shape[1]),
+            param1=edge,
+            param2=votes,
+            minRadius=int(smallest),
+            maxRadius=int(largest),
         )
-        return [] if found is None else [(float(c[3]), tuple(map(float, c[:3]))) for c in found.reshape(-1, 4)]
+        return (
+            []
+            if found is None
+            else [(float(c[3]), tuple(map(float, c[:3]))) for c in found.reshape(-1, 4)]
+        )
 
     return detect
 
@@ -144,16 +181,20 @@ def edge_drawing(blur):
     drawing = cv2.ximgproc.createEdgeDrawing()
     drawing.setParams(settings)
 
-    def detect(grey, smallest, largest):
-        drawing.detectEdges(cv2.GaussianBlur(grey, (9, 9), 2.0) if blur else grey)
+    def detect(gray, smallest, largest):
+        drawing.detectEdges(cv2.GaussianBlur(gray, (9, 9), 2.0) if blur else gray)
         shapes = drawing.detectEllipses()
         circles = []
-        for x, y, radius, major, minor, _ in [] if shapes is None else shapes.reshape(-1, 6).astype(float):
+        for x, y, radius, major, minor, _ in (
+            [] if shapes is None else shapes.reshape(-1, 6).astype(float)
+        ):
             # A shape is a circle, or an ellipse, which passes for a circle if it is nearly one.
             if radius <= 0 and min(major, minor) > 0.9 * max(major, minor):
                 radius = (major + minor) / 2
             circle = (x, y, radius)
-            if smallest <= radius <= largest and all(overlap(circle, other) < 0.8 for other in circles):
+            if smallest <= radius <= largest and all(
+                overlap(circle, other) < 0.8 for other in circles
+            ):
                 circles.append(circle)
         return [(-place, circle) for place, circle in enumerate(circles)]
 
@@ -172,15 +213,30 @@ def run_rival(detect, frames, options, found):
     for frame, result in zip(frames, found):
         for _ in range(options.repeat):
             start = time.process_time()
-            result.circles = detect(frame.grey, options.min_radius, options.max_radius)
+            result.circles = detect(frame.gray, options.min_radius, options.max_radius)
             result.cpu = min(result.cpu, 1e3 * (time.process_time() - start))
 
 
 def run_ours(name, frames, options, found, scratch):
     repeat = 1 if name in listed(options.slow) else options.repeat
     circles, times = os.path.join(scratch, "found.csv"), os.path.join(scratch, "times.csv")
-    command = [options.program, "--detector", name, "--repeat", str(repeat), "--csv", circles, "--times", times,
-               "--min-radius", str(options.min_radius), "--max-radius", str(options.max_radius), "--seed", str(options.detector_seed)]
+    command = [
+        options.program,
+        "--detector",
+        name,
+        "--repeat",
+        str(repeat),
+        "--csv",
+        circles,
+        "--times",
+        times,
+        "--min-radius",
+        str(options.min_radius),
+        "--max-radius",
+        str(options.max_radius),
+        "--seed",
+        str(options.detector_seed),
+    ]
     subprocess.run(command + [frame.path for frame in frames], check=True)
     by_path = {frame.path: result for frame, result in zip(frames, found)}
     for result in found:
@@ -195,7 +251,7 @@ def run_ours(name, frames, options, found, scratch):
             result.cpu = min(result.cpu, float(row["cpu_us"]) / 1e3)
 
 
-# ---- measures --------------------------------------------------------------------------------------------------------
+# ---- measures ----
 
 
 def overlap(a, b):
@@ -236,7 +292,7 @@ def by_pixels(c, t):
 
 
 def average_precision(frames, found):
-    """Every detection in the order of its score, true if it overlaps a circle that no better one has claimed."""
+    """Ranks detections by score; one is true if it overlaps a circle that no better one claimed."""
     total = sum(len(frame.truth) for frame in frames)
     ranked = []
     for frame, result in zip(frames, found):
@@ -264,7 +320,9 @@ def measure(frames, found):
     circles = [[circle for _, circle in result.circles] for result in found]
     true, reported = sum(len(f.truth) for f in frames), sum(map(len, circles))
     overlapping = sum(len(pairs(c, f.truth, by_overlap)) for f, c in zip(frames, circles))
-    near = [(c[i], f.truth[j]) for f, c in zip(frames, circles) for i, j in pairs(c, f.truth, by_pixels)]
+    near = [
+        (c[i], f.truth[j]) for f, c in zip(frames, circles) for i, j in pairs(c, f.truth, by_pixels)
+    ]
     empty = [c for f, c in zip(frames, circles) if not f.truth]
     holding = [(f, r) for f, r in zip(frames, found) if f.truth]
     best = lambda r: max(r.circles, key=lambda c: c[0], default=None)
@@ -273,29 +331,42 @@ def measure(frames, found):
     radius = [abs(c[2] - t[2]) for c, t in near]
     times = [r.cpu for r in found]
     return {
-        "frames": len(frames), "circles": true, "found": reported,
-        "recall_iou": share(overlapping, true), "precision_iou": share(overlapping, reported) if true else None,
-        "recall_2px": share(len(near), true), "precision_2px": share(len(near), reported) if true else None,
-        "average_precision": average_precision(frames, found), "top1": share(first, len(holding)),
+        "frames": len(frames),
+        "circles": true,
+        "found": reported,
+        "recall_iou": share(overlapping, true),
+        "precision_iou": share(overlapping, reported) if true else None,
+        "recall_2px": share(len(near), true),
+        "precision_2px": share(len(near), reported) if true else None,
+        "average_precision": average_precision(frames, found),
+        "top1": share(first, len(holding)),
         "false_per_empty": share(sum(map(len, empty)), len(empty)),
-        "centre_px_median": spot(centre, 50), "centre_px_p95": spot(centre, 95),
-        "radius_px_median": spot(radius, 50), "radius_px_p95": spot(radius, 95),
-        "cpu_ms_median": spot(times, 50), "cpu_ms_p95": spot(times, 95), "cpu_ms_max": max(times),
-        "cpu_ms_per_mpx": max(1e6 * r.cpu / f.grey.size for f, r in zip(frames, found)),
+        "centre_px_median": spot(centre, 50),
+        "centre_px_p95": spot(centre, 95),
+        "radius_px_median": spot(radius, 50),
+        "radius_px_p95": spot(radius, 95),
+        "cpu_ms_median": spot(times, 50),
+        "cpu_ms_p95": spot(times, 95),
+        "cpu_ms_max": max(times),
+        "cpu_ms_per_mpx": max(1e6 * r.cpu / f.gray.size for f, r in zip(frames, found)),
     }
 
 
 def mean(rows):
-    """The mean over sets of each measure that a set has; counts are summed, and of the worst the worst is kept."""
+    """Averages each measure over the sets that have it; sums counts, keeps the worst time."""
     result = {}
     for key in rows[0]:
         values = [row[key] for row in rows if row[key] is not None]
-        combine = sum if key in ("frames", "circles", "found") else max if key in ("cpu_ms_max", "cpu_ms_per_mpx") else np.mean
+        combine = (
+            sum
+            if key in ("frames", "circles", "found")
+            else max if key in ("cpu_ms_max", "cpu_ms_per_mpx") else np.mean
+        )
         result[key] = combine(values) if values else None
     return result
 
 
-# ---- the run ---------------------------------------------------------------------------------------------------------
+# ---- the run ----
 
 
 def listed(text):
@@ -306,9 +377,15 @@ def compare(sets, options, scratch, emit):
     """Measures every detector on every set of a folder."""
     rivals = {name: RIVALS[name]() for name in listed(options.rivals)}
     for name, frames in sets.items():
+
         def sample(detector):
             few = options.slow_frames if detector in listed(options.slow) else len(frames)
-            return [frames[k] for k in sorted({int(k) for k in np.linspace(0, len(frames) - 1, min(few, len(frames)))})]
+            return [
+                frames[k]
+                for k in sorted(
+                    {int(k) for k in np.linspace(0, len(frames) - 1, min(few, len(frames)))}
+                )
+            ]
 
         found = {d: [Found() for _ in sample(d)] for d in listed(options.detectors) + list(rivals)}
         for turn in range(options.rounds):
@@ -324,38 +401,97 @@ def compare(sets, options, scratch, emit):
 
 
 SHOWN = {
-    "frames": "frames", "circles": "circles", "recall_iou": "recall", "precision_iou": "precision", "recall_2px": "recall 2 px",
-    "precision_2px": "precision 2 px", "average_precision": "AP", "top1": "best is true", "false_per_empty": "false per empty frame",
-    "cpu_ms_median": "CPU ms", "cpu_ms_p95": "95 %", "cpu_ms_max": "worst",
+    "frames": "frames",
+    "circles": "circles",
+    "recall_iou": "recall",
+    "precision_iou": "precision",
+    "recall_2px": "recall 2 px",
+    "precision_2px": "precision 2 px",
+    "average_precision": "AP",
+    "top1": "best is true",
+    "false_per_empty": "false per empty frame",
+    "cpu_ms_median": "CPU ms",
+    "cpu_ms_p95": "95 %",
+    "cpu_ms_max": "worst",
 }
 
 
 def shown(value):
     if value is None:
         return "–"
-    return str(value) if isinstance(value, int) else f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
+    return (
+        str(value)
+        if isinstance(value, int)
+        else f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
+    )
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folders", nargs="*", metavar="FOLDER")
-    parser.add_argument("--detectors", default="a-contrario,heuristic", help="ours, as detect_circles names them [%(default)s]")
-    parser.add_argument("--rivals", default="hough,hough-alt,ed,ed-unblurred", help="OpenCV's [%(default)s]")
+    parser.add_argument(
+        "--detectors",
+        default="a-contrario,heuristic",
+        help="ours, as detect_circles names them [%(default)s]",
+    )
+    parser.add_argument(
+        "--rivals", default="hough,hough-alt,ed,ed-unblurred", help="OpenCV's [%(default)s]"
+    )
     parser.add_argument("--min-radius", type=float, default=8, metavar="PX", help="[%(default)s]")
     parser.add_argument("--max-radius", type=float, default=280, metavar="PX", help="[%(default)s]")
-    parser.add_argument("--detector-seed", type=int, default=1, metavar="N", help="seed of our random searches [%(default)s]")
-    parser.add_argument("--repeat", type=int, default=3, help="repetitions per frame and round [%(default)s]")
-    parser.add_argument("--rounds", type=int, default=2, help="passes through all detectors [%(default)s]")
-    parser.add_argument("--slow", default="sht,sht-gradient", help="detectors that see few frames, each once [%(default)s]")
-    parser.add_argument("--slow-frames", type=int, default=5, help="that many, spread over the set [%(default)s]")
-    parser.add_argument("--pad", type=int, default=0, metavar="PX", help="widen the frames of folders by repeating their border")
-    parser.add_argument("--scenes", metavar="KIND,...", help="kinds of scenes to render; `benchmark` or `simple` for those made for this")
-    parser.add_argument("--sizes", default="768x576", help="at these sizes; the radius range is scaled along [%(default)s]")
-    parser.add_argument("--frames", type=int, default=20, help="so many frames of each [%(default)s]")
+    parser.add_argument(
+        "--detector-seed",
+        type=int,
+        default=1,
+        metavar="N",
+        help="seed of our random searches [%(default)s]",
+    )
+    parser.add_argument(
+        "--repeat", type=int, default=3, help="repetitions per frame and round [%(default)s]"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=2, help="passes through all detectors [%(default)s]"
+    )
+    parser.add_argument(
+        "--slow",
+        default="sht,sht-gradient",
+        help="detectors that see few frames, each once [%(default)s]",
+    )
+    parser.add_argument(
+        "--slow-frames", type=int, default=5, help="that many, spread over the set [%(default)s]"
+    )
+    parser.add_argument(
+        "--pad",
+        type=int,
+        default=0,
+        metavar="PX",
+        help="widen the frames of folders by repeating their border",
+    )
+    parser.add_argument(
+        "--scenes",
+        metavar="KIND,...",
+        help="kinds of scenes to render; `benchmark` or `simple` for those made for this",
+    )
+    parser.add_argument(
+        "--sizes",
+        default="768x576",
+        help="at these sizes; the radius range is scaled along [%(default)s]",
+    )
+    parser.add_argument(
+        "--frames", type=int, default=20, help="so many frames of each [%(default)s]"
+    )
     parser.add_argument("--seed", type=int, default=1, help="from this seed [%(default)s]")
-    parser.add_argument("--program", default="target/release/examples/detect_circles", help="[%(default)s]")
-    parser.add_argument("--renderer", default="target/release/examples/render_dataset", help="[%(default)s]")
-    parser.add_argument("--simple-renderer", default="target/release/examples/scenes", help="[%(default)s]")
+    parser.add_argument(
+        "--program", default="target/release/examples/detect_circles", help="[%(default)s]"
+    )
+    parser.add_argument(
+        "--renderer", default="target/release/examples/render_dataset", help="[%(default)s]"
+    )
+    parser.add_argument(
+        "--simple-renderer", default="target/release/examples/scenes", help="[%(default)s]"
+    )
     parser.add_argument("--csv", metavar="FILE", help="where to write all measures")
     options = parser.parse_args()
     if not options.folders and not options.scenes:
@@ -372,7 +508,10 @@ def main():
 
     def emit(name, detector, row):
         rows.append((name, detector, row))
-        print(f"| {name} | {detector} | " + " | ".join(shown(row[key]) for key in SHOWN) + " |", flush=True)
+        print(
+            f"| {name} | {detector} | " + " | ".join(shown(row[key]) for key in SHOWN) + " |",
+            flush=True,
+        )
         if options.csv:
             write(options.csv, rows)
 
@@ -382,10 +521,15 @@ def main():
     for size in listed(options.sizes) if options.scenes else []:
         with tempfile.TemporaryDirectory() as rendered, tempfile.TemporaryDirectory() as scratch:
             render(options, size, rendered)
-            sets = {f"{kind} {size}": frames for kind, frames in read_sets(rendered, scratch, 0).items()}
+            sets = {
+                f"{kind} {size}": frames for kind, frames in read_sets(rendered, scratch, 0).items()
+            }
             scale = int(size.split("x")[0]) / 768
             scaled = argparse.Namespace(**vars(options))
-            scaled.min_radius, scaled.max_radius = max(4, options.min_radius * scale), options.max_radius * scale
+            scaled.min_radius, scaled.max_radius = (
+                max(4, options.min_radius * scale),
+                options.max_radius * scale,
+            )
             compare(sets, scaled, scratch, emit)
     if len({name for name, _, _ in rows}) > 1:
         for detector in dict.fromkeys(detector for _, detector, _ in rows):
@@ -398,14 +542,18 @@ def write(path, rows):
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["set", "detector", *rows[0][2]])
         rounded = lambda value: f"{value:.4g}" if isinstance(value, float) else value
-        table.writerows([name, detector, *map(rounded, row.values())] for name, detector, row in rows)
+        table.writerows(
+            [name, detector, *map(rounded, row.values())] for name, detector, row in rows
+        )
     os.replace(path + ".part", path)
 
 
 def processor():
     try:
         with open("/proc/cpuinfo") as file:
-            return next(line.split(":")[1].strip() for line in file if line.startswith("model name"))
+            return next(
+                line.split(":")[1].strip() for line in file if line.startswith("model name")
+            )
     except (OSError, StopIteration):
         return platform.processor() or platform.machine()
 
