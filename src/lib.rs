@@ -34,7 +34,6 @@
 //! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example
 //! `grasp`: `cargo run --release --example grasp`.
 
-mod guarded_arm;
 mod plane;
 mod rig;
 mod setup;

@@ -11,12 +11,11 @@ use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
 use puma_val2::SerialLine;
 use puma_val2::nalgebra::Point3;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, Profile,
-    ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, GuardedArm, JointDelta, Joints, Manipulator,
+    Profile, ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
 use crate::Contacts;
-use crate::guarded_arm::GuardedArm;
 use crate::surroundings::Surroundings;
 
 /// An arm behind a VAL II controller, calibrated, with a simulated cell around it: a ball to place,

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use crate::{Joint, Joints};
+use crate::joints::{Joint, Joints};
 
 /// Why an arm did not do what it was asked to.
 ///

@@ -44,6 +44,16 @@ impl fmt::Display for Joint {
 pub struct Joints(pub [f64; 6]);
 
 impl Joints {
+    /// VAL's `READY`: the arm upright, straight up from the shoulder.
+    pub const READY: Self = Self([
+        0.0,
+        (-90.0_f64).to_radians(),
+        90.0_f64.to_radians(),
+        0.0,
+        0.0,
+        0.0,
+    ]);
+
     /// Joint angles from degrees, as VAL writes them.
     pub fn from_degrees(degrees: [f64; 6]) -> Self {
         Self(degrees.map(f64::to_radians))

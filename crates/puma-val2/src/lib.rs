@@ -99,11 +99,14 @@ mod emulator;
 mod error;
 mod joints;
 mod kinematics;
+mod limits;
 mod manipulator;
 mod serve;
 mod transport;
 
-pub use client::{ClientConfig, Ending, Location, MoveWay, ReplyReader, Resident, Val2Client};
+pub use client::{
+    ClientConfig, Ending, GuardedArm, Location, MoveWay, ReplyReader, Resident, Val2Client,
+};
 pub use emulator::{
     BootQuestion, Emulator, Event, Fault, Message, Place, Profile, StartPower, TextError,
     WhereLayout, char_time,
@@ -111,9 +114,10 @@ pub use emulator::{
 pub use error::ArmError;
 pub use joints::{Joint, JointDelta, Joints};
 pub use kinematics::{
-    ArmDynamics, ArmSide, Configuration, DriveTrain, Elbow, Frames, JointRange, LinkDynamics,
-    PumaParams, Singularity, Solution, Solutions, Unreachable, Wrist, Xyzoat,
+    ArmDynamics, ArmSide, Configuration, DriveTrain, Elbow, Frames, LinkDynamics, PumaParams,
+    Singularity, Solution, Solutions, Unreachable, Wrist, Xyzoat,
 };
+pub use limits::JointRange;
 pub use manipulator::{Gripper, Manipulator, ProximitySensor};
 pub use nalgebra;
 #[cfg(unix)]

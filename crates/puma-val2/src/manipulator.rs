@@ -1,6 +1,7 @@
 //! The doors of an arm: what a controller needs of it, whatever it is made of.
 
-use crate::{ArmError, JointDelta, Joints};
+use crate::error::ArmError;
+use crate::joints::{JointDelta, Joints};
 
 /// An arm that moves by joint angles.
 ///

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::PumaParams;
+use crate::kinematics::params::PumaParams;
 
 /// Settings of a [`Val2Client`](super::Val2Client). The defaults suit a real controller behind a
 /// USB serial adapter.

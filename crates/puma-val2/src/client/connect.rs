@@ -1,8 +1,15 @@
 //! Getting hold of the monitor, and calibrating the arm.
 
-use super::wire::{NUDGE, SPOIL, is_boot_question, is_doubt, last_question, shortened, way_out};
-use super::{ClientConfig, Ending, Location, Val2Client, Wire, reader};
-use crate::{ArmError, Transport};
+use crate::client::config::ClientConfig;
+use crate::client::dialogue::{NUDGE, SPOIL, is_boot_question, last_question, shortened, way_out};
+use crate::client::number::check_percent;
+use crate::client::reader;
+use crate::client::reader::Ending;
+use crate::client::val2_client::Val2Client;
+use crate::client::whereabouts::Location;
+use crate::client::wire::{Wire, is_doubt};
+use crate::error::ArmError;
+use crate::transport::Transport;
 
 impl<T: Transport> Val2Client<T> {
     /// Gets hold of the monitor: through the start-up dialogue of a controller just switched on,
@@ -247,7 +254,7 @@ impl<T: Transport> Val2Client<T> {
 /// Settings that would make the client send nonsense or wait for ever.
 fn check(config: &ClientConfig) -> Result<(), ArmError> {
     if let Some(percent) = config.speed_percent {
-        super::check_percent(percent)?;
+        check_percent(percent)?;
     }
     let name = &config.point_name;
     let sound = (1..=6).contains(&name.len())

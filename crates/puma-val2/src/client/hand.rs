@@ -2,9 +2,13 @@
 
 use nalgebra::Isometry3;
 
-use super::wire::Failed;
-use super::{Val2Client, plain};
-use crate::{ArmError, Location, Transport, Xyzoat};
+use crate::client::number::plain;
+use crate::client::val2_client::Val2Client;
+use crate::client::whereabouts::Location;
+use crate::client::wire::Failed;
+use crate::error::ArmError;
+use crate::kinematics::xyzoat::Xyzoat;
+use crate::transport::Transport;
 
 impl<T: Transport> Val2Client<T> {
     /// Moves the hand to a pose in the world frame by `DO MOVE TRANS(...)`, the joints

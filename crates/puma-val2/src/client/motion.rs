@@ -2,9 +2,13 @@
 
 use std::time::Duration;
 
-use super::wire::{Failed, is_doubt};
-use super::{MoveWay, Val2Client, check_percent, degrees, plain};
-use crate::{ArmError, Joint, JointDelta, Joints, Transport};
+use crate::client::config::MoveWay;
+use crate::client::number::{check_percent, degrees, plain};
+use crate::client::val2_client::Val2Client;
+use crate::client::wire::{Failed, is_doubt};
+use crate::error::ArmError;
+use crate::joints::{Joint, JointDelta, Joints};
+use crate::transport::Transport;
 
 /// Less than VAL's smallest step of a joint, half a thousandth of a degree.
 pub(super) const STILL: f64 = 0.0005 * std::f64::consts::PI / 180.0;
@@ -55,7 +59,7 @@ impl<T: Transport> Val2Client<T> {
     /// # Errors
     /// As for [`Manipulator::move_to`](crate::Manipulator::move_to).
     pub fn ready(&mut self) -> Result<Joints, ArmError> {
-        let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        let ready = Joints::READY;
         let means = match self.guard {
             Some(_) => Means::Guarded(None),
             None => Means::Ready,

@@ -1,8 +1,11 @@
 //! Points typed to the controller, and compared with what it shows of them.
 
-use super::wire::{Failed, is_doubt};
-use super::{Ending, Val2Client};
-use crate::{ArmError, Joints, Transport};
+use crate::client::reader::Ending;
+use crate::client::val2_client::Val2Client;
+use crate::client::wire::{Failed, is_doubt};
+use crate::error::ArmError;
+use crate::joints::Joints;
+use crate::transport::Transport;
 
 /// Whether values displayed, each with what rounding can have changed of it, are those that were
 /// meant.

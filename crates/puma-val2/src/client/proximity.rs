@@ -1,8 +1,14 @@
 //! The proximity sensors: read, and set up to stop the arm.
 
-use super::wire::{Failed, NUDGE, Reply, is_doubt};
-use super::{Ending, Val2Client, plain, shortened};
-use crate::{ArmError, Joints, ProximitySensor, Transport};
+use crate::client::dialogue::{NUDGE, shortened};
+use crate::client::number::plain;
+use crate::client::reader::Ending;
+use crate::client::val2_client::Val2Client;
+use crate::client::wire::{Failed, Reply, is_doubt};
+use crate::error::ArmError;
+use crate::joints::Joints;
+use crate::manipulator::ProximitySensor;
+use crate::transport::Transport;
 
 /// The program in which the client's moves run under guard, one for a single move of another kind,
 /// and the one that the signal calls.

@@ -1,17 +1,20 @@
 //! A program that stays in the controller and moves the arm as it is told: the fewest characters
 //! per move.
 
-use super::motion::{AS_SENT, STILL, furthest};
-use super::point::shown_values;
-use super::wire::{Reply, is_doubt};
-use super::{Ending, Val2Client, degrees, plain, shortened};
-use crate::{ArmError, Gripper, JointDelta, Joints, Manipulator, Transport};
+use crate::client::dialogue::shortened;
+use crate::client::motion::{AS_SENT, STILL, furthest};
+use crate::client::number::{degrees, plain};
+use crate::client::point::shown_values;
+use crate::client::reader::Ending;
+use crate::client::val2_client::Val2Client;
+use crate::client::wire::{Reply, is_doubt};
+use crate::error::ArmError;
+use crate::joints::{JointDelta, Joints};
+use crate::manipulator::{Gripper, Manipulator};
+use crate::transport::Transport;
 
 /// Its name.
 const NAME: &str = "PGLOOP";
-
-/// What it asks.
-pub(super) const QUESTION: &str = "GO? ";
 
 /// Keys of the program. A changed bit can make a carriage return of a character, and its line two:
 /// so what a line begins with after an angle (no angle is as large as these numbers) is no key, and
@@ -43,9 +46,6 @@ const STEPS: [&str; 17] = [
     "GOTO 10",
     "20 TYPE \"BYE\"",
 ];
-
-/// The line that ends the program.
-pub(super) const LEAVE: &[u8] = b"914\r";
 
 /// The arm through a program that runs in its controller. While this lives, the monitor is not
 /// used.

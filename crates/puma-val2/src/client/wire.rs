@@ -3,8 +3,12 @@
 use std::io;
 use std::time::Duration;
 
-use super::{ClientConfig, Ending, reader};
-use crate::{ArmError, ReplyReader, Transport};
+use crate::client::config::ClientConfig;
+use crate::client::dialogue::{CANCEL, NUDGE, SPOIL, is_boot_question, shortened, way_out};
+use crate::client::reader;
+use crate::client::reader::{Ending, ReplyReader};
+use crate::error::ArmError;
+use crate::transport::Transport;
 
 /// A reply that has ended.
 #[derive(Debug)]
@@ -40,16 +44,6 @@ impl Failed {
 pub(super) fn is_doubt(error: &ArmError) -> bool {
     matches!(error, ArmError::Silence { .. } | ArmError::Garbled { .. })
 }
-
-/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried
-/// out. Ctrl-Q comes before it: a single flipped bit makes an `S` a Ctrl-S, which holds all output.
-pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
-
-/// Asks for the prompt.
-pub(super) const NUDGE: &[u8] = b"\x11\r";
-
-/// Cancels a dialogue, where control characters are known.
-const CANCEL: &[u8] = b"\x03";
 
 /// Most characters that mean nothing (NUL, bell) that an echo may be strewn with.
 const FILLERS: usize = 256;
@@ -383,62 +377,5 @@ impl<T: Transport> Wire<T> {
             expected: expected.to_owned(),
             heard: heard.to_owned(),
         }
-    }
-}
-
-/// Whether the last question of a text is one of the start-up dialogue.
-pub(super) fn is_boot_question(text: &str) -> bool {
-    let question = last_question(text);
-    question.contains("(Y/N)") && (question.contains("LOAD") || question.contains("INIT"))
-}
-
-/// What leaves a dialogue, tried in turn.
-///
-/// An empty line ends those that ask for changes or for yes and no. It is not the first thing that
-/// an unknown question is answered with: a program that asks for numbers would take it for zeros
-/// and go on with them.
-pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
-    let question = last_line(text).to_ascii_uppercase();
-    let words = question.trim_end_matches(['?', ' ']);
-    let of_editor = words.trim_end_matches('.').trim().parse::<u32>().is_ok();
-    let yes_or_no = question.contains("Y/N");
-    let first = attempt.is_multiple_of(2);
-    if question.starts_with(super::resident::QUESTION.trim_end()) {
-        super::resident::LEAVE
-    } else if of_editor {
-        if first { b"\r" } else { b"E\r" }
-    } else if yes_or_no {
-        if first { b"\r" } else { b"N\r" }
-    } else if first != question.contains("CHANGE") {
-        CANCEL
-    } else {
-        b"\r"
-    }
-}
-
-/// The last question of a text, in upper case and without its mark. Where nothing is echoed one
-/// question can follow another on its line.
-pub(super) fn last_question(text: &str) -> String {
-    let line = last_line(text).trim_end_matches(['?', ' ']);
-    line.rsplit('?')
-        .next()
-        .unwrap_or_default()
-        .to_ascii_uppercase()
-}
-
-fn last_line(text: &str) -> &str {
-    text.trim_end()
-        .rsplit(['\r', '\n'])
-        .next()
-        .unwrap_or_default()
-}
-
-/// The end of a text, short enough for a message.
-pub(super) fn shortened(text: &str) -> String {
-    let count = text.chars().count();
-    if count <= 120 {
-        text.to_owned()
-    } else {
-        format!("...{}", text.chars().skip(count - 117).collect::<String>())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::Joint;
+use crate::joints::Joint;
 
 /// A message of the controller, by its meaning. The wording is the profile's: the classes are
 /// known, the texts mostly are not.

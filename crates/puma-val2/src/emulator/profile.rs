@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::Message;
-use crate::Joints;
+use crate::emulator::message::{Fault, Message};
+use crate::joints::Joints;
 
 /// A question of the start-up dialogue.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -188,7 +188,7 @@ impl Profile {
             control_characters: true,
             start_power: StartPower::OnAtCalibration,
             start_calibrated: false,
-            start: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+            start: Joints::READY,
             nest: Joints::from_degrees([0.0, -215.0, 215.0, 0.0, 0.0, 0.0]),
             acceleration_time: Duration::from_millis(250),
             stop_time: Duration::from_millis(60),
@@ -242,6 +242,14 @@ impl Profile {
     /// The profile of this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::all().into_iter().find(|p| p.name == name)
+    }
+
+    /// Refuses a name that is too long for the controller.
+    pub(crate) fn check_name(&self, name: &str) -> Result<(), Fault> {
+        if name.len() > self.max_name {
+            return Err(Message::NameTooLong.into());
+        }
+        Ok(())
     }
 
     /// The wording of a message.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::Joints;
+use crate::joints::Joints;
 
 /// How motor shafts turn into joint angles.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use crate::{DriveTrain, Joints, PumaParams};
+use crate::joints::Joints;
+use crate::kinematics::drive_train::DriveTrain;
+use crate::kinematics::params::PumaParams;
 
 /// Mass, motor and friction of one link and its drive.
 #[derive(Clone, Copy, Debug, PartialEq)]

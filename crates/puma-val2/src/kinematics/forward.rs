@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use crate::{Joints, PumaParams};
+use crate::joints::Joints;
+use crate::kinematics::params::PumaParams;
 
 impl PumaParams {
     /// The pose of the flange in the world frame (metres) for the given joint angles.
@@ -10,7 +11,7 @@ impl PumaParams {
     /// ```
     /// use puma_val2::{Joints, PumaParams};
     ///
-    /// let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    /// let ready = Joints::READY;
     /// let hand = PumaParams::unimation().forward(&ready);
     /// assert!((hand.translation.z - 0.92112).abs() < 1e-12);
     /// ```

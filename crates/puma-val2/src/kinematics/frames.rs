@@ -2,7 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use crate::{Joints, PumaParams};
+use crate::joints::Joints;
+use crate::kinematics::params::PumaParams;
 
 /// Where the arm stands in the world, and what its flange holds: VAL's `BASE` and `TOOL`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,8 @@ use std::fmt;
 
 use nalgebra::Isometry3;
 
-use crate::{Joint, Joints, PumaParams};
+use crate::joints::{Joint, Joints};
+use crate::kinematics::params::PumaParams;
 
 /// The upper arm as seen from behind: a right or a left arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -421,7 +422,7 @@ mod tests {
 
     #[test]
     fn ready_is_a_right_arm_with_its_elbow_above() {
-        let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        let ready = Joints::READY;
         let words = PumaParams::unimation().configuration(&ready).to_string();
         assert_eq!(words, "RIGHTY ABOVE NOFLIP");
     }

@@ -4,7 +4,8 @@ use std::fmt;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use crate::{Joints, PumaParams};
+use crate::joints::Joints;
+use crate::kinematics::params::PumaParams;
 
 /// A posture in which the hand cannot move in some direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -113,11 +113,12 @@ impl fmt::Display for Xyzoat {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Joints, PumaParams};
+    use crate::joints::Joints;
+    use crate::kinematics::params::PumaParams;
 
     #[test]
     fn ready_shows_ninety_minus_ninety_zero() {
-        let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        let ready = Joints::READY;
         let shown = Xyzoat::from_pose(&PumaParams::unimation().forward(&ready)).val();
         let wanted = [-20.32, 149.09, 921.12, 90.0, -90.0, 0.0];
         assert!(

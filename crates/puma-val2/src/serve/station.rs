@@ -4,7 +4,7 @@ use std::io::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::Emulator;
+use crate::emulator::controller::Emulator;
 use crate::transport::Transcript;
 
 /// An emulator shared between the thread that serves it and its owner.

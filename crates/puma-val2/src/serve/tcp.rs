@@ -7,9 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::ServeConfig;
-use super::station::Station;
-use crate::{Emulator, Gripper, Joints};
+use crate::emulator::controller::Emulator;
+use crate::joints::Joints;
+use crate::manipulator::Gripper;
+use crate::serve::ServeConfig;
+use crate::serve::station::Station;
 
 /// Longest time after which a change made through [`TcpServer::with_emulator`] reaches the
 /// terminal.

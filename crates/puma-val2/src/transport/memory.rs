@@ -3,8 +3,8 @@
 use std::io;
 use std::time::Duration;
 
-use super::Transport;
-use crate::Emulator;
+use crate::emulator::controller::Emulator;
+use crate::transport::Transport;
 
 /// An emulated controller as a line: no thread, no clock. Time passes only while the other side
 /// waits, and then as fast as the machine.

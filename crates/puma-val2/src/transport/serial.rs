@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 
-use super::{Transport, received};
-use crate::ArmError;
+use crate::error::ArmError;
+use crate::transport::{Transport, received};
 
 /// A serial port, or a pseudo-terminal opened as one: 8 data bits, no parity, 1 stop bit, no flow
 /// control.

@@ -4,8 +4,8 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-use super::{Transport, received};
-use crate::ArmError;
+use crate::error::ArmError;
+use crate::transport::{Transport, received};
 
 /// A TCP connection to a controller, or to a terminal server with a controller behind it.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use super::Transport;
+use crate::transport::Transport;
 
 /// Writes down what passes on a line: `< ` begins what went to the controller, `> ` what came from
 /// it. Line ends are shown by line ends, other control characters as `^C`, bytes beyond ASCII as

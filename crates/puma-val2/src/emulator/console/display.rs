@@ -1,11 +1,13 @@
 //! Numbers and blocks as the controller prints them.
 
-use super::place::Place;
-use super::{Profile, WhereLayout};
-use crate::{Gripper, Joints, Xyzoat};
+use crate::emulator::language::place::Place;
+use crate::emulator::profile::{Profile, WhereLayout};
+use crate::joints::Joints;
+use crate::kinematics::xyzoat::Xyzoat;
+use crate::manipulator::Gripper;
 
 /// A fixed-point number, right-aligned, never `-0.000`.
-pub(super) fn number(value: f64, width: usize, decimals: usize) -> String {
+pub(crate) fn number(value: f64, width: usize, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.starts_with('-') && text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
     let text = if is_zero { &text[1..] } else { &text };
@@ -19,7 +21,7 @@ pub(super) fn number(value: f64, width: usize, decimals: usize) -> String {
 
 /// A real as `TYPE` and `LISTR` show it by default: whole numbers plain, others with up to four
 /// decimals.
-pub(super) fn plain(value: f64) -> String {
+pub(crate) fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" {
@@ -37,7 +39,7 @@ fn above(word: &str, width: usize) -> String {
 }
 
 /// The two blocks of `WHERE`, each a heading and a line of values.
-pub(super) fn whereabouts(
+pub(crate) fn whereabouts(
     joints: &Joints,
     hand: &Xyzoat,
     gripper: Gripper,
@@ -80,7 +82,7 @@ pub(super) fn whereabouts(
 }
 
 /// The heading that `HERE`, `POINT` and `LISTL` put above locations of either kind.
-pub(super) fn place_heading(profile: &Profile) -> String {
+pub(crate) fn place_heading(profile: &Profile) -> String {
     let width = profile.width + 1;
     ["X/JT1", "Y/JT2", "Z/JT3", "O/JT4", "A/JT5", "T/JT6"]
         .map(|w| format!("{w:>width$}"))
@@ -88,7 +90,7 @@ pub(super) fn place_heading(profile: &Profile) -> String {
 }
 
 /// The six values of a location below that heading.
-pub(super) fn place_values(place: &Place, profile: &Profile) -> String {
+pub(crate) fn place_values(place: &Place, profile: &Profile) -> String {
     let values = place.val();
     let lengths = matches!(place, Place::Transformation(_));
     (0..6)

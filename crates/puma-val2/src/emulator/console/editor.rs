@@ -1,29 +1,20 @@
 //! The program editor.
 
-use super::dialogue::Mode;
-use super::lexer::{Cursor, Token};
-use super::program::{Program, Step};
-use super::scope::check_name;
-use super::{Emulator, Fault, Message};
-
-#[derive(Debug)]
-pub(super) struct Editing {
-    name: String,
-    program: Program,
-    /// The step that the next line is for, from 0.
-    at: usize,
-    /// Whether lines are inserted before the step instead of replacing it.
-    inserting: bool,
-}
+use crate::emulator::console::mode::Editing;
+use crate::emulator::console::mode::Mode;
+use crate::emulator::controller::Emulator;
+use crate::emulator::language::lexer::{Cursor, Token};
+use crate::emulator::language::program::{Program, Step};
+use crate::emulator::message::{Fault, Message};
 
 /// A step as it is listed.
-pub(super) fn numbered(index: usize, text: &str) -> String {
+pub(crate) fn numbered(index: usize, text: &str) -> String {
     format!("{:>3}.  {text}", index + 1)
 }
 
 impl Emulator {
     /// `EDIT program[,step]`.
-    pub(super) fn edit(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    pub(crate) fn edit(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let name = match cursor.peek() {
             None => self.edited_last.clone().ok_or(Message::UndefinedProgram)?,
             Some(_) => cursor.name()?,
@@ -38,7 +29,7 @@ impl Emulator {
             }
         }
         cursor.expect_end()?;
-        check_name(&name, &self.profile)?;
+        self.profile.check_name(&name)?;
         let program = match self.memory.programs.get(&name) {
             Some(program) => (**program).clone(),
             None => {
@@ -60,7 +51,7 @@ impl Emulator {
         Ok(())
     }
 
-    pub(super) fn editor_prompt(&mut self, editing: Editing) {
+    pub(crate) fn editor_prompt(&mut self, editing: Editing) {
         self.terminal.resume();
         if let Some(step) = editing.program.steps.get(editing.at)
             && !editing.inserting
@@ -73,7 +64,7 @@ impl Emulator {
     }
 
     /// Ends editing; the program is kept as it is then.
-    pub(super) fn leave_editor(&mut self) {
+    pub(crate) fn leave_editor(&mut self) {
         if let Mode::Editor(editing) = std::mem::replace(&mut self.mode, Mode::Monitor) {
             self.keep(editing);
         }
@@ -91,7 +82,7 @@ impl Emulator {
     ///
     /// `E` ends; an empty line goes to the next step; `S n` to step n, `P n` prints n steps, `L`
     /// goes one step back, `D n` deletes n steps, `I` inserts until an empty line.
-    pub(super) fn edit_line(&mut self, mut editing: Editing, line: &str) {
+    pub(crate) fn edit_line(&mut self, mut editing: Editing, line: &str) {
         let text = line.trim().to_ascii_uppercase();
         let mut words = text.split_whitespace();
         let command = words.next().unwrap_or_default();

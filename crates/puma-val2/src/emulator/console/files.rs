@@ -16,14 +16,17 @@
 
 use std::collections::BTreeMap;
 
-use super::dialogue::Kind;
-use super::lexer::Cursor;
-use super::memory::Memory;
-use super::place::Place;
-use super::program::{Program, Step};
-use super::scope::check_name;
-use super::{Emulator, Event, Fault, Message, Profile};
-use crate::{Joints, Xyzoat};
+use crate::emulator::console::mode::Kind;
+use crate::emulator::controller::{Emulator, Event};
+use crate::emulator::language::lexer::Cursor;
+use crate::emulator::language::place::Place;
+use crate::emulator::language::place_expr::PlaceName;
+use crate::emulator::language::program::{Program, Step};
+use crate::emulator::machine::memory::Memory;
+use crate::emulator::message::{Fault, Message};
+use crate::emulator::profile::Profile;
+use crate::joints::Joints;
+use crate::kinematics::xyzoat::Xyzoat;
 
 /// Why a text is not one of programs, locations and variables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -66,13 +69,13 @@ impl Emulator {
 
     /// `STORE file[=name,...]`: everything, or only programs, locations or variables, or only those
     /// named.
-    pub(super) fn store(
+    pub(crate) fn store(
         &mut self,
         kind: Option<Kind>,
         cursor: &mut Cursor<'_>,
     ) -> Result<(), Fault> {
         let file = cursor.name()?;
-        check_name(&file, &self.profile)?;
+        self.profile.check_name(&file)?;
         let mut names = Vec::new();
         if cursor.sign("=") {
             names.push(self.stored_name(cursor)?);
@@ -103,11 +106,11 @@ impl Emulator {
     }
 
     fn stored_name(&self, cursor: &mut Cursor<'_>) -> Result<String, Fault> {
-        super::place::PlaceName::parse(cursor)?.key(&self.scope())
+        PlaceName::parse(cursor)?.key(&self.scope())
     }
 
     /// `LOAD file`: everything in it, or only its programs, locations or variables.
-    pub(super) fn load(
+    pub(crate) fn load(
         &mut self,
         kind: Option<Kind>,
         cursor: &mut Cursor<'_>,
@@ -301,6 +304,6 @@ fn sound_name(name: &str, profile: &Profile) -> Result<String, Fault> {
     if !fits {
         return Err(Message::InvalidArgument.into());
     }
-    check_name(plain, profile)?;
+    profile.check_name(plain)?;
     Ok(name.to_owned())
 }

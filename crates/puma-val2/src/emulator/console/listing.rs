@@ -1,14 +1,17 @@
 //! Commands that show what is there.
 
-use super::lexer::Cursor;
-use super::monitor::Command;
-use super::place::PlaceName;
-use super::signals::BANKS;
-use super::{Emulator, Fault, Message, display};
-use crate::Xyzoat;
+use crate::emulator::console::display;
+use crate::emulator::console::editor::numbered;
+use crate::emulator::console::monitor::Command;
+use crate::emulator::controller::Emulator;
+use crate::emulator::language::lexer::Cursor;
+use crate::emulator::language::place_expr::PlaceName;
+use crate::emulator::machine::signals::BANKS;
+use crate::emulator::message::{Fault, Message};
+use crate::kinematics::xyzoat::Xyzoat;
 
 impl Emulator {
-    pub(super) fn show_where(&mut self) {
+    pub(crate) fn show_where(&mut self) {
         let joints = self.arm.shown();
         let hand = Xyzoat::from_pose(&self.arm.hand(&joints));
         for line in display::whereabouts(&joints, &hand, self.arm.gripper, &self.profile) {
@@ -16,7 +19,7 @@ impl Emulator {
         }
     }
 
-    pub(super) fn list(&mut self, command: Command, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+    pub(crate) fn list(&mut self, command: Command, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let of_names = [
             Command::ListLocations,
             Command::ListReals,
@@ -110,7 +113,7 @@ impl Emulator {
                     .steps
                     .iter()
                     .enumerate()
-                    .map(|(i, s)| super::editor::numbered(i, &s.text)),
+                    .map(|(i, s)| numbered(i, &s.text)),
             );
             lines.push(".END".into());
         }

@@ -1,13 +1,14 @@
 //! Program instructions and their parser.
 
-use super::expr::{Expr, Variable};
-use super::lexer::{Cursor, Token, keyword};
-use super::place::{PlaceExpr, PlaceName, arguments};
-use super::{Fault, Message};
-use crate::{ArmSide, Elbow, Gripper, Wrist};
+use crate::emulator::language::expr::{Expr, Variable};
+use crate::emulator::language::lexer::{Cursor, Token, keyword};
+use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments};
+use crate::emulator::message::{Fault, Message};
+use crate::kinematics::inverse::{ArmSide, Elbow, Wrist};
+use crate::manipulator::Gripper;
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Instruction {
+pub(crate) enum Instruction {
     /// An empty line or a comment.
     Remark,
     /// `MOVE`, `MOVES`, `MOVET`, `MOVEST`: the hand opening (millimetres) with the last two.
@@ -89,14 +90,14 @@ pub(super) enum Instruction {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Posture {
+pub(crate) enum Posture {
     Side(ArmSide),
     Elbow(Elbow),
     Wrist(Wrist),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum SpeedUnit {
+pub(crate) enum SpeedUnit {
     Percent,
     MillimetresPerSecond,
     InchesPerSecond,
@@ -104,7 +105,7 @@ pub(super) enum SpeedUnit {
 
 /// A part of what `TYPE` prints.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Item {
+pub(crate) enum Item {
     Text(String),
     Value(Expr),
     /// `/Xn`: blanks.
@@ -221,7 +222,7 @@ const WORDS: [(&str, Word); 64] = [
 
 impl Instruction {
     /// Parses a whole instruction; a label before it is not part of it.
-    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+    pub(crate) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         let Some(first) = cursor.peek() else {
             return Ok(Self::Remark);
         };
@@ -244,7 +245,7 @@ impl Instruction {
     }
 
     /// Whether the instruction makes sense only among the steps of a program.
-    pub(super) fn needs_program(&self) -> bool {
+    pub(crate) fn needs_program(&self) -> bool {
         matches!(
             self,
             Self::Goto(_)

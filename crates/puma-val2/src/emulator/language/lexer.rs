@@ -1,9 +1,9 @@
 //! A line of VAL II cut into words, numbers, texts and signs.
 
-use super::{Fault, Message};
+use crate::emulator::message::{Fault, Message};
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Token {
+pub(crate) enum Token {
     /// A name or keyword, upper case.
     Name(String),
     Number(f64),
@@ -17,7 +17,7 @@ const SIGNS: [&str; 20] = [
 ];
 
 /// Cuts a line into tokens; a comment after `;` is dropped.
-pub(super) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
+pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
     let mut found = Vec::new();
     let mut rest = line.trim_start();
     while let Some(first) = rest.chars().next() {
@@ -69,7 +69,7 @@ pub(super) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
 
 /// A reader over the tokens of a line.
 #[derive(Debug)]
-pub(super) struct Cursor<'a> {
+pub(crate) struct Cursor<'a> {
     tokens: &'a [Token],
     depth: usize,
     operators: usize,
@@ -82,7 +82,7 @@ const DEPTH: usize = 24;
 const OPERATORS: usize = 128;
 
 impl<'a> Cursor<'a> {
-    pub(super) fn new(tokens: &'a [Token]) -> Self {
+    pub(crate) fn new(tokens: &'a [Token]) -> Self {
         Self {
             tokens,
             depth: 0,
@@ -90,26 +90,26 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(super) fn peek(&self) -> Option<&'a Token> {
+    pub(crate) fn peek(&self) -> Option<&'a Token> {
         self.tokens.first()
     }
 
-    pub(super) fn peek_second(&self) -> Option<&'a Token> {
+    pub(crate) fn peek_second(&self) -> Option<&'a Token> {
         self.tokens.get(1)
     }
 
-    pub(super) fn next(&mut self) -> Option<&'a Token> {
+    pub(crate) fn next(&mut self) -> Option<&'a Token> {
         let (first, rest) = self.tokens.split_first()?;
         self.tokens = rest;
         Some(first)
     }
 
-    pub(super) fn at_end(&self) -> bool {
+    pub(crate) fn at_end(&self) -> bool {
         self.tokens.is_empty()
     }
 
     /// Takes the sign if it comes next.
-    pub(super) fn sign(&mut self, sign: &str) -> bool {
+    pub(crate) fn sign(&mut self, sign: &str) -> bool {
         let is_next = matches!(self.peek(), Some(Token::Sign(s)) if *s == sign);
         if is_next {
             self.next();
@@ -118,7 +118,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Takes the word if it comes next.
-    pub(super) fn word(&mut self, word: &str) -> bool {
+    pub(crate) fn word(&mut self, word: &str) -> bool {
         let is_next = matches!(self.peek(), Some(Token::Name(n)) if n == word);
         if is_next {
             self.next();
@@ -126,7 +126,7 @@ impl<'a> Cursor<'a> {
         is_next
     }
 
-    pub(super) fn expect_sign(&mut self, sign: &str) -> Result<(), Fault> {
+    pub(crate) fn expect_sign(&mut self, sign: &str) -> Result<(), Fault> {
         if self.sign(sign) {
             Ok(())
         } else {
@@ -134,7 +134,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(super) fn expect_word(&mut self, word: &str) -> Result<(), Fault> {
+    pub(crate) fn expect_word(&mut self, word: &str) -> Result<(), Fault> {
         if self.word(word) {
             Ok(())
         } else {
@@ -142,14 +142,14 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(super) fn name(&mut self) -> Result<String, Fault> {
+    pub(crate) fn name(&mut self) -> Result<String, Fault> {
         match self.next() {
             Some(Token::Name(name)) => Ok(name.clone()),
             _ => Err(Message::InvalidArgument.into()),
         }
     }
 
-    pub(super) fn expect_end(&self) -> Result<(), Fault> {
+    pub(crate) fn expect_end(&self) -> Result<(), Fault> {
         if self.at_end() {
             Ok(())
         } else {
@@ -158,7 +158,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Goes one bracket deeper.
-    pub(super) fn descend(&mut self) -> Result<(), Fault> {
+    pub(crate) fn descend(&mut self) -> Result<(), Fault> {
         self.depth += 1;
         if self.depth > DEPTH {
             return Err(Message::InvalidArgument.into());
@@ -167,7 +167,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Takes an operator, which makes what is parsed one deeper.
-    pub(super) fn operator(&mut self) -> Result<(), Fault> {
+    pub(crate) fn operator(&mut self) -> Result<(), Fault> {
         self.next();
         self.operators += 1;
         if self.operators > OPERATORS {
@@ -176,13 +176,13 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    pub(super) fn ascend(&mut self) {
+    pub(crate) fn ascend(&mut self) {
         self.depth -= 1;
     }
 }
 
 /// The one entry of `words` that `typed` names: itself, or the only one that it abbreviates.
-pub(super) fn keyword<T: Copy>(
+pub(crate) fn keyword<T: Copy>(
     typed: &str,
     words: &[(&str, T)],
     unknown: Message,

@@ -1,13 +1,17 @@
 //! An arm that its controller stops when something comes too near to the hand.
 
-use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, Transport, Val2Client};
+use crate::client::val2_client::Val2Client;
+use crate::error::ArmError;
+use crate::joints::{JointDelta, Joints};
+use crate::manipulator::{Gripper, Manipulator};
+use crate::transport::Transport;
 
 /// A [`Val2Client`] whose moves the controller itself watches ([`Val2Client::arm_proximity`]).
 ///
 /// A stop ([`ArmError::ProximityStop`]) uses the guard up, so that the arm can be taken back the
 /// way it came; it is armed again as soon as a move has ended with nothing near.
 #[derive(Debug)]
-pub(crate) struct GuardedArm<T: Transport> {
+pub struct GuardedArm<T: Transport> {
     client: Val2Client<T>,
     signal: u16,
     armed: bool,
@@ -15,7 +19,10 @@ pub(crate) struct GuardedArm<T: Transport> {
 
 impl<T: Transport> GuardedArm<T> {
     /// Arms the guard on the input that `client` is set to for its sensors.
-    pub(crate) fn new(mut client: Val2Client<T>) -> Result<Self, ArmError> {
+    ///
+    /// # Errors
+    /// As for [`Val2Client::arm_proximity`].
+    pub fn new(mut client: Val2Client<T>) -> Result<Self, ArmError> {
         let signal = client.config().proximity_signal;
         client.arm_proximity(signal)?;
         Ok(Self {

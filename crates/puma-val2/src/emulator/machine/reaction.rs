@@ -1,20 +1,22 @@
 //! `REACT` and `REACTI`: what happens when a signal comes.
 
-use super::job::{CALL_DEPTH, JobKind, Wait};
-use super::{Emulator, Event, Message};
+use crate::emulator::controller::{Emulator, Event};
+use crate::emulator::language::scope::Scope;
+use crate::emulator::machine::job::{CALL_DEPTH, JobKind, Wait};
+use crate::emulator::message::Message;
 
 /// An armed `REACT` or `REACTI`.
 #[derive(Clone, Debug)]
-pub(super) struct Reaction {
+pub(crate) struct Reaction {
     /// Negative: reacts when the signal is off.
-    pub(super) signal: f64,
-    pub(super) program: Option<String>,
-    pub(super) at_once: bool,
+    pub(crate) signal: f64,
+    pub(crate) program: Option<String>,
+    pub(crate) at_once: bool,
 }
 
 impl Emulator {
     /// Looks whether a signal has come that somebody waits for.
-    pub(super) fn check_reactions(&mut self) {
+    pub(crate) fn check_reactions(&mut self) {
         let due = |r: &Reaction| self.scope().signal(r.signal).unwrap_or(false);
         let Some(index) = self.reactions.iter().position(due) else {
             return;

@@ -4,49 +4,56 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::instruction::{Posture, SpeedUnit};
-use super::motion::{Motion, Pace};
-use super::place::Place;
-use super::{Fault, Message, Profile};
-use crate::{Configuration, DriveTrain, Frames, Gripper, Joint, Joints, PumaParams, Unreachable};
+use crate::emulator::language::instruction::{Posture, SpeedUnit};
+use crate::emulator::language::place::Place;
+use crate::emulator::machine::motion::{Motion, Pace};
+use crate::emulator::message::{Fault, Message};
+use crate::emulator::profile::Profile;
+use crate::emulator::profile::StartPower;
+use crate::joints::{Joint, Joints};
+use crate::kinematics::drive_train::DriveTrain;
+use crate::kinematics::frames::Frames;
+use crate::kinematics::inverse::{Configuration, Unreachable};
+use crate::kinematics::params::PumaParams;
+use crate::manipulator::Gripper;
 
 #[derive(Clone, Debug)]
-pub(super) struct Arm {
-    pub(super) params: PumaParams,
+pub(crate) struct Arm {
+    pub(crate) params: PumaParams,
     drives: Option<DriveTrain>,
     joints: Joints,
     motion: Option<Motion>,
-    pub(super) power: bool,
-    pub(super) calibrated: bool,
-    pub(super) frames: Frames,
-    pub(super) gripper: Gripper,
+    pub(crate) power: bool,
+    pub(crate) calibrated: bool,
+    pub(crate) frames: Frames,
+    pub(crate) gripper: Gripper,
     gripper_next: Option<Gripper>,
     postures_next: Vec<Posture>,
     keeps_posture: bool,
     /// Percent.
-    pub(super) monitor_speed: f64,
-    pub(super) program_speed: Speed,
+    pub(crate) monitor_speed: f64,
+    pub(crate) program_speed: Speed,
     next_speed: Option<Speed>,
 }
 
 /// A program speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Speed {
+pub(crate) struct Speed {
     value: f64,
     unit: SpeedUnit,
 }
 
 impl Speed {
-    pub(super) const FULL: Self = Self::percent(100.0);
+    pub(crate) const FULL: Self = Self::percent(100.0);
 
-    pub(super) const fn percent(value: f64) -> Self {
+    pub(crate) const fn percent(value: f64) -> Self {
         Self {
             value,
             unit: SpeedUnit::Percent,
         }
     }
 
-    pub(super) fn new(value: f64, unit: SpeedUnit) -> Result<Self, Fault> {
+    pub(crate) fn new(value: f64, unit: SpeedUnit) -> Result<Self, Fault> {
         if value > 0.0 && value <= 100_000.0 {
             Ok(Self { value, unit })
         } else {
@@ -65,20 +72,20 @@ impl Speed {
     }
 
     /// The number as the controller shows it.
-    pub(super) fn shown(self) -> f64 {
+    pub(crate) fn shown(self) -> f64 {
         self.value
     }
 }
 
 impl Arm {
-    pub(super) fn new(params: PumaParams, profile: &Profile) -> Self {
+    pub(crate) fn new(params: PumaParams, profile: &Profile) -> Self {
         let drives = profile.encoder_counts.then(DriveTrain::puma560);
         Self {
             params,
             joints: drives.map_or(profile.start, |d| d.quantized(&profile.start)),
             drives,
             motion: None,
-            power: profile.start_power == super::StartPower::On,
+            power: profile.start_power == StartPower::On,
             calibrated: profile.start_calibrated,
             frames: Frames::default(),
             gripper: Gripper::Open,
@@ -92,46 +99,46 @@ impl Arm {
     }
 
     /// Stands at `joints` (or the nearest whole encoder counts) from now on.
-    pub(super) fn put(&mut self, joints: Joints) {
+    pub(crate) fn put(&mut self, joints: Joints) {
         self.motion = None;
         self.joints = joints;
         self.joints = self.shown();
     }
 
     /// Joint angles at the time of the last [`Arm::advance`].
-    pub(super) fn joints(&self) -> Joints {
+    pub(crate) fn joints(&self) -> Joints {
         self.joints
     }
 
     /// Joint angles as the encoders give them.
-    pub(super) fn shown(&self) -> Joints {
+    pub(crate) fn shown(&self) -> Joints {
         self.drives
             .map_or(self.joints, |d| d.quantized(&self.joints))
     }
 
     /// Where the present motion ends, or where the arm stands.
-    pub(super) fn destination(&self) -> Joints {
+    pub(crate) fn destination(&self) -> Joints {
         self.motion
             .as_ref()
             .map_or_else(|| self.shown(), Motion::target)
     }
 
     /// The hand in the world frame.
-    pub(super) fn hand(&self, joints: &Joints) -> Isometry3<f64> {
+    pub(crate) fn hand(&self, joints: &Joints) -> Isometry3<f64> {
         self.frames.hand(&self.params, joints)
     }
 
-    pub(super) fn moving(&self) -> bool {
+    pub(crate) fn moving(&self) -> bool {
         self.motion.is_some()
     }
 
-    pub(super) fn motion_end(&self) -> Option<Duration> {
+    pub(crate) fn motion_end(&self) -> Option<Duration> {
         self.motion.as_ref().map(Motion::end)
     }
 
     /// Follows the motion to `now`. If it has ended, says how: with the fault that the path ended
     /// in, if any.
-    pub(super) fn advance(&mut self, now: Duration) -> Option<Result<(), Fault>> {
+    pub(crate) fn advance(&mut self, now: Duration) -> Option<Result<(), Fault>> {
         let motion = self.motion.as_ref()?;
         self.joints = motion.at(now);
         if now < motion.end() {
@@ -146,35 +153,35 @@ impl Arm {
     }
 
     /// Brings a motion under way to a stand.
-    pub(super) fn break_off(&mut self, now: Duration, time: Duration) {
+    pub(crate) fn break_off(&mut self, now: Duration, time: Duration) {
         if let Some(motion) = &mut self.motion {
             motion.break_off(now, time);
         }
     }
 
     /// What is asked of the next motion by words that come before it is forgotten.
-    pub(super) fn forget_words(&mut self) {
+    pub(crate) fn forget_words(&mut self) {
         self.gripper_next = None;
         self.postures_next.clear();
         self.next_speed = None;
     }
 
-    pub(super) fn set_gripper_next(&mut self, to: Gripper) {
+    pub(crate) fn set_gripper_next(&mut self, to: Gripper) {
         self.gripper_next = Some(to);
     }
 
-    pub(super) fn set_posture_next(&mut self, posture: Posture) {
+    pub(crate) fn set_posture_next(&mut self, posture: Posture) {
         if self.postures_next.len() < 16 {
             self.postures_next.push(posture);
         }
     }
 
-    pub(super) fn set_speed_next(&mut self, speed: Speed) {
+    pub(crate) fn set_speed_next(&mut self, speed: Speed) {
         self.next_speed = Some(speed);
     }
 
     /// Whether the arm may be moved at all.
-    pub(super) fn check_ready(&self) -> Result<(), Fault> {
+    pub(crate) fn check_ready(&self) -> Result<(), Fault> {
         if !self.power {
             return Err(Message::ArmPowerOff.into());
         }
@@ -216,7 +223,7 @@ impl Arm {
     }
 
     /// Starts a joint-interpolated motion. `speed` overrides the program's.
-    pub(super) fn start_joints(
+    pub(crate) fn start_joints(
         &mut self,
         to: Joints,
         speed: Option<Speed>,
@@ -232,7 +239,7 @@ impl Arm {
     }
 
     /// The joint angles that reach a location, in the posture asked for or else the present one.
-    pub(super) fn resolve(&self, place: &Place) -> Result<Joints, Fault> {
+    pub(crate) fn resolve(&self, place: &Place) -> Result<Joints, Fault> {
         let pose = match place {
             Place::PrecisionPoint(joints) => return Ok(*joints),
             Place::Transformation(pose) => pose,
@@ -292,7 +299,7 @@ impl Arm {
     }
 
     /// Starts a straight-line motion of the hand, in the present posture.
-    pub(super) fn start_line(
+    pub(crate) fn start_line(
         &mut self,
         to: &Place,
         now: Duration,
@@ -347,7 +354,7 @@ impl Arm {
     }
 
     /// `place` moved by `distance` metres back along its own tool axis.
-    pub(super) fn approach(&self, place: &Place, distance: f64) -> Place {
+    pub(crate) fn approach(&self, place: &Place, distance: f64) -> Place {
         let pose = match place {
             Place::Transformation(pose) => *pose,
             Place::PrecisionPoint(joints) => self.hand(joints),
@@ -356,7 +363,7 @@ impl Arm {
     }
 
     /// The present pose with the tool axis turned to the nearest axis of the world.
-    pub(super) fn aligned(&self) -> Place {
+    pub(crate) fn aligned(&self) -> Place {
         let hand = self.hand(&self.destination());
         let axis = hand * Vector3::z();
         let (nearest, _) = axis
@@ -379,7 +386,7 @@ impl Arm {
     }
 
     /// Every joint by a degree and a half and back, which passes an index pulse of each encoder.
-    pub(super) fn start_calibration(&mut self, now: Duration, profile: &Profile) {
+    pub(crate) fn start_calibration(&mut self, now: Duration, profile: &Profile) {
         let pace = Pace {
             fraction: 0.05,
             acceleration_time: profile.acceleration_time.as_secs_f64().max(1e-3),

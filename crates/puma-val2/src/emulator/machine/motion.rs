@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use super::Fault;
-use crate::{Joints, PumaParams};
+use crate::emulator::message::Fault;
+use crate::joints::Joints;
+use crate::kinematics::params::PumaParams;
 
 /// A path from knot to knot, evenly spaced, travelled from rest to rest.
 #[derive(Clone, Debug)]
-pub(super) struct Motion {
+pub(crate) struct Motion {
     knots: Vec<Joints>,
     start: Duration,
     /// Greatest speed and acceleration along the path, whose length is 1; per second, per second
@@ -17,7 +18,7 @@ pub(super) struct Motion {
     /// How it comes to a stand before its end.
     stop: Option<Stop>,
     /// What is wrong with the place where the path ends.
-    pub(super) failure: Option<Fault>,
+    pub(crate) failure: Option<Fault>,
 }
 
 /// A motion that is broken off travels its path ever more slowly.
@@ -34,17 +35,17 @@ struct Stop {
 
 /// How fast joints may turn.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pace {
+pub(crate) struct Pace {
     /// Fraction of full joint speed.
-    pub(super) fraction: f64,
+    pub(crate) fraction: f64,
     /// Time in which full joint speed is reached, seconds.
-    pub(super) acceleration_time: f64,
+    pub(crate) acceleration_time: f64,
 }
 
 impl Motion {
     /// All joints start together, stop together, and none exceeds its limits; the joint that needs
     /// longest sets the pace.
-    pub(super) fn joint_interpolated(
+    pub(crate) fn joint_interpolated(
         from: Joints,
         to: Joints,
         start: Duration,
@@ -57,7 +58,7 @@ impl Motion {
     }
 
     /// Along the knots, at most `path_speed` (path lengths per second).
-    pub(super) fn along(
+    pub(crate) fn along(
         knots: Vec<Joints>,
         start: Duration,
         path_speed: f64,
@@ -88,7 +89,7 @@ impl Motion {
     }
 
     /// The last knot.
-    pub(super) fn target(&self) -> Joints {
+    pub(crate) fn target(&self) -> Joints {
         self.knots[self.knots.len() - 1]
     }
 
@@ -104,7 +105,7 @@ impl Motion {
     }
 
     /// When the arm stands.
-    pub(super) fn end(&self) -> Duration {
+    pub(crate) fn end(&self) -> Duration {
         let end = self
             .start
             .saturating_add(Duration::from_secs_f64(self.undisturbed().min(1e9)));
@@ -115,13 +116,13 @@ impl Motion {
     }
 
     /// Whether it was broken off before its end.
-    pub(super) fn is_broken_off(&self) -> bool {
+    pub(crate) fn is_broken_off(&self) -> bool {
         self.stop.is_some()
     }
 
     /// Brings the arm to a stand within `time`, on the path. One that is slowing down already does
     /// so more sharply, if that is sooner.
-    pub(super) fn break_off(&mut self, now: Duration, time: Duration) {
+    pub(crate) fn break_off(&mut self, now: Duration, time: Duration) {
         let end = now.saturating_add(time);
         if self
             .stop
@@ -154,7 +155,7 @@ impl Motion {
     }
 
     /// The joint angles at `now`.
-    pub(super) fn at(&self, now: Duration) -> Joints {
+    pub(crate) fn at(&self, now: Duration) -> Joints {
         let (peak, ramp) = self.ramp();
         let whole = self.undisturbed();
         let t = self.travelled(now).clamp(0.0, whole);
@@ -193,7 +194,7 @@ mod tests {
     };
 
     fn motion() -> Motion {
-        let from = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        let from = Joints::READY;
         let to = Joints::from_degrees([80.0, -60.0, 90.0, 0.0, -30.0, 0.0]);
         Motion::joint_interpolated(
             from,

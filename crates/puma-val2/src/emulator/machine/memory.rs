@@ -3,19 +3,20 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::place::Place;
-use super::program::Program;
-use super::{Fault, Message, Profile};
+use crate::emulator::language::place::Place;
+use crate::emulator::language::program::Program;
+use crate::emulator::message::{Fault, Message};
+use crate::emulator::profile::Profile;
 
 #[derive(Clone, Debug, Default)]
-pub(super) struct Memory {
-    pub(super) programs: BTreeMap<String, Arc<Program>>,
-    pub(super) places: BTreeMap<String, Place>,
-    pub(super) reals: BTreeMap<String, f64>,
+pub(crate) struct Memory {
+    pub(crate) programs: BTreeMap<String, Arc<Program>>,
+    pub(crate) places: BTreeMap<String, Place>,
+    pub(crate) reals: BTreeMap<String, f64>,
 }
 
 impl Memory {
-    pub(super) fn set_place(
+    pub(crate) fn set_place(
         &mut self,
         key: String,
         place: Place,
@@ -27,7 +28,7 @@ impl Memory {
         insert(&mut self.places, key, place, profile)
     }
 
-    pub(super) fn set_real(
+    pub(crate) fn set_real(
         &mut self,
         key: String,
         value: f64,
@@ -36,7 +37,7 @@ impl Memory {
         insert(&mut self.reals, key, value, profile)
     }
 
-    pub(super) fn set_program(
+    pub(crate) fn set_program(
         &mut self,
         name: String,
         program: Program,

@@ -2,18 +2,21 @@
 
 use std::time::Duration;
 
-use super::arm::Speed;
-use super::dialogue::Mode;
-use super::expr::{Expr, Variable, is_true, whole};
-use super::instruction::{Instruction, Item};
-use super::job::{Flow, Job, Wait};
-use super::place::{Place, values};
-use super::reaction::Reaction;
-use super::{Emulator, Event, Fault, Message, display};
-use crate::{Gripper, Joint, Joints};
+use crate::emulator::controller::{Emulator, Event};
+use crate::emulator::language::expr::{Expr, is_true, whole};
+use crate::emulator::language::instruction::{Instruction, SpeedUnit};
+use crate::emulator::language::place::Place;
+use crate::emulator::language::place_expr::values;
+use crate::emulator::language::scope::Scope;
+use crate::emulator::machine::arm::Speed;
+use crate::emulator::machine::job::{Flow, Job, Wait};
+use crate::emulator::machine::reaction::Reaction;
+use crate::emulator::message::{Fault, Message};
+use crate::joints::{Joint, Joints};
+use crate::manipulator::Gripper;
 
 impl Emulator {
-    pub(super) fn carry_out(
+    pub(crate) fn carry_out(
         &mut self,
         instruction: &Instruction,
         job: &mut Job,
@@ -65,7 +68,7 @@ impl Emulator {
                 self.start_motion(false, &target)?;
             }
             Instruction::Ready => {
-                let ready = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+                let ready = Joints::READY;
                 self.start_motion(false, &Place::PrecisionPoint(ready))?;
             }
             Instruction::Nest => {
@@ -179,7 +182,8 @@ impl Emulator {
                     variable.key(&scope)?;
                 }
                 let text = text.clone().unwrap_or_default();
-                return Ok(self.ask_values(&text, variables.clone()));
+                self.ask_values(&text, variables.clone());
+                return Ok(Flow::Wait(Wait::Answer));
             }
             Instruction::Call(name) => return Ok(Flow::Call(name.clone())),
             Instruction::Return => return Ok(Flow::Return),
@@ -215,7 +219,7 @@ impl Emulator {
 
     fn drive(&mut self, joint: f64, change: f64, speed: f64) -> Result<(), Fault> {
         let joint = Joint::ALL[(whole(joint, 1, 6)? - 1) as usize];
-        let speed = Speed::new(speed, super::instruction::SpeedUnit::Percent)?;
+        let speed = Speed::new(speed, SpeedUnit::Percent)?;
         let short = self.profile.drive_error_degrees.min(change.abs()) * change.signum();
         let mut to = self.arm.joints();
         to.0[joint.index()] += change.to_radians();
@@ -232,7 +236,7 @@ impl Emulator {
         Ok(())
     }
 
-    pub(super) fn here(&self, precision: bool) -> Place {
+    pub(crate) fn here(&self, precision: bool) -> Place {
         if precision {
             Place::PrecisionPoint(self.arm.shown())
         } else {
@@ -240,7 +244,7 @@ impl Emulator {
         }
     }
 
-    pub(super) fn set_base(&mut self, [dx, dy, dz, turn]: [f64; 4]) {
+    pub(crate) fn set_base(&mut self, [dx, dy, dz, turn]: [f64; 4]) {
         let shift = nalgebra::Vector3::new(dx, dy, dz) / 1000.0;
         let turn = nalgebra::UnitQuaternion::from_axis_angle(
             &nalgebra::Vector3::z_axis(),
@@ -249,7 +253,7 @@ impl Emulator {
         self.arm.frames.base = nalgebra::Isometry3::from_parts(shift.into(), turn);
     }
 
-    pub(super) fn command_signal(&mut self, value: f64) -> Result<(), Fault> {
+    pub(crate) fn command_signal(&mut self, value: f64) -> Result<(), Fault> {
         let number = whole(value, -9999, 9999).map_err(|_| Message::IllegalSignal)?;
         self.signals.command(number)?;
         self.note(Event::Output {
@@ -262,47 +266,6 @@ impl Emulator {
     fn disarm(&mut self, signal: f64) {
         self.reactions
             .retain(|r| r.signal.abs().total_cmp(&signal.abs()).is_ne());
-    }
-
-    fn type_items(&mut self, items: &[Item]) -> Result<(), Fault> {
-        let mut text = String::new();
-        let mut stay = false;
-        let mut format = None;
-        for item in items {
-            match item {
-                Item::Text(words) => text.push_str(words),
-                Item::Value(value) => {
-                    let value = value.value(&self.scope())?;
-                    match format {
-                        Some((width, decimals)) => {
-                            text.push_str(&display::number(value, width, decimals))
-                        }
-                        None => text.push_str(&format!(" {}", display::plain(value))),
-                    }
-                }
-                Item::Blanks(n) => text.push_str(&" ".repeat(*n)),
-                Item::Lines(n) => text.push_str(&self.profile.eol.repeat(*n)),
-                Item::Stay => stay = true,
-                Item::Format(new) => format = *new,
-            }
-        }
-        if matches!(self.mode, Mode::Monitor) && !self.type_stays {
-            self.terminal.fresh_line(&self.profile, self.now);
-        }
-        self.type_stays = stay;
-        self.print(&text);
-        if !stay {
-            self.print(self.profile.eol);
-        }
-        Ok(())
-    }
-
-    fn ask_values(&mut self, text: &str, variables: Vec<Variable>) -> Flow {
-        self.terminal.resume();
-        self.terminal.fresh_line(&self.profile, self.now);
-        self.print(text);
-        self.mode = Mode::Answer(variables);
-        Flow::Wait(Wait::Answer)
     }
 }
 

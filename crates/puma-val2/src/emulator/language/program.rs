@@ -1,27 +1,27 @@
 //! A stored program: its steps, and which step each control word leads to.
 
-use super::instruction::Instruction;
-use super::lexer::{Cursor, Token, tokens};
-use super::{Fault, Message};
+use crate::emulator::language::instruction::Instruction;
+use crate::emulator::language::lexer::{Cursor, Token, tokens};
+use crate::emulator::message::{Fault, Message};
 
 /// A stored program.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Program {
-    pub(super) steps: Vec<Step>,
+pub(crate) struct Program {
+    pub(crate) steps: Vec<Step>,
 }
 
 /// One line of a program.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Step {
-    pub(super) label: Option<u32>,
+pub(crate) struct Step {
+    pub(crate) label: Option<u32>,
     /// The line as it is listed.
-    pub(super) text: String,
-    pub(super) instruction: Instruction,
+    pub(crate) text: String,
+    pub(crate) instruction: Instruction,
 }
 
 impl Step {
     /// Parses a line: an optional label and an instruction.
-    pub(super) fn parse(line: &str) -> Result<Self, Fault> {
+    pub(crate) fn parse(line: &str) -> Result<Self, Fault> {
         let tokens = tokens(line)?;
         let mut cursor = Cursor::new(&tokens);
         let mut label = None;
@@ -59,7 +59,7 @@ fn upper_case(line: &str) -> String {
 
 impl Program {
     /// The step that bears the label.
-    pub(super) fn labelled(&self, label: u32) -> Result<usize, Fault> {
+    pub(crate) fn labelled(&self, label: u32) -> Result<usize, Fault> {
         self.steps
             .iter()
             .position(|s| s.label == Some(label))
@@ -69,7 +69,7 @@ impl Program {
     /// The control word that belongs to the one at `step` and comes next at its level: from `IF`
     /// the `ELSE` or `END`, from `CASE` or `VALUE` the next `VALUE`, `ANY` or `END`, from `DO` the
     /// `UNTIL`, from the others the `END`.
-    pub(super) fn next_part(&self, step: usize) -> Result<usize, Fault> {
+    pub(crate) fn next_part(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, later) in self.steps.iter().enumerate().skip(step + 1) {
             match later.instruction {
@@ -94,7 +94,7 @@ impl Program {
     }
 
     /// The `END` or `UNTIL` of the structure that `step` is part of the head or a branch of.
-    pub(super) fn end_of(&self, step: usize) -> Result<usize, Fault> {
+    pub(crate) fn end_of(&self, step: usize) -> Result<usize, Fault> {
         let mut at = self.next_part(step)?;
         while !matches!(
             self.steps[at].instruction,
@@ -106,7 +106,7 @@ impl Program {
     }
 
     /// The head (`IF`, `FOR`, `WHILE`, `DO`, `CASE`) of the structure that ends at `step`.
-    pub(super) fn head_of(&self, step: usize) -> Result<usize, Fault> {
+    pub(crate) fn head_of(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, earlier) in self.steps.iter().enumerate().take(step).rev() {
             match earlier.instruction {
@@ -128,7 +128,7 @@ impl Program {
     }
 
     /// Whether the words of every structure match; the first step that does not fit otherwise.
-    pub(super) fn check(&self) -> Result<(), usize> {
+    pub(crate) fn check(&self) -> Result<(), usize> {
         let mut open: Vec<&Instruction> = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             let fits = match &step.instruction {

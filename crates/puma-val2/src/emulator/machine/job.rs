@@ -3,60 +3,60 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::arm::Speed;
-use super::dialogue::Mode;
-use super::expr::{Expr, is_true};
-use super::instruction::Instruction;
-use super::program::Program;
-use super::{Emulator, Event, Fault, Message};
+use crate::emulator::controller::{Emulator, Event};
+use crate::emulator::language::expr::{Expr, is_true};
+use crate::emulator::language::instruction::Instruction;
+use crate::emulator::language::program::Program;
+use crate::emulator::machine::arm::Speed;
+use crate::emulator::message::{Fault, Message};
 
 /// Deepest nesting of `CALL`.
-pub(super) const CALL_DEPTH: usize = 16;
+pub(crate) const CALL_DEPTH: usize = 16;
 
 /// Something that is being carried out.
 #[derive(Debug)]
-pub(super) struct Job {
-    pub(super) kind: JobKind,
+pub(crate) struct Job {
+    pub(crate) kind: JobKind,
     /// The program and those that called it, innermost last. Empty for `DO`.
-    pub(super) frames: Vec<Frame>,
-    pub(super) wait: Wait,
-    pub(super) next_step: Duration,
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) wait: Wait,
+    pub(crate) next_step: Duration,
     /// Cycles left after this one; `None` for ever.
-    pub(super) cycles_left: Option<u32>,
+    pub(crate) cycles_left: Option<u32>,
     /// How it ends as soon as the arm stands.
-    pub(super) ending: Option<Message>,
+    pub(crate) ending: Option<Message>,
     /// What `DO` carries out as soon as the motion before it has ended.
-    pub(super) pending: Option<Instruction>,
+    pub(crate) pending: Option<Instruction>,
     /// Stop after one step, for `NEXT`.
-    pub(super) single: bool,
+    pub(crate) single: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum JobKind {
+pub(crate) enum JobKind {
     Program,
     Do,
     Calibration,
 }
 
 #[derive(Debug)]
-pub(super) struct Frame {
-    pub(super) name: String,
-    pub(super) program: Arc<Program>,
-    pub(super) step: usize,
-    pub(super) loops: Vec<Loop>,
+pub(crate) struct Frame {
+    pub(crate) name: String,
+    pub(crate) program: Arc<Program>,
+    pub(crate) step: usize,
+    pub(crate) loops: Vec<Loop>,
 }
 
 /// A `FOR` under way.
 #[derive(Debug)]
-pub(super) struct Loop {
-    pub(super) head: usize,
-    pub(super) key: String,
-    pub(super) to: f64,
-    pub(super) step: f64,
+pub(crate) struct Loop {
+    pub(crate) head: usize,
+    pub(crate) key: String,
+    pub(crate) to: f64,
+    pub(crate) step: f64,
 }
 
 #[derive(Debug, PartialEq)]
-pub(super) enum Wait {
+pub(crate) enum Wait {
     Nothing,
     /// Until the arm stands.
     Motion,
@@ -67,7 +67,7 @@ pub(super) enum Wait {
 }
 
 /// What carrying out an instruction leads to.
-pub(super) enum Flow {
+pub(crate) enum Flow {
     /// On to the next step.
     Next,
     /// The same step again when the arm stands.
@@ -99,21 +99,21 @@ impl Job {
         }
     }
 
-    pub(super) fn is_program(&self) -> bool {
+    pub(crate) fn is_program(&self) -> bool {
         self.kind == JobKind::Program
     }
 
     /// Name and step (from 1) of the innermost program.
-    pub(super) fn at(&self) -> Option<(&str, usize)> {
+    pub(crate) fn at(&self) -> Option<(&str, usize)> {
         self.frames.last().map(|f| (f.name.as_str(), f.step + 1))
     }
 
-    pub(super) fn cycles_left(&self) -> Option<u32> {
+    pub(crate) fn cycles_left(&self) -> Option<u32> {
         self.cycles_left
     }
 
     /// The signal that a `WAIT` waits for may come; show what it waits for.
-    pub(super) fn waits(&self) -> bool {
+    pub(crate) fn waits(&self) -> bool {
         matches!(self.wait, Wait::Condition(_) | Wait::Answer)
     }
 }
@@ -124,7 +124,7 @@ impl Emulator {
     }
 
     /// When the job goes on of itself.
-    pub(super) fn job_due(&self, job: &Job) -> Option<Duration> {
+    pub(crate) fn job_due(&self, job: &Job) -> Option<Duration> {
         if job.ending.is_some() {
             return (!self.arm.moving()).then_some(self.now);
         }
@@ -141,7 +141,7 @@ impl Emulator {
     }
 
     /// Starts a program.
-    pub(super) fn start_program(
+    pub(crate) fn start_program(
         &mut self,
         name: &str,
         cycles: Option<u32>,
@@ -162,7 +162,7 @@ impl Emulator {
         Ok(())
     }
 
-    pub(super) fn frame(&self, name: &str, step: usize) -> Result<Frame, Fault> {
+    pub(crate) fn frame(&self, name: &str, step: usize) -> Result<Frame, Fault> {
         let program = self
             .memory
             .programs
@@ -183,7 +183,7 @@ impl Emulator {
 
     /// Goes on with a program that was paused, aborted or refused, at its next step or (`again`) at
     /// the one it stopped in.
-    pub(super) fn resume_program(&mut self, again: bool, single: bool) -> Result<(), Fault> {
+    pub(crate) fn resume_program(&mut self, again: bool, single: bool) -> Result<(), Fault> {
         let mut job = self.paused.take().ok_or(Message::NotRunning)?;
         if again && let Some(frame) = job.frames.last_mut() {
             frame.step = frame.step.saturating_sub(1);
@@ -197,7 +197,7 @@ impl Emulator {
     }
 
     /// Carries out one instruction for `DO`; the prompt comes when it is done.
-    pub(super) fn do_instruction(&mut self, instruction: &Instruction) -> Result<(), Fault> {
+    pub(crate) fn do_instruction(&mut self, instruction: &Instruction) -> Result<(), Fault> {
         if instruction.needs_program() {
             return Err(Message::IllegalInstruction.into());
         }
@@ -229,22 +229,20 @@ impl Emulator {
             self.prompt();
             return Ok(());
         }
-        if !matches!(self.mode, Mode::Answer(_)) {
-            self.mode = Mode::Busy;
-        }
+        self.hold_terminal();
         self.job = Some(job);
         Ok(())
     }
 
-    pub(super) fn start_calibration_job(&mut self) {
+    pub(crate) fn start_calibration_job(&mut self) {
         let mut job = Job::new(JobKind::Calibration, self.now);
         job.wait = Wait::Motion;
         self.job = Some(job);
-        self.mode = Mode::Busy;
+        self.hold_terminal();
     }
 
     /// The arm has come to a stand.
-    pub(super) fn motion_ended(&mut self, outcome: Result<(), Fault>) {
+    pub(crate) fn motion_ended(&mut self, outcome: Result<(), Fault>) {
         self.sense();
         self.note(Event::MotionEnded);
         if let Err(fault) = outcome {
@@ -253,7 +251,7 @@ impl Emulator {
     }
 
     /// Stops the arm and ends the job; `PROCEED` can go on with a program.
-    pub(super) fn stop_job(&mut self, how: Message) {
+    pub(crate) fn stop_job(&mut self, how: Message) {
         if self.arm.moving() {
             self.note(Event::MotionBrokenOff);
         }
@@ -264,13 +262,13 @@ impl Emulator {
     }
 
     /// Ends the job with a message in asterisks; without a job the message comes unasked.
-    pub(super) fn fail_job(&mut self, fault: Fault) {
+    pub(crate) fn fail_job(&mut self, fault: Fault) {
         let job = self.job.take();
         self.refuse(fault);
         match job {
             Some(job) => self.end_job(job, Message::Aborted),
             None => {
-                if matches!(self.mode, Mode::Monitor) {
+                if self.at_monitor() {
                     self.prompt();
                 }
             }
@@ -278,7 +276,7 @@ impl Emulator {
     }
 
     /// The terminal has answered a `PROMPT`.
-    pub(super) fn answered(&mut self) {
+    pub(crate) fn answered(&mut self) {
         match self.job.as_mut() {
             Some(job) => {
                 job.wait = Wait::Nothing;
@@ -292,7 +290,7 @@ impl Emulator {
     }
 
     /// Lets the job go on if it can.
-    pub(super) fn run_job(&mut self) {
+    pub(crate) fn run_job(&mut self) {
         let due = |emulator: &Self| emulator.job.as_ref().and_then(|job| emulator.job_due(job));
         if due(self).is_none_or(|at| at > self.now) {
             return;
@@ -311,7 +309,7 @@ impl Emulator {
         }
         job.wait = Wait::Nothing;
         if let Some(instruction) = job.pending.take() {
-            self.mode = Mode::Monitor;
+            self.release_terminal();
             if let Err(fault) = self.do_instruction(&instruction) {
                 self.refuse(fault);
                 self.prompt();
@@ -364,7 +362,7 @@ impl Emulator {
                 if !matches!(how, Message::Completed | Message::Halted) {
                     self.paused = Some(job);
                 }
-                if !matches!(self.mode, Mode::Monitor | Mode::Busy | Mode::Answer(_)) {
+                if self.in_dialogue() {
                     // The terminal is in another dialogue, which goes on.
                     return;
                 }

@@ -1,17 +1,21 @@
 //! Monitor commands.
 
-use super::dialogue::{Confirm, Kind};
-use super::expr::{Expr, whole};
-use super::instruction::Instruction;
-use super::job::Job;
-use super::lexer::{Cursor, Token, keyword, tokens};
-use super::place::{Place, PlaceExpr, PlaceName, arguments, values};
-use super::scope::check_name;
-use super::{Emulator, Fault, Message};
-use crate::Joints;
+use crate::emulator::console::mode::{Confirm, Kind};
+use crate::emulator::controller::Emulator;
+use crate::emulator::language::expr::{Expr, whole};
+use crate::emulator::language::instruction::Instruction;
+use crate::emulator::language::lexer::{Cursor, Token, keyword, tokens};
+use crate::emulator::language::place::Place;
+use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments, values};
+use crate::emulator::language::scope::Scope;
+use crate::emulator::machine::job::Job;
+use crate::emulator::message::{Fault, Message};
+use crate::emulator::profile::StartPower;
+use crate::joints::Joints;
+use crate::kinematics::xyzoat::Xyzoat;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Command {
+pub(crate) enum Command {
     Abort,
     Base,
     Calibrate,
@@ -98,7 +102,7 @@ const COMMANDS: [(&str, (Command, bool)); 43] = [
 
 impl Emulator {
     /// Carries out a line typed at the monitor.
-    pub(super) fn command(&mut self, line: &str) {
+    pub(crate) fn command(&mut self, line: &str) {
         if let Err(fault) = self.try_command(line) {
             self.refuse(fault);
             self.prompt();
@@ -157,8 +161,7 @@ impl Emulator {
             Command::Calibrate => {
                 cursor.expect_end()?;
                 if !self.arm.power
-                    && (self.panel_used
-                        || self.profile.start_power != super::StartPower::OnAtCalibration)
+                    && (self.panel_used || self.profile.start_power != StartPower::OnAtCalibration)
                 {
                     return Err(Message::ArmPowerOff.into());
                 }
@@ -279,7 +282,7 @@ impl Emulator {
             None => scope.place(&key).unwrap_or(if name.precision {
                 Place::PrecisionPoint(Joints::default())
             } else {
-                Place::Transformation(crate::Xyzoat::default().pose())
+                Place::Transformation(Xyzoat::default().pose())
             }),
         };
         if name.precision != matches!(place, Place::PrecisionPoint(_)) {
@@ -375,7 +378,7 @@ impl Emulator {
         }
         let old = cursor.name()?;
         cursor.expect_end()?;
-        check_name(&new, &self.profile)?;
+        self.profile.check_name(&new)?;
         let program = self
             .memory
             .programs
@@ -395,7 +398,7 @@ impl Emulator {
     fn set_switch(&mut self, cursor: &mut Cursor<'_>, on: bool) -> Result<(), Fault> {
         let name = cursor.name()?;
         cursor.expect_end()?;
-        check_name(&name, &self.profile)?;
+        self.profile.check_name(&name)?;
         if self.switches.len() >= 64 && !self.switches.contains_key(&name) {
             return Err(Message::OutOfMemory.into());
         }

@@ -1,12 +1,12 @@
 //! Arithmetic expressions: parsing and evaluation. Truth is -1, falsehood 0.
 
-use super::lexer::{Cursor, Token};
-use super::place::PlaceExpr;
-use super::scope::Scope;
-use super::{Fault, Message};
+use crate::emulator::language::lexer::{Cursor, Token};
+use crate::emulator::language::place_expr::PlaceExpr;
+use crate::emulator::language::scope::Scope;
+use crate::emulator::message::{Fault, Message};
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Expr {
+pub(crate) enum Expr {
     Number(f64),
     Variable(Variable),
     Negate(Box<Expr>),
@@ -18,13 +18,13 @@ pub(super) enum Expr {
 
 /// A real variable, possibly an element of an array.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Variable {
-    pub(super) name: String,
-    pub(super) index: Option<Box<Expr>>,
+pub(crate) struct Variable {
+    pub(crate) name: String,
+    pub(crate) index: Option<Box<Expr>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Operator {
+pub(crate) enum Operator {
     Or,
     Xor,
     And,
@@ -43,7 +43,7 @@ pub(super) enum Operator {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Function {
+pub(crate) enum Function {
     Abs,
     Atan2,
     Cos,
@@ -60,7 +60,7 @@ pub(super) enum Function {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum PlaceFunction {
+pub(crate) enum PlaceFunction {
     Distance,
     Dx,
     Dy,
@@ -122,12 +122,12 @@ const NOT_BINDS: u8 = 3;
 const SIGN_BINDS: u8 = 7;
 
 impl Expr {
-    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+    pub(crate) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         Self::parse_from(cursor, 0)
     }
 
     /// An expression, unless its place is left empty: before a comma, a closing sign or the end.
-    pub(super) fn parse_optional(cursor: &mut Cursor<'_>) -> Result<Option<Self>, Fault> {
+    pub(crate) fn parse_optional(cursor: &mut Cursor<'_>) -> Result<Option<Self>, Fault> {
         match cursor.peek() {
             None | Some(Token::Sign("," | ")")) => Ok(None),
             Some(_) => Self::parse(cursor).map(Some),
@@ -227,7 +227,7 @@ impl Expr {
         }))
     }
 
-    pub(super) fn value(&self, scope: &Scope<'_>) -> Result<f64, Fault> {
+    pub(crate) fn value(&self, scope: &dyn Scope) -> Result<f64, Fault> {
         let value = match self {
             Self::Number(number) => *number,
             Self::Variable(variable) => scope.real(&variable.key(scope)?)?,
@@ -254,7 +254,7 @@ impl Expr {
 }
 
 /// An index in brackets, if one follows.
-pub(super) fn parse_index(cursor: &mut Cursor<'_>) -> Result<Option<Box<Expr>>, Fault> {
+pub(crate) fn parse_index(cursor: &mut Cursor<'_>) -> Result<Option<Box<Expr>>, Fault> {
     if !cursor.sign("[") {
         return Ok(None);
     }
@@ -264,20 +264,20 @@ pub(super) fn parse_index(cursor: &mut Cursor<'_>) -> Result<Option<Box<Expr>>, 
 }
 
 impl Variable {
-    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+    pub(crate) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         let name = cursor.name()?;
         let index = parse_index(cursor)?;
         Ok(Self { name, index })
     }
 
     /// The name under which the value is kept: `A`, or `A[3]`.
-    pub(super) fn key(&self, scope: &Scope<'_>) -> Result<String, Fault> {
+    pub(crate) fn key(&self, scope: &dyn Scope) -> Result<String, Fault> {
         key(&self.name, self.index.as_deref(), scope)
     }
 }
 
 /// The name under which a value is kept: `A`, or `A[3]`.
-pub(super) fn key(name: &str, index: Option<&Expr>, scope: &Scope<'_>) -> Result<String, Fault> {
+pub(crate) fn key(name: &str, index: Option<&Expr>, scope: &dyn Scope) -> Result<String, Fault> {
     scope.check_name(name)?;
     match index {
         None => Ok(name.to_owned()),
@@ -286,7 +286,7 @@ pub(super) fn key(name: &str, index: Option<&Expr>, scope: &Scope<'_>) -> Result
 }
 
 /// A whole number within bounds.
-pub(super) fn whole(value: f64, min: i32, max: i32) -> Result<i32, Fault> {
+pub(crate) fn whole(value: f64, min: i32, max: i32) -> Result<i32, Fault> {
     let rounded = value.trunc();
     if rounded >= f64::from(min) && rounded <= f64::from(max) {
         // In range, so the conversion is exact.
@@ -296,11 +296,11 @@ pub(super) fn whole(value: f64, min: i32, max: i32) -> Result<i32, Fault> {
     }
 }
 
-pub(super) fn truth(condition: bool) -> f64 {
+pub(crate) fn truth(condition: bool) -> f64 {
     if condition { -1.0 } else { 0.0 }
 }
 
-pub(super) fn is_true(value: f64) -> bool {
+pub(crate) fn is_true(value: f64) -> bool {
     value != 0.0
 }
 
@@ -329,7 +329,7 @@ impl Operator {
 }
 
 impl Function {
-    fn apply(self, values: &[f64], scope: &Scope<'_>) -> Result<f64, Fault> {
+    fn apply(self, values: &[f64], scope: &dyn Scope) -> Result<f64, Fault> {
         let first = values.first().copied().unwrap_or_default();
         Ok(match self {
             Self::Abs => first.abs(),
@@ -363,7 +363,7 @@ impl Function {
 }
 
 impl PlaceFunction {
-    fn apply(self, places: &[PlaceExpr], scope: &Scope<'_>) -> Result<f64, Fault> {
+    fn apply(self, places: &[PlaceExpr], scope: &dyn Scope) -> Result<f64, Fault> {
         let first = places[0].transformation(scope)?.translation.vector;
         Ok(1000.0
             * match self {

@@ -1,50 +1,26 @@
-//! Locations: transformations, precision points and the expressions that make them.
+//! Location expressions: names, `TRANS`, `#PPOINT`, `SHIFT`, `INVERSE`, `FRAME` and compounds.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::expr::{self, Expr};
-use super::lexer::{Cursor, Token};
-use super::scope::Scope;
-use super::{Fault, Message};
-use crate::{Joints, Xyzoat};
-
-/// A location's value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Place {
-    /// A hand pose in the world frame (or relative to another one), metres.
-    Transformation(Isometry3<f64>),
-    /// A precision point: six joint angles.
-    PrecisionPoint(Joints),
-}
-
-impl Place {
-    /// The six numbers that VAL shows: millimetres and degrees, or six joint angles in degrees.
-    pub fn val(&self) -> [f64; 6] {
-        match self {
-            Self::Transformation(pose) => Xyzoat::from_pose(pose).val(),
-            Self::PrecisionPoint(joints) => joints.degrees(),
-        }
-    }
-
-    /// The value with its six numbers replaced; of the same kind.
-    pub(super) fn with_val(&self, values: [f64; 6]) -> Self {
-        match self {
-            Self::Transformation(_) => Self::Transformation(Xyzoat::from_val(values).pose()),
-            Self::PrecisionPoint(_) => Self::PrecisionPoint(Joints::from_degrees(values)),
-        }
-    }
-}
+use crate::emulator::language::expr;
+use crate::emulator::language::expr::Expr;
+use crate::emulator::language::lexer::{Cursor, Token};
+use crate::emulator::language::place::Place;
+use crate::emulator::language::scope::Scope;
+use crate::emulator::message::{Fault, Message};
+use crate::joints::Joints;
+use crate::kinematics::xyzoat::Xyzoat;
 
 /// The name of a location: `P1`, `#P1`, `P[3]`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct PlaceName {
-    pub(super) precision: bool,
-    pub(super) name: String,
-    pub(super) index: Option<Box<Expr>>,
+pub(crate) struct PlaceName {
+    pub(crate) precision: bool,
+    pub(crate) name: String,
+    pub(crate) index: Option<Box<Expr>>,
 }
 
 impl PlaceName {
-    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+    pub(crate) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         let precision = cursor.sign("#");
         let name = cursor.name()?;
         let index = expr::parse_index(cursor)?;
@@ -56,7 +32,7 @@ impl PlaceName {
     }
 
     /// The name under which the value is kept; that of a precision point begins with `#`.
-    pub(super) fn key(&self, scope: &Scope<'_>) -> Result<String, Fault> {
+    pub(crate) fn key(&self, scope: &dyn Scope) -> Result<String, Fault> {
         let key = expr::key(&self.name, self.index.as_deref(), scope)?;
         Ok(if self.precision {
             format!("#{key}")
@@ -68,7 +44,7 @@ impl PlaceName {
 
 /// A location expression: terms joined by `:`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct PlaceExpr(Vec<Term>);
+pub(crate) struct PlaceExpr(Vec<Term>);
 
 #[derive(Clone, Debug, PartialEq)]
 enum Term {
@@ -84,7 +60,7 @@ enum Term {
 }
 
 impl PlaceExpr {
-    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
+    pub(crate) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         cursor.descend()?;
         let mut terms = vec![Term::parse(cursor)?];
         while cursor.sign(":") {
@@ -95,7 +71,7 @@ impl PlaceExpr {
     }
 
     /// The value. A precision point stands alone: it cannot be part of a compound.
-    pub(super) fn place(&self, scope: &Scope<'_>) -> Result<Place, Fault> {
+    pub(crate) fn place(&self, scope: &dyn Scope) -> Result<Place, Fault> {
         let (first, rest) = self.0.split_first().ok_or(Message::InvalidArgument)?;
         let first = first.place(scope)?;
         if rest.is_empty() {
@@ -109,7 +85,7 @@ impl PlaceExpr {
     }
 
     /// The value, which must be a transformation.
-    pub(super) fn transformation(&self, scope: &Scope<'_>) -> Result<Isometry3<f64>, Fault> {
+    pub(crate) fn transformation(&self, scope: &dyn Scope) -> Result<Isometry3<f64>, Fault> {
         transformation(self.place(scope)?)
     }
 }
@@ -174,7 +150,7 @@ impl Term {
         }
     }
 
-    fn place(&self, scope: &Scope<'_>) -> Result<Place, Fault> {
+    fn place(&self, scope: &dyn Scope) -> Result<Place, Fault> {
         Ok(match self {
             Self::Named(name) => scope.place(&name.key(scope)?)?,
             Self::Trans(arguments) => {
@@ -204,7 +180,7 @@ impl Term {
 }
 
 /// Up to `N` arguments between commas; what is left out is zero.
-pub(super) fn arguments<const N: usize>(
+pub(crate) fn arguments<const N: usize>(
     cursor: &mut Cursor<'_>,
 ) -> Result<[Option<Expr>; N], Fault> {
     let mut found = [const { None }; N];
@@ -218,9 +194,9 @@ pub(super) fn arguments<const N: usize>(
 }
 
 /// The values of arguments, zero for those left out.
-pub(super) fn values<const N: usize>(
+pub(crate) fn values<const N: usize>(
     arguments: &[Option<Expr>; N],
-    scope: &Scope<'_>,
+    scope: &dyn Scope,
 ) -> Result<[f64; N], Fault> {
     let mut found = [0.0; N];
     for (value, argument) in found.iter_mut().zip(arguments) {

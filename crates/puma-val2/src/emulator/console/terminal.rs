@@ -4,11 +4,11 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::Profile;
+use crate::emulator::profile::Profile;
 
 /// What a character that came in amounts to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Typed {
+pub(crate) enum Typed {
     /// Nothing to act on yet.
     Nothing,
     /// A line is complete.
@@ -35,14 +35,14 @@ const LINE_LIMIT: usize = 64;
 
 /// A complete line.
 #[derive(Clone, Debug)]
-pub(super) struct Line {
-    pub(super) text: String,
+pub(crate) struct Line {
+    pub(crate) text: String,
     /// Whether more of it was typed than the line buffer holds.
-    pub(super) too_long: bool,
+    pub(crate) too_long: bool,
 }
 
 #[derive(Debug)]
-pub(super) struct Terminal {
+pub(crate) struct Terminal {
     arriving: VecDeque<(Duration, u8)>,
     line_busy_until: Duration,
     typed: String,
@@ -58,7 +58,7 @@ pub(super) struct Terminal {
 }
 
 impl Terminal {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             arriving: VecDeque::new(),
             line_busy_until: Duration::ZERO,
@@ -74,7 +74,7 @@ impl Terminal {
     }
 
     /// Takes bytes off the wire; each is complete a character's time after the one before.
-    pub(super) fn arrive(&mut self, bytes: &[u8], now: Duration, profile: &Profile) {
+    pub(crate) fn arrive(&mut self, bytes: &[u8], now: Duration, profile: &Profile) {
         for &byte in bytes {
             if self.arriving.len() >= INPUT_LIMIT {
                 return;
@@ -89,12 +89,12 @@ impl Terminal {
     }
 
     /// When the next character is complete.
-    pub(super) fn next_arrival(&self) -> Option<Duration> {
+    pub(crate) fn next_arrival(&self) -> Option<Duration> {
         self.arriving.front().map(|(at, _)| *at)
     }
 
     /// Handles the next character if it is complete by `now`.
-    pub(super) fn take_character(&mut self, now: Duration, profile: &Profile) -> Option<Typed> {
+    pub(crate) fn take_character(&mut self, now: Duration, profile: &Profile) -> Option<Typed> {
         let (at, byte) = *self.arriving.front()?;
         if at > now {
             return None;
@@ -191,22 +191,22 @@ impl Terminal {
     }
 
     /// The oldest complete line that has not been worked on.
-    pub(super) fn next_line(&mut self) -> Option<Line> {
+    pub(crate) fn next_line(&mut self) -> Option<Line> {
         self.lines.pop_front()
     }
 
     /// The newest complete line, without taking it.
-    pub(super) fn newest_line(&self) -> Option<&str> {
+    pub(crate) fn newest_line(&self) -> Option<&str> {
         self.lines.back().map(|line| line.text.as_str())
     }
 
     /// Whether complete lines wait.
-    pub(super) fn has_line(&self) -> bool {
+    pub(crate) fn has_line(&self) -> bool {
         !self.lines.is_empty()
     }
 
     /// Drops the lines typed ahead.
-    pub(super) fn forget_lines(&mut self) {
+    pub(crate) fn forget_lines(&mut self) {
         self.lines.clear();
     }
 
@@ -217,7 +217,7 @@ impl Terminal {
     }
 
     /// Queues text for the line.
-    pub(super) fn print(&mut self, text: &str, now: Duration) {
+    pub(crate) fn print(&mut self, text: &str, now: Duration) {
         if text.is_empty() || self.dropped {
             return;
         }
@@ -231,19 +231,19 @@ impl Terminal {
     }
 
     /// Ends the line that output stands in, unless it stands at the start of one.
-    pub(super) fn fresh_line(&mut self, profile: &Profile, now: Duration) {
+    pub(crate) fn fresh_line(&mut self, profile: &Profile, now: Duration) {
         if !self.at_line_start {
             self.print(profile.eol, now);
         }
     }
 
     /// Output that Ctrl-O has suppressed resumes with the next prompt or question.
-    pub(super) fn resume(&mut self) {
+    pub(crate) fn resume(&mut self) {
         self.dropped = false;
     }
 
     /// When the next character goes out, if output waits.
-    pub(super) fn next_departure(&self, profile: &Profile) -> Option<Duration> {
+    pub(crate) fn next_departure(&self, profile: &Profile) -> Option<Duration> {
         let waits = !self.sending.is_empty() && !self.held;
         waits.then(|| {
             self.sent_at
@@ -252,7 +252,7 @@ impl Terminal {
     }
 
     /// What has gone out by `now`.
-    pub(super) fn departed(&mut self, now: Duration, profile: &Profile) -> Vec<u8> {
+    pub(crate) fn departed(&mut self, now: Duration, profile: &Profile) -> Vec<u8> {
         if self.held {
             return Vec::new();
         }

@@ -1,64 +1,32 @@
 //! What the next line from the terminal is for.
 
-use super::editor::Editing;
-use super::expr::Variable;
-use super::job::Job;
-use super::lexer::{Cursor, Token, tokens};
-use super::place::Place;
-use super::terminal::Line;
-use super::{Emulator, Event, Fault, Message, display};
-use crate::Joints;
-
-#[derive(Debug)]
-pub(super) enum Mode {
-    /// The answer to the start-up question of this number.
-    Boot(usize),
-    /// A command.
-    Monitor,
-    /// The answer to "are you sure?".
-    Confirm(Confirm),
-    /// New values for a location, or nothing to keep what it has.
-    Change { key: String, place: Place },
-    /// A line for the editor.
-    Editor(Editing),
-    /// Values for a program's `PROMPT`.
-    Answer(Vec<Variable>),
-    /// Nothing: `DO` has the terminal until its motion ends.
-    Busy,
-}
-
-/// What is done when the answer is yes.
-#[derive(Debug)]
-pub(super) enum Confirm {
-    Calibrate,
-    Zero,
-    Delete(Vec<(Kind, String)>),
-    Format,
-}
-
-/// A kind of thing that has a name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    Program,
-    Place,
-    Real,
-    File,
-}
+use crate::emulator::console::display;
+use crate::emulator::console::mode::{Confirm, Kind, Mode};
+use crate::emulator::console::terminal::Line;
+use crate::emulator::controller::{Emulator, Event};
+use crate::emulator::language::expr::Variable;
+use crate::emulator::language::lexer::{Cursor, Token, tokens};
+use crate::emulator::language::place::Place;
+use crate::emulator::machine::job::Job;
+use crate::emulator::machine::memory::Memory;
+use crate::emulator::message::{Fault, Message};
+use crate::emulator::profile::StartPower;
+use crate::joints::Joints;
 
 impl Emulator {
-    pub(super) fn print(&mut self, text: &str) {
+    pub(crate) fn print(&mut self, text: &str) {
         self.terminal.print(text, self.now);
     }
 
     /// Prints a whole line, starting a new one if need be.
-    pub(super) fn print_line(&mut self, text: &str) {
+    pub(crate) fn print_line(&mut self, text: &str) {
         self.terminal.fresh_line(&self.profile, self.now);
         self.print(text);
         self.print(self.profile.eol);
     }
 
     /// Prints a fault between asterisks.
-    pub(super) fn refuse(&mut self, fault: Fault) {
+    pub(crate) fn refuse(&mut self, fault: Fault) {
         let text = self.profile.text(fault.message);
         let line = match fault.joint {
             Some(joint) => format!("*{text}* Jt {}", joint.number()),
@@ -69,7 +37,7 @@ impl Emulator {
     }
 
     /// Back to the monitor, with its prompt.
-    pub(super) fn prompt(&mut self) {
+    pub(crate) fn prompt(&mut self) {
         self.mode = Mode::Monitor;
         self.terminal.resume();
         self.terminal.fresh_line(&self.profile, self.now);
@@ -82,7 +50,7 @@ impl Emulator {
         self.print(prompt.encode_utf8(&mut [0; 4]));
     }
 
-    pub(super) fn boot(&mut self, question: usize) {
+    pub(crate) fn boot(&mut self, question: usize) {
         match self.profile.boot.get(question) {
             Some(asked) => {
                 let text = asked.text.clone();
@@ -101,13 +69,35 @@ impl Emulator {
     }
 
     /// Whether a complete line would be worked on now.
-    pub(super) fn takes_lines(&self) -> bool {
+    pub(crate) fn takes_lines(&self) -> bool {
         !matches!(self.mode, Mode::Busy)
+    }
+
+    /// Takes no lines until the motion of a `DO` has ended, unless a `PROMPT` waits for values.
+    pub(crate) fn hold_terminal(&mut self) {
+        if !matches!(self.mode, Mode::Answer(_)) {
+            self.mode = Mode::Busy;
+        }
+    }
+
+    /// Takes lines as monitor commands again.
+    pub(crate) fn release_terminal(&mut self) {
+        self.mode = Mode::Monitor;
+    }
+
+    /// Returns `true` if the next line is a monitor command.
+    pub(crate) fn at_monitor(&self) -> bool {
+        matches!(self.mode, Mode::Monitor)
+    }
+
+    /// Returns `true` if the next line belongs to a dialogue that no program has begun.
+    pub(crate) fn in_dialogue(&self) -> bool {
+        !matches!(self.mode, Mode::Monitor | Mode::Busy | Mode::Answer(_))
     }
 
     /// A line has just been completed. While `DO` blocks only the words that stop the arm are
     /// heard.
-    pub(super) fn line_complete(&mut self) {
+    pub(crate) fn line_complete(&mut self) {
         if self.takes_lines() || !self.profile.stop_while_busy {
             return;
         }
@@ -124,7 +114,7 @@ impl Emulator {
     }
 
     /// Ctrl-C.
-    pub(super) fn cancel(&mut self) {
+    pub(crate) fn cancel(&mut self) {
         match self.mode {
             Mode::Busy => self.stop_job(Message::Aborted),
             Mode::Boot(question) => self.boot(question),
@@ -133,7 +123,7 @@ impl Emulator {
     }
 
     /// Ctrl-Z.
-    pub(super) fn end_of_input(&mut self) {
+    pub(crate) fn end_of_input(&mut self) {
         match &self.mode {
             Mode::Editor(_) => self.leave_editor(),
             Mode::Change { .. } | Mode::Confirm(_) => self.prompt(),
@@ -142,7 +132,7 @@ impl Emulator {
     }
 
     /// Works on a line.
-    pub(super) fn line(&mut self, line: &Line) {
+    pub(crate) fn line(&mut self, line: &Line) {
         self.sense();
         for _ in 0..self.profile.blank_lines.min(8) {
             self.print(self.profile.eol);
@@ -206,7 +196,7 @@ impl Emulator {
         }
     }
 
-    pub(super) fn ask(&mut self, confirm: Confirm) {
+    pub(crate) fn ask(&mut self, confirm: Confirm) {
         let text = format!("{} (Y/N)? ", self.profile.text(Message::AreYouSure));
         self.terminal.resume();
         self.terminal.fresh_line(&self.profile, self.now);
@@ -253,13 +243,13 @@ impl Emulator {
     }
 
     fn forget_everything(&mut self) {
-        self.memory = super::memory::Memory::default();
+        self.memory = Memory::default();
         self.paused = None;
         self.reactions.clear();
     }
 
     /// Shows a location and asks for changes.
-    pub(super) fn ask_change(&mut self, key: String, place: Place) {
+    pub(crate) fn ask_change(&mut self, key: String, place: Place) {
         let heading = display::place_heading(&self.profile);
         let values = display::place_values(&place, &self.profile);
         let question = self.profile.change_text.clone();
@@ -314,7 +304,7 @@ impl Emulator {
     /// Moves every joint a little to find the index pulses of the encoders.
     fn calibrate(&mut self) {
         if !self.arm.power
-            && self.profile.start_power == super::StartPower::OnAtCalibration
+            && self.profile.start_power == StartPower::OnAtCalibration
             && !self.panel_used
         {
             self.switch_power(true);
@@ -329,7 +319,7 @@ impl Emulator {
     }
 
     /// The true joint angles are taken over: what the arm shows from now on.
-    pub(super) fn calibration_done(&mut self) {
+    pub(crate) fn calibration_done(&mut self) {
         self.arm.calibrated = true;
         self.note(Event::Calibrated);
     }

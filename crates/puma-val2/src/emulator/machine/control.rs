@@ -2,16 +2,18 @@
 
 use std::sync::Arc;
 
-use super::expr::is_true;
-use super::instruction::Instruction;
-use super::job::{Flow, Job, Loop};
-use super::program::Program;
-use super::{Emulator, Fault, Message};
+use crate::emulator::controller::Emulator;
+use crate::emulator::language::expr::is_true;
+use crate::emulator::language::instruction::Instruction;
+use crate::emulator::language::program::Program;
+use crate::emulator::language::scope::Scope;
+use crate::emulator::machine::job::{Flow, Job, Loop};
+use crate::emulator::message::{Fault, Message};
 
 impl Emulator {
     /// `GOTO`, `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their parts. The frame's step already points
     /// behind the instruction.
-    pub(super) fn control(
+    pub(crate) fn control(
         &mut self,
         instruction: &Instruction,
         job: &mut Job,

@@ -1,15 +1,15 @@
 //! Signals: 1 to 64 are outputs, 1001 to 1064 inputs, 2001 to 2064 soft signals.
 
-use super::{Fault, Message};
+use crate::emulator::message::{Fault, Message};
 
 /// Signals of each kind.
 const COUNT: u16 = 64;
 
 /// First number of the outputs, the inputs and the soft signals.
-pub(super) const BANKS: [u16; 3] = [1, 1001, 2001];
+pub(crate) const BANKS: [u16; 3] = [1, 1001, 2001];
 
 #[derive(Clone, Debug, Default)]
-pub(super) struct Signals {
+pub(crate) struct Signals {
     banks: [u64; 3],
 }
 
@@ -22,13 +22,13 @@ impl Signals {
             .ok_or(Message::IllegalSignal.into())
     }
 
-    pub(super) fn get(&self, number: u16) -> Result<bool, Fault> {
+    pub(crate) fn get(&self, number: u16) -> Result<bool, Fault> {
         let (bank, bit) = Self::locate(number)?;
         Ok(self.banks[bank] & bit != 0)
     }
 
     /// Sets any signal, as the wiring does.
-    pub(super) fn set(&mut self, number: u16, on: bool) -> Result<(), Fault> {
+    pub(crate) fn set(&mut self, number: u16, on: bool) -> Result<(), Fault> {
         let (bank, bit) = Self::locate(number)?;
         if on {
             self.banks[bank] |= bit;
@@ -39,7 +39,7 @@ impl Signals {
     }
 
     /// Sets an output or a soft signal, as a program does: negative is off, inputs cannot be set.
-    pub(super) fn command(&mut self, number: i32) -> Result<(), Fault> {
+    pub(crate) fn command(&mut self, number: i32) -> Result<(), Fault> {
         let magnitude = u16::try_from(number.unsigned_abs()).map_err(|_| Message::IllegalSignal)?;
         if (BANKS[1]..BANKS[1] + COUNT).contains(&magnitude) {
             return Err(Message::IllegalSignal.into());
@@ -48,12 +48,12 @@ impl Signals {
     }
 
     /// All outputs off.
-    pub(super) fn reset_outputs(&mut self) {
+    pub(crate) fn reset_outputs(&mut self) {
         self.banks[0] = 0;
     }
 
     /// The states of the first `count` signals of a bank.
-    pub(super) fn bank(&self, bank: usize, count: usize) -> impl Iterator<Item = bool> + '_ {
+    pub(crate) fn bank(&self, bank: usize, count: usize) -> impl Iterator<Item = bool> + '_ {
         (0..count).map(move |i| self.banks[bank] >> i & 1 != 0)
     }
 }

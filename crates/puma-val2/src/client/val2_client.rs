@@ -1,0 +1,281 @@
+//! The client itself: its settings, its line and the calls that do not move the arm.
+
+use std::time::Duration;
+
+use crate::client::config::ClientConfig;
+use crate::client::dialogue::shortened;
+use crate::client::number::{check_percent, plain};
+use crate::client::reader;
+use crate::client::reader::Ending;
+use crate::client::whereabouts::Location;
+use crate::client::wire::{Failed, Reply, Wire, is_doubt};
+use crate::error::ArmError;
+use crate::joints::{JointDelta, Joints};
+use crate::manipulator::{Gripper, Manipulator};
+use crate::transport::Transport;
+
+/// A client of a VAL II controller.
+///
+/// Every call waits until the controller has answered and, where the arm moves, until `WHERE` shows
+/// that it stands where it was sent.
+///
+/// **The rule for faults on the line.** A relative motion is never repeated blindly: after any
+/// doubt about what the controller has understood, the position is read, and only what is missing
+/// from there to the goal is commanded. A call therefore ends with the arm at its goal, or with a
+/// typed error, the arm stopped and its last known joint angles kept ([`Val2Client::last_known`]).
+///
+/// A move starts from the joint angles that the arm reported last, which saves a reply of a quarter
+/// of a second on a slow line. Whoever moves the arm by other means (the teach pendant, a program)
+/// calls [`Manipulator::joints`] before the next [`Manipulator::move_by`].
+#[derive(Debug)]
+pub struct Val2Client<T: Transport> {
+    pub(super) wire: Wire<T>,
+    pub(super) config: ClientConfig,
+    pub(super) last_known: Option<Joints>,
+    /// Whether the controller has turned out not to know `#PPOINT`.
+    pub(super) lacks_ppoint: bool,
+    /// The signal that stops the next motions.
+    pub(super) guard: Option<u16>,
+}
+
+impl<T: Transport> Val2Client<T> {
+    /// The settings.
+    pub fn config(&self) -> &ClientConfig {
+        &self.config
+    }
+
+    /// The line.
+    pub fn line(&self) -> &T {
+        &self.wire.line
+    }
+
+    /// The line, to press the buttons of an emulator at its other end. Bytes read or written here
+    /// are missing in the client's dialogue.
+    pub fn line_mut(&mut self) -> &mut T {
+        &mut self.wire.line
+    }
+
+    /// Gives the line back.
+    pub fn into_line(self) -> T {
+        self.wire.line
+    }
+
+    /// The joint angles that the arm reported last, without asking it; `None` if it may have moved
+    /// since, or the controller was started again.
+    pub fn last_known(&self) -> Option<Joints> {
+        self.last_known.filter(|_| !self.wire.restarted)
+    }
+
+    /// Whether the controller echoes what is typed.
+    pub fn echoes(&self) -> bool {
+        self.wire.echo == Some(true)
+    }
+
+    /// Messages of the controller that belong to no command, oldest first, at most a hundred; taken
+    /// out.
+    pub fn take_notices(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.wire.notices)
+    }
+
+    /// Carries out one line that neither moves the arm nor opens a dialogue, trying again after
+    /// doubt, and returns the reply.
+    pub(super) fn command(&mut self, line: &str) -> Result<String, ArmError> {
+        let mut tries = 0;
+        loop {
+            match self.command_once(line, self.config.patience()) {
+                Ok(text) => return Ok(text),
+                Err(failed) if is_doubt(&failed.error) && tries < self.config.retries => {
+                    tries += 1;
+                    self.wire.settle(&self.config)?;
+                }
+                Err(failed) => return Err(failed.error),
+            }
+        }
+    }
+
+    /// Carries out one line, once. The reply must end with the monitor's prompt and hold no
+    /// message.
+    pub(super) fn command_once(&mut self, line: &str, timeout: Duration) -> Result<String, Failed> {
+        let reply = self.wire.exchange(line, timeout, &self.config)?;
+        self.without_message(line, &reply)?;
+        if reply.ending == Ending::Question {
+            let heard = shortened(&reply.text);
+            return Err(Failed {
+                error: self.wire.garbled(line, "the monitor's prompt", &heard),
+                maybe_done: true,
+            });
+        }
+        Ok(reply.text)
+    }
+
+    pub(super) fn without_message(&self, line: &str, reply: &Reply) -> Result<(), Failed> {
+        match reader::messages(&reply.text).pop() {
+            None => Ok(()),
+            Some(message) => Err(Failed {
+                error: ArmError::Refused {
+                    port: self.wire.port(),
+                    sent: line.to_owned(),
+                    message,
+                },
+                maybe_done: false,
+            }),
+        }
+    }
+
+    /// Sets the monitor's speed, percent of normal, above 0 to 327.
+    ///
+    /// # Errors
+    /// [`ArmError::Setting`] before anything is sent; otherwise what the line or the controller
+    /// said.
+    pub fn set_speed(&mut self, percent: f64) -> Result<(), ArmError> {
+        check_percent(percent)?;
+        self.command(&format!("SPEED {}", plain(percent))).map(drop)
+    }
+
+    /// Where the arm says it is.
+    ///
+    /// The reply is believed when its joint angles and its hand pose belong together; with a tool
+    /// or base set in the controller they do not, and then two equal replies in a row are asked
+    /// for.
+    ///
+    /// # Errors
+    /// What kept the arm from answering, [`ArmError::Garbled`] if no two replies agree.
+    pub fn where_(&mut self) -> Result<Location, ArmError> {
+        let mut before: Option<Location> = None;
+        let mut last_error = None;
+        for _ in 0..self.config.retries.saturating_add(3) {
+            match self.where_once() {
+                Ok(location) => {
+                    if location.agrees(&self.config.params) || before.is_some_and(|b| b == location)
+                    {
+                        self.last_known = Some(location.joints);
+                        return Ok(location);
+                    }
+                    before = Some(location);
+                }
+                Err(error) if is_doubt(&error) => {
+                    last_error = Some(error);
+                    self.wire.settle(&self.config)?;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Err(last_error.unwrap_or_else(|| {
+            self.wire
+                .garbled("WHERE", "two equal replies in a row", "none")
+        }))
+    }
+
+    pub(super) fn where_once(&mut self) -> Result<Location, ArmError> {
+        let timeout = self.config.patience();
+        let reply = self
+            .wire
+            .exchange("WHERE", timeout, &self.config)
+            .map_err(|failed| failed.error)?;
+        if let Some(location) = Location::parse(&reply.text) {
+            // A message beside a whole answer was not meant for it.
+            self.wire.notice(&reply.text);
+            return Ok(location);
+        }
+        self.without_message("WHERE", &reply)
+            .map_err(|failed| failed.error)?;
+        let expected = "a heading and six numbers each for X Y Z O A T and JT1 to JT6";
+        Err(self
+            .wire
+            .garbled("WHERE", expected, &shortened(&reply.text)))
+    }
+
+    /// Opens or closes the hand and waits until that is done.
+    ///
+    /// # Errors
+    /// What the line or the controller said.
+    pub fn set_hand(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+        self.command(match gripper {
+            Gripper::Open => "DO OPENI",
+            Gripper::Closed => "DO CLOSEI",
+        })
+        .map(drop)
+    }
+
+    /// Whether a signal is on: 1 and up outputs, 1001 and up inputs.
+    ///
+    /// # Errors
+    /// What the line or the controller said; [`ArmError::Garbled`] if the answer is no number.
+    pub fn signal(&mut self, number: u16) -> Result<bool, ArmError> {
+        self.truth(&format!("SIG({number})"))
+    }
+
+    /// The value of a condition, -1 for true and 0 for false.
+    ///
+    /// No single character that changes, gets lost or comes twice makes one of the other. Whatever
+    /// else is shown counts when it is shown twice in a row.
+    pub(super) fn truth(&mut self, condition: &str) -> Result<bool, ArmError> {
+        let line = format!("DO TYPE {condition}");
+        let mut before = None;
+        let mut heard = String::new();
+        for _ in 0..self.config.retries.saturating_add(3) {
+            heard = self.command(&line)?;
+            let shown = heard
+                .split(['\r', '\n'])
+                .filter_map(|l| l.trim().parse::<f64>().ok())
+                .rfind(|value| value.is_finite());
+            let is = |value: f64| shown.is_some_and(|s| s.total_cmp(&value).is_eq());
+            if is(-1.0) || is(0.0) || shown.is_some() && shown == before {
+                return Ok(shown.is_some_and(|value| value != 0.0));
+            }
+            before = shown;
+        }
+        Err(self.wire.garbled(&line, "-1 or 0", &shortened(&heard)))
+    }
+
+    /// Refuses what would move the arm without the guard that is armed.
+    pub(super) fn refuse_under_guard(&self, what: &'static str) -> Result<(), ArmError> {
+        match self.guard {
+            None => Ok(()),
+            Some(signal) => Err(ArmError::Setting {
+                what,
+                value: format!("started while signal {signal} guards the motions"),
+                allowed: "disarm the proximity guard first",
+            }),
+        }
+    }
+
+    /// Stops the arm: `PANIC` and Ctrl-C, without waiting for a prompt before. The client can be
+    /// used again afterwards.
+    ///
+    /// `PANIC` is sent twice: the first may end a half-typed line, which it spoils.
+    ///
+    /// # Errors
+    /// [`ArmError::Line`] if the line did not take it.
+    pub fn panic_stop(&mut self) -> Result<(), ArmError> {
+        self.wire.send(b"PANIC\rPANIC\r\x03", "PANIC")?;
+        // Whatever is said to that, in whichever number of prompts, is of no interest; only a dead
+        // line is.
+        match self.wire.settle(&self.config) {
+            Err(error @ ArmError::Line { .. }) => Err(error),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl<T: Transport> Manipulator for Val2Client<T> {
+    fn joints(&mut self) -> Result<Joints, ArmError> {
+        self.where_().map(|location| location.joints)
+    }
+
+    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        self.move_joints_by(delta)
+    }
+
+    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
+        self.move_joints_to(target)
+    }
+
+    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+        self.set_hand(gripper)
+    }
+
+    fn stop(&mut self) -> Result<(), ArmError> {
+        self.panic_stop()
+    }
+}

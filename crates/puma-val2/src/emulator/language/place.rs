@@ -1,0 +1,33 @@
+//! Values of locations.
+
+use nalgebra::Isometry3;
+
+use crate::joints::Joints;
+use crate::kinematics::xyzoat::Xyzoat;
+
+/// A location's value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// A hand pose in the world frame (or relative to another one), metres.
+    Transformation(Isometry3<f64>),
+    /// A precision point: six joint angles.
+    PrecisionPoint(Joints),
+}
+
+impl Place {
+    /// The six numbers that VAL shows: millimetres and degrees, or six joint angles in degrees.
+    pub fn val(&self) -> [f64; 6] {
+        match self {
+            Self::Transformation(pose) => Xyzoat::from_pose(pose).val(),
+            Self::PrecisionPoint(joints) => joints.degrees(),
+        }
+    }
+
+    /// The value with its six numbers replaced; of the same kind.
+    pub(crate) fn with_val(&self, values: [f64; 6]) -> Self {
+        match self {
+            Self::Transformation(_) => Self::Transformation(Xyzoat::from_val(values).pose()),
+            Self::PrecisionPoint(_) => Self::PrecisionPoint(Joints::from_degrees(values)),
+        }
+    }
+}

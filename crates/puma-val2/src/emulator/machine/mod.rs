@@ -1,0 +1,11 @@
+//! The emulated machine: arm, signals, memory, and the jobs that work on them.
+
+pub(crate) mod arm;
+mod control;
+mod interpreter;
+pub(crate) mod job;
+pub(crate) mod memory;
+mod motion;
+pub(crate) mod reaction;
+pub(crate) mod scope;
+pub(crate) mod signals;
