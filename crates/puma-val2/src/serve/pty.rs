@@ -10,12 +10,15 @@ use std::thread::JoinHandle;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
+use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use super::ServeConfig;
-use super::station::Station;
-use crate::{Emulator, Gripper, Joints};
+use crate::emulator::controller::Emulator;
+use crate::joints::Joints;
+use crate::manipulator::Gripper;
+use crate::serve::ServeConfig;
+use crate::serve::station::Station;
 
 /// Most output that waits for a terminal that does not read; older output is dropped beyond it.
 const PENDING_LIMIT: usize = 256 * 1024;
@@ -39,7 +42,9 @@ impl PtyServer {
     /// # Errors
     /// The system has no pseudo-terminal to spare, or the link cannot be made.
     pub fn spawn(emulator: Emulator, config: ServeConfig) -> io::Result<Self> {
-        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        // Not every system opens a pseudo-terminal with this flag.
+        fcntl_setfd(&master, FdFlags::CLOEXEC)?;
         grantpt(&master)?;
         unlockpt(&master)?;
         let name = ptsname(&master, Vec::new())?;
