@@ -1,6 +1,6 @@
 //! See a ball, learn to reach it, and move a real arm to it.
 //!
-//! Five libraries, each of use on its own, and this package over them:
+//! Five libraries, each usable on its own, and this package over them:
 //!
 //! | crate | turns |
 //! |---|---|
@@ -10,36 +10,37 @@
 //! | [`pipeline_sim`] | an arm pose into a camera frame, and samples of it into a regression simulator |
 //! | [`grasp_agent`] | circles into joint moves: learned behaviours, search, recovery, grip |
 //!
-//! They are re-exported here under their own names. What this package adds is the wiring between
-//! the two that do not know each other, the simulated cell and the controller: a [`Simulator`] is
-//! fitted to samples of the cell, [`learn`] teaches a behaviour in it, and a [`Rig`] is an arm
-//! behind a VAL II controller with the cell around it, in which an agent goes for a ball.
+//! They are re-exported here under their own names. This package joins the simulated cell to the
+//! controller, which do not know each other: a [`Simulator`] is fitted to samples of the cell and
+//! teaches a behaviour, and a [`Rig`] is an arm behind a VAL II controller with the cell around it,
+//! in which an agent goes for a ball.
 //!
 //! ```
+//! use puma_grasp::Simulator;
 //! use puma_grasp::grasp_agent::BehaviourSpec;
 //! use puma_grasp::pipeline_sim::{Ball, Cell, ReachForm, sample_moves};
-//! use puma_grasp::{Simulator, learn};
-//! use rand::SeedableRng;
-//! use rand::rngs::Xoshiro256PlusPlus;
+//! use puma_grasp::qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 //!
-//! let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
-//! let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-//! let (centring, reaching) = sample_moves(&cell, 500, 0.5, &mut rng);
-//! let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
-//! let lesson = learn(BehaviourSpec::centering(), &simulator, 20_000, &mut rng, &mut |_| {})?;
-//! assert!(lesson.report.curve.last().and_then(|record| record.success_share) > Some(0.8));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+//!     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+//!     let (centering, reaching) = sample_moves(&cell, 500, 0.5, &mut rng);
+//!     let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
+//!     let spec = BehaviourSpec::centering();
+//!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, &mut |_| {})?;
+//!     let last = lesson.report.curve.last();
+//!     assert!(last.and_then(|record| record.success_share) > Some(0.8));
+//!     Ok(())
+//! }
 //! ```
 //!
 //! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example
 //! `grasp`: `cargo run --release --example grasp`.
 
-mod plane;
+mod detector;
 mod rig;
-mod setup;
+mod simulator;
 mod surroundings;
-mod training;
-mod trial;
 
 pub use grasp_agent;
 pub use hough_heuristic;
@@ -47,14 +48,10 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
-pub use plane::{
-    ExactPlane, PlaneScore, PlaneStart, optimum, score, search_percepts, search_starts,
-};
+pub use detector::{BallDetector, UnknownDetector, bright_ball_scene};
 pub use rig::{PlaceError, Rig, RigError, RigParts};
-pub use setup::{BallDetector, UnknownDetector, bright_ball_scene};
+pub use simulator::Simulator;
 pub use surroundings::Contacts;
-pub use training::{Simulator, learn, learn_best};
-pub use trial::{FeatureEye, TrialCell, TrialResult};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -18,15 +18,14 @@ use puma_val2::{
 use crate::Contacts;
 use crate::surroundings::Surroundings;
 
-/// An arm behind a VAL II controller, calibrated, with a simulated cell around it: a ball to place,
-/// a camera on the hand whose frames are rendered from where the arm stands, proximity sensors, and
-/// a gripper that holds the ball or misses it.
+/// An arm behind a VAL II controller, calibrated, in a simulated cell: a ball to place, a camera on
+/// the hand whose frames are rendered from the arm's pose, proximity sensors, and a gripper that
+/// holds the ball or misses it.
 ///
-/// With [`Rig::emulated`] the controller is emulated here; camera, sensors and ball follow the
-/// emulated arm itself, on its way too, and the sensors are wired to the controller, which stops
-/// the arm. With [`Rig::on_port`] and [`Rig::on_socket`] it is somebody else's, and the cell
-/// follows what that controller reports at the end of each move; its moves are guarded by its own
-/// sensors' input.
+/// [`Rig::emulated`] starts an emulated controller. Camera, sensors and ball then follow the
+/// emulated arm during its moves too, and the sensors are wired to the controller, which stops the
+/// arm. [`Rig::on_port`] and [`Rig::on_socket`] connect to another controller. The cell then follows
+/// the pose that it reports at the end of each move, and its own sensors guard the moves.
 pub struct Rig {
     name: String,
     arm: Box<dyn Manipulator>,
@@ -36,24 +35,25 @@ pub struct Rig {
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
 }
 
-/// Where the joints are, now and later.
+/// Reader of the arm's current joint angles.
 type Pose = Arc<dyn Fn() -> Joints + Send + Sync>;
 
 /// Baud rate of VAL II's terminal line (8 data bits, no parity, one stop bit).
 const BAUD: u32 = 9600;
 
-/// How long a socket may take to be connected.
+/// Longest time for a socket to connect.
 const SOCKET_TIMEOUT: Duration = Duration::from_secs(5);
 
 impl Rig {
-    /// Starts a controller emulator on a line of its own and connects to it: a pseudo-terminal
-    /// opened through `serialport` like a serial line where the system has them (Unix, feature
-    /// `serial`), a local socket elsewhere.
+    /// Starts a controller emulator and connects to it: through a pseudo-terminal opened like a
+    /// serial line where the system has them (Unix, feature `serial`), elsewhere through a local
+    /// socket.
     ///
-    /// The emulated arm takes no time unless `realtime`. `scene` and `seed` are the renderer's.
+    /// The emulated arm moves in no time unless `realtime` is set. `scene` and `seed` are the
+    /// renderer's.
     ///
     /// # Errors
-    /// The system has no line to spare, or the emulator cannot be reached through it.
+    /// The system has no free line, or the emulator does not answer on it.
     pub fn emulated(realtime: bool, scene: &Scene, seed: u64) -> Result<Self, RigError> {
         let (cell, client_config) = (paper_cell(), ClientConfig::for_emulator());
         let surroundings = Surroundings::new(cell.clone());
@@ -111,7 +111,7 @@ impl Rig {
     /// Connects to the controller behind the socket `address` (`host:port`).
     ///
     /// # Errors
-    /// Nobody listens there, or no VAL II monitor does.
+    /// Nothing listens there, or it is not a VAL II monitor.
     pub fn on_socket(address: &str, scene: &Scene, seed: u64) -> Result<Self, RigError> {
         Self::elsewhere(TcpLine::connect(address, SOCKET_TIMEOUT)?, scene, seed)
     }
@@ -170,25 +170,39 @@ impl Rig {
         }
     }
 
-    /// What the line to the controller is called: a device path or an address.
+    /// Returns the name of the line to the controller: a device path or an address.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The cell around the arm.
+    /// Returns the cell around the arm.
     pub fn cell(&self) -> &SharedCell {
         &self.cell
     }
 
-    /// Puts the ball, on a holder, at another place, out of the jaws if they held it; contacts are
-    /// counted from here on.
+    /// Puts the ball, on a holder, at another place, and counts contacts from zero. Where the hand
+    /// is in the way, the arm first moves to VAL's READY pose, straight up.
     ///
     /// # Errors
-    /// [`PlaceError::InHand`] where ball or holder would stand in the hand, which rests there; then
-    /// nothing has changed.
+    /// [`PlaceError::InHand`] if ball or holder would still stand in the hand, which leaves the
+    /// cell unchanged, and what kept the arm from making room.
     pub fn place(&mut self, ball: &Ball) -> Result<(), PlaceError> {
+        if !self.put(ball) {
+            self.clear_for(Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]))?;
+            if !self.put(ball) {
+                return Err(PlaceError::InHand {
+                    ball_mm: (ball.centre.coords * 1000.0).into(),
+                });
+            }
+        }
+        self.surroundings.begin();
+        Ok(())
+    }
+
+    /// Puts the ball at its place unless it would stand in the hand. Returns whether it did.
+    fn put(&self, ball: &Ball) -> bool {
         let joints = (self.pose)();
-        let placed = self.cell.with(|cell| {
+        self.cell.with(|cell| {
             let (mut there, mut nowhere) = (*cell, *cell);
             there.place_ball(ball.centre);
             take_away(&mut nowhere);
@@ -198,33 +212,10 @@ impl Rig {
                 *cell = there;
             }
             free
-        });
-        if !placed {
-            return Err(PlaceError::InHand {
-                ball_mm: (ball.centre.coords * 1000.0).into(),
-            });
-        }
-        self.surroundings.begin();
-        Ok(())
+        })
     }
 
-    /// As [`Rig::place`]; where the hand is in the way the arm first goes to VAL's READY pose,
-    /// straight up.
-    ///
-    /// # Errors
-    /// What kept the arm from getting there.
-    pub fn place_making_room(&mut self, ball: &Ball) -> Result<(), PlaceError> {
-        match self.place(ball) {
-            Err(PlaceError::InHand { .. }) => {
-                self.clear_for(Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]))?;
-                self.place(ball)
-            }
-            placed => placed,
-        }
-    }
-
-    /// Takes the ball and its holder out of the cell, opens the jaws, and takes the arm to `pose`;
-    /// then the next ball can be placed.
+    /// Removes the ball and its holder from the cell, opens the jaws, and moves the arm to `pose`.
     ///
     /// # Errors
     /// What kept the arm from getting there.
@@ -232,40 +223,27 @@ impl Rig {
         self.cell.with(take_away);
         self.arm.set_gripper(Gripper::Open)?;
         match self.arm.move_to(pose) {
-            // An arm that stood close to what has just been taken away.
+            // The arm stood close to what has just been removed.
             Err(ArmError::ProximityStop { .. }) => self.arm.move_to(pose).map(drop),
             outcome => outcome.map(drop),
         }
     }
 
-    /// What the hand has done in the cell since the ball was placed.
+    /// Returns the contacts of the hand with the cell since the ball was placed.
     pub fn contacts(&self) -> Contacts {
         self.surroundings.contacts()
     }
 
-    /// Whether the ball is in the jaws.
+    /// Returns whether the ball is in the jaws.
     pub fn holds_ball(&self) -> bool {
         self.cell.get().held.is_some()
     }
 
-    /// Lets `agent` go for the ball.
-    ///
-    /// # Errors
-    /// Those of [`Agent::run`].
-    pub fn run<C: Controller + Clone>(
-        &mut self,
-        agent: &Agent<C>,
-        detector: &mut dyn CircleDetector,
-        observe: &mut dyn FnMut(&Event<'_>),
-    ) -> Result<Outcome, AgentError> {
-        self.run_and_learn(&mut agent.clone(), detector, observe)
-    }
-
-    /// As [`Rig::run`], keeping what the controller learns.
+    /// Lets `agent` find, reach and grasp the ball. The controller keeps what it learns.
     ///
     /// # Errors
     /// Those of [`Agent::run_and_learn`].
-    pub fn run_and_learn<C: Controller>(
+    pub fn run<C: Controller>(
         &mut self,
         agent: &mut Agent<C>,
         detector: &mut dyn CircleDetector,
@@ -276,15 +254,11 @@ impl Rig {
             arm,
             mut sensor,
         } = self.parts();
-        agent.run_and_learn(
-            &mut CameraEye::new(camera, detector),
-            arm,
-            &mut *sensor,
-            observe,
-        )
+        let mut eye = CameraEye::new(camera, detector);
+        agent.run_and_learn(&mut eye, arm, &mut *sensor, observe)
     }
 
-    /// Camera, arm and sensor apart, for an eye of one's own or with something in between.
+    /// Returns camera, arm and sensor, for a caller that puts something of its own in between.
     pub fn parts(&mut self) -> RigParts<'_> {
         RigParts {
             camera: &mut self.camera,
@@ -296,19 +270,14 @@ impl Rig {
         }
     }
 
-    /// Where the arm stands, now and whenever the closure is called.
+    /// Returns a closure that reads the arm's current joint angles.
     pub fn pose(&self) -> impl Fn() -> Joints + Send + Sync + use<> {
         let pose = Arc::clone(&self.pose);
         move || pose()
     }
-
-    /// How far the point between the jaws is from the ball's centre, metres.
-    pub fn grip_miss(&self) -> f64 {
-        self.cell.get().grip_miss(&(self.pose)())
-    }
 }
 
-/// What a [`Rig`] is made of.
+/// The devices of a [`Rig`].
 pub struct RigParts<'a> {
     /// The camera on the hand.
     pub camera: &'a mut dyn FrameSource,
@@ -333,18 +302,18 @@ impl std::fmt::Debug for Rig {
     }
 }
 
-/// Takes the ball and its holder out of the cell.
+/// Removes the ball and its holder from the cell.
 fn take_away(cell: &mut Cell) {
     cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
     cell.holder = None;
 }
 
-/// The cell that a rig begins with.
+/// Returns the cell that a rig begins with.
 fn paper_cell() -> SharedCell {
     SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)))
 }
 
-/// Gets hold of the monitor, calibrates, and arms the proximity guard.
+/// Connects to the monitor, calibrates, and arms the proximity guard.
 fn connect<T: Transport>(line: T, config: ClientConfig) -> Result<GuardedArm<T>, ArmError> {
     let config = ClientConfig {
         speed_percent: Some(100.0),
@@ -374,7 +343,7 @@ struct ArmInCell<M> {
     arm: M,
     surroundings: Surroundings,
     pose: Pose,
-    /// For the cell to know where the arm is, what it reports; `None` where the cell sees it move.
+    /// The last pose that the arm reported, for the cell; `None` where the cell sees it move.
     reported: Option<Arc<Mutex<Joints>>>,
 }
 
@@ -419,25 +388,25 @@ impl<M: Manipulator> Manipulator for ArmInCell<M> {
     }
 }
 
-/// Why a ball could not be placed.
+/// Error of placing a ball.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaceError {
     /// Ball or holder would stand in the hand.
     #[error(
-        "a ball at {:.0} {:.0} {:.0} mm would stand in the hand, which rests there; take the arm away first",
+        "a ball at {:.0} {:.0} {:.0} mm would stand in the hand; move the arm away first",
         ball_mm[0], ball_mm[1], ball_mm[2]
     )]
     InHand {
         /// The ball's centre, millimetres.
         ball_mm: [f64; 3],
     },
-    /// The arm could not be taken away.
+    /// The arm could not be moved away.
     #[error(transparent)]
     Arm(#[from] ArmError),
 }
 
-/// Why a rig could not be set up.
+/// Error of setting up a rig.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigError {

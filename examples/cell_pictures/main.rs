@@ -19,7 +19,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use example_support::files::{writable_folder, write_whole};
+use example_support::files::{animated, writable_folder, write_whole};
 use example_support::program::ended;
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageFormat};
@@ -99,7 +99,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
         .iter()
         .map(|pose| resize(renderer.render(&cell, pose), 384, 288, FilterType::Triangle))
         .collect();
-    save("run.png", &animated(&frames)?)?;
+    save("run.png", &animated(&frames, (1, 12), (3, 2))?)?;
     Ok(())
 }
 
@@ -119,25 +119,4 @@ fn reach(cell: &Cell, start: &Joints, goal: &Joints, frames: u32) -> Vec<Joints>
     approach
         .chain((1..=swing).map(|i| between(goal, &grip, f64::from(i) / f64::from(swing))))
         .collect()
-}
-
-/// An animated PNG of equally large frames, twelve a second, the last one shown longer.
-fn animated(frames: &[GrayImage]) -> Result<Vec<u8>, Box<dyn Error>> {
-    let first = frames.first().ok_or("no frames")?;
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, first.width(), first.height());
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
-    encoder.set_animated(u32::try_from(frames.len())?, 0)?;
-    encoder.set_frame_delay(1, 12)?;
-    let mut writer = encoder.write_header()?;
-    for (i, frame) in frames.iter().enumerate() {
-        if i + 1 == frames.len() {
-            writer.set_frame_delay(3, 2)?;
-        }
-        writer.write_image_data(frame.as_raw())?;
-    }
-    writer.finish()?;
-    Ok(bytes)
 }

@@ -17,15 +17,17 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, EventKind, Hybrid, HybridSettings, JacobianAt, Learned, Percept,
-    SavedController, SavedRun, ServoSettings, TaughtGoal,
+    Agent, BehaviourSpec, Hybrid, HybridSettings, JacobianAt, Learned, Percept, SavedController,
+    SavedRun, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
-use puma_grasp::{BallDetector, ExactPlane, Simulator, learn_best, search_percepts};
+use puma_grasp::{BallDetector, Simulator};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::files::{writable_folder, write_whole};
+use example_support::learning::{ACTIONS, TRIALS};
+use example_support::plane::{ExactPlane, search_percepts};
 use example_support::program::ended;
 use table::{Row, Tally};
 use world::World;
@@ -118,13 +120,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let (mut tallies, mut unshown) = (vec![Tally::default(); rivals.len()], 0);
         for draw in 0..options.draws {
             let errors = seed_of(options.seed, &[1, draw]);
-            let new_world = || {
-                if options.full_chain {
-                    World::chain(*level, errors, options.detector, options.grip)
-                } else {
-                    World::shortcut(*level, errors, options.grip)
-                }
-            };
+            let new_world = || World::draw(options, *level, errors);
             let mut world = new_world()?;
             let goal = if options.taught_goal {
                 world.teach_goal(seed_of(options.seed, &[5, draw]))?
@@ -133,7 +129,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             };
             // Where the goal cannot be shown, the cell is left with the one there is.
             unshown += usize::from(options.taught_goal && goal.is_none());
-            let untaught = world.agent_config();
+            let untaught = world.agent_config(options);
             let config = goal.map_or(untaught.clone(), |goal| goal.applied_to(untaught));
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
                 let run_of = |run: String| format!("{level} {} cell {draw} {run}", rival.name);
@@ -161,17 +157,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
                     let mut saved = SavedRun::before(&agent, controller.clone());
-                    let mut at_goal = None;
-                    let outcome = world.run(&mut agent, seed, &mut |event| {
-                        if event.kind == EventKind::AtGoal {
-                            at_goal.get_or_insert(event.cycle);
-                        }
-                        saved.note(event);
-                    });
-                    let mut trial = match outcome {
-                        Ok(Some(trial)) => trial,
+                    let run = world.run(&mut agent, seed, &mut |event| saved.note(event));
+                    let (mut trial, collisions) = match run {
+                        Ok(Some(run)) => run,
                         Ok(None) => continue,
-                        // A run that an arm or a camera ends is one that has failed, and no more.
+                        // A run that a fault of arm or camera ends has failed.
                         Err(error) => {
                             failures.broken_off(
                                 &run_of(format!("ball {start}")),
@@ -186,14 +176,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     let success = if options.grip {
                         trial.held
                     } else {
-                        trial.reached
+                        trial.at_goal.is_some()
                     };
-                    if let (Some(cycles), false) = (at_goal, options.grip) {
-                        // What comes after the goal was reached is another matter.
+                    if let (Some(cycles), false) = (trial.at_goal, options.grip) {
+                        // Moves after reaching the goal are not counted.
                         trial.outcome.cycles = cycles;
                     }
                     tally.add(success, &trial.outcome);
-                    if let Some(collisions) = trial.collisions {
+                    if let Some(collisions) = collisions {
                         *tally.collisions.get_or_insert(0) += collisions;
                     }
                     if !success {
@@ -376,17 +366,19 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
     let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
     let plane = ExactPlane::new(20_000, &mut rng);
-    let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
-    let trials = search_percepts(500, seed_of(options.seed, &[4]));
+    let anywhere: Vec<Percept> = (0..TRIALS).map(|_| rigid.start(&mut rng)).collect();
+    let trials = search_percepts(TRIALS, seed_of(options.seed, &[4]));
     let (spec, quiet) = (BehaviourSpec::centering(), &mut |_: &qtable::Progress| ());
-    let centering = learn_best(spec, &rigid, &anywhere, 60_000, &mut rng, quiet)?.behaviour;
+    let centering = rigid
+        .learn(spec, &anywhere, ACTIONS.0, &mut rng, quiet)?
+        .behaviour;
     let (paper, fine) = (BehaviourSpec::approaching, BehaviourSpec::approaching_fine);
     let approaching = [
-        learn_best(paper(), &linear, &trials, 500_000, &mut rng, quiet)?,
-        learn_best(paper(), &rigid, &trials, 500_000, &mut rng, quiet)?,
-        learn_best(fine(), &rigid, &trials, 4_000_000, &mut rng, quiet)?,
-        plane.learn_best(paper(), &trials, 500_000, &mut rng, quiet)?,
-        plane.learn_best(fine(), &trials, 4_000_000, &mut rng, quiet)?,
+        linear.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
+        rigid.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
+        rigid.learn(fine(), &trials, 4_000_000, &mut rng, quiet)?,
+        plane.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
+        plane.learn(fine(), &trials, 4_000_000, &mut rng, quiet)?,
     ];
     let both = approaching.map(|lesson| Learned::new(centering.clone(), lesson.behaviour));
     Ok(NAMES.into_iter().zip(both).collect())
@@ -418,7 +410,7 @@ fn taught_hybrid(
         match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| {
             saved.note(event)
         }) {
-            Ok(trial) => made += trial.map_or(0, |trial| trial.outcome.cycles),
+            Ok(trial) => made += trial.map_or(0, |(trial, _)| trial.outcome.cycles),
             Err(error) => {
                 fault = Some(Fault { run, saved, error });
                 break;

@@ -17,27 +17,28 @@
 
 use std::cell::Cell;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, BehaviourPair, CameraEye, EggFeatures, EggLimits, EventKind, GripAcross,
-    Learned, ObjectFeatures, Percept, SavedController, SavedRun, Sighting,
+    ObjectFeatures, SavedController, SavedRun, Sighting,
 };
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse};
 use nalgebra::Vector3;
 use pipeline_sim::{ReachForm, Workspace, sample_moves};
-use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts};
+use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use detour::Detour;
 use egg::{Egg, EggCamera};
-use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::files::{keep_run, writable_folder, write_png};
+use example_support::learning::learn_both;
 use example_support::overlay::Overlay;
 use example_support::program::ended;
 
@@ -97,13 +98,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     let workspace = Workspace::paper();
     let config = AgentConfig::paper(workspace.search_poses());
-    let learned = taught_for_balls(&rig, options.seed, &mut rng)?;
+    let (centering, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, &mut rng);
+    let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
+    let pair = BehaviourPair::paper_mended();
+    let learned = learn_both(&simulator, pair, options.seed, &mut rng)?;
     let controller = SavedController::GripAcross {
         controller: Box::new(SavedController::of_learned(&learned, None)),
         grip: config.grip,
     };
     let agent = Agent::with_controller(config.clone(), GripAcross::new(learned, config.grip))?;
 
+    let run_file = |run: usize| options.out.join(format!("egg{run:03}.json"));
     let (mut gripped, mut moves) = (0, 0);
     println!(
         " run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result"
@@ -116,7 +121,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             half_length: 0.5e-3 * options.length,
             heading: rng.random_range(0.0..std::f64::consts::PI),
         };
-        rig.place_making_room(&place)?;
+        rig.place(&place)?;
         let (cell, pose) = (rig.cell().clone(), rig.pose());
         let RigParts {
             camera,
@@ -157,7 +162,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let outcome = match end {
             Ok(outcome) => outcome,
             Err(error) => {
-                let kept = keep_run(&options.out, run, &saved)?;
+                let kept = keep_run(&run_file(run), &saved)?;
                 return Err(format!("run {run} was broken off: {error}; {kept}").into());
             }
         };
@@ -183,7 +188,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             outcome.cycles, outcome.losses
         );
         if !held {
-            println!("      {}", keep_run(&options.out, run, &saved)?);
+            println!("      {}", keep_run(&run_file(run), &saved)?);
         }
         if let Some((frame, ellipse)) = last {
             let mut overlay = Overlay::new(&frame);
@@ -206,13 +211,6 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         options.out.display()
     );
     Ok(())
-}
-
-/// Writes a run that failed, and says where.
-fn keep_run(out: &Path, run: usize, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
-    let path = out.join(format!("egg{run:03}.json"));
-    write_whole(&path, saved.to_json().as_bytes())?;
-    Ok(format!("for `replay`: {}", path.display()))
 }
 
 /// Ellipses among the edges of the frame.
@@ -239,36 +237,6 @@ fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
             elongation: 2.2,
         },
     ))
-}
-
-/// The paper's behaviours, learned for balls.
-fn taught_for_balls(
-    rig: &Rig,
-    seed: u64,
-    rng: &mut Xoshiro256PlusPlus,
-) -> Result<Learned, Box<dyn Error>> {
-    let (centring, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, rng);
-    let simulator = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
-    let pair = BehaviourPair::paper_mended();
-    let anywhere: Vec<Percept> = (0..500).map(|_| simulator.start(rng)).collect();
-    let found = search_percepts(500, seed);
-    let centering = learn_best(
-        pair.centering,
-        &simulator,
-        &anywhere,
-        60_000,
-        rng,
-        &mut |_| (),
-    )?;
-    let approaching = learn_best(
-        pair.approaching,
-        &simulator,
-        &found,
-        500_000,
-        rng,
-        &mut |_| (),
-    )?;
-    Ok(Learned::new(centering.behaviour, approaching.behaviour))
 }
 
 /// Features whose ellipse others can look at.

@@ -20,21 +20,22 @@ use std::time::Instant;
 use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind,
-    JointLimits, Learned, Lesson, OnlineLearning, Outcome, Percept, SavedController, SavedRun,
+    JointLimits, Learned, Lesson, OnlineLearning, Percept, SavedController, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pipeline_sim::{Ball, Cell, ReachForm, Workspace, sample_moves};
-use puma_grasp::{
-    Rig, RigError, RigParts, Simulator, bright_ball_scene, learn_best, search_percepts,
-};
+use puma_grasp::{Rig, RigError, RigParts, Simulator, bright_ball_scene};
 use qtable::TrainReport;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
 use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::learning::{ACTIONS, TRIALS};
+use example_support::plane::search_percepts;
 use example_support::program::ended;
 use example_support::stages::{Stages, Timed};
+use example_support::trial::{Devices, Trial};
 use options::{FormName, Options, RewardName};
 use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
@@ -48,12 +49,8 @@ mod results;
 const SAMPLES: usize = 2_500;
 /// Standard deviation of the features in those samples, feature units.
 const FEATURE_NOISE: f64 = 0.5;
-/// Actions of training, centering and approaching.
-const ACTIONS: (u64, u64) = (60_000, 500_000);
 /// Actions of training, approaching on 540 states.
 const ACTIONS_FINE: u64 = 4_000_000;
-/// Trials in simulation by which the best table is chosen.
-const TRIALS: usize = 500;
 
 fn main() -> ExitCode {
     ended(run(&Options::parse()))
@@ -154,8 +151,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
         });
         match done {
-            Ok(outcome) => {
-                record.ended(outcome, rig.holds_ball(), rig.contacts().collisions);
+            Ok(trial) => {
+                record.ended(&trial, rig.contacts().collisions);
                 bar.suspend(|| say(options, &one_line(run, &record)));
                 bar.inc(1);
             }
@@ -375,16 +372,9 @@ fn teach(
         spec.states(),
         spec.actions()
     );
-    let lesson = learn_best(
-        spec.clone(),
-        simulator,
-        trials,
-        actions,
-        rng,
-        &mut |progress| {
-            bar.set_position(progress.actions);
-        },
-    )?;
+    let lesson = simulator.learn(spec.clone(), trials, actions, rng, &mut |progress| {
+        bar.set_position(progress.actions);
+    })?;
     bar.finish_and_clear();
     let success = lesson
         .report
@@ -402,35 +392,36 @@ fn teach(
 /// Takes down an event, if it can.
 type Observe<'a> = dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>> + 'a;
 
-/// One run: places the ball and lets the agent go for it. What `observe` cannot write ends the
-/// run's pictures, not the run.
+/// Places the ball and lets the agent go for it. A picture that cannot be written ends the writing
+/// of pictures, not the run.
 fn reach_for(
     agent: &mut Agent<Timed<Learned>>,
     rig: &mut Rig,
     detector: &mut dyn CircleDetector,
     ball: &Ball,
     observe: &mut Observe<'_>,
-) -> Result<Outcome, Box<dyn Error>> {
-    rig.place_making_room(ball)?;
-    let stages = agent.controller().stages.clone();
+) -> Result<Trial, Box<dyn Error>> {
+    rig.place(ball)?;
+    let (stages, cell) = (agent.controller().stages.clone(), rig.cell().clone());
     let RigParts {
         camera,
         arm,
         mut sensor,
     } = rig.parts();
-    let (mut camera, mut arm, mut detector) = (
-        stages.around(camera),
-        stages.around(arm),
-        stages.around(detector),
-    );
+    let (mut camera, mut detector) = (stages.around(camera), stages.around(detector));
+    let devices = Devices {
+        eye: &mut CameraEye::new(&mut camera, &mut detector),
+        arm: &mut stages.around(arm),
+        sensor: &mut *sensor,
+        cell: &cell,
+    };
     let mut written = Ok(());
-    let mut eye = CameraEye::new(&mut camera, &mut detector);
-    let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
+    let trial = devices.run(agent, &mut |event| {
         if written.is_ok() {
             written = observe(event);
         }
     })?;
-    written.map(|()| outcome)
+    written.map(|()| trial)
 }
 
 /// Makes a folder, or takes out of it what this program wrote there before: files of an earlier run

@@ -7,6 +7,7 @@ use image::imageops::{FilterType, resize};
 use puma_val2::{JointDelta, Joints};
 
 use example_support::overlay::Overlay;
+use example_support::trial::Trial;
 
 /// Everything that was recorded of one run.
 pub(crate) struct RunRecord {
@@ -131,10 +132,10 @@ impl RunRecord {
     }
 
     /// The run is over.
-    pub(crate) fn ended(&mut self, outcome: Outcome, holds_ball: bool, collisions: usize) {
-        self.grasped = outcome.gave_up.is_none() && holds_ball;
+    pub(crate) fn ended(&mut self, trial: &Trial, collisions: usize) {
+        self.grasped = trial.outcome.gave_up.is_none() && trial.held;
         self.collisions = collisions;
-        self.outcome = Some(outcome);
+        self.outcome = Some(trial.outcome);
     }
 
     /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.

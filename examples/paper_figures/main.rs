@@ -17,22 +17,23 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{Agent, BehaviourPair, EventKind, LearnError, Learned, Lesson, Percept, YGoal};
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
-use puma_grasp::{
-    ExactPlane, Simulator, TrialCell, learn_best, score, search_percepts, search_starts,
+use grasp_agent::{
+    Agent, BehaviourPair, BehaviourSpec, EventKind, LearnError, Learned, Lesson, Percept, YGoal,
 };
+use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
+use puma_grasp::Simulator;
 use qtable::Record;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::cpu::cpu_time;
 use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
+use example_support::plot::{Panel, drawn};
 use example_support::program::ended;
-use plot::{Panel, drawn};
+use example_support::trial::TrialCell;
 
 mod on_the_arm;
-mod plot;
 mod snapshots;
 
 /// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut,
@@ -130,80 +131,62 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         floored.reward.floor = 1.0;
         let quiet = &mut |_: &qtable::Progress| ();
         let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
-        let centering = learn_best(mended.centering, &rigid, &anywhere, 60_000, &mut rng, quiet)?;
+        let centering = rigid.learn(mended.centering, &anywhere, 60_000, &mut rng, quiet)?;
         let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
         // A table of more states has more corners in which a ball can be lost.
         let more_found = search_percepts(10_000, seed.wrapping_add(1_000_000));
         let rng = &mut rng;
-        let timed = |learn: &mut dyn FnMut() -> Result<Lesson, LearnError>| {
-            let begin = cpu_time();
-            let lesson = learn();
-            (lesson, cpu_time().saturating_sub(begin))
-        };
-        let lessons = [
-            (
-                "exact plane, mended",
-                timed(&mut || {
-                    plane.learn_best(mended.approaching.clone(), &found, 500_000, rng, quiet)
-                }),
-            ),
+        let (mended, wide, fine) = (mended.approaching, wide.approaching, fine.approaching);
+        let (found, none) = (&found[..], &[][..]);
+        type Cases<'a> = [(
+            &'a str,
+            Option<&'a Simulator>,
+            BehaviourSpec,
+            &'a [Percept],
+            u64,
+        ); 8];
+        let cases: Cases<'_> = [
+            ("exact plane, mended", None, mended.clone(), found, 500_000),
             (
                 "exact plane, mended, last table",
-                timed(&mut || plane.learn(mended.approaching.clone(), 500_000, rng, quiet)),
+                None,
+                mended.clone(),
+                none,
+                500_000,
             ),
-            (
-                "exact plane, y goal 74..92",
-                timed(&mut || {
-                    plane.learn_best(wide.approaching.clone(), &found, 500_000, rng, quiet)
-                }),
-            ),
+            ("exact plane, y goal 74..92", None, wide, found, 500_000),
             (
                 "exact plane, literal",
-                timed(&mut || plane.learn(literal.approaching.clone(), 500_000, rng, quiet)),
+                None,
+                literal.approaching,
+                none,
+                500_000,
             ),
-            (
-                "exact plane, floored only",
-                timed(&mut || plane.learn(floored.clone(), 500_000, rng, quiet)),
-            ),
-            (
-                "exact plane, fine",
-                timed(&mut || {
-                    plane.learn_best(
-                        fine.approaching.clone(),
-                        &more_found,
-                        options.fine,
-                        rng,
-                        quiet,
-                    )
-                }),
-            ),
+            ("exact plane, floored only", None, floored, none, 500_000),
+            ("exact plane, fine", None, fine, &more_found, options.fine),
             (
                 "rigid regression, mended",
-                timed(&mut || {
-                    learn_best(
-                        mended.approaching.clone(),
-                        &rigid,
-                        &found,
-                        500_000,
-                        rng,
-                        quiet,
-                    )
-                }),
+                Some(&rigid),
+                mended.clone(),
+                found,
+                500_000,
             ),
             (
                 "linear regression, mended",
-                timed(&mut || {
-                    learn_best(
-                        mended.approaching.clone(),
-                        &linear,
-                        &found,
-                        500_000,
-                        rng,
-                        quiet,
-                    )
-                }),
+                Some(&linear),
+                mended,
+                found,
+                500_000,
             ),
         ];
+        let lessons = cases.map(|(name, simulator, spec, trials, actions)| {
+            let begin = cpu_time();
+            let lesson = match simulator {
+                None => plane.learn(spec, trials, actions, rng, quiet),
+                Some(simulator) => simulator.learn(spec, trials, actions, rng, quiet),
+            };
+            (name, (lesson, cpu_time().saturating_sub(begin)))
+        });
         for (name, (lesson, spent)) in &lessons {
             println!(
                 "{seed:4}  {name:32} {}  {:8.2}",
@@ -244,12 +227,12 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     }
     write_whole(
         &options.out.join("figure6.svg"),
-        drawn(&panels, 2)?.as_bytes(),
+        drawn(&panels, 2, (400, 290))?.as_bytes(),
     )?;
     taught.ok_or_else(|| "at least one seed is needed".into())
 }
 
-fn scored(lesson: &Result<Lesson, LearnError>, starts: &[puma_grasp::PlaneStart]) -> String {
+fn scored(lesson: &Result<Lesson, LearnError>, starts: &[PlaneStart]) -> String {
     match lesson {
         Ok(lesson) => {
             let s = score(&lesson.behaviour, Learned::APPROACHING_KAPPA, starts);
@@ -344,7 +327,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
     }
     write_whole(
         &options.out.join("figure7.svg"),
-        drawn(&panels, 3)?.as_bytes(),
+        drawn(&panels, 3, (400, 290))?.as_bytes(),
     )?;
     let panels: Vec<Panel> = track
         .iter()
@@ -360,7 +343,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
         .collect();
     write_whole(
         &options.out.join("figure8.svg"),
-        drawn(&panels, 3)?.as_bytes(),
+        drawn(&panels, 3, (400, 290))?.as_bytes(),
     )
 }
 

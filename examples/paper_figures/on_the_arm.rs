@@ -4,15 +4,15 @@
 use std::error::Error;
 use std::fmt::Write as _;
 
-use grasp_agent::{
-    Agent, AgentConfig, BehaviourSpec, GoalInterval, Learned, OnlineLearning, Percept,
-};
+use grasp_agent::{Agent, AgentConfig, BehaviourPair, GoalInterval, Learned, OnlineLearning};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
-use puma_grasp::{Simulator, TrialCell, learn_best, search_percepts};
+use puma_grasp::Simulator;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use crate::plot::{Panel, drawn};
+use example_support::learning::learn_both;
+use example_support::plot::{Panel, drawn};
+use example_support::trial::TrialCell;
 use example_support::wilson::wilson;
 
 /// Moves on the arm after which the behaviours are looked at.
@@ -93,7 +93,7 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
         panels.push(Panel::new(&title, "moves learned from on the arm", lines).up_to(105.0));
     }
     Ok(Report {
-        svg: drawn(&panels, 2)?,
+        svg: drawn(&panels, 2, (400, 290))?,
         csv,
     })
 }
@@ -109,15 +109,9 @@ fn one_arm(
     let (centring, reaching) =
         sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 2_500, 0.5, &mut rng);
     let simulator = Simulator::fit(&centring, &reaching, form)?;
-    let anywhere: Vec<Percept> = (0..500).map(|_| simulator.start(&mut rng)).collect();
-    let found = search_percepts(500, 1_000 + seed);
-    let (center, approach) = (BehaviourSpec::centering(), BehaviourSpec::approaching());
-    let only_x = center.goal.clone();
-    let centering =
-        learn_best(center, &simulator, &anywhere, 60_000, &mut rng, &mut |_| ())?.behaviour;
-    let approaching =
-        learn_best(approach, &simulator, &found, 500_000, &mut rng, &mut |_| ())?.behaviour;
-    let learned = Learned::new(centering, approaching);
+    let pair = BehaviourPair::paper_mended();
+    let only_x = pair.centering.goal.clone();
+    let learned = learn_both(&simulator, pair, 1_000 + seed, &mut rng)?;
 
     let cell = TrialCell::draw(level, 50 + seed)?.without_bodies();
     let mut scores = vec![score(&cell, &learned, Some(only_x))?];
@@ -161,7 +155,7 @@ fn score(
             continue;
         };
         runs += 1;
-        if result.reached {
+        if result.at_goal.is_some() {
             reached += 1;
             moves += result.outcome.cycles;
         }

@@ -37,7 +37,7 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
     let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
     let mut detector = BallDetector::default().build(seed)?;
     let workspace = Workspace::paper();
-    let agent = Agent::with_controller(
+    let mut agent = Agent::with_controller(
         AgentConfig::paper(workspace.search_poses()),
         learned.clone(),
     )?;
@@ -48,7 +48,7 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
     rig.place(&ball)?;
     let table = rig.cell().get().table;
     let (mut moments, mut gripped) = (Vec::new(), false);
-    rig.run(&agent, &mut *detector, &mut |event| {
+    rig.run(&mut agent, &mut *detector, &mut |event| {
         gripped |= event.kind == EventKind::Gripped;
         if let (EventKind::Seen(sighting), Some(frame), false) = (&event.kind, event.frame, gripped)
         {

@@ -13,15 +13,19 @@
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
+use clap::Parser;
+use example_support::files::{animated, keep_run, writable_folder, write_whole};
+use example_support::program::{at_least_one, ended};
+use example_support::stages::{Stages, Timed};
+use example_support::trial::{Devices, Trial, TrialCell};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, Hybrid, HybridSettings, Outcome,
+    Agent, AgentConfig, AgentError, Belief, CameraEye, Event, EventKind, Hybrid, HybridSettings,
     SavedController, SavedRun,
 };
-use hough_heuristic::{CircleDetector, Features};
+use hough_heuristic::CircleDetector;
 use image::GrayImage;
 use image::imageops::{FilterType, resize};
 use pipeline_sim::{Cell, ErrorLevel, Workspace};
@@ -30,13 +34,11 @@ use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use example_support::files::{writable_folder, write_whole};
-use example_support::program::ended;
-use example_support::stages::{Stages, Timed};
 use tally::{Counted, Tally};
+use world::{Fate, World};
 
-mod shortcut;
 mod tally;
+mod world;
 
 /// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
 ///
@@ -106,42 +108,14 @@ impl Options {
     }
 }
 
-fn at_least_one(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(0) => Err("at least one is needed".into()),
-        Ok(count) => Ok(count),
-        Err(error) => Err(format!("{error}")),
-    }
-}
-
-/// What happens to the ball.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Fate {
-    /// It stays where it is
-    Rest,
-    /// Whenever it is reached it is pushed toward the camera, to a radius of 60 units, three times
-    /// (Fig. 8 of the paper)
-    Push,
-    /// When it is first reached it jumps 150 mm away
-    Jump,
-    /// It drifts by 20 mm in every move, ten times
-    Drift,
-}
-
 fn main() -> ExitCode {
-    let options = Options::parse();
-    let done = if options.shortcut {
-        shortcut::run(&options)
-    } else {
-        run(&options)
-    };
-    ended(done)
+    ended(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let belief = options.belief.as_deref().map(Belief::load).transpose()?;
     writable_folder(&options.out)?;
-    let mut chain = Chain {
+    let mut runs = Runs {
         options,
         belief,
         detector: options.detector.build(options.seed)?,
@@ -150,39 +124,51 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         film: Vec::new(),
         tally: Tally::default(),
     };
-    // What has been done until a fault is worth keeping.
-    let mut done = Ok(());
-    for cell in 0..options.cells {
-        chain.tally.begin_cell();
-        done = chain.go_for_balls(
-            options.seed.wrapping_add(cell as u64),
-            options.runs_in(cell),
-        );
-        if done.is_err() {
-            break;
-        }
+    // The results until a fault are kept.
+    let cells = 0..options.cells;
+    let done = cells.into_iter().try_for_each(|cell| runs.in_cell(cell));
+    if options.shortcut {
+        println!("{}", runs.tally);
+        return done;
     }
-    write_whole(&options.out.join("track.csv"), chain.csv.as_bytes())?;
-    if !chain.film.is_empty() {
-        write_whole(&options.out.join("track.png"), &animated(&chain.film)?)?;
+    write_whole(&options.out.join("track.csv"), runs.csv.as_bytes())?;
+    if !runs.film.is_empty() {
+        let film = animated(&runs.film, (1, 3), (1, 3))?;
+        write_whole(&options.out.join("track.png"), &film)?;
     }
-    println!("{}\n{}", chain.stages, chain.tally);
+    println!("{}\n{}", runs.stages, runs.tally);
     println!("results: {}", options.out.display());
     done
 }
 
-/// Writes what happened in a run that is worth looking into, for the example `replay`, and says
-/// where.
-fn keep_run(folder: &Path, name: &str, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
-    let file = folder.join(format!("{name}.json"));
-    write_whole(&file, saved.to_json().as_bytes())?;
-    Ok(format!("for `replay`: {}", file.display()))
+/// A cell with drawn errors.
+enum Place {
+    /// Features straight from the geometry, an arm that moves at once.
+    Shortcut(Box<TrialCell>),
+    /// Rendered frames, circle detection, VAL II on a line; and the generator of the balls.
+    Chain(Box<Rig>, Xoshiro256PlusPlus),
 }
 
-/// Rendered frames, circle detection, VAL II on a line, and what is written down of all that.
-struct Chain<'a> {
+impl Place {
+    fn draw(options: &Options, seed: u64) -> Result<Self, Box<dyn Error>> {
+        if options.shortcut {
+            let cell = TrialCell::draw(options.level, seed)?;
+            return Ok(Self::Shortcut(Box::new(cell)));
+        }
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut scene = bright_ball_scene();
+        scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
+        let rig = Rig::emulated(false, &scene, seed)?;
+        let wrong = options.level.draw(&mut rng).apply(&rig.cell().get())?;
+        rig.cell().with(|cell| *cell = wrong);
+        Ok(Self::Chain(Box::new(rig), rng))
+    }
+}
+
+/// All runs, and the records of those that count.
+struct Runs<'a> {
     options: &'a Options,
-    /// What is known of the camera before.
+    /// Knowledge of the camera from an earlier run.
     belief: Option<Belief>,
     detector: Box<dyn CircleDetector + Send>,
     stages: Stages,
@@ -191,20 +177,14 @@ struct Chain<'a> {
     tally: Tally,
 }
 
-impl Chain<'_> {
-    /// In a cell with errors drawn anew: first balls at rest to learn from, then `runs` that count.
-    fn go_for_balls(&mut self, seed: u64, runs: usize) -> Result<(), Box<dyn Error>> {
+impl Runs<'_> {
+    /// Makes the runs in one cell: first on balls at rest to learn from, then those that count.
+    fn in_cell(&mut self, number: usize) -> Result<(), Box<dyn Error>> {
         let options = self.options;
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut scene = bright_ball_scene();
-        scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
-        let mut rig = Rig::emulated(false, &scene, seed)?;
-        let errors = options.level.draw(&mut rng);
-        let wrong = errors.apply(&rig.cell().get())?;
-        rig.cell().with(|cell| *cell = wrong);
-
-        let workspace = Workspace::paper();
-        let mut config = AgentConfig::paper(workspace.search_poses());
+        self.tally.begin_cell();
+        let seed = options.seed.wrapping_add(number as u64);
+        let mut place = Place::draw(options, seed)?;
+        let mut config = AgentConfig::paper(Workspace::paper().search_poses());
         config.max_cycles = 120;
         let settings = HybridSettings::paper();
         let hybrid = match &self.belief {
@@ -213,78 +193,88 @@ impl Chain<'_> {
         };
         let stages = self.stages.clone();
         let mut agent = Agent::with_controller(config, stages.around(hybrid))?;
-        for number in 0..options.teach + runs {
-            let teaching = number < options.teach;
-            if number == options.teach {
+        for ball in 0..options.teach + options.runs_in(number) {
+            let teaching = ball < options.teach;
+            if ball == options.teach {
                 let learned = agent.controller().inner.clone().frozen();
                 agent = Agent::with_controller(agent.config().clone(), stages.around(learned))?;
             }
-            let (ball, _) = workspace
-                .sample_seen_ball(&rig.cell().get(), &mut rng)
-                .ok_or("no place of the workspace is in view from a search pose")?;
-            rig.place_making_room(&ball)?;
             let fate = if teaching { Fate::Rest } else { options.ball };
-            let mut world = World::new(fate, rng.random());
             let counted = (!teaching).then(|| self.tally.runs() + 1);
-            let (end, saved) = self.run(&mut agent, &mut rig, &mut world, counted);
-            // Whatever it ended with: what was learned until then is kept.
-            let learned = agent.controller().inner.belief();
-            learned.save(&options.out.join("camera.belief"))?;
-            let Some(number) = counted else {
+            let mut saved = SavedRun::before(
+                &agent,
+                SavedController::of_hybrid(&agent.controller().inner),
+            );
+            let (end, happened, collisions) = match &mut place {
+                Place::Shortcut(cell) => {
+                    let seed = seed.wrapping_mul(1_000).wrapping_add(ball as u64);
+                    let mut world = World::new(fate, ball as u64);
+                    let end = on_shortcut(cell, &mut agent, seed, &mut world, &mut saved);
+                    (end.transpose(), world.has_happened(), None)
+                }
+                Place::Chain(rig, rng) => {
+                    let (ball, _) = Workspace::paper()
+                        .sample_seen_ball(&rig.cell().get(), rng)
+                        .ok_or("no place of the workspace is in view from a search pose")?;
+                    rig.place(&ball)?;
+                    let mut world = World::new(fate, rng.random());
+                    let end = self.on_chain(rig, &mut agent, &mut world, counted, &mut saved);
+                    // Keeps what was learned, however the run ended.
+                    let learned = agent.controller().inner.belief();
+                    learned.save(&options.out.join("camera.belief"))?;
+                    let collisions = rig.contacts().collisions;
+                    (Some(end), world.has_happened(), Some(collisions))
+                }
+            };
+            let Some(end) = end else {
+                continue;
+            };
+            let Some(run) = counted else {
                 if let Err(error) = end {
-                    let kept = keep_run(&options.out, "teaching", &saved)?;
+                    let kept = keep_run(&options.out.join("teaching.json"), &saved)?;
                     return Err(format!("teaching was broken off: {error}; {kept}").into());
                 }
                 continue;
             };
-            let (contacts, holds) = (rig.contacts(), rig.holds_ball());
-            let success = holds && matches!(&end, Ok(Outcome { gave_up: None, .. }));
+            let held = |trial: &Trial| trial.held && trial.outcome.gave_up.is_none();
+            let success = end.as_ref().is_ok_and(held);
             self.tally.add(Counted {
-                happened: world.has_happened(),
+                happened,
                 success,
-                moves: end.as_ref().map_or(0, |outcome| outcome.cycles),
-                near: saved
-                    .log()
-                    .events
-                    .iter()
-                    .filter(|event| event.kind == EventKind::TooNear)
-                    .count(),
-                collisions: Some(contacts.collisions),
+                moves: end.as_ref().map_or(0, |trial| trial.outcome.cycles),
+                near: end.as_ref().map_or(0, |trial| trial.near),
+                collisions,
             });
-            if !success || contacts.collisions > 0 {
-                let kept = keep_run(&options.out, &format!("run-{number:03}"), &saved)?;
-                let what = if success { "collision" } else { "not grasped" };
-                println!("run {number}: {what}: {end:?}, {contacts:?}; {kept}");
+            let collisions = collisions.unwrap_or(0);
+            if !success || collisions > 0 {
+                let kept = keep_run(&options.out.join(format!("run-{run:03}.json")), &saved)?;
+                let reason = match &end {
+                    Err(error) => error.to_string(),
+                    Ok(_) if success => "grasped".into(),
+                    Ok(trial) => trial.outcome.gave_up.map_or_else(
+                        || "not grasped: the jaws hold no ball, though none is seen".into(),
+                        |reason| format!("not grasped: {reason}"),
+                    ),
+                };
+                println!("run {run}: {reason}, {collisions} collisions; {kept}");
             }
         }
         Ok(())
     }
 
-    /// One ball; `counted` is the number of a run that counts.
-    fn run(
+    /// Lets `agent` go for the ball that is placed in the rig; `counted` is the number of a run
+    /// that counts.
+    fn on_chain(
         &mut self,
-        agent: &mut Agent<Timed<Hybrid>>,
         rig: &mut Rig,
+        agent: &mut Agent<Timed<Hybrid>>,
         world: &mut World,
         counted: Option<usize>,
-    ) -> (Result<Outcome, AgentError>, SavedRun) {
-        let mut saved =
-            SavedRun::before(agent, SavedController::of_hybrid(&agent.controller().inner));
+        saved: &mut SavedRun,
+    ) -> Result<Trial, AgentError> {
         let (shared, mut gripped) = (rig.cell().clone(), false);
-        let (csv, film) = (&mut self.csv, &mut self.film);
-        let RigParts {
-            camera,
-            arm,
-            mut sensor,
-        } = rig.parts();
-        let stages = &self.stages;
-        let (mut camera, mut detector, mut arm) = (
-            stages.around(camera),
-            stages.around(&mut *self.detector as &mut dyn CircleDetector),
-            stages.around(arm),
-        );
-        let mut eye = CameraEye::new(&mut camera, &mut detector);
-        let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
+        let (csv, film, stages) = (&mut self.csv, &mut self.film, &self.stages);
+        let mut observe = |event: &Event<'_>| {
             saved.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),
@@ -306,114 +296,45 @@ impl Chain<'_> {
                 let (width, height) = (frame.width() / 2, frame.height() / 2);
                 film.push(resize(frame, width, height, FilterType::Triangle));
             }
-        });
-        (end, saved)
+        };
+        let cell = rig.cell().clone();
+        let RigParts {
+            camera,
+            arm,
+            mut sensor,
+        } = rig.parts();
+        let detector: &mut dyn CircleDetector = &mut *self.detector;
+        let (mut camera, mut detector) = (stages.around(camera), stages.around(detector));
+        let devices = Devices {
+            eye: &mut CameraEye::new(&mut camera, &mut detector),
+            arm: &mut stages.around(arm),
+            sensor: &mut *sensor,
+            cell: &cell,
+        };
+        devices.run(agent, &mut observe)
     }
 }
 
-/// What happens to one ball.
-struct World {
-    fate: Fate,
-    events: usize,
-    heading: Option<(f64, f64)>,
-    rng: Xoshiro256PlusPlus,
-}
-
-impl World {
-    fn new(fate: Fate, seed: u64) -> Self {
-        Self {
-            fate,
-            events: 0,
-            heading: None,
-            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+/// Lets `agent` go for the ball that `seed` places in a cell without frames or line; `None` if it
+/// is out of view.
+fn on_shortcut(
+    cell: &TrialCell,
+    agent: &mut Agent<Timed<Hybrid>>,
+    seed: u64,
+    world: &mut World,
+    saved: &mut SavedRun,
+) -> Result<Option<Trial>, AgentError> {
+    // Nothing happens to the ball before it is seen, nor when it is looked at again without a move,
+    // nor in the jaws.
+    let (mut seen, mut looked_from) = (false, None);
+    let mut go_on = |cell: &mut Cell, joints: &Joints| {
+        let moved = looked_from.replace(*joints) != Some(*joints);
+        if seen && moved && cell.held.is_none() {
+            world.go_on(cell, joints);
         }
-    }
-
-    /// Whether all that was to happen to the ball has; for a ball that drifts until it is gripped,
-    /// whether it has moved at all.
-    fn has_happened(&self) -> bool {
-        self.events
-            >= match self.fate {
-                Fate::Rest => 0,
-                Fate::Push => 3,
-                Fate::Jump | Fate::Drift => 1,
-            }
-    }
-
-    /// The arm has moved to `joints`.
-    fn go_on(&mut self, cell: &mut Cell, joints: &Joints) {
-        let workspace = Workspace::paper();
-        let reached = cell.features(joints).is_some_and(|f| at_goal(&f));
-        match self.fate {
-            Fate::Push if reached && self.events < 3 => {
-                self.events += usize::from(cell.push_to_radius(joints, 60.0));
-            }
-            Fate::Jump if reached && self.events < 1 => {
-                // To a place where the search can find it again.
-                for _ in 0..100 {
-                    let Some(place) =
-                        workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng)
-                    else {
-                        return;
-                    };
-                    let mut there = *cell;
-                    there.place_ball(place);
-                    if workspace
-                        .search_poses()
-                        .iter()
-                        .any(|pose| there.features(pose).is_some())
-                    {
-                        *cell = there;
-                        self.events = 1;
-                        return;
-                    }
-                }
-            }
-            Fate::Drift if self.events < 10 => {
-                let (centre, rng) = (cell.ball.centre, &mut self.rng);
-                let (x, y) = *self.heading.get_or_insert_with(|| {
-                    // One of the directions in which it stays in the workspace.
-                    let ways =
-                        (0..100).map(|_| rng.random_range(0.0..std::f64::consts::TAU).sin_cos());
-                    let stays = |(x, y): &(f64, f64)| {
-                        let mut end = centre;
-                        (end.x, end.y) = (end.x + 0.2 * x, end.y + 0.2 * y);
-                        workspace.contains(&end)
-                    };
-                    ways.into_iter().find(stays).unwrap_or_default()
-                });
-                if x.hypot(y) < 0.5 {
-                    return;
-                }
-                let mut next = centre;
-                (next.x, next.y) = (next.x + 0.020 * x, next.y + 0.020 * y);
-                cell.place_ball(next);
-                self.events += 1;
-            }
-            _ => {}
-        }
-    }
-}
-
-fn at_goal(f: &Features) -> bool {
-    (99.0..=108.0).contains(&f.x) && (74.0..=82.0).contains(&f.y) && (32.0..=34.0).contains(&f.r)
-}
-
-/// An animated PNG, three frames a second.
-fn animated(frames: &[GrayImage]) -> Result<Vec<u8>, Box<dyn Error>> {
-    let first = frames.first().ok_or("no frames")?;
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, first.width(), first.height());
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_animated(u32::try_from(frames.len())?, 0)?;
-    encoder.set_frame_delay(1, 3)?;
-    let mut writer = encoder.write_header()?;
-    for frame in frames {
-        writer.write_image_data(frame.as_raw())?;
-    }
-    writer.finish()?;
-    Ok(bytes)
+        seen |= cell.features(joints).is_some();
+    };
+    cell.run(agent, seed, &mut go_on, &mut |event| saved.note(event))
 }
 
 #[cfg(test)]

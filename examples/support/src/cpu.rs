@@ -1,8 +1,8 @@
-//! The processor's clock.
+//! CPU time of a thread.
 
 use std::time::Duration;
 
-/// CPU time of this thread; time on the wall where the system does not tell.
+/// Returns the CPU time of this thread; wall time where the system does not tell.
 pub fn cpu_time() -> Duration {
     #[cfg(unix)]
     {

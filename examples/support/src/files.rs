@@ -4,9 +4,13 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-use image::RgbImage;
+use grasp_agent::SavedRun;
+use image::{GrayImage, RgbImage};
 
-/// Makes the folder if need be, and makes sure that files can be written into it.
+/// Creates the folder if need be, and checks that files can be written into it.
+///
+/// # Errors
+/// A folder that cannot be written to.
 pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
     let probe = folder.join(".writable.part");
     fs::create_dir_all(folder)
@@ -15,8 +19,11 @@ pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
         .map_err(|error| format!("{}: cannot be written to: {error}", folder.display()).into())
 }
 
-/// Writes a file: first beside its place, then renamed into it. What is there and is no regular
-/// file (a device, a pipe) is written to as it is, never replaced; a link stays a link.
+/// Writes a file beside its place and renames it into it. A device or a pipe is written to directly
+/// and never replaced; a link stays a link.
+///
+/// # Errors
+/// A file that cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
     let failed = |error| format!("{}: cannot be written: {error}", path.display());
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -32,7 +39,48 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
     })?)
 }
 
+/// Writes a saved run for the example `replay`, and returns a note of where it is.
+///
+/// # Errors
+/// Those of [`write_whole`].
+pub fn keep_run(path: &Path, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
+    write_whole(path, saved.to_json().as_bytes())?;
+    Ok(format!("for `replay`: {}", path.display()))
+}
+
+/// Encodes frames of one size as an animated PNG, each shown for `delay` seconds (a fraction), the
+/// last one for `last`.
+///
+/// # Errors
+/// No frames, or frames of several sizes.
+pub fn animated(
+    frames: &[GrayImage],
+    delay: (u16, u16),
+    last: (u16, u16),
+) -> Result<Vec<u8>, Box<dyn Error>> {
+    let first = frames.first().ok_or("no frames")?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, first.width(), first.height());
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    encoder.set_animated(u32::try_from(frames.len())?, 0)?;
+    encoder.set_frame_delay(delay.0, delay.1)?;
+    let mut writer = encoder.write_header()?;
+    for (i, frame) in frames.iter().enumerate() {
+        if i + 1 == frames.len() {
+            writer.set_frame_delay(last.0, last.1)?;
+        }
+        writer.write_image_data(frame.as_raw())?;
+    }
+    writer.finish()?;
+    Ok(bytes)
+}
+
 /// Writes a picture as PNG.
+///
+/// # Errors
+/// Those of [`write_whole`].
 pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Box<dyn Error>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png)?;

@@ -1,5 +1,4 @@
-//! Where the time of a control cycle goes: camera, detector, controller and arm, each with a
-//! stopwatch around it.
+//! Time of a control cycle by stage: camera, detector, controller and arm.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -13,7 +12,7 @@ use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
 
 use crate::cpu::cpu_time;
 
-/// CPU time of this thread and time on the wall, by stage, of all cycles so far.
+/// CPU time of this thread and wall time of all cycles so far, by stage.
 #[derive(Clone, Debug, Default)]
 pub struct Stages(Rc<RefCell<Spent>>);
 
@@ -24,12 +23,12 @@ struct Spent {
     detect: Duration,
     decide: Duration,
     serial: Duration,
-    /// While the arm was driven, on the wall.
+    /// Wall time while the arm was driven.
     driven: Duration,
 }
 
 impl Stages {
-    /// `inner` with a stopwatch of these around it.
+    /// Wraps a part so that its time is added to these.
     pub fn around<T>(&self, inner: T) -> Timed<T> {
         Timed {
             inner,
@@ -70,7 +69,7 @@ impl fmt::Display for Stages {
     }
 }
 
-/// Something with a stopwatch around it.
+/// A part whose time is measured.
 #[derive(Clone, Debug)]
 pub struct Timed<T> {
     /// The measured part itself.

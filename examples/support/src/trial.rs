@@ -1,9 +1,10 @@
-//! Trials on the feature shortcut: one ball in a cell that may be wrong, and an agent that goes for
-//! it, without rendering.
+//! One ball and an agent that goes for it; and the cell without rendering, the feature shortcut.
+
+use std::fmt;
 
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Controller, Event, Eye, ImageBased, Look, Outcome, Sighting,
-    TaughtGoal,
+    Agent, AgentConfig, AgentError, Controller, Event, EventKind, Eye, ImageBased, Look, Outcome,
+    Sighting, TaughtGoal,
 };
 use hough_heuristic::{Detection, Features, FrameError};
 use pipeline_sim::{
@@ -34,37 +35,81 @@ impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
     }
 }
 
-/// A cell with drawn errors, in which balls can be placed and gone for.
+/// The devices that an agent works with, and the cell around them.
+pub struct Devices<'a> {
+    /// The view of the ball.
+    pub eye: &'a mut dyn Eye,
+    /// The arm.
+    pub arm: &'a mut dyn Manipulator,
+    /// The proximity sensors.
+    pub sensor: &'a mut dyn ProximitySensor,
+    /// The cell with the ball.
+    pub cell: &'a SharedCell,
+}
+
+impl fmt::Debug for Devices<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Devices").finish_non_exhaustive()
+    }
+}
+
+/// The result of one run toward a ball.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// The agent's own account.
+    pub outcome: Outcome,
+    /// Moves until the ball stood at the goal for the first time, `None` if it never did.
+    pub at_goal: Option<usize>,
+    /// Whether the jaws hold the ball at the end.
+    pub held: bool,
+    /// Stops by the proximity sensors.
+    pub near: usize,
+}
+
+impl Devices<'_> {
+    /// Lets `agent` go for the ball.
+    ///
+    /// # Errors
+    /// Those of [`Agent::run_and_learn`].
+    pub fn run<C: Controller>(
+        self,
+        agent: &mut Agent<C>,
+        observe: &mut dyn FnMut(&Event<'_>),
+    ) -> Result<Trial, AgentError> {
+        let (mut at_goal, mut near) = (None, 0);
+        let outcome = agent.run_and_learn(self.eye, self.arm, self.sensor, &mut |event| {
+            match event.kind {
+                EventKind::AtGoal => {
+                    at_goal.get_or_insert(event.cycle);
+                }
+                EventKind::TooNear => near += 1,
+                _ => {}
+            }
+            observe(event);
+        })?;
+        Ok(Trial {
+            outcome,
+            at_goal,
+            held: self.cell.get().held.is_some(),
+            near,
+        })
+    }
+}
+
+/// A cell with drawn errors on the feature shortcut: no frames, and an arm that moves at once.
 #[derive(Clone, Debug)]
 pub struct TrialCell {
-    /// What is wrong with it.
-    pub errors: Errors,
+    errors: Errors,
     cell: Cell,
     workspace: Workspace,
     bodies: bool,
 }
 
-/// What came of a trial.
-#[derive(Clone, Debug)]
-pub struct TrialResult {
-    /// What the agent says.
-    pub outcome: Outcome,
-    /// Whether the ball stood at the goal.
-    pub reached: bool,
-    /// Whether the jaws hold the ball at the end.
-    pub held: bool,
-    /// From the point between the finger pads to the ball's centre when the jaws closed, metres;
-    /// `None` if they did not.
-    pub miss: Option<f64>,
-    /// How often something came too near to the hand.
-    pub near: usize,
-}
-
 impl TrialCell {
-    /// The paper's cell with errors of `level`, drawn from `seed`.
+    /// Draws errors of `level` from `seed` and applies them to the paper's cell.
     ///
     /// # Errors
-    /// None of the levels makes an impossible camera; the type says that others could.
+    /// A camera that cannot be; none of the levels makes one.
     pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, CameraError> {
         let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
         let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
@@ -76,8 +121,8 @@ impl TrialCell {
         })
     }
 
-    /// The same cell with a hand that touches nothing: whether the ball is *reached* does not
-    /// depend then on what stands in the way.
+    /// Gives the cell a hand that touches nothing, so that nothing can stand in the way of
+    /// *reaching* the ball.
     #[must_use]
     pub fn without_bodies(mut self) -> Self {
         // Everything of the hand at the wrist centre, where no ball can be.
@@ -96,13 +141,13 @@ impl TrialCell {
         self
     }
 
-    /// A ball that the arm, as it really stands in the search poses, sees from one of them.
+    /// Draws a ball that is in view from one of the search poses as the arm really takes them.
     fn sample_seen_ball(&self, rng: &mut Xoshiro256PlusPlus) -> Result<Option<Ball>, ArmError> {
         let shared = SharedCell::new(self.cell);
         let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
         let mut pose = arm.pose();
         let mut stands = Vec::new();
-        for search_pose in self.search_poses() {
+        for search_pose in self.workspace.search_poses() {
             arm.move_to(search_pose)?;
             stands.push(pose());
         }
@@ -119,35 +164,29 @@ impl TrialCell {
         }))
     }
 
-    /// The paper's settings for this cell. A hand without bodies cannot hold the ball, and is not
-    /// asked to lift it.
+    /// Returns the paper's settings, without the lift for a hand without bodies, which cannot hold
+    /// the ball.
     pub fn agent_config(&self) -> AgentConfig {
-        let paper = AgentConfig::paper(self.search_poses());
+        let paper = AgentConfig::paper(self.workspace.search_poses());
         AgentConfig {
             lift: paper.lift.filter(|_| self.bodies),
             ..paper
         }
     }
 
-    /// The poses from which balls are looked for.
-    pub fn search_poses(&self) -> [Joints; 6] {
-        self.workspace.search_poses()
-    }
-
     /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5`
-    /// is taken back, and the camera looks a few times. Where the ball is not well in view then, a
-    /// shorter or a longer turn is tried, and then one of `JT4` before it, which brings a ball that
-    /// shows too far aside into view. `None` where it is with none of them.
+    /// is taken back, and the camera looks a few times. If the ball is not well in view, shorter and
+    /// longer turns are tried, then turns of `JT4` before them. `None` if no turn brings the ball
+    /// into view.
     ///
-    /// Both are turns of the wrist, by which jaws and camera move in the same way wherever the arm
-    /// stands.
+    /// Both are turns of the wrist, which move jaws and camera alike wherever the arm stands.
     ///
     /// # Errors
     /// What the arm reports.
     pub fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, ArmError> {
-        /// What is added to the grip's turn, degrees, in the order it is tried.
+        /// Angles added to the grip's turn, degrees, in the order of trial.
         const TURNS: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
-        /// The turns of `JT4` that are tried, degrees.
+        /// Turns of `JT4`, degrees, in the order of trial.
         const ASIDE: [f64; 8] = [4.0, -4.0, 8.0, -8.0, 12.0, -12.0, 16.0, -16.0];
         let from = Joints::from_degrees(ImageBased::GOAL_POSE);
         let config = self.agent_config();
@@ -166,8 +205,8 @@ impl TrialCell {
         Ok(None)
     }
 
-    /// The ball as it shows on average from `from`, having been between the jaws when `grip` led
-    /// there; `None` if it is not well in view.
+    /// Returns the mean features seen from `from` of a ball that is between the jaws after `grip`;
+    /// `None` if it is not well in view.
     fn seen_after_taking_back(
         &self,
         grip: &JointDelta,
@@ -175,7 +214,7 @@ impl TrialCell {
         seed: u64,
     ) -> Result<Option<Features>, ArmError> {
         const LOOKS: usize = 20;
-        // The jaws that the ball is shown between, also where the hand has no bodies otherwise.
+        // The ball is shown between real jaws even where the hand has no bodies otherwise.
         let shared = SharedCell::new(Cell {
             hand: Hand::paper(),
             ..self.cell
@@ -198,19 +237,19 @@ impl TrialCell {
         Ok(seen.map(mean).filter(well_inside))
     }
 
-    /// Lets `agent` go for the ball that `seed` places among those that can be seen from the search
-    /// poses. `world` is called after each look, before it is answered, with the cell and the
-    /// joints as they are: it may move the ball. `None` if no ball can be seen.
+    /// Lets `agent` go for the ball that `seed` places among those in view from the search poses;
+    /// `None` if there is none. `world` may move the ball: it is called before each look with the
+    /// cell and the arm's joint angles.
     ///
     /// # Errors
-    /// What the agent reports.
+    /// Those of [`Agent::run_and_learn`].
     pub fn run<C: Controller>(
         &self,
         agent: &mut Agent<C>,
         seed: u64,
         world: &mut dyn FnMut(&mut Cell, &Joints),
         observe: &mut dyn FnMut(&Event<'_>),
-    ) -> Result<Option<TrialResult>, AgentError> {
+    ) -> Result<Option<Trial>, AgentError> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let Some(ball) = self.sample_seen_ball(&mut rng)? else {
             return Ok(None);
@@ -221,41 +260,22 @@ impl TrialCell {
         let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
         let noise = self.errors.feature_noise;
         let camera = FeatureCamera::new(shared.clone(), arm.pose(), noise, rng.random());
-        let mut eye = ChangingWorld {
-            eye: FeatureEye(camera),
-            cell: shared.clone(),
-            pose: arm.pose(),
-            world,
+        let devices = Devices {
+            eye: &mut ChangingWorld {
+                eye: FeatureEye(camera),
+                cell: shared.clone(),
+                pose: arm.pose(),
+                world,
+            },
+            sensor: &mut Sensor(self.bodies.then(|| arm.clone())),
+            arm: &mut arm,
+            cell: &shared,
         };
-        let (mut sensor, mut near, mut miss, mut reached) = (arm.clone(), 0, None, false);
-        let mut pose = arm.pose();
-        let outcome = agent.run_and_learn(
-            &mut eye,
-            &mut arm,
-            &mut Sensor {
-                arm: self.bodies.then_some(&mut sensor),
-                near: &mut near,
-            },
-            &mut |event| {
-                reached |= event.kind == grasp_agent::EventKind::AtGoal;
-                if let grasp_agent::EventKind::Gripping(_) = event.kind {
-                    miss = Some(shared.with(|cell| cell.grip_miss(&pose())));
-                }
-                observe(event);
-            },
-        )?;
-        let held = shared.get().held.is_some();
-        Ok(Some(TrialResult {
-            outcome,
-            reached,
-            held,
-            miss,
-            near,
-        }))
+        devices.run(agent, observe).map(Some)
     }
 }
 
-/// An eye in a world that moves on with every look.
+/// An eye in a world that changes before every look.
 struct ChangingWorld<'a, E, P> {
     eye: E,
     cell: SharedCell,
@@ -271,25 +291,16 @@ impl<E: Eye, P: FnMut() -> Joints> Eye for ChangingWorld<'_, E, P> {
     }
 }
 
-/// A proximity sensor that is counted; without an arm, one that never senses anything.
-struct Sensor<'a> {
-    arm: Option<&'a mut SimulatedArm>,
-    near: &'a mut usize,
-}
+/// The arm's proximity sensors; without an arm, sensors that never respond.
+struct Sensor(Option<SimulatedArm>);
 
-impl ProximitySensor for Sensor<'_> {
+impl ProximitySensor for Sensor {
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        let near = match &mut self.arm {
-            Some(arm) => arm.object_near()?,
-            None => false,
-        };
-        *self.near += usize::from(near);
-        Ok(near)
+        self.0.as_mut().map_or(Ok(false), |arm| arm.object_near())
     }
 }
 
-/// Whether a ball that shows like this still does from a pose that differs by the play of the
-/// joints.
+/// Returns whether the ball stays in view when the pose changes by the play of the joints.
 fn well_inside(f: &Features) -> bool {
     const MARGIN: f64 = 8.0;
     f.r > 5.5
@@ -297,7 +308,7 @@ fn well_inside(f: &Features) -> bool {
         && (MARGIN..Features::HEIGHT - MARGIN).contains(&f.y)
 }
 
-/// Where the arm stands before a trial: VAL's READY pose.
+/// Returns the pose of the arm before a trial: VAL's READY.
 fn home() -> Joints {
     Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
 }

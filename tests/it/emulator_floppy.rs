@@ -3,8 +3,6 @@
 //! `cargo test` builds the example beside the tests; where it is not there, the test says so and is
 //! skipped.
 
-#![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;

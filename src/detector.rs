@@ -1,5 +1,4 @@
-//! What the programs and tests of this package have in common: detectors by name, set for the
-//! camera on the hand, and a scene.
+//! Circle detectors by name, configured for the camera on the hand, and a scene they suit.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,15 +10,14 @@ use hough_heuristic::{
 };
 use pipeline_sim::{Scene, Shape};
 
-/// A way of finding the ball in frames of the camera on the hand.
+/// A circle detector for the ball in frames of the camera on the hand.
 ///
-/// This is the one place that knows which there are: what is in [`BallDetector::ALL`] can be named
-/// on every command line.
+/// Command lines accept the names of all that are in [`BallDetector::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum BallDetector {
-    /// Pairs of edge points at several sizes, each circle proven against chance: goes beyond the
-    /// paper.
+    /// The *a contrario* detector: pairs of edge points at several sizes, each circle tested
+    /// against chance. Beyond the paper.
     #[default]
     AContrario,
     /// Three random edge pixels, belonging against a threshold: the paper's.
@@ -37,7 +35,7 @@ const RADII: (f64, f64) = (20.0, 272.0);
 const THETA: f64 = 0.6;
 
 impl BallDetector {
-    /// All of them.
+    /// All detectors.
     pub const ALL: [Self; 4] = [
         Self::AContrario,
         Self::Heuristic,
@@ -45,7 +43,7 @@ impl BallDetector {
         Self::StandardHough,
     ];
 
-    /// What it is called.
+    /// Returns its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::AContrario => "a-contrario",
@@ -55,11 +53,11 @@ impl BallDetector {
         }
     }
 
-    /// The detector, set for the ball of 20 mm radius in frames of 768x576 pixels. `seed` is that
-    /// of its draws, if it has any.
+    /// Builds the detector for the ball of 20 mm radius in frames of 768x576 pixels. `seed` is that
+    /// of its random draws.
     ///
     /// # Errors
-    /// None for the settings that are made here; the type says that others could.
+    /// None: the settings made here are valid.
     pub fn build(self, seed: u64) -> Result<Box<dyn CircleDetector + Send>, ConfigError> {
         let accept = Acceptance {
             theta: THETA,
@@ -109,13 +107,13 @@ impl BallDetector {
     }
 }
 
-/// Least score of a circle that the arm goes for. An arm looks at many frames without a ball in
-/// them and follows what it sees: a curve of the clutter that scores half leads it astray, while
-/// the ball itself scores above .9 unless the border cuts it.
+/// Least score of a circle that the arm goes for. Curves of the clutter score up to 0.5 and would
+/// lead the arm astray in the many frames without a ball; the ball scores above 0.9 unless the
+/// border cuts it.
 const MIN_SCORE: f64 = 0.8;
 
-/// The shaded side of the ball is hardly brighter than the table: edges must be taken that are
-/// weaker than usual.
+/// Builds an edge detector with low thresholds: the shaded side of the ball is hardly brighter than
+/// the table.
 fn weak_edges() -> Result<Canny, ConfigError> {
     Canny::new(CannyConfig {
         low: 20.0,
@@ -134,7 +132,7 @@ impl FromStr for BallDetector {
     type Err = UnknownDetector;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        // The name of the a contrario detector before it was called so.
+        // Former name of the a contrario detector.
         let text = if text == "trusted" {
             "a-contrario"
         } else {
@@ -147,15 +145,14 @@ impl FromStr for BallDetector {
     }
 }
 
-/// A name that no detector has.
+/// Error for a name that no detector has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no detector {0:?}; there are {names}", names = BallDetector::ALL.map(BallDetector::name).join(", "))]
 pub struct UnknownDetector(String);
 
-/// A bright ball over a dark wooden table with boxes and tape on it.
+/// Returns a scene of a bright ball over a dark wooden table with boxes and tape on it.
 ///
-/// Nothing else in the scene is round: seen straight on, a disc on the table cannot be told from a
-/// ball by its outline.
+/// Nothing else in the scene is round: the outline of a disc seen straight on is that of a ball.
 pub fn bright_ball_scene() -> Scene {
     let mut scene = Scene::laboratory();
     (scene.table.albedo, scene.table.texture) = (0.20, 0.30);

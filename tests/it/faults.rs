@@ -333,7 +333,7 @@ fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
         let (mut agent, mut log, mut moves) = (agent(), EventLog::default(), 0);
         let mut server = Some(server);
         let mut detector = BallDetector::AContrario.build(1).expect("valid settings");
-        let end = rig.run_and_learn(&mut agent, &mut *detector, &mut |event| {
+        let end = rig.run(&mut agent, &mut *detector, &mut |event| {
             log.note(event);
             moves += usize::from(matches!(event.kind, EventKind::Moved(_)));
             if moves >= after {
@@ -350,7 +350,7 @@ fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
 
         // Another run on the dead line fails at once, and the one before stays learned.
         let before = agent.controller().belief().clone();
-        let again = rig.run_and_learn(&mut agent, &mut *detector, &mut |_| ());
+        let again = rig.run(&mut agent, &mut *detector, &mut |_| ());
         assert!(matches!(again, Err(AgentError::Arm(_))), "{again:?}");
         assert!(*agent.controller().belief() == before);
     }

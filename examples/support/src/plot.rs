@@ -1,15 +1,21 @@
-//! Diagrams of lines, with a legend where there are several.
+//! Diagrams of lines as SVG, with a legend where there are several.
 
 use std::error::Error;
 
 use plotters::prelude::*;
 use qtable::Record;
 
-/// A diagram: some lines, a band around the first, and where the goal is.
-pub(crate) struct Panel {
+/// Named points, joined by a line.
+pub type Line = (String, Vec<(f64, f64)>);
+
+/// A diagram: some lines, a band around the first, and the interval of the goal.
+#[derive(Clone, Debug)]
+pub struct Panel {
     title: String,
     across: String,
-    lines: Vec<(String, Vec<(f64, f64)>)>,
+    lines: Vec<Line>,
+    /// Lines in gray behind the others.
+    behind: Vec<Vec<(f64, f64)>>,
     band: Vec<(f64, f64, f64)>,
     goal: Option<(f64, f64)>,
     top: Option<f64>,
@@ -26,35 +32,45 @@ const COLOURS: [RGBColor; 6] = [
 const GOAL: RGBColor = RGBColor(120, 190, 120);
 
 impl Panel {
-    pub(crate) fn new(title: &str, across: &str, lines: Vec<(String, Vec<(f64, f64)>)>) -> Self {
+    /// Makes a diagram of `lines` over a quantity named `across`.
+    pub fn new(title: &str, across: &str, lines: Vec<Line>) -> Self {
         Self {
             title: title.into(),
             across: across.into(),
             lines,
+            behind: Vec::new(),
             band: Vec::new(),
             goal: None,
             top: None,
         }
     }
 
-    /// Shades where the goal is.
-    pub(crate) fn with_goal(self, low: f64, high: f64) -> Self {
+    /// Adds lines in gray behind the others.
+    #[must_use]
+    pub fn in_front_of(self, behind: Vec<Vec<(f64, f64)>>) -> Self {
+        Self { behind, ..self }
+    }
+
+    /// Shades the interval of the goal.
+    #[must_use]
+    pub fn with_goal(self, low: f64, high: f64) -> Self {
         Self {
             goal: Some((low, high)),
             ..self
         }
     }
 
-    /// Ends the axis here.
-    pub(crate) fn up_to(self, top: f64) -> Self {
+    /// Sets the upper end of the axis.
+    #[must_use]
+    pub fn up_to(self, top: f64) -> Self {
         Self {
             top: Some(top),
             ..self
         }
     }
 
-    /// Mean over the seeds, with the 95 % interval as band.
-    pub(crate) fn of_seeds(
+    /// Makes a diagram of the mean over the seeds, with the 95 % interval as band.
+    pub fn of_seeds(
         title: &str,
         seeds: &[Vec<Record>],
         value: impl Fn(&Record) -> Option<f64>,
@@ -81,7 +97,8 @@ impl Panel {
         &self,
         area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     ) -> Result<(), Box<dyn Error>> {
-        let points = || self.lines.iter().flat_map(|(_, line)| line);
+        let lines = self.lines.iter().map(|(_, line)| line);
+        let points = || lines.clone().chain(&self.behind).flatten();
         let right = points().map(|p| p.0).fold(1.0, f64::max);
         let highest = points()
             .map(|p| p.1)
@@ -125,6 +142,11 @@ impl Panel {
                 .chain(self.band.iter().rev().map(|b| (b.0, b.2.min(top))));
             chart.draw_series([Polygon::new(edge.collect::<Vec<_>>(), COLOURS[0].mix(0.2))])?;
         }
+        const GRAY: RGBColor = RGBColor(200, 200, 205);
+        for line in &self.behind {
+            let points = line.iter().copied();
+            chart.draw_series(LineSeries::new(points, GRAY.stroke_width(2)))?;
+        }
         for ((name, line), colour) in self.lines.iter().zip(COLOURS.iter().cycle()) {
             let drawn = chart.draw_series(LineSeries::new(
                 line.iter().copied(),
@@ -152,8 +174,8 @@ impl Panel {
     }
 }
 
-/// Mean and half the width of its 95 % interval; Student's factor for ten values.
-pub(crate) fn mean_and_interval(values: &[f64]) -> (f64, f64) {
+/// Returns the mean and half the width of its 95 % interval, by Student's factor.
+fn mean_and_interval(values: &[f64]) -> (f64, f64) {
     const FACTORS: [f64; 12] = [
         12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179,
     ];
@@ -167,13 +189,20 @@ pub(crate) fn mean_and_interval(values: &[f64]) -> (f64, f64) {
     (mean, factor * (variance / n).sqrt())
 }
 
-/// Panels in rows of `columns`.
-pub(crate) fn drawn(panels: &[Panel], columns: usize) -> Result<String, Box<dyn Error>> {
+/// Draws panels of `size` pixels each in rows of `columns`, as SVG.
+///
+/// # Errors
+/// Those of plotters.
+pub fn drawn(
+    panels: &[Panel],
+    columns: usize,
+    (width, height): (u32, u32),
+) -> Result<String, Box<dyn Error>> {
     let columns = columns.max(1);
     let rows = panels.len().div_ceil(columns).max(1);
     let mut svg = String::new();
     {
-        let size = (400 * columns as u32, 290 * rows as u32);
+        let size = (width * columns as u32, height * rows as u32);
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         for (area, panel) in root.split_evenly((rows, columns)).iter().zip(panels) {

@@ -4,14 +4,9 @@
 //!
 //! `cargo test --test literal_reward -- --nocapture` prints the figures.
 
-#![allow(
-    clippy::print_stdout,
-    reason = "the figures are what one runs this for"
-)]
-
+use example_support::plane::ExactPlane;
 use grasp_agent::{BehaviourPair, BehaviourSpec, Percept, Reward};
 use hough_heuristic::Features;
-use puma_grasp::ExactPlane;
 use qtable::{Action, Model, ModelEstimate, Outcome, State, Status, Step};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};

@@ -3,8 +3,6 @@
 //! `cargo test` builds the examples beside the tests; where one is not there, its test says so and
 //! is skipped.
 
-#![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
-
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
 //! A goal that is shown on the arm, in cells whose camera is not what it is taken to be.
 
+use example_support::trial::TrialCell;
 use grasp_agent::{
     Agent, AgentConfig, Controller, Hybrid, HybridSettings, PositionBased, ServoSettings,
     TaughtGoal,
 };
 use pipeline_sim::ErrorLevel;
-use puma_grasp::TrialCell;
 use puma_val2::Joint;
 
 /// How many of six balls the jaws hold in the end.

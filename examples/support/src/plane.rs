@@ -1,21 +1,21 @@
-//! The arm's plane: approaching alone, with the exact geometry instead of a regression, and the
-//! breadth-first optimum as yardstick.
+//! Approaching alone, in the arm's plane: with the exact geometry in the place of a regression, and
+//! measured against the breadth-first optimum.
 //!
-//! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything, and (y, r,
-//! theta 3) is the whole state: turning arm and ball together about the shoulder changes nothing.
-//! Centering has nothing to do here.
+//! With the ball in the plane that the arm moves in, `JT2` and `JT3` decide everything and (y, r,
+//! theta 3) is the whole state. Centering has nothing to do here.
 
-use grasp_agent::{ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, Percept};
+use grasp_agent::{
+    ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, LearnError, Lesson,
+    Percept, schedule,
+};
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace, exploring_start};
 use puma_val2::{JointDelta, Joints};
-use qtable::{Action, Progress, TrainConfig};
+use qtable::{Action, Progress};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
-use grasp_agent::{LearnError, Lesson, schedule};
-
-/// A simulator of approaching that makes no errors, and the starts to learn from.
+/// A simulator of approaching with the exact geometry, and the starts to learn from.
 #[derive(Clone, Debug)]
 pub struct ExactPlane {
     model: CameraModel,
@@ -23,7 +23,7 @@ pub struct ExactPlane {
     starts: Vec<Percept>,
 }
 
-/// What one policy achieved from a set of starts.
+/// The result of one policy from a set of starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneScore {
     /// Starts from which the goal was reached.
@@ -36,7 +36,7 @@ pub struct PlaneScore {
     pub over_optimum: f64,
 }
 
-/// A start before a search pose's view: the ball in the arm's plane.
+/// A start as a search pose shows the ball, turned into the arm's plane.
 #[derive(Clone, Debug)]
 pub struct PlaneStart {
     cell: Cell,
@@ -52,8 +52,8 @@ const MOST_STEPS: usize = 60;
 const CAMERA_BESIDE: f64 = 0.225;
 
 impl ExactPlane {
-    /// With `starts` exploring starts drawn from `rng`; with none, every episode begins with the
-    /// ball as a search pose shows it.
+    /// Draws `starts` exploring starts. With none, every episode begins with the ball as a search
+    /// pose shows it.
     pub fn new(starts: usize, rng: &mut dyn Rng) -> Self {
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let drawn = (0..starts).filter_map(|_| {
@@ -82,57 +82,28 @@ impl ExactPlane {
         }
     }
 
-    /// A start for an episode: one of those drawn at the beginning.
+    /// Draws the start of an episode.
     pub fn start(&self, rng: &mut dyn Rng) -> Percept {
         self.starts[rng.random_range(0..self.starts.len())]
     }
 
-    /// What is perceived after the move, `None` when the ball is lost.
+    /// Returns what is perceived after the move, `None` when the ball is lost.
     pub fn after(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         self.model
             .after(percept, delta, &JointLimits::paper())
             .filter(|after| self.sight.sees_features(&after.features))
     }
 
-    /// Learns `spec` here with the paper's settings.
+    /// Learns `spec` here with the paper's settings. With `trials` the table that does best from
+    /// them is kept ([`grasp_agent::learn`]).
     ///
     /// # Errors
-    /// As for [`learn`](crate::learn).
+    /// Those of [`grasp_agent::learn`].
     pub fn learn(
         &self,
         spec: BehaviourSpec,
-        actions: u64,
-        rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Progress),
-    ) -> Result<Lesson, LearnError> {
-        self.learn_with(spec, &[], &schedule(actions)?, rng, on_progress)
-    }
-
-    /// As [`ExactPlane::learn`], and keeps the table that does best from `trials`: see
-    /// [`learn_best`](crate::learn_best).
-    ///
-    /// # Errors
-    /// As for [`learn`](crate::learn).
-    pub fn learn_best(
-        &self,
-        spec: BehaviourSpec,
         trials: &[Percept],
         actions: u64,
-        rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Progress),
-    ) -> Result<Lesson, LearnError> {
-        self.learn_with(spec, trials, &schedule(actions)?, rng, on_progress)
-    }
-
-    /// As [`ExactPlane::learn_best`], with other settings.
-    ///
-    /// # Errors
-    /// As for [`learn`](crate::learn).
-    pub fn learn_with(
-        &self,
-        spec: BehaviourSpec,
-        trials: &[Percept],
-        config: &TrainConfig,
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Progress),
     ) -> Result<Lesson, LearnError> {
@@ -142,11 +113,13 @@ impl ExactPlane {
             self.sight.sees_features(&after.features).then_some(after)
         };
         let start = |rng: &mut dyn Rng| self.start(rng);
-        grasp_agent::learn(spec, simulate, start, trials, config, rng, on_progress)
+        let config = schedule(actions)?;
+        grasp_agent::learn(spec, simulate, start, trials, &config, rng, on_progress)
     }
 }
 
-/// `count` balls as the search finds them, turned into the arm's plane, with the optimum from each.
+/// Returns `count` balls as the search finds them, turned into the arm's plane, with the optimum
+/// from each.
 pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
     let spec = BehaviourSpec::approaching();
     let starts = found_by_search(seed).filter_map(|(cell, joints)| {
@@ -160,8 +133,8 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
     starts.take(count).collect()
 }
 
-/// What is perceived of `count` balls where the search finds them, turned into the arm's plane:
-/// trials for [`learn_best`](crate::learn_best).
+/// Returns what is perceived of `count` balls where the search finds them, turned into the arm's
+/// plane: trials to choose a table by.
 pub fn search_percepts(count: usize, seed: u64) -> Vec<Percept> {
     let seen = found_by_search(seed).filter_map(|(cell, joints)| {
         let features = cell.features(&joints)?;
@@ -170,7 +143,7 @@ pub fn search_percepts(count: usize, seed: u64) -> Vec<Percept> {
     seen.take(count).collect()
 }
 
-/// Balls and search poses that see them, with the ball in the arm's plane.
+/// Returns balls and search poses that see them, with the ball in the arm's plane.
 fn found_by_search(seed: u64) -> impl Iterator<Item = (Cell, Joints)> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let workspace = Workspace::paper();
@@ -185,7 +158,7 @@ fn found_by_search(seed: u64) -> impl Iterator<Item = (Cell, Joints)> {
     .flatten()
 }
 
-/// How a policy does from `starts`: greedy, with the loop breaker at `kappa`.
+/// Measures a policy from `starts`: greedy, with the loop breaker at `kappa`.
 pub fn score(behaviour: &Behaviour, kappa: f64, starts: &[PlaneStart]) -> PlaneScore {
     let (mut reached, mut steps, mut optimum) = (0, 0, 0);
     for start in starts {
@@ -221,9 +194,9 @@ fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Optio
     None
 }
 
-/// The fewest steps from `joints` to the goal with the actions of `spec`, the ball in view after
-/// each ([`Cell::fewest_moves`]); `None` if there is no way.
-pub fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
+/// Returns the fewest steps from `joints` to the goal with the actions of `spec`, the ball in view
+/// after each; `None` if there is no way.
+fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
     let moves: Vec<JointDelta> = (0..spec.actions())
         .map(|action| spec.delta(Action(action)))
         .collect();
@@ -245,7 +218,7 @@ mod tests {
         assert!(plane.after(&start, &JointDelta::default()).is_some());
         let spec = BehaviourSpec::approaching();
         let lesson = plane
-            .learn(spec, 2_000, &mut rng, &mut |_| ())
+            .learn(spec, &[], 2_000, &mut rng, &mut |_| ())
             .expect("learns");
         assert!(lesson.report.episodes > 0);
     }

@@ -2,13 +2,13 @@
 //! but the file and the arm's geometry, reaches the balls with it, and in as many moves as the
 //! controller here.
 
-#![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
-
 use std::process::Command;
 
-use grasp_agent::{Agent, AgentConfig, BehaviourSpec, JointLimits, Learned};
+use example_support::learning::learn_both;
+use example_support::trial::TrialCell;
+use grasp_agent::{Agent, AgentConfig, BehaviourPair, JointLimits, Learned};
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, Workspace, sample_moves};
-use puma_grasp::{Simulator, TrialCell, learn_best, search_percepts};
+use puma_grasp::Simulator;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -19,29 +19,8 @@ fn learned() -> Learned {
     let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
     let simulator =
         Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
-    let quiet = &mut |_: &qtable::Progress| ();
-    let anywhere: Vec<_> = (0..500).map(|_| simulator.start(&mut rng)).collect();
-    let centering = learn_best(
-        BehaviourSpec::centering(),
-        &simulator,
-        &anywhere,
-        60_000,
-        &mut rng,
-        quiet,
-    );
-    let trials = search_percepts(500, 1);
-    let approaching = learn_best(
-        BehaviourSpec::approaching(),
-        &simulator,
-        &trials,
-        500_000,
-        &mut rng,
-        quiet,
-    );
-    Learned::new(
-        centering.expect("learns").behaviour,
-        approaching.expect("learns").behaviour,
-    )
+    let pair = BehaviourPair::paper_mended();
+    learn_both(&simulator, pair, 1, &mut rng).expect("learns")
 }
 
 /// Balls reached, and moves on average, as the script says: "reached 198 of 200 balls, in 9.71
@@ -92,7 +71,7 @@ fn another_program_reaches_the_balls_with_an_exported_policy() {
     for seed in 0..200 {
         let run = cell.run(&mut agent, seed, &mut |_, _| (), &mut |_| ());
         let trial = run.expect("no fault").expect("a ball in view");
-        if trial.reached {
+        if trial.at_goal.is_some() {
             here += 1;
             cycles += trial.outcome.cycles;
         }

@@ -2,12 +2,13 @@
 //! controller on a pseudo-terminal (a socket where the system has none), rendered frames, the
 //! paper's detector, and the grip.
 
+use example_support::plane::search_percepts;
 use grasp_agent::{
     Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned, Percept,
 };
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{Ball, ReachForm, Workspace, sample_moves};
-use puma_grasp::{BallDetector, Rig, Simulator, bright_ball_scene, learn_best, search_percepts};
+use puma_grasp::{BallDetector, Rig, Simulator, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -29,8 +30,9 @@ fn agent(rig: &Rig, seed: u64) -> Agent {
     );
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut taught = |spec: BehaviourSpec, trials: &[Percept], actions| {
-        let lesson =
-            learn_best(spec, &simulator, trials, actions, &mut rng, &mut |_| {}).expect("learns");
+        let lesson = simulator
+            .learn(spec, trials, actions, &mut rng, &mut |_| {})
+            .expect("learns");
         let path = folder.path().join("behaviour.policy");
         lesson.behaviour.save(&path).expect("saves");
         let loaded = Behaviour::load(&path, lesson.behaviour.spec()).expect("loads");
@@ -52,7 +54,7 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
     let run = || {
         let mut rig =
             Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
-        let agent = agent(&rig, 2000);
+        let mut agent = agent(&rig, 2000);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut log = Vec::new();
         let (mut grasped, mut moves) = (0, 0);
@@ -63,7 +65,7 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
                 .expect("a ball in view");
             rig.place(&ball).expect("away from the hand");
             let outcome = rig
-                .run(&agent, &mut *detector(), &mut |event| {
+                .run(&mut agent, &mut *detector(), &mut |event| {
                     log.push((event.kind.clone(), event.joints));
                 })
                 .expect("the line holds");
@@ -83,13 +85,13 @@ fn balls_are_found_reached_and_gripped_and_the_same_seed_repeats_the_run() {
 #[test]
 fn a_ball_out_of_view_is_reported_and_not_gripped() {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
-    let agent = agent(&rig, 1);
+    let mut agent = agent(&rig, 1);
     // Behind the arm.
     rig.place(&Ball::at(-0.6, 0.0, -0.1))
         .expect("away from the hand");
     let mut searched = Vec::new();
     let outcome = rig
-        .run(&agent, &mut *detector(), &mut |event| {
+        .run(&mut agent, &mut *detector(), &mut |event| {
             if let EventKind::AtSearchPose(pose) = event.kind {
                 searched.push(pose);
             }

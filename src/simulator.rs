@@ -1,0 +1,106 @@
+//! The simulator in which both behaviours are learned, as in section 4 of the paper.
+
+use grasp_agent::{BehaviourSpec, LearnError, Lesson, Percept, schedule};
+use pipeline_sim::{
+    CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample,
+};
+use puma_val2::{Joint, JointDelta};
+use qtable::Progress;
+use rand::{Rng, RngExt};
+
+/// Regression simulator of section 4: predicts x, y and r after a joint move from models fitted to
+/// samples.
+#[derive(Clone, Debug)]
+pub struct Simulator {
+    centre: CentreModel,
+    reach: ReachModel,
+    starts: Vec<Percept>,
+}
+
+/// Elbow angles that divide the intervals of theta 3, degrees of `JT3`.
+const ELBOW_EDGES: [f64; 2] = [175.0, 190.0];
+
+/// Working range of `JT3`, degrees. A move beyond it changes nothing.
+const ELBOW_RANGE: (f64, f64) = (120.0, 215.0);
+
+/// `JT3` where theta 3 is zero, degrees.
+const THETA3_ZERO: f64 = 170.0;
+
+impl Simulator {
+    /// Fits the simulator to samples of the cell by least squares.
+    ///
+    /// # Errors
+    /// Too few samples, or samples that do not determine the model.
+    pub fn fit(
+        centring: &[CentreSample],
+        reaching: &[ReachSample],
+        form: ReachForm,
+    ) -> Result<Self, FitError> {
+        Ok(Self {
+            centre: CentreModel::fit(centring)?,
+            reach: ReachModel::fit(reaching, form, &ELBOW_EDGES)?,
+            starts: reaching
+                .iter()
+                .map(|sample| Percept {
+                    features: sample.before,
+                    theta3: sample.jt3_degrees - THETA3_ZERO,
+                })
+                .collect(),
+        })
+    }
+
+    /// Returns the quality of fit of each output: `dx` of centering, `dy` and `dr` of approaching,
+    /// in feature units.
+    pub fn quality(&self) -> Vec<Quality> {
+        let mut all = self.centre.quality();
+        all.extend(self.reach.quality());
+        all
+    }
+
+    /// Draws the start of an episode from those of the samples, which were in view and within reach.
+    pub fn start(&self, rng: &mut dyn Rng) -> Percept {
+        self.starts[rng.random_range(0..self.starts.len())]
+    }
+
+    /// Returns what the camera shows after the move, `None` when the ball is out of view.
+    fn predict(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
+        let [d1, d2, d3, ..] = delta.degrees();
+        let elbow = percept.theta3 + THETA3_ZERO;
+        if !(ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&(elbow + d3)) {
+            return Some(*percept);
+        }
+        let mut features = percept.features;
+        if delta[Joint::J1] != 0.0 {
+            features = self.centre.predict(&features, d1)?;
+        }
+        if d2 != 0.0 || d3 != 0.0 {
+            features = self.reach.predict(&features, elbow, d2, d3)?;
+        }
+        Some(Percept {
+            features,
+            theta3: percept.theta3 + d3,
+        })
+    }
+
+    /// Learns `spec` in this simulator with the paper's settings ([`schedule`]).
+    ///
+    /// With `trials`, percepts to start from, the best table of the second half of the run is kept
+    /// ([`grasp_agent::learn`]); without, the last one.
+    ///
+    /// # Errors
+    /// No actions to learn from, or a reward that is not a number (the literal Eq. 5 and 6 divide
+    /// by zero on their targets).
+    pub fn learn(
+        &self,
+        spec: BehaviourSpec,
+        trials: &[Percept],
+        actions: u64,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Progress),
+    ) -> Result<Lesson, LearnError> {
+        let simulate = |percept: &Percept, delta: &JointDelta| self.predict(percept, delta);
+        let start = |rng: &mut dyn Rng| self.start(rng);
+        let config = schedule(actions)?;
+        grasp_agent::learn(spec, simulate, start, trials, &config, rng, on_progress)
+    }
+}
