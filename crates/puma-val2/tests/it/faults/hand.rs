@@ -2,8 +2,8 @@
 
 use puma_val2::{Joints, Manipulator, MoveWay, Profile, PumaParams, Xyzoat};
 
-use crate::harness::{STEP, Subject, Tally, client, off, truth};
-use crate::line::{CHARACTERS, Damage, Way};
+use crate::faults::harness::{STEP, Subject, Tally, client, off, truth};
+use crate::faults::line::{CHARACTERS, Damage, Way};
 
 /// A pose in which no two postures meet.
 const HOME: [f64; 6] = [0.0, -45.0, 180.0, 10.0, 45.0, 0.0];

@@ -5,8 +5,8 @@ use puma_val2::{
     Val2Client,
 };
 
-use crate::harness::{Client, STEP, assert_knows_where, client, config, judge, truth};
-use crate::line::FaultyLine;
+use crate::faults::harness::{Client, STEP, assert_knows_where, client, config, judge, truth};
+use crate::faults::line::FaultyLine;
 
 /// Runs a move during which something happens to the controller as soon as the arm has begun to
 /// move.

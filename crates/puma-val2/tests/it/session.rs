@@ -1,13 +1,10 @@
 //! Whole sessions at the terminal, compared character by character with what is kept in
 //! `tests/golden`. With `REGENERATE=1` the kept ones are written anew; look at the difference
 //! before keeping it.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
-
-mod console;
 
 use std::path::Path;
 
-use console::Console;
+use crate::console::Console;
 use puma_val2::Profile;
 
 fn compare(name: &str, screen: &str) {

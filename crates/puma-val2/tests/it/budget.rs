@@ -1,6 +1,5 @@
 //! What a move costs on a 9600-baud line: characters, and moves per second when the motion itself
 //! takes no time.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::time::Duration;
 

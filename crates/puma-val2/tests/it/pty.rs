@@ -1,6 +1,4 @@
 //! A real pseudo-terminal, opened through the `serialport` crate.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
-#![cfg(all(unix, feature = "serial"))]
 
 use puma_val2::{
     ArmError, ClientConfig, Emulator, Gripper, JointDelta, Manipulator, Profile, PtyServer,

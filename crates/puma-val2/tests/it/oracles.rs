@@ -3,7 +3,6 @@
 //!
 //! The tables are looked for in the folder `oracles` of `PUMA_GRASP_SHARED`; without them these
 //! tests print that they are skipped.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::f64::consts::{PI, TAU};
 

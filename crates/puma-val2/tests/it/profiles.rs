@@ -1,5 +1,4 @@
 //! The client against controllers that answer otherwise: random profiles, seeded.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

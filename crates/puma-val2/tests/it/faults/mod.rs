@@ -4,12 +4,6 @@
 //! What must hold each time: a call that succeeds leaves the arm where it was sent; a call that
 //! fails is a typed error, the arm stands, no joint has gone beyond where it was sent, and the
 //! joint angles that the client still holds for known are those of the arm.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stdout,
-    clippy::needless_pass_by_value
-)] // Functions that serve tests may fail as tests do.
 
 mod babble;
 mod characters;

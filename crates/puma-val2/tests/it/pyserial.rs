@@ -1,6 +1,5 @@
 //! A session held by Python and pyserial on a real pseudo-terminal. Without Python or pyserial it
 //! is skipped, and says so.
-#![cfg(unix)]
 
 use std::path::Path;
 use std::process::Command;
@@ -47,6 +46,6 @@ fn pyserial_holds_the_example_session_and_reopens_the_line() {
         .unwrap();
         return;
     }
-    let expected = include_str!("golden/pyserial.txt").replace("\r\n", "\n");
+    let expected = include_str!("../golden/pyserial.txt").replace("\r\n", "\n");
     assert_eq!(screen, expected);
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use puma_val2::{Emulator, Manipulator, MoveWay, Profile, PumaParams, Transport, Val2Client};
 
-use crate::harness::{STEP, Tally, config, off};
-use crate::line::{CHARACTERS, Damage, FaultyLine, Way};
+use crate::faults::harness::{STEP, Tally, config, off};
+use crate::faults::line::{CHARACTERS, Damage, FaultyLine, Way};
 
 /// A line that can still be looked at when a connection has failed.
 struct Kept(Rc<RefCell<FaultyLine>>);

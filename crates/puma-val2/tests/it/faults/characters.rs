@@ -5,8 +5,8 @@ use puma_val2::{
 };
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
-use crate::harness::{STEP, Subject, Tally, client, config, judge, truth};
-use crate::line::{CHARACTERS, Damage, FaultyLine, Way};
+use crate::faults::harness::{STEP, Subject, Tally, client, config, judge, truth};
+use crate::faults::line::{CHARACTERS, Damage, FaultyLine, Way};
 
 fn profiles_and_ways() -> Vec<(Profile, MoveWay)> {
     let silent = Profile {

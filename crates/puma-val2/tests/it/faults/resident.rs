@@ -5,10 +5,10 @@ use puma_val2::{
     PumaParams, Val2Client,
 };
 
-use crate::harness::{
+use crate::faults::harness::{
     STEP, Subject, Tally, assert_knows_where, assert_not_misled, client, config, judge, off, truth,
 };
-use crate::line::{CHARACTERS, Damage, FaultyLine};
+use crate::faults::line::{CHARACTERS, Damage, FaultyLine};
 
 fn resident() -> Subject<'static> {
     Subject {

@@ -7,7 +7,7 @@ use puma_val2::{
     PumaParams, Transport, Val2Client,
 };
 
-use crate::line::{Damage, FaultyLine, Way};
+use crate::faults::line::{Damage, FaultyLine, Way};
 
 pub(crate) type Client = Val2Client<FaultyLine>;
 

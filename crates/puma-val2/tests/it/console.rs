@@ -1,27 +1,19 @@
 //! A person at the terminal of an emulated controller.
-#![allow(
-    dead_code,
-    unreachable_pub,
-    missing_debug_implementations,
-    clippy::unwrap_used,
-    clippy::panic
-)]
-// Each test file uses its part; functions that serve tests may fail as tests do.
 
 use std::time::Duration;
 
 use puma_val2::{Emulator, Profile, PumaParams};
 
-pub struct Console {
-    pub emulator: Emulator,
-    pub now: Duration,
+pub(crate) struct Console {
+    pub(crate) emulator: Emulator,
+    pub(crate) now: Duration,
     /// Everything the terminal has shown.
-    pub screen: String,
+    pub(crate) screen: String,
 }
 
 impl Console {
     /// At the start-up dialogue.
-    pub fn switched_on(profile: Profile) -> Self {
+    pub(crate) fn switched_on(profile: Profile) -> Self {
         let mut console = Self {
             emulator: Emulator::new(PumaParams::unimation(), profile),
             now: Duration::ZERO,
@@ -32,11 +24,11 @@ impl Console {
     }
 
     /// At the monitor, calibrated, with arm power.
-    pub fn ready() -> Self {
+    pub(crate) fn ready() -> Self {
         Self::ready_with(Profile::val2())
     }
 
-    pub fn ready_with(profile: Profile) -> Self {
+    pub(crate) fn ready_with(profile: Profile) -> Self {
         let mut console = Self::switched_on(profile);
         for line in ["N", "N", "CAL", "Y"] {
             console.line(line);
@@ -46,7 +38,7 @@ impl Console {
 
     /// Types a line and returns what follows on the screen until nothing more is due within a
     /// minute, or for a tenth of a second where something goes on and on.
-    pub fn line(&mut self, line: &str) -> String {
+    pub(crate) fn line(&mut self, line: &str) -> String {
         let before = self.screen.len();
         let said = self.emulator.feed(format!("{line}\r").as_bytes(), self.now);
         self.show(&said);
@@ -55,7 +47,7 @@ impl Console {
     }
 
     /// Types lines, and returns what follows the last.
-    pub fn lines(&mut self, text: &str) -> String {
+    pub(crate) fn lines(&mut self, text: &str) -> String {
         text.lines()
             .map(|line| self.line(line.trim()))
             .last()
@@ -63,7 +55,7 @@ impl Console {
     }
 
     /// Lets the clock jump while the controller waits for nothing but time.
-    pub fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         let until = self.now + Duration::from_secs(60);
         for _ in 0..4000 {
             match self.emulator.next_deadline() {
@@ -76,7 +68,7 @@ impl Console {
     }
 
     /// Lets this much time pass.
-    pub fn wait(&mut self, time: Duration) -> String {
+    pub(crate) fn wait(&mut self, time: Duration) -> String {
         let before = self.screen.len();
         self.now += time;
         let said = self.emulator.poll(self.now);
@@ -85,7 +77,7 @@ impl Console {
     }
 
     /// Types a line without letting time pass.
-    pub fn line_now(&mut self, line: &str) -> String {
+    pub(crate) fn line_now(&mut self, line: &str) -> String {
         let said = self.emulator.feed(format!("{line}\r").as_bytes(), self.now);
         self.show(&said);
         String::from_utf8(said).unwrap()
@@ -96,7 +88,7 @@ impl Console {
     }
 
     /// Stores a program through the editor.
-    pub fn program(&mut self, name: &str, steps: &str) {
+    pub(crate) fn program(&mut self, name: &str, steps: &str) {
         self.line(&format!("EDIT {name}"));
         for step in steps.lines().map(str::trim).filter(|s| !s.is_empty()) {
             let said = self.line(step);
@@ -106,7 +98,7 @@ impl Console {
     }
 
     /// Runs a program of these steps to its end and returns what it printed.
-    pub fn run(&mut self, steps: &str) -> String {
+    pub(crate) fn run(&mut self, steps: &str) -> String {
         self.program("TEST", steps);
         let said = self.line("EXECUTE TEST");
         self.line("DELETEP TEST");
@@ -114,11 +106,11 @@ impl Console {
         said
     }
 
-    pub fn degrees(&self) -> [f64; 6] {
+    pub(crate) fn degrees(&self) -> [f64; 6] {
         self.emulator.joints().degrees()
     }
 
-    pub fn assert_at(&self, degrees: [f64; 6]) {
+    pub(crate) fn assert_at(&self, degrees: [f64; 6]) {
         let near = self
             .degrees()
             .iter()

@@ -1,5 +1,4 @@
 //! The client itself against bytes of any kind: no panic, no endless wait, bounded memory.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
 
 use std::io;
 use std::time::Duration;

@@ -1,5 +1,4 @@
 //! The client against an emulator in memory.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
 
 use std::time::Duration;
 

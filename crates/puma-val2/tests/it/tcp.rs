@@ -1,5 +1,4 @@
 //! An emulator on a socket.
-#![allow(clippy::unwrap_used, clippy::panic)] // Functions that serve tests may fail as tests do.
 
 use std::time::Duration;
 

@@ -5,8 +5,10 @@ use puma_val2::{
     PumaParams, Xyzoat,
 };
 
-use crate::harness::{Client, STEP, Subject, Tally, assert_knows_where, client, judge, off, truth};
-use crate::line::{CHARACTERS, Damage};
+use crate::faults::harness::{
+    Client, STEP, Subject, Tally, assert_knows_where, client, judge, off, truth,
+};
+use crate::faults::line::{CHARACTERS, Damage};
 
 /// An object beside the path of joint 1 that the sensors see in passing, between these angles in
 /// degrees.
@@ -244,8 +246,8 @@ fn damage_anywhere_in_a_move_that_is_stopped() {
     let mut sum = Tally::default();
     for damage in CHARACTERS {
         for direction in [
-            crate::line::Way::ToController,
-            crate::line::Way::FromController,
+            crate::faults::line::Way::ToController,
+            crate::faults::line::Way::FromController,
         ] {
             let mut client = client(Profile::val2(), MoveWay::Automatic);
             for at in (0..).step_by(5) {

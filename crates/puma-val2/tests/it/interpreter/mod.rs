@@ -1,0 +1,6 @@
+//! Every instruction and function, in stored programs and through `DO`.
+
+mod motions;
+mod programs;
+mod reactions;
+mod texts;
