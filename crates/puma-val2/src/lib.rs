@@ -101,6 +101,8 @@ mod joints;
 mod kinematics;
 mod limits;
 mod manipulator;
+#[cfg(feature = "cli")]
+pub mod program;
 mod serve;
 mod transport;
 
