@@ -79,9 +79,7 @@ impl BallDetector {
             }
             Self::Heuristic => {
                 let config = HeuristicConfig {
-                    theta: THETA,
-                    min_radius: RADII.0,
-                    max_radius: RADII.1,
+                    accept,
                     seed,
                     ..HeuristicConfig::default()
                 };
@@ -180,7 +178,8 @@ mod tests {
         let frame = renderer.render(&cell, &pose);
         for kind in BallDetector::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
-            let found = kind.build(1).expect("valid settings").detect(frame);
+            let mut detector = kind.build(1).expect("valid settings");
+            let found = detector.detect(frame).expect("no region of interest");
             let seen = Features::from_circle(&found[0].circle, frame.width());
             let off = (seen.x - truth.x).hypot(seen.y - truth.y) + (seen.r - truth.r).abs();
             assert!(off < 0.5, "{kind}: {seen:?} for {truth:?}");

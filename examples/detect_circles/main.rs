@@ -20,9 +20,9 @@ use std::time::Duration;
 use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    AContrario, AContrarioConfig, Acceptance, Canny, Circle, CircleDetector, Detection, FrameError,
-    FrameSource, Heuristic, HeuristicConfig, ImageFiles, RandomizedHough, RandomizedHoughConfig,
-    Sampling, StageTimes, StandardHough, StandardHoughConfig, write_stages,
+    AContrario, AContrarioConfig, Acceptance, Canny, Circle, CircleDetector, Detection,
+    EdgeDetector, FrameError, FrameSource, Heuristic, HeuristicConfig, ImageFiles, RandomizedHough,
+    RandomizedHoughConfig, Sampling, Stages, StandardHough, StandardHoughConfig,
 };
 
 use example_support::files::{writable_folder, write_png, write_whole};
@@ -119,7 +119,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         writable_folder(folder)?;
     }
     let mut results = Results::default();
-    let mut all_read = true;
+    let (mut all_read, mut frame) = (true, GrayImage::default());
     for path in &options.paths {
         let mut files = match ImageFiles::open(path) {
             Ok(files) => files,
@@ -130,14 +130,15 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
             }
         };
         loop {
-            match files.grab() {
-                Ok(frame) => {
+            match files.grab(&mut frame) {
+                Ok(()) => {
                     let path = files.last_path().unwrap_or(path);
-                    if let Err(reason) = usable(&frame, &*detector) {
-                        eprintln!("error: {}: {reason}", path.display());
-                        all_read = false;
-                    } else {
-                        results.add(path, &frame, &mut *detector, options)?;
+                    match search(&frame, &mut *detector, options.repeat) {
+                        Ok(searched) => results.add(path, &frame, &*detector, searched, options)?,
+                        Err(reason) => {
+                            eprintln!("error: {}: {reason}", path.display());
+                            all_read = false;
+                        }
                     }
                 }
                 Err(FrameError::End) => break,
@@ -152,14 +153,70 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     Ok(all_read)
 }
 
-/// Why the detector cannot work on an image, if it cannot.
-fn usable(frame: &GrayImage, detector: &dyn CircleDetector) -> Result<(), String> {
+/// A detector that may show the stages of its last frame.
+trait Staged: CircleDetector {
+    fn stages(&self) -> Option<Stages<'_>> {
+        None
+    }
+
+    fn keep_candidates(&mut self, _keep: bool) {}
+}
+
+impl Staged for AContrario {}
+
+macro_rules! staged {
+    ($($detector:ident)*) => {$(
+        impl<E: EdgeDetector> Staged for $detector<E> {
+            fn stages(&self) -> Option<Stages<'_>> {
+                Some(self.stages())
+            }
+
+            fn keep_candidates(&mut self, keep: bool) {
+                self.keep_candidates(keep);
+            }
+        }
+    )*};
+}
+
+staged!(Heuristic RandomizedHough StandardHough);
+
+/// The circles of one frame.
+struct Searched {
+    found: Vec<Detection>,
+    cpu: Duration,
+    /// Times of the edges, of the structure and of the search, where the detector shows them.
+    stages: Option<[Duration; 3]>,
+}
+
+/// Searches a frame `repeat` times and takes the least time.
+fn search(frame: &GrayImage, detector: &mut dyn Staged, repeat: u32) -> Result<Searched, String> {
     if frame.is_empty() {
         return Err("the image has no pixels".into());
     }
-    detector
-        .check_frame(frame.width(), frame.height())
-        .map_err(|error| error.to_string())
+    let mut searched = Searched {
+        found: Vec::new(),
+        cpu: Duration::MAX,
+        stages: None,
+    };
+    for _ in 0..repeat {
+        let before = cpu_time();
+        let found = detector.detect(frame).map_err(|error| error.to_string())?;
+        let spent = cpu_time().saturating_sub(before);
+        if spent < searched.cpu {
+            searched.found = found.to_vec();
+            searched.cpu = spent;
+            searched.stages = detector.stages().map(|stages| {
+                let Stages {
+                    edge_time,
+                    structure_time,
+                    search_time,
+                    ..
+                } = stages;
+                [edge_time, structure_time, search_time]
+            });
+        }
+    }
+    Ok(searched)
 }
 
 /// What has been found so far.
@@ -169,7 +226,6 @@ struct Results {
     times: String,
     overlays: HashSet<String>,
     stages: HashSet<String>,
-    found: Vec<Detection>,
 }
 
 impl Results {
@@ -178,20 +234,13 @@ impl Results {
         &mut self,
         path: &Path,
         frame: &GrayImage,
-        detector: &mut dyn CircleDetector,
+        detector: &dyn Staged,
+        searched: Searched,
         options: &Options,
     ) -> Result<(), Box<dyn Error>> {
-        let (mut least, mut stages) = (Duration::MAX, None);
-        for _ in 0..options.repeat {
-            let before = cpu_time();
-            detector.detect_into(frame, &mut self.found);
-            let spent = cpu_time().saturating_sub(before);
-            if spent < least {
-                (least, stages) = (spent, detector.stages().map(|stages| stages.times));
-            }
-        }
+        let Searched { found, cpu, stages } = searched;
         let name = path.display().to_string();
-        for Detection { circle, score } in &self.found {
+        for Detection { circle, score } in &found {
             let Circle { x, y, radius } = circle;
             writeln!(
                 self.csv,
@@ -200,17 +249,16 @@ impl Results {
             )?;
         }
         let micros = |time: Duration| format!("{:.1}", time.as_secs_f64() * 1e6);
-        let [edges, structure, search] = stages.map_or_else(Default::default, |times| {
-            [times.edges, times.structure, times.search].map(micros)
-        });
+        let [edges, structure, search] =
+            stages.map_or_else(Default::default, |times| times.map(micros));
         writeln!(
             self.times,
             "{},{},{edges},{structure},{search}",
             quoted(&name),
-            micros(least)
+            micros(cpu)
         )?;
         if options.csv.is_none() {
-            print_table(&name, &self.found, least, stages);
+            print_table(&name, &found, cpu, stages);
         }
         if let Some(folder) = &options.stages {
             let folder = folder.join(unused_name(path, "", &mut self.stages));
@@ -218,14 +266,14 @@ impl Results {
             let stages = detector
                 .stages()
                 .ok_or("this detector does not show its stages")?;
-            write_stages(&folder, frame, &stages, &self.found)?;
+            stages.write(&folder, frame, &found)?;
         }
         if let Some(folder) = &options.overlay {
             let mut picture = Overlay::new(frame);
-            self.found
+            found
                 .iter()
                 .for_each(|detection| picture.circle(&detection.circle));
-            let picture = picture.captioned(&format!("{} circles", self.found.len()));
+            let picture = picture.captioned(&format!("{} circles", found.len()));
             write_png(
                 &folder.join(unused_name(path, ".png", &mut self.overlays)),
                 &picture.into_image(),
@@ -256,7 +304,7 @@ impl Results {
     }
 }
 
-fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>> {
+fn detector(options: &Options) -> Result<Box<dyn Staged>, Box<dyn Error>> {
     let accept = Acceptance {
         min_radius: options.min_radius,
         max_radius: options.max_radius,
@@ -265,9 +313,7 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
     };
     let heuristic = |sampling| {
         Heuristic::with_canny(HeuristicConfig {
-            min_radius: accept.min_radius,
-            max_radius: accept.max_radius,
-            max_circles: accept.max_circles,
+            accept,
             seed: options.seed,
             sampling,
             ..HeuristicConfig::default()
@@ -290,7 +336,7 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
         };
         StandardHough::new(config, Canny::default())
     };
-    let mut detector: Box<dyn CircleDetector> = match options.detector {
+    let mut detector: Box<dyn Staged> = match options.detector {
         DetectorName::AContrario => Box::new(AContrario::new(AContrarioConfig {
             min_radius: accept.min_radius,
             max_radius: accept.max_radius,
@@ -309,15 +355,10 @@ fn detector(options: &Options) -> Result<Box<dyn CircleDetector>, Box<dyn Error>
     Ok(detector)
 }
 
-fn print_table(name: &str, found: &[Detection], cpu: Duration, stages: Option<StageTimes>) {
+fn print_table(name: &str, found: &[Detection], cpu: Duration, stages: Option<[Duration; 3]>) {
     let millis = |time: Duration| time.as_secs_f64() * 1e3;
     let mut table = format!("{name}: {} circles, {:.2} ms", found.len(), millis(cpu));
-    if let Some(times) = stages {
-        let StageTimes {
-            edges,
-            structure,
-            search,
-        } = times;
+    if let Some([edges, structure, search]) = stages {
         table.push_str(&format!(
             " (edges {:.2}, structure {:.2}, search {:.2})",
             millis(edges),

@@ -129,9 +129,9 @@ impl<'a> EggCamera<'a> {
 }
 
 impl FrameSource for EggCamera<'_> {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
-        let mut frame = self.frames.grab()?;
-        self.paint(&mut frame);
-        Ok(frame)
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
+        self.frames.grab(frame)?;
+        self.paint(frame);
+        Ok(())
     }
 }

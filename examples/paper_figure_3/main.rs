@@ -19,7 +19,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use hough_heuristic::image::{GenericImage, GrayImage, Luma, Rgb, RgbImage};
 use hough_heuristic::{
-    Circle, CircleDetector, Curve, EdgeMap, EdgePixel, Features, Heuristic, HeuristicConfig,
+    Acceptance, Circle, CircleDetector, Curve, EdgeMap, EdgePixel, Features, Heuristic,
+    HeuristicConfig,
 };
 use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -52,13 +53,16 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let frame = render(options.seed)?;
     let mut detector = Heuristic::with_canny(HeuristicConfig {
         seed: options.seed,
-        min_radius: RADII.start,
-        max_radius: RADII.end,
+        accept: Acceptance {
+            min_radius: RADII.start,
+            max_radius: RADII.end,
+            ..Acceptance::default()
+        },
         ..HeuristicConfig::default()
     })?;
-    let found = detector.detect(&frame);
+    let found = detector.detect(&frame)?.to_vec();
 
-    let edges = detector.edges();
+    let edges = detector.stages().edges;
     let edge_words = format!("Canny edges: {} pixels", edges.pixels().len());
     let mut result = Overlay::new(&frame);
     for detection in &found {

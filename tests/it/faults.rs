@@ -7,7 +7,7 @@ use grasp_agent::{
     HybridSettings, Outcome, Prior,
 };
 use hough_heuristic::image::{GrayImage, Luma};
-use hough_heuristic::{Circle, CircleDetector, Detection, FrameError, FrameSource};
+use hough_heuristic::{Circle, CircleDetector, Detection, FrameError, FrameRefused, FrameSource};
 use pipeline_sim::{Ball, Workspace};
 use puma_grasp::{BallDetector, Rig, RigParts, bright_ball_scene};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
@@ -84,8 +84,10 @@ struct Camera<'a> {
 }
 
 impl FrameSource for Camera<'_> {
-    fn grab(&mut self) -> Grabbed {
-        (self.change)(self.inner.grab())
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
+        let grabbed = self.inner.grab(frame).map(|()| std::mem::take(frame));
+        *frame = (self.change)(grabbed)?;
+        Ok(())
     }
 }
 
@@ -247,11 +249,11 @@ fn garbage_in_the_place_of_frames_is_no_ball_for_any_detector() {
 }
 
 /// Sees a circle in every frame, anywhere, and sometimes none that can be.
-struct Liar(Xoshiro256PlusPlus);
+struct Liar(Xoshiro256PlusPlus, [Detection; 1]);
 
 impl CircleDetector for Liar {
-    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        let Self(rng) = self;
+    fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
+        let Self(rng, found) = self;
         let circle = match rng.random_range(0..10) {
             0 => Circle {
                 x: f64::NAN,
@@ -269,8 +271,8 @@ impl CircleDetector for Liar {
                 radius: rng.random_range(0.1..400.0),
             },
         };
-        found.clear();
-        found.push(Detection { circle, score: 1.0 });
+        *found = [Detection { circle, score: 1.0 }];
+        Ok(found)
     }
 }
 
@@ -279,7 +281,15 @@ fn circles_where_none_are_end_the_run_within_its_limits_and_without_a_ball() {
     for seed in 0..3 {
         let (mut rig, mut agent) = (rig(BEHIND_THE_ARM), agent());
         let mut between = Between::nothing();
-        between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(seed)));
+        let nothing = Detection {
+            circle: Circle {
+                x: 0.0,
+                y: 0.0,
+                radius: 1.0,
+            },
+            score: 0.0,
+        };
+        between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(seed), [nothing]));
         let (end, log) = between.run(&mut rig, &mut agent);
         let outcome = end.expect("no fault of a device");
         assert!(

@@ -6,6 +6,8 @@
 mod contest;
 #[path = "../scenes/scenes.rs"]
 mod scenes;
+#[path = "../scenes/staged.rs"]
+mod staged;
 
 use std::time::Duration;
 
@@ -24,16 +26,12 @@ fn frames(criterion: &mut Criterion) {
     {
         let (frame, balls) = round.scene.render();
         let mut detector = AContrario::new(AContrarioConfig::default()).expect("usable settings");
-        let mut found = Vec::new();
         group.bench_function(round.name, |bencher| {
-            bencher.iter(|| {
-                detector.detect_into(&frame, &mut found);
-                found.len()
-            });
+            bencher.iter(|| detector.detect(&frame).expect("a usable frame").len());
         });
         if let [ball] = balls[..] {
             group.bench_function(format!("{}, followed", round.name), |bencher| {
-                bencher.iter(|| detector.track(&frame, &ball, 10.0, &mut found));
+                bencher.iter(|| detector.track(&frame, &ball, 10.0));
             });
         }
     }

@@ -9,6 +9,8 @@
 mod contest;
 #[path = "../scenes/scenes.rs"]
 mod scenes;
+#[path = "../scenes/staged.rs"]
+mod staged;
 
 use std::time::Duration;
 
@@ -27,12 +29,8 @@ fn detectors(criterion: &mut Criterion) {
         for name in contest::DETECTORS {
             let mut detector =
                 contest::detector(name, &round.scene, edges.clone()).expect("usable settings");
-            let mut found = Vec::new();
             group.bench_function(name, |bencher| {
-                bencher.iter(|| {
-                    detector.detect_into(&frame, &mut found);
-                    found.len()
-                });
+                bencher.iter(|| detector.detect(&frame).expect("a usable frame").len());
             });
         }
         group.finish();

@@ -10,6 +10,8 @@
 mod contest;
 #[path = "../scenes/scenes.rs"]
 mod scenes;
+#[path = "../scenes/staged.rs"]
+mod staged;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -116,14 +118,13 @@ fn measure(
         let edges = round.canny().detect_edges(&frame).clone();
         row.edges += edges.pixels().len();
         let mut detector = contest::detector(detector_name, &scene, edges)?;
-        let mut found = Vec::new();
         // Slow ones need no repetition to be timed.
-        detector.detect_into(&frame, &mut found);
+        let found = detector.detect(&frame)?.to_vec();
         let reps = if detector_name == "SHT" { 1 } else { 3 };
         times.push(least_millis(reps, || {
-            detector.detect_into(&frame, &mut found)
+            let _ = detector.detect(&frame);
         }));
-        row.memory = row.memory.max(detector.memory());
+        row.memory = row.memory.max(detector.stages().memory);
         row.truths += balls.len();
         row.found += found.len();
         for ball in &balls {

@@ -98,15 +98,16 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     let mut files = ImageFiles::open(&options.frames)?;
     let (mut table, mut all) = (String::from("file,cpu_us,low,high\n"), Vec::new());
+    let mut frame = GrayImage::default();
     loop {
-        let frame = match files.grab() {
-            Ok(frame) => frame,
+        match files.grab(&mut frame) {
+            Ok(()) => {}
             Err(FrameError::End) => break,
             Err(error) => {
                 eprintln!("skipped: {error}");
                 continue;
             }
-        };
+        }
         let name = PathBuf::from(
             files
                 .last_path()

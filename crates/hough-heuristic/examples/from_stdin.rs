@@ -12,8 +12,10 @@ use std::io::{BufReader, Write, stdin, stdout};
 use std::process::ExitCode;
 
 use clap::Parser;
+use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    CircleDetector, Detection, FrameError, FrameSource, Heuristic, HeuristicConfig, Y4mFrames,
+    Acceptance, CircleDetector, Detection, FrameError, FrameSource, FrameStream, Heuristic,
+    HeuristicConfig,
 };
 use serde::Serialize;
 
@@ -52,23 +54,25 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut detector = Heuristic::with_canny(HeuristicConfig {
-        min_radius: options.min_radius,
-        max_radius: options.max_radius,
-        max_circles: options.max_circles,
+        accept: Acceptance {
+            min_radius: options.min_radius,
+            max_radius: options.max_radius,
+            max_circles: options.max_circles,
+            ..Acceptance::default()
+        },
         ..HeuristicConfig::default()
     })?;
-    let mut frames = Y4mFrames::new(BufReader::new(stdin().lock()))?;
-    let mut found: Vec<Detection> = Vec::new();
+    let mut frames = FrameStream::y4m(BufReader::new(stdin().lock()))?;
+    let mut frame = GrayImage::default();
     for number in 1u64.. {
-        let frame = match frames.grab() {
-            Ok(frame) => frame,
+        match frames.grab(&mut frame) {
+            Ok(()) => {}
             Err(FrameError::End) => break,
             Err(error) => return Err(error.into()),
-        };
-        detector.try_detect_into(&frame, &mut found)?;
+        }
         let line = serde_json::to_string(&Line {
             frame: number,
-            circles: &found,
+            circles: detector.detect(&frame)?,
         })?;
         // A reader that has seen enough closes the pipe.
         if writeln!(stdout(), "{line}").is_err() {

@@ -4,12 +4,12 @@
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    Acceptance, Canny, CannyConfig, CircleDetector, ConfigError, EdgeDetector, EdgeMap, Heuristic,
-    HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
-    StandardHoughConfig,
+    Acceptance, Canny, CannyConfig, ConfigError, EdgeDetector, EdgeMap, Heuristic, HeuristicConfig,
+    RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
 };
 
 use crate::scenes::Scene;
+use crate::staged::Staged;
 
 /// A scene of the comparison.
 #[derive(Clone, Copy)]
@@ -116,11 +116,7 @@ pub const DETECTORS: [&str; 6] = [
 
 /// A detector for a scene, which knows the radius range and how many balls to look for, on edges
 /// that are already found.
-pub fn detector(
-    name: &str,
-    scene: &Scene,
-    edges: EdgeMap,
-) -> Result<Box<dyn Contestant>, ConfigError> {
+pub fn detector(name: &str, scene: &Scene, edges: EdgeMap) -> Result<Box<dyn Staged>, ConfigError> {
     let edges = Found(edges);
     let small = scene.width < 400;
     let accept = Acceptance {
@@ -135,9 +131,7 @@ pub fn detector(
         Sampling::Near
     };
     let heuristic = HeuristicConfig {
-        min_radius: accept.min_radius,
-        max_radius: accept.max_radius,
-        max_circles: accept.max_circles,
+        accept,
         sampling,
         ..HeuristicConfig::default()
     };
@@ -156,29 +150,6 @@ pub fn detector(
         "RHT" | "RHT, anywhere" => Box::new(RandomizedHough::new(rht, edges)?),
         _ => Box::new(Heuristic::new(heuristic, edges)?),
     })
-}
-
-/// A detector that tells what memory it holds.
-pub trait Contestant: CircleDetector {
-    fn memory(&self) -> usize;
-}
-
-impl<E: EdgeDetector> Contestant for Heuristic<E> {
-    fn memory(&self) -> usize {
-        self.memory()
-    }
-}
-
-impl<E: EdgeDetector> Contestant for RandomizedHough<E> {
-    fn memory(&self) -> usize {
-        self.memory()
-    }
-}
-
-impl<E: EdgeDetector> Contestant for StandardHough<E> {
-    fn memory(&self) -> usize {
-        self.memory()
-    }
 }
 
 /// The edges of the one frame that is looked at.

@@ -23,7 +23,7 @@ use image::GrayImage;
 pub use config::AContrarioConfig;
 
 use crate::circle::Circle;
-use crate::detect::{CircleDetector, Detection};
+use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::error::ConfigError;
 use budget::{Budget, MEASURING, Stage};
@@ -76,10 +76,10 @@ use search::{Outline, Search};
 ///     Luma([if inside(100.0, 70.0, 28.0) || inside(220.5, 150.2, 14.0) { 40 } else { 200 }])
 /// });
 /// let mut detector = AContrario::new(AContrarioConfig::default())?;
-/// assert_eq!(detector.detect(&frame).len(), 2);
+/// assert_eq!(detector.detect(&frame)?.len(), 2);
 /// let ball = detector.measurements()[0];
 /// assert!((ball.circle.x - 100.0).abs() < 0.1 && ball.score > 0.8 && ball.centre_error < 0.1);
-/// # Ok::<(), hough_heuristic::ConfigError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct AContrario {
@@ -96,6 +96,7 @@ pub struct AContrario {
     polar: Polar,
     proofs: Vec<Proof>,
     measurements: Vec<Measurement>,
+    found: Vec<Detection>,
     budget: Budget,
     /// What [`AContrario::track`] looks at.
     window: GrayImage,
@@ -152,15 +153,11 @@ impl AContrario {
             polar: Polar::default(),
             proofs: Vec::new(),
             measurements: Vec::new(),
+            found: Vec::new(),
             budget: Budget::default(),
             window: GrayImage::default(),
             config,
         })
-    }
-
-    /// The settings the detector was built with.
-    pub fn config(&self) -> &AContrarioConfig {
-        &self.config
     }
 
     /// What is known of the circles found last, in the order of the detections.
@@ -377,31 +374,20 @@ impl AContrario {
 }
 
 impl CircleDetector for AContrario {
-    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        found.clear();
-        if self.check_frame(frame.width(), frame.height()).is_err() {
-            self.measurements.clear();
-            self.budget = Budget::default();
-            return;
+    fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
+        self.measurements.clear();
+        self.budget = Budget::default();
+        if let Some(region) = &self.config.region {
+            region.check_frame(frame.width(), frame.height())?;
         }
         self.find(frame, (self.config.min_radius, self.config.max_radius));
-        found.extend(self.measurements.iter().map(Measurement::detection));
-    }
-
-    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
-        self.config
-            .region
-            .as_ref()
-            .map_or(Ok(()), |region| region.check_frame(width, height))
-    }
-}
-
-impl Measurement {
-    fn detection(&self) -> Detection {
-        Detection {
-            circle: self.circle,
-            score: self.score,
-        }
+        self.found.clear();
+        let detections = self.measurements.iter().map(|measurement| Detection {
+            circle: measurement.circle,
+            score: measurement.score,
+        });
+        self.found.extend(detections);
+        Ok(&self.found)
     }
 }
 
@@ -423,7 +409,9 @@ pub fn detect_circles(
         max_radius,
         ..AContrarioConfig::default()
     };
-    Ok(AContrario::new(config)?.detect(frame))
+    let mut detector = AContrario::new(config)?;
+    // Without a region of interest no frame is refused.
+    Ok(detector.detect(frame).unwrap_or_default().to_vec())
 }
 
 /// Frames with a shorter side hold nothing, pixels.

@@ -1,7 +1,7 @@
 //! The rules by which the transforms report a circle.
 
 use crate::circle::Circle;
-use crate::detect::Detection;
+use crate::detect::{Detection, FrameRefused};
 use crate::error::{ConfigError, require, require_radii};
 use crate::region::Region;
 
@@ -88,12 +88,13 @@ impl Acceptance {
             min_distance,
             "finite and at least 0 px",
             usable,
-        )
+        )?;
+        self.region.map_or(Ok(()), |region| region.check())
     }
 
     /// # Errors
-    /// The region of interest, if it does not lie in such a frame.
-    pub(crate) fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+    /// The region of interest, if it sticks out of such a frame.
+    pub(crate) fn check_frame(&self, width: u32, height: u32) -> Result<(), FrameRefused> {
         self.region
             .map_or(Ok(()), |region| region.check_frame(width, height))
     }

@@ -1,4 +1,6 @@
-//! Why a configuration was refused.
+//! The error of configurations.
+
+use crate::region::Region;
 
 /// A configuration that no detector can be built from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -34,55 +36,13 @@ pub enum ConfigError {
         /// The upper threshold.
         high: f64,
     },
-    /// The rows of a frame in memory overlap.
-    #[error("the stride of {stride} bytes is below the frame's width of {width} px")]
-    Stride {
-        /// Bytes from one row to the next.
-        stride: usize,
-        /// Pixels in a row.
-        width: u32,
-    },
-    /// A frame in memory is cut short.
-    #[error("the buffer of {given} bytes is too short: the frame needs {needed}")]
-    Buffer {
-        /// Its length, bytes.
-        given: usize,
-        /// The bytes up to the last pixel.
-        needed: usize,
-    },
-    /// A region of interest is empty or sticks out of its frame.
+    /// A region of interest is empty, or lies beyond any frame.
     #[error(
-        "the region of {width}x{height} px at ({left}, {top}) is empty or sticks out of the {frame_width}x{frame_height} px frame"
+        "the region of {}x{} px at ({}, {}) is not usable: it must have pixels, below row and \
+         column 4294967295",
+        .0.width, .0.height, .0.left, .0.top
     )]
-    Region {
-        /// Leftmost column.
-        left: u32,
-        /// Top row.
-        top: u32,
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Columns of the frame.
-        frame_width: u32,
-        /// Rows of the frame.
-        frame_height: u32,
-    },
-    /// The accumulator of a Hough transform would take more memory than it may.
-    #[error(
-        "a {frame_width}x{frame_height} px frame needs an accumulator of {needed} bytes, but max_memory is {limit}: narrow \
-         the radius range, or make the cells larger"
-    )]
-    Accumulator {
-        /// Columns of the frame.
-        frame_width: u32,
-        /// Rows of the frame.
-        frame_height: u32,
-        /// The memory it would take, bytes.
-        needed: u64,
-        /// The most it may take, bytes.
-        limit: u64,
-    },
+    Region(Region),
 }
 
 /// Checks one number; NaN fails every test.
@@ -101,6 +61,12 @@ pub(crate) fn require(
             expected,
         })
     }
+}
+
+/// Checks a number of draws.
+pub(crate) fn require_iterations(iterations: u32) -> Result<(), ConfigError> {
+    let usable = iterations > 0;
+    require("iterations", iterations.into(), "at least 1", usable)
 }
 
 /// Checks a radius range.

@@ -3,26 +3,29 @@
 #[cfg(feature = "files")]
 mod files;
 mod stream;
-mod view;
 
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
-pub use stream::{RawFrames, Y4mFrames};
-pub use view::GrayView;
+pub use stream::FrameStream;
 
 use image::GrayImage;
 
 /// A source of monochrome frames: a camera, a folder of files, a stream, a rendered scene.
 pub trait FrameSource {
-    /// The next frame.
+    /// Replaces the content of `frame` by the next frame, whose size may differ.
+    ///
+    /// The frame of a live source is **exposed after this call**: a control loop moves its arm, and
+    /// then needs the view from the new pose. A source that buffers frames discards the older ones
+    /// first. A recorded source delivers its frames in order. Reuse `frame`, so that nothing is
+    /// allocated for it.
     ///
     /// # Errors
-    /// [`FrameError::End`] after the last frame; otherwise what kept the source from delivering
-    /// one.
-    fn grab(&mut self) -> Result<GrayImage, FrameError>;
+    /// [`FrameError::End`] after the last frame; [`FrameError::Failed`] if the source could not
+    /// deliver one. The content of `frame` is then unspecified.
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError>;
 }
 
-/// Why a [`FrameSource`] delivered no frame.
+/// The reason why a [`FrameSource`] delivered no frame.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -37,4 +40,18 @@ pub enum FrameError {
         /// What went wrong and, where known, what to do.
         reason: String,
     },
+}
+
+/// Gives `frame` this size and the pixels that `fill` writes, reusing its memory.
+fn refill<T>(
+    frame: &mut GrayImage,
+    (width, height): (u32, u32),
+    fill: impl FnOnce(&mut [u8]) -> T,
+) -> T {
+    let mut pixels = std::mem::take(frame).into_raw();
+    pixels.resize(width as usize * height as usize, 0);
+    let result = fill(&mut pixels);
+    // There are exactly as many bytes as pixels, so this never falls back.
+    *frame = GrayImage::from_raw(width, height, pixels).unwrap_or_default();
+    result
 }

@@ -18,10 +18,10 @@
 //! });
 //!
 //! let mut detector = Heuristic::with_canny(HeuristicConfig::default())?;
-//! let ball = detector.detect(&frame)[0];
+//! let ball = detector.detect(&frame)?[0];
 //! assert!((ball.circle.x - 100.0).abs() < 0.5 && (ball.circle.radius - 28.0).abs() < 0.5);
 //! assert!(ball.score > 0.9);
-//! # Ok::<(), hough_heuristic::ConfigError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! # Detectors
@@ -45,8 +45,7 @@
 //! # Frames
 //!
 //! A [`FrameSource`] delivers them: `ImageFiles` from files and folders (feature `files`, on by
-//! default), [`Y4mFrames`] and [`RawFrames`] from any reader, so also from a camera through a pipe.
-//! [`GrayView`] takes a frame from a caller's memory.
+//! default), [`FrameStream`] from any reader, so also from a camera through a pipe.
 //!
 //! # Conventions
 //!
@@ -70,6 +69,7 @@
 mod a_contrario;
 mod acceptance;
 mod circle;
+mod clock;
 mod curve;
 mod detect;
 mod edges;
@@ -77,7 +77,6 @@ mod error;
 mod frame;
 mod region;
 mod sampling;
-#[cfg(feature = "files")]
 mod stages;
 mod transforms;
 
@@ -85,7 +84,7 @@ pub use a_contrario::{AContrario, AContrarioConfig, Effort, Measurement, detect_
 pub use acceptance::Acceptance;
 pub use circle::{Circle, Features};
 pub use curve::{Curve, Ellipse, Line};
-pub use detect::{CircleDetector, Detection, StageTimes, Stages};
+pub use detect::{CircleDetector, Detection, FrameRefused};
 pub use edges::{
     Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny,
 };
@@ -93,12 +92,11 @@ pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
 #[cfg(feature = "files")]
 pub use frame::ImageFiles;
-pub use frame::{FrameError, FrameSource, GrayView, RawFrames, Y4mFrames};
+pub use frame::{FrameError, FrameSource, FrameStream};
 pub use image;
 pub use region::Region;
 pub use sampling::Sampling;
-#[cfg(feature = "files")]
-pub use stages::{StageError, write_stages};
+pub use stages::Stages;
 pub use transforms::{
     CurveSearch, CurveSearchConfig, FoundCurve, Heuristic, HeuristicConfig, RandomizedHough,
     RandomizedHoughConfig, StandardHough, StandardHoughConfig,

@@ -5,6 +5,7 @@ mod curve_search;
 mod evidence;
 mod fit;
 mod heuristic;
+mod pass;
 mod randomized_hough;
 mod standard_hough;
 

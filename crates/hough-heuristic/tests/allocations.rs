@@ -11,13 +11,16 @@ use std::cell::Cell;
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
-    AContrario, AContrarioConfig, Acceptance, Canny, CircleDetector, Detection, Heuristic,
-    HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough,
-    StandardHoughConfig,
+    AContrario, AContrarioConfig, Acceptance, Canny, CircleDetector, Heuristic, HeuristicConfig,
+    RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
 };
 
 #[path = "../scenes/scenes.rs"]
 mod scenes;
+#[path = "../scenes/staged.rs"]
+mod staged;
+
+use staged::Staged;
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -61,13 +64,12 @@ const ACCEPT: Acceptance = Acceptance {
     refine: true,
 };
 
-fn detectors() -> Vec<(String, Box<dyn CircleDetector>)> {
+fn detectors() -> Vec<(String, Box<dyn Staged>)> {
     let canny = Canny::default;
-    let mut all: Vec<(String, Box<dyn CircleDetector>)> = Vec::new();
+    let mut all: Vec<(String, Box<dyn Staged>)> = Vec::new();
     for sampling in [Sampling::Near, Sampling::Anywhere] {
         let heuristic = HeuristicConfig {
-            max_radius: ACCEPT.max_radius,
-            max_circles: ACCEPT.max_circles,
+            accept: ACCEPT,
             sampling,
             ..HeuristicConfig::default()
         };
@@ -112,28 +114,24 @@ fn frame(width: u32, height: u32, balls: usize, distractors: usize, seed: u64) -
     scene.render().0
 }
 
-fn allocations(
-    detector: &mut dyn CircleDetector,
-    frame: &GrayImage,
-    found: &mut Vec<Detection>,
-) -> usize {
+/// How many allocations a frame takes, and how many circles it has.
+fn allocations(detector: &mut dyn CircleDetector, frame: &GrayImage) -> (usize, usize) {
     let before = ALLOCATIONS.with(Cell::get);
-    detector.detect_into(frame, found);
-    ALLOCATIONS.with(Cell::get) - before
+    let circles = detector.detect(frame).unwrap().len();
+    (ALLOCATIONS.with(Cell::get) - before, circles)
 }
 
-fn edges(detector: &mut dyn CircleDetector, frame: &GrayImage) -> usize {
-    detector.detect(frame);
-    detector.stages().unwrap().edges.pixels().len()
+fn edges(detector: &mut dyn Staged, frame: &GrayImage) -> usize {
+    detector.detect(frame).unwrap();
+    detector.stages().edges.pixels().len()
 }
 
 #[test]
 fn the_a_contrario_detector_allocates_nothing_after_the_first_frame_either() {
     let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
-    let mut found = Vec::new();
     let crowded = frame(500, 400, 8, 25, 1);
-    assert!(allocations(&mut detector, &crowded, &mut found) > 0);
-    assert!(!found.is_empty());
+    let (first, circles) = allocations(&mut detector, &crowded);
+    assert!(first > 0 && circles > 0);
     for other in [
         frame(320, 240, 4, 6, 2),
         frame(90, 200, 1, 1, 4),
@@ -141,12 +139,12 @@ fn the_a_contrario_detector_allocates_nothing_after_the_first_frame_either() {
         frame(300, 400, 5, 3, 6),
         crowded.clone(),
     ] {
-        assert_eq!(allocations(&mut detector, &other, &mut found), 0);
+        assert_eq!(allocations(&mut detector, &other).0, 0);
     }
-    let last = found[0].circle;
-    detector.track(&crowded, &last, 5.0, &mut found);
+    let last = detector.measurements()[0].circle;
+    detector.track(&crowded, &last, 5.0).unwrap();
     let before = ALLOCATIONS.with(Cell::get);
-    assert!(detector.track(&crowded, &last, 5.0, &mut found));
+    assert!(detector.track(&crowded, &last, 5.0).unwrap());
     assert_eq!(ALLOCATIONS.with(Cell::get), before);
 }
 
@@ -165,18 +163,17 @@ fn a_frame_after_the_first_allocates_nothing() {
         frame(300, 400, 5, 3, 6),
     ];
     for (name, mut detector) in detectors() {
-        let mut found = Vec::new();
-        let first = allocations(&mut *detector, &crowded, &mut found);
+        let (first, found) = allocations(&mut *detector, &crowded);
         assert!(first > 0, "{name}: the count does not count");
-        assert!(found.len() >= 5, "{name}: {found:?}");
-        allocations(&mut *detector, &futile, &mut Vec::new());
+        assert!(found >= 5, "{name}: {found}");
+        allocations(&mut *detector, &futile);
         let mut circles = 0;
         let most = edges(&mut *detector, &crowded);
         for (index, frame) in others.iter().chain(others.iter().rev()).enumerate() {
-            let count = allocations(&mut *detector, frame, &mut found);
+            let (count, found) = allocations(&mut *detector, frame);
             assert_eq!(count, 0, "{name}, frame {index}");
-            circles += found.len();
-            let stages = detector.stages().unwrap();
+            circles += found;
+            let stages = detector.stages();
             assert!(
                 stages.edges.pixels().len() < most,
                 "{name}, frame {index} is the busiest"
@@ -191,13 +188,12 @@ fn remembered_candidates_keep_their_memory() {
     let frames = [frame(320, 240, 4, 6, 2), frame(200, 150, 2, 2, 3)];
     for (name, mut detector) in detectors() {
         detector.keep_candidates(true);
-        let mut found = Vec::new();
         for frame in &frames {
-            allocations(&mut *detector, frame, &mut found);
+            allocations(&mut *detector, frame);
         }
         for frame in frames.iter().rev() {
-            assert_eq!(allocations(&mut *detector, frame, &mut found), 0, "{name}");
-            assert!(!detector.stages().unwrap().candidates.is_empty(), "{name}");
+            assert_eq!(allocations(&mut *detector, frame).0, 0, "{name}");
+            assert!(!detector.stages().candidates.is_empty(), "{name}");
         }
     }
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout)] // Measured differences, shown with --nocapture.
 
 use hough_heuristic::{
-    CircleDetector, Features, FrameSource, Heuristic, HeuristicConfig, Y4mFrames,
+    Acceptance, CircleDetector, Features, FrameSource, FrameStream, Heuristic, HeuristicConfig,
 };
 use pipeline_sim::{Ball, Cell, Renderer, Scene, SceneKind, Snapshot, Workspace, Y4mWriter};
 use rand::SeedableRng;
@@ -16,9 +16,12 @@ fn the_shortcut_agrees_with_rendering_and_detection() {
     // The laboratory has other round things, and outlines off the axis are ellipses: several
     // circles, some tolerance.
     let config = HeuristicConfig {
-        min_radius: 18.0,
-        max_circles: 8,
-        tolerance: 2.0,
+        accept: Acceptance {
+            min_radius: 18.0,
+            max_circles: 8,
+            tolerance: 2.0,
+            ..Acceptance::default()
+        },
         ..HeuristicConfig::default()
     };
     let mut detector = Heuristic::with_canny(config).expect("a sound configuration");
@@ -36,7 +39,7 @@ fn the_shortcut_agrees_with_rendering_and_detection() {
         }
         frames += 1;
         let frame = renderer.render(&cell, &joints);
-        let found = detector.detect(frame);
+        let found = detector.detect(frame).expect("no region of interest");
         // Of all circles found, the ball: the one nearest to where the shortcut has it.
         let seen = found
             .iter()
@@ -96,10 +99,15 @@ fn a_written_run_is_read_back_frame_by_frame() {
     let wrong = image::GrayImage::new(4, 4);
     assert!(video.write(&wrong).is_err(), "another size");
     let bytes = video.finish().expect("memory");
-    let mut back = Y4mFrames::new(bytes.as_slice()).expect("its own stream");
+    let mut read = image::GrayImage::default();
+    let mut back = FrameStream::y4m(bytes.as_slice()).expect("its own stream");
     for frame in &frames {
-        assert!(back.grab().expect("as many as were written") == *frame);
+        back.grab(&mut read).expect("as many as were written");
+        assert!(read == *frame);
     }
-    assert!(matches!(back.grab(), Err(hough_heuristic::FrameError::End)));
+    assert!(matches!(
+        back.grab(&mut read),
+        Err(hough_heuristic::FrameError::End)
+    ));
     assert!(Y4mWriter::new(Vec::new(), 0, 1).is_err());
 }

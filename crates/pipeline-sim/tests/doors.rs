@@ -13,6 +13,12 @@ fn cell() -> SharedCell {
     SharedCell::new(Cell::paper(Ball::at(0.60, 0.15, -0.10)))
 }
 
+fn grabbed(camera: &mut impl FrameSource) -> GrayImage {
+    let mut frame = GrayImage::default();
+    camera.grab(&mut frame).expect("a frame");
+    frame
+}
+
 #[test]
 fn frames_follow_the_arm_and_repeat_with_the_seed() {
     let run = || {
@@ -20,11 +26,11 @@ fn frames_follow_the_arm_and_repeat_with_the_seed() {
         let mut arm = SimulatedArm::new(cell.clone(), Workspace::paper().search_poses()[3])
             .expect("a search pose");
         let mut camera = CellCamera::new(cell, Renderer::new(&Scene::laboratory(), 5), arm.pose());
-        let first = camera.grab().expect("a frame");
-        let again = camera.grab().expect("a frame");
+        let first = grabbed(&mut camera);
+        let again = grabbed(&mut camera);
         arm.move_by(JointDelta::from_degrees([0.0, 6.0, -5.0, 0.0, 0.0, 0.0]))
             .expect("within limits");
-        [first, again, camera.grab().expect("a frame")]
+        [first, again, grabbed(&mut camera)]
     };
     let (a, b) = (run(), run());
     assert!(a == b, "same seed, same frames");
@@ -63,7 +69,10 @@ fn impossible_moves_are_refused_and_nothing_moves() {
     let mut lost = CellCamera::new(cell(), Renderer::new(&Scene::plain(), 1), || {
         Joints([f64::NAN; 6])
     });
-    assert!(matches!(lost.grab(), Err(FrameError::Failed { .. })));
+    assert!(matches!(
+        lost.grab(&mut GrayImage::default()),
+        Err(FrameError::Failed { .. })
+    ));
 }
 
 #[test]
@@ -94,7 +103,7 @@ fn exposed(shot: Shot, speed: f64) -> GrayImage {
     let mut camera = CellCamera::new(cell(), Renderer::new(&scene, 5), move || pose)
         .exposed(shot, motion)
         .expect("a sound shot");
-    camera.grab().expect("a frame")
+    grabbed(&mut camera)
 }
 
 /// Mean difference of neighbours along rows and along columns: what motion along x takes from the
@@ -155,7 +164,7 @@ fn the_ball_of_an_exposure_is_where_the_cell_has_it() {
         if exposed {
             camera = camera.exposed(shot, rolling).expect("a sound shot");
         }
-        let frame = camera.grab().expect("a frame");
+        let frame = grabbed(&mut camera);
         let bright = |p: &u8| f64::from(p.saturating_sub(150));
         let sum: f64 = frame.iter().map(bright).sum();
         let rows = frame
@@ -191,7 +200,7 @@ fn exposures_that_make_no_sense_are_refused() {
     let mut camera = camera()
         .exposed(Shot::pal(0.01, 4), nowhere)
         .expect("a sound shot");
-    let Err(FrameError::Failed { reason, .. }) = camera.grab() else {
+    let Err(FrameError::Failed { reason, .. }) = camera.grab(&mut GrayImage::default()) else {
         panic!("no such speed");
     };
     assert!(reason.contains("speed of JT2"), "{reason}");

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use grasp_agent::{Consequence, Controller, GaveUp, JointLimits, Situation};
 use hough_heuristic::image::GrayImage;
-use hough_heuristic::{CircleDetector, Detection, FrameError, FrameSource};
+use hough_heuristic::{CircleDetector, Detection, FrameError, FrameRefused, FrameSource};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
 
 use crate::cpu::cpu_time;
@@ -79,18 +79,16 @@ pub struct Timed<T> {
 }
 
 impl FrameSource for Timed<&mut dyn FrameSource> {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         self.stages
-            .measured(|spent| &mut spent.render, || self.inner.grab())
+            .measured(|spent| &mut spent.render, || self.inner.grab(frame))
     }
 }
 
 impl CircleDetector for Timed<&mut dyn CircleDetector> {
-    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        self.stages.measured(
-            |spent| &mut spent.detect,
-            || self.inner.detect_into(frame, found),
-        );
+    fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
+        self.stages
+            .measured(|spent| &mut spent.detect, || self.inner.detect(frame))
     }
 }
 

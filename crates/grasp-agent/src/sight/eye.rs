@@ -49,7 +49,8 @@ impl<'a> CameraEye<'a> {
 
 impl Eye for CameraEye<'_> {
     fn look(&mut self) -> Result<Look, FrameError> {
-        let frame = self.source.grab()?;
+        let mut frame = GrayImage::default();
+        self.source.grab(&mut frame)?;
         let ball = self.object.find(&frame);
         Ok(Look {
             frame: Some(frame),

@@ -25,16 +25,12 @@ pub trait ObjectFeatures {
 /// frame.
 pub struct BallFeatures<'a> {
     detector: &'a mut dyn CircleDetector,
-    found: Vec<Detection>,
 }
 
 impl<'a> BallFeatures<'a> {
     /// By the circles that `detector` finds.
     pub fn new(detector: &'a mut dyn CircleDetector) -> Self {
-        Self {
-            detector,
-            found: Vec::new(),
-        }
+        Self { detector }
     }
 }
 
@@ -46,8 +42,8 @@ impl<O: ObjectFeatures + ?Sized> ObjectFeatures for &mut O {
 
 impl ObjectFeatures for BallFeatures<'_> {
     fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
-        self.detector.detect_into(frame, &mut self.found);
-        self.found
+        let found = self.detector.detect(frame).unwrap_or_default();
+        found
             .iter()
             .find_map(|detection| sighting(*detection, None, frame))
     }

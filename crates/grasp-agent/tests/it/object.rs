@@ -5,8 +5,9 @@ use std::collections::VecDeque;
 
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{
-    Canny, CannyConfig, Circle, CircleDetector, CurveSearch, CurveSearchConfig, Detection, Ellipse,
-    Features, FrameError, FrameSource, Heuristic, HeuristicConfig,
+    Acceptance, Canny, CannyConfig, Circle, CircleDetector, CurveSearch, CurveSearchConfig,
+    Detection, Ellipse, Features, FrameError, FrameRefused, FrameSource, Heuristic,
+    HeuristicConfig,
 };
 use grasp_agent::{BallFeatures, CameraEye, EggFeatures, EggLimits, Eye, ObjectFeatures, Sighting};
 
@@ -113,8 +114,8 @@ fn what_is_too_small_too_large_or_too_long_is_no_egg() {
 struct Saying(Vec<Detection>);
 
 impl CircleDetector for Saying {
-    fn detect_into(&mut self, _frame: &GrayImage, found: &mut Vec<Detection>) {
-        found.clone_from(&self.0);
+    fn detect(&mut self, _frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
+        Ok(&self.0)
     }
 }
 
@@ -147,8 +148,11 @@ fn a_ball_is_the_first_circle_whose_centre_lies_in_the_frame() {
 fn a_ball_is_found_by_a_detector_that_looks() {
     let canny = Canny::new(CannyConfig::default()).unwrap();
     let config = HeuristicConfig {
-        min_radius: 20.0,
-        max_radius: 272.0,
+        accept: Acceptance {
+            min_radius: 20.0,
+            max_radius: 272.0,
+            ..Acceptance::default()
+        },
         ..HeuristicConfig::default()
     };
     let mut detector = Heuristic::new(config, canny).unwrap();
@@ -170,8 +174,9 @@ fn a_ball_is_found_by_a_detector_that_looks() {
 struct Film(VecDeque<GrayImage>);
 
 impl FrameSource for Film {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
-        self.0.pop_front().ok_or(FrameError::End)
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
+        *frame = self.0.pop_front().ok_or(FrameError::End)?;
+        Ok(())
     }
 }
 

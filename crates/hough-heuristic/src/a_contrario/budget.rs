@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::AContrarioConfig;
+use crate::clock;
 
 /// Looks that a draw takes, in the mean over dense texture; those of all draws are shared by what
 /// takes few and what takes many.
@@ -50,9 +51,9 @@ impl Budget {
         Self {
             most_draws,
             most_looks: [14, 17, 20].map(|twentieths| looks / 20 * twentieths),
-            deadline: config
-                .milliseconds_per_megapixel
-                .map(|time| Instant::now() + Duration::from_secs_f64(time * megapixels * 1e-3)),
+            deadline: config.milliseconds_per_megapixel.and_then(|time| {
+                Some(clock::now()? + Duration::from_secs_f64(time * megapixels * 1e-3))
+            }),
             ..Self::default()
         }
     }
@@ -70,7 +71,7 @@ impl Budget {
     pub(super) fn is_late(&mut self) -> bool {
         self.late |= self
             .deadline
-            .is_some_and(|deadline| Instant::now() >= deadline);
+            .is_some_and(|deadline| clock::now() >= Some(deadline));
         self.spent |= self.late;
         self.late
     }

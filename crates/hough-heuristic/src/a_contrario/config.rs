@@ -96,6 +96,7 @@ impl AContrarioConfig {
             time,
             "above 0..=1e6",
             time > 0.0 && time <= 1e6,
-        )
+        )?;
+        self.region.map_or(Ok(()), |region| region.check())
     }
 }

@@ -4,32 +4,32 @@ use image::GrayImage;
 
 use super::{AContrario, LEAST_SIDE, Measurement};
 use crate::circle::Circle;
-use crate::detect::{CircleDetector, Detection};
+use crate::detect::{CircleDetector, FrameRefused};
 
 impl AContrario {
-    /// Looks for the circle `last` first, whose centre and radius may have changed by `reach`
-    /// pixels, and in the whole frame only if it is not there; true if it was.
+    /// Searches for the circle `last`, whose centre and radius may have changed by `reach` pixels,
+    /// and searches the whole frame only if it is not there. Returns `true` if it was.
     ///
-    /// Replaces the content of `found` by the one circle followed, or else by all circles of the
-    /// frame. The number of false alarms counts the circles in the part that was looked at. A
-    /// `last` or a `reach` that is not finite, or has no radius, is never there.
+    /// [`measurements`](Self::measurements) then holds the one circle followed, or else all circles
+    /// of the frame. The number of false alarms counts the circles in the part that was searched.
+    /// A `last` or a `reach` that is not finite, or has no radius, is never there.
+    ///
+    /// # Errors
+    /// [`FrameRefused`] if the whole frame is to be searched and the configuration does not suit it.
     pub fn track(
         &mut self,
         frame: &GrayImage,
         last: &Circle,
         reach: f64,
-        found: &mut Vec<Detection>,
-    ) -> bool {
+    ) -> Result<bool, FrameRefused> {
         let followed = self.follow(frame, last, reach);
         if let Some(measurement) = followed {
             self.measurements.clear();
             self.measurements.push(measurement);
-            found.clear();
-            found.push(measurement.detection());
         } else {
-            self.detect_into(frame, found);
+            self.detect(frame)?;
         }
-        followed.is_some()
+        Ok(followed.is_some())
     }
 
     /// The best circle near the last one.

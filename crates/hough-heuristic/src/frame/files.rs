@@ -15,12 +15,13 @@ const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "pgm"];
 /// [`grab`](FrameSource::grab) goes on with the next file.
 ///
 /// ```no_run
+/// use hough_heuristic::image::GrayImage;
 /// use hough_heuristic::{FrameError, FrameSource, ImageFiles};
 ///
-/// let mut files = ImageFiles::open("frames/")?;
+/// let (mut files, mut frame) = (ImageFiles::open("frames/")?, GrayImage::default());
 /// loop {
-///     match files.grab() {
-///         Ok(frame) => println!("{:?}: {}x{}", files.last_path(), frame.width(), frame.height()),
+///     match files.grab(&mut frame) {
+///         Ok(()) => println!("{:?}: {}x{}", files.last_path(), frame.width(), frame.height()),
 ///         Err(FrameError::End) => break,
 ///         Err(error) => eprintln!("skipped: {error}"),
 ///     }
@@ -82,21 +83,17 @@ impl ImageFiles {
         let last = self.next.checked_sub(1)?;
         self.paths.get(last).map(PathBuf::as_path)
     }
-
-    /// How many files have not been read yet.
-    pub fn remaining(&self) -> usize {
-        self.paths.len() - self.next
-    }
 }
 
 impl FrameSource for ImageFiles {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         let path = self.paths.get(self.next).ok_or(FrameError::End)?;
         self.next += 1;
-        read(path).map_err(|error| FrameError::Failed {
+        *frame = read(path).map_err(|error| FrameError::Failed {
             origin: path.display().to_string(),
             reason: error.to_string(),
-        })
+        })?;
+        Ok(())
     }
 }
 
@@ -130,10 +127,10 @@ mod tests {
 
         let mut files = ImageFiles::open(folder.path()).unwrap();
         assert_eq!(files.last_path(), None);
-        let mut greys = Vec::new();
+        let (mut greys, mut frame) = (Vec::new(), GrayImage::default());
         loop {
-            match files.grab() {
-                Ok(frame) => greys.push(frame.get_pixel(0, 0).0[0]),
+            match files.grab(&mut frame) {
+                Ok(()) => greys.push(frame.get_pixel(0, 0).0[0]),
                 Err(FrameError::End) => break,
                 Err(error) => {
                     assert!(error.to_string().contains("c.png"), "{error}");
@@ -143,8 +140,7 @@ mod tests {
             }
         }
         assert_eq!(greys, [10, 20, 0, 40]);
-        assert_eq!(files.remaining(), 0);
-        assert!(matches!(files.grab(), Err(FrameError::End)));
+        assert!(matches!(files.grab(&mut frame), Err(FrameError::End)));
     }
 
     #[test]

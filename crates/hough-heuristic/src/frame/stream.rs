@@ -1,165 +1,111 @@
+//! Frames from a stream of bytes.
+
 use std::io::{self, Read};
 
 use image::GrayImage;
 
-use super::{FrameError, FrameSource};
-use crate::error::ConfigError;
+use super::{FrameError, FrameSource, refill};
+use crate::error::{ConfigError, require};
 
 /// The longest line of a Y4M header that is read, bytes.
 const MAX_LINE: usize = 1024;
 /// The most pixels of a frame: what a damaged header may not exceed.
 const MAX_PIXELS: u64 = 1 << 28;
 
-/// A [`FrameSource`] over a YUV4MPEG2 (Y4M) stream of 8-bit video, of which it takes the luma.
-///
-/// So a live camera comes in through a pipe:
+/// A [`FrameSource`] over a stream of 8-bit video, so also over a live camera through a pipe.
 ///
 /// ```text
 /// ffmpeg -i /dev/video0 -f yuv4mpegpipe -pix_fmt yuv420p - | your-program
 /// ```
 ///
 /// A stream that ends in the middle of a frame delivers the frames before it, then an error that
-/// names the frame, then [`FrameError::End`]. After an error nothing more is read.
+/// names the frame, then [`FrameError::End`]. After an error nothing more is read. A pipe buffers
+/// frames: whoever moves a camera by them reads the stream in a thread of its own and keeps the
+/// newest.
 #[derive(Debug)]
-pub struct Y4mFrames<R> {
-    stream: Stream<R>,
-    /// Bytes of chroma after each luma plane.
-    chroma: u64,
+pub struct FrameStream<R> {
+    reader: R,
+    width: u32,
+    height: u32,
+    format: Format,
+    delivered: u64,
+    ended: bool,
 }
 
-impl<R: Read> Y4mFrames<R> {
-    /// Reads the stream's header. Give a buffered reader, such as `stdin().lock()`.
+#[derive(Clone, Copy, Debug)]
+enum Format {
+    /// Luma, row by row, without any header.
+    Raw,
+    /// A line `FRAME`, luma, and so many bytes of chroma.
+    Y4m { chroma: u64 },
+}
+
+impl<R: Read> FrameStream<R> {
+    /// Reads the header of a YUV4MPEG2 (Y4M) stream, of whose frames the luma is taken. Give a
+    /// buffered reader, such as `stdin().lock()`.
     ///
     /// # Errors
-    /// [`FrameError::Failed`] if there is no Y4M header, or one of a format that is not read, with
-    /// what it says.
-    pub fn new(mut reader: R) -> Result<Self, FrameError> {
+    /// [`FrameError::Failed`] if there is no Y4M header, or one of a format that is not supported;
+    /// the text quotes it.
+    pub fn y4m(mut reader: R) -> Result<Self, FrameError> {
         let header = match read_line(&mut reader) {
             Ok(Some(line)) => line,
             Ok(None) => return Err(failed("the stream is empty".into())),
             Err(error) => return Err(failed(format!("no header: {error}"))),
         };
         let (width, height, chroma) = parse_header(&header).map_err(failed)?;
-        Ok(Self {
-            stream: Stream::new(reader, width, height),
-            chroma,
-        })
+        Ok(Self::new(reader, width, height, Format::Y4m { chroma }))
     }
 
-    /// Width and height of the frames, pixels.
-    pub fn dimensions(&self) -> (u32, u32) {
-        (self.stream.width, self.stream.height)
-    }
-}
-
-impl<R: Read> FrameSource for Y4mFrames<R> {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
-        let chroma = self.chroma;
-        self.stream.next(|reader, luma| {
-            match read_line(reader)? {
-                None => return Ok(false),
-                Some(line) if line.starts_with(b"FRAME") => {}
-                Some(_) => {
-                    return Err(io::Error::new(
-                        io::ErrorKind::InvalidData,
-                        "it does not begin with FRAME",
-                    ));
-                }
-            }
-            reader.read_exact(luma)?;
-            let skipped = io::copy(&mut reader.by_ref().take(chroma), &mut io::sink())?;
-            if skipped < chroma {
-                return Err(io::ErrorKind::UnexpectedEof.into());
-            }
-            Ok(true)
-        })
-    }
-}
-
-/// A [`FrameSource`] over raw 8-bit monochrome frames that follow one another without any header.
-///
-/// ```text
-/// ffmpeg -i /dev/video0 -f rawvideo -pix_fmt gray -s 768x576 - | your-program
-/// ```
-///
-/// A stream that ends in the middle of a frame is treated as by [`Y4mFrames`].
-#[derive(Debug)]
-pub struct RawFrames<R> {
-    stream: Stream<R>,
-}
-
-impl<R: Read> RawFrames<R> {
-    /// Frames of `width` x `height` pixels from `reader`.
+    /// Takes frames of `width` x `height` bytes that follow one another without any header, such as
+    /// `ffmpeg -f rawvideo -pix_fmt gray` writes.
     ///
     /// # Errors
     /// [`ConfigError::OutOfRange`] if a side is 0 or a frame has more than 2^28 pixels.
-    pub fn new(reader: R, width: u32, height: u32) -> Result<Self, ConfigError> {
+    pub fn raw(reader: R, width: u32, height: u32) -> Result<Self, ConfigError> {
         for (parameter, side) in [("width", width), ("height", height)] {
             let usable = side > 0 && u64::from(width) * u64::from(height) <= MAX_PIXELS;
             let expected = "at least 1, with at most 2^28 pixels in all";
-            crate::error::require(parameter, side.into(), expected, usable)?;
+            require(parameter, side.into(), expected, usable)?;
         }
-        Ok(Self {
-            stream: Stream::new(reader, width, height),
-        })
+        Ok(Self::new(reader, width, height, Format::Raw))
     }
-}
 
-impl<R: Read> FrameSource for RawFrames<R> {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
-        self.stream.next(|reader, luma| {
-            // An end before the first byte is the ordinary one.
-            let Some(first) = read_byte(reader)? else {
-                return Ok(false);
-            };
-            luma[0] = first;
-            reader.read_exact(&mut luma[1..])?;
-            Ok(true)
-        })
-    }
-}
-
-/// What both streams share: counting frames, and stopping at the first that fails.
-#[derive(Debug)]
-struct Stream<R> {
-    reader: R,
-    width: u32,
-    height: u32,
-    delivered: u64,
-    ended: bool,
-}
-
-impl<R: Read> Stream<R> {
-    fn new(reader: R, width: u32, height: u32) -> Self {
+    fn new(reader: R, width: u32, height: u32, format: Format) -> Self {
         Self {
             reader,
             width,
             height,
+            format,
             delivered: 0,
             ended: false,
         }
     }
 
-    /// The next frame, its luma filled in by `read`, which says false at the ordinary end.
-    fn next(
-        &mut self,
-        read: impl FnOnce(&mut R, &mut [u8]) -> io::Result<bool>,
-    ) -> Result<GrayImage, FrameError> {
+    /// Returns width and height of the frames, pixels.
+    pub fn dimensions(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+}
+
+impl<R: Read> FrameSource for FrameStream<R> {
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         if self.ended {
             return Err(FrameError::End);
         }
-        let mut frame = GrayImage::new(self.width, self.height);
-        match read(&mut self.reader, &mut frame) {
+        let (reader, format) = (&mut self.reader, self.format);
+        let read = refill(frame, (self.width, self.height), |luma| match format {
+            Format::Raw => read_raw(reader, luma),
+            Format::Y4m { chroma } => read_y4m(reader, luma, chroma),
+        });
+        self.ended = !matches!(read, Ok(true));
+        match read {
             Ok(true) => {
                 self.delivered += 1;
-                Ok(frame)
+                Ok(())
             }
-            Ok(false) => {
-                self.ended = true;
-                Err(FrameError::End)
-            }
+            Ok(false) => Err(FrameError::End),
             Err(error) => {
-                self.ended = true;
                 let number = self.delivered + 1;
                 Err(failed(if error.kind() == io::ErrorKind::UnexpectedEof {
                     format!("the stream ends in the middle of frame {number}")
@@ -169,6 +115,37 @@ impl<R: Read> Stream<R> {
             }
         }
     }
+}
+
+/// Reads a raw frame; false at the end of the stream.
+fn read_raw(reader: &mut impl Read, luma: &mut [u8]) -> io::Result<bool> {
+    // An end before the first byte is the ordinary one.
+    let Some(first) = read_byte(reader)? else {
+        return Ok(false);
+    };
+    luma[0] = first;
+    reader.read_exact(&mut luma[1..])?;
+    Ok(true)
+}
+
+/// Reads a Y4M frame; false at the end of the stream.
+fn read_y4m(reader: &mut impl Read, luma: &mut [u8], chroma: u64) -> io::Result<bool> {
+    match read_line(reader)? {
+        None => return Ok(false),
+        Some(line) if line.starts_with(b"FRAME") => {}
+        Some(_) => {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "it does not begin with FRAME",
+            ));
+        }
+    }
+    reader.read_exact(luma)?;
+    let skipped = io::copy(&mut reader.by_ref().take(chroma), &mut io::sink())?;
+    if skipped < chroma {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(true)
 }
 
 fn failed(reason: String) -> FrameError {
@@ -268,19 +245,19 @@ mod tests {
         bytes
     }
 
-    fn greys(source: &mut impl FrameSource) -> (Vec<u8>, String) {
-        let mut greys = Vec::new();
+    fn grays(source: &mut impl FrameSource) -> (Vec<u8>, String) {
+        let (mut grays, mut frame) = (Vec::new(), GrayImage::new(50, 1));
         loop {
-            match source.grab() {
-                Ok(frame) => {
+            match source.grab(&mut frame) {
+                Ok(()) => {
                     assert_eq!(frame.dimensions(), (5, 3));
-                    assert!(frame.iter().all(|&grey| grey == frame.as_raw()[0]));
-                    greys.push(frame.as_raw()[0]);
+                    assert!(frame.iter().all(|&gray| gray == frame.as_raw()[0]));
+                    grays.push(frame.as_raw()[0]);
                 }
-                Err(FrameError::End) => return (greys, String::new()),
+                Err(FrameError::End) => return (grays, String::new()),
                 Err(error) => {
-                    assert!(matches!(source.grab(), Err(FrameError::End)));
-                    return (greys, error.to_string());
+                    assert!(matches!(source.grab(&mut frame), Err(FrameError::End)));
+                    return (grays, error.to_string());
                 }
             }
         }
@@ -298,9 +275,9 @@ mod tests {
             (" Cmono", 0),
         ] {
             let bytes = y4m(colour, chroma, 3);
-            let mut frames = Y4mFrames::new(&bytes[..]).unwrap();
+            let mut frames = FrameStream::y4m(&bytes[..]).unwrap();
             assert_eq!(
-                greys(&mut frames),
+                grays(&mut frames),
                 (vec![0, 1, 2], String::new()),
                 "{colour}"
             );
@@ -313,9 +290,9 @@ mod tests {
         let frame = (bytes.len() - y4m(" C420", 12, 0).len()) / 3;
         let header = bytes.len() - 3 * frame;
         for end in header..bytes.len() {
-            let (greys, error) = greys(&mut Y4mFrames::new(&bytes[..end]).unwrap());
+            let (grays, error) = grays(&mut FrameStream::y4m(&bytes[..end]).unwrap());
             let whole = (end - header) / frame;
-            assert_eq!(greys.len(), whole, "{end}");
+            assert_eq!(grays.len(), whole, "{end}");
             let cut = !(end - header).is_multiple_of(frame);
             assert_eq!(
                 error.contains(&format!("frame {}", whole + 1)),
@@ -324,7 +301,7 @@ mod tests {
             );
         }
         for end in 0..header {
-            assert!(Y4mFrames::new(&bytes[..end]).is_err());
+            assert!(FrameStream::y4m(&bytes[..end]).is_err());
         }
     }
 
@@ -341,23 +318,23 @@ mod tests {
             "YUV4MPEG2 W60000 H60000\n",
             "YUV4MPEG2 W99999999999 H3\n",
         ] {
-            assert!(Y4mFrames::new(header.as_bytes()).is_err(), "{header:?}");
+            assert!(FrameStream::y4m(header.as_bytes()).is_err(), "{header:?}");
         }
         let endless = io::repeat(b'Y');
-        assert!(Y4mFrames::new(endless).is_err());
+        assert!(FrameStream::y4m(endless).is_err());
     }
 
     #[test]
     fn raw_frames_follow_one_another() {
         let bytes: Vec<u8> = (0..4u8).flat_map(|number| [number; 15]).collect();
         assert_eq!(
-            greys(&mut RawFrames::new(&bytes[..], 5, 3).unwrap()),
+            grays(&mut FrameStream::raw(&bytes[..], 5, 3).unwrap()),
             (vec![0, 1, 2, 3], String::new())
         );
-        let (delivered, error) = greys(&mut RawFrames::new(&bytes[..50], 5, 3).unwrap());
+        let (delivered, error) = grays(&mut FrameStream::raw(&bytes[..50], 5, 3).unwrap());
         assert_eq!(delivered, [0, 1, 2]);
         assert!(error.contains("frame 4"), "{error}");
-        assert!(RawFrames::new(&bytes[..], 0, 3).is_err());
-        assert!(RawFrames::new(&bytes[..], u32::MAX, u32::MAX).is_err());
+        assert!(FrameStream::raw(&bytes[..], 0, 3).is_err());
+        assert!(FrameStream::raw(&bytes[..], u32::MAX, u32::MAX).is_err());
     }
 }

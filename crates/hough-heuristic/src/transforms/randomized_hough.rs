@@ -1,17 +1,16 @@
 //! The randomized Hough transform, the nearer of the paper's two rivals.
 
-use std::time::Instant;
-
 use image::GrayImage;
 
-use super::evidence::{Evidence, rank};
+use super::evidence::Evidence;
+use super::pass::Frames;
 use crate::acceptance::Acceptance;
 use crate::circle::Circle;
-use crate::detect::{CircleDetector, Detection, StageTimes, Stages};
-use crate::edges::{Canny, EdgeDetector, EdgeMap};
-use crate::error::ConfigError;
-use crate::error::require;
+use crate::detect::{CircleDetector, Detection, FrameRefused};
+use crate::edges::{Canny, EdgeDetector};
+use crate::error::{ConfigError, require, require_iterations};
 use crate::sampling::{Draw, Sampler, Sampling};
+use crate::stages::Stages;
 
 /// The settings of [`RandomizedHough`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,16 +61,13 @@ impl Default for RandomizedHoughConfig {
 #[derive(Clone, Debug)]
 pub struct RandomizedHough<E = Canny> {
     config: RandomizedHoughConfig,
-    edge_detector: E,
     sampler: Sampler,
-    evidence: Evidence,
     cells: Cells,
-    candidates: Option<Vec<Circle>>,
-    times: StageTimes,
+    frames: Frames<E>,
 }
 
 impl<E: EdgeDetector> RandomizedHough<E> {
-    /// A detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
+    /// Builds a detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
     ///
     /// # Errors
     /// The first parameter outside its range.
@@ -81,126 +77,76 @@ impl<E: EdgeDetector> RandomizedHough<E> {
             iterations,
             votes,
             cell,
-            ..
+            sampling,
+            seed,
         } = config;
-        require(
-            "iterations",
-            iterations.into(),
-            "at least 1",
-            iterations > 0,
-        )?;
+        require_iterations(iterations)?;
         require("votes", votes.into(), "2..=255", (2..=255).contains(&votes))?;
         require("cell", cell, "0.5..=64 px", (0.5..=64.0).contains(&cell))?;
         Ok(Self {
-            evidence: Evidence::new(accept)?,
-            sampler: Sampler::new(config.sampling, &accept, config.seed),
-            edge_detector,
-            cells: Cells::with_room_for(config.iterations),
-            candidates: None,
-            times: StageTimes::default(),
+            frames: Frames::new(edge_detector, Evidence::new(accept)?),
+            sampler: Sampler::new(sampling, &accept, seed),
+            cells: Cells::with_room_for(iterations),
             config,
         })
     }
 
-    /// The edges of the last frame; empty before the first.
-    pub fn edges(&self) -> &EdgeMap {
-        self.edge_detector.edges()
+    /// Sets whether the detector remembers the candidates of each frame from now on, for
+    /// [`stages`](Self::stages). By default it does not.
+    pub fn keep_candidates(&mut self, keep: bool) {
+        self.frames.keep_candidates(keep);
     }
 
-    /// The memory that the circle search holds, bytes, edges not included.
-    pub fn memory(&self) -> usize {
-        self.evidence.memory()
-            + size_of::<Cell>() * (self.cells.slots.len() + self.cells.moved.len())
+    /// Returns the stages of the last frame that was searched.
+    pub fn stages(&self) -> Stages<'_> {
+        let cells = self.cells.slots.len() + self.cells.moved.len();
+        self.frames.stages(size_of::<Cell>() * cells)
     }
 }
 
 impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
-    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        found.clear();
-        if self.check_frame(frame.width(), frame.height()).is_err() {
-            return;
-        }
-        let start = Instant::now();
-        let edges = self.edge_detector.detect_edges(frame);
-        let with_edges = Instant::now();
-        let evidence = &mut self.evidence;
-        evidence.fill(edges);
-        let with_structure = Instant::now();
-
-        if let Some(candidates) = &mut self.candidates {
-            candidates.clear();
-        }
-        self.cells.clear();
-        self.sampler.restart();
+    fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
         let RandomizedHoughConfig {
             accept,
+            iterations,
             votes,
             cell,
             ..
         } = self.config;
-        for _ in 0..self.config.iterations {
-            let circle = match self.sampler.draw(&evidence.structure) {
-                Draw::Exhausted => break,
-                Draw::Nothing => continue,
-                Draw::Circle(circle) => circle,
-            };
-            // Triples scatter around their circle, so votes are taken from a cell beyond the range
-            // of radii.
-            let radii = accept.min_radius - cell..=accept.max_radius + cell;
-            if !radii.contains(&circle.radius)
-                || accept.region.is_some_and(|region| !region.holds(&circle))
-            {
-                continue;
-            }
-            let Some(mean) = self.cells.vote(&circle, cell, votes) else {
-                continue;
-            };
-            let mean = Circle {
-                radius: mean.radius.clamp(accept.min_radius, accept.max_radius),
-                ..mean
-            };
-            if !evidence.might_be(&mean) {
-                continue;
-            }
-            if let Some(candidates) = &mut self.candidates {
-                candidates.push(mean);
-            }
-            let reach = cell.max(2.0 * accept.tolerance + 1.0);
-            let verified = evidence
-                .fitted(edges, mean, reach)
-                .filter(|circle| accept.admits(circle, found))
-                .and_then(|circle| evidence.check(circle));
-            if let Some(detection) = verified {
-                evidence.accept(edges, detection, found);
-                self.cells.clear();
-                if found.len() == accept.max_circles {
-                    break;
+        accept.check_frame(frame.width(), frame.height())?;
+        self.cells.clear();
+        self.sampler.restart();
+        // Triples scatter around their circle, so votes are taken from a cell beyond the range of
+        // radii.
+        let radii = accept.min_radius - cell..=accept.max_radius + cell;
+        let reach = cell.max(2.0 * accept.tolerance + 1.0);
+        Ok(self.frames.run(frame, |pass| {
+            for _ in 0..iterations {
+                let circle = match self.sampler.draw(&pass.evidence.structure) {
+                    Draw::Exhausted => break,
+                    Draw::Nothing => continue,
+                    Draw::Circle(circle) => circle,
+                };
+                if !radii.contains(&circle.radius)
+                    || accept.region.is_some_and(|region| !region.holds(&circle))
+                {
+                    continue;
+                }
+                let Some(mean) = self.cells.vote(&circle, cell, votes) else {
+                    continue;
+                };
+                let mean = Circle {
+                    radius: mean.radius.clamp(accept.min_radius, accept.max_radius),
+                    ..mean
+                };
+                if pass.evidence.might_be(&mean) && pass.verify(mean, reach) {
+                    self.cells.clear();
+                    if pass.is_complete() {
+                        break;
+                    }
                 }
             }
-        }
-        rank(found);
-        self.times = StageTimes {
-            edges: with_edges - start,
-            structure: with_structure - with_edges,
-            search: with_structure.elapsed(),
-        };
-    }
-
-    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
-        self.config.accept.check_frame(width, height)
-    }
-
-    fn keep_candidates(&mut self, keep: bool) {
-        self.candidates = keep.then(Vec::new);
-    }
-
-    fn stages(&self) -> Option<Stages<'_>> {
-        Some(Stages {
-            edges: self.edges(),
-            candidates: self.candidates.as_deref().unwrap_or_default(),
-            times: self.times,
-            tolerance: self.config.accept.tolerance,
-        })
+        }))
     }
 }
 

@@ -1,16 +1,15 @@
 //! The standard Hough transform for circles, the other of the paper's rivals.
 
-use std::time::Instant;
-
 use image::GrayImage;
 
-use super::evidence::{Evidence, rank};
+use super::evidence::Evidence;
+use super::pass::Frames;
 use crate::acceptance::Acceptance;
 use crate::circle::Circle;
-use crate::detect::{CircleDetector, Detection, StageTimes, Stages};
-use crate::edges::{Canny, EdgeDetector, EdgeMap};
-use crate::error::ConfigError;
-use crate::error::require;
+use crate::detect::{CircleDetector, Detection, FrameRefused};
+use crate::edges::{Canny, EdgeDetector};
+use crate::error::{ConfigError, require};
+use crate::stages::Stages;
 
 /// The settings of [`StandardHough`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +33,7 @@ pub struct StandardHoughConfig {
     /// 0.4; 0..1).
     pub min_votes: f64,
     /// The most memory that the accumulator may take, bytes (default 2^29, half a gigabyte; at
-    /// least 1). A frame that needs more is refused:
-    /// [`StandardHough::check_frame`](CircleDetector::check_frame).
+    /// least 1). A frame that needs more is refused: [`FrameRefused::Accumulator`].
     pub max_memory: u64,
 }
 
@@ -71,16 +69,13 @@ impl Default for StandardHoughConfig {
 #[derive(Clone, Debug)]
 pub struct StandardHough<E = Canny> {
     config: StandardHoughConfig,
-    edge_detector: E,
-    evidence: Evidence,
+    frames: Frames<E>,
     /// For each radius the cells around a pixel that it votes for, by direction.
     rings: Vec<Ring>,
     accumulator: Accumulator,
     peaks: Vec<Peak>,
     /// The directions of the gradients, in turns.
     turns: Vec<f64>,
-    candidates: Option<Vec<Circle>>,
-    times: StageTimes,
 }
 
 /// The cells at one radius from the origin.
@@ -157,34 +152,32 @@ impl<E: EdgeDetector> StandardHough<E> {
                     )
                 })
                 .collect(),
-            evidence,
-            edge_detector,
+            frames: Frames::new(edge_detector, evidence),
             accumulator: Accumulator::default(),
             peaks: Vec::with_capacity(FORESEEN_PEAKS),
             turns: Vec::new(),
-            candidates: None,
-            times: StageTimes::default(),
             config,
         })
     }
 
-    /// The edges of the last frame; empty before the first.
-    pub fn edges(&self) -> &EdgeMap {
-        self.edge_detector.edges()
+    /// Sets whether the detector remembers the candidates of each frame from now on, for
+    /// [`stages`](Self::stages). By default it does not.
+    pub fn keep_candidates(&mut self, keep: bool) {
+        self.frames.keep_candidates(keep);
     }
 
-    /// The memory that the circle search holds, bytes, edges not included.
-    pub fn memory(&self) -> usize {
+    /// Returns the stages of the last frame that was searched.
+    pub fn stages(&self) -> Stages<'_> {
         let rings: usize = self
             .rings
             .iter()
             .map(|ring| size_of::<(i32, i32)>() * (ring.cells.capacity() + ring.around.capacity()))
             .sum();
-        self.evidence.memory()
-            + rings
+        let memory = rings
             + size_of::<u16>() * self.accumulator.votes.capacity()
             + size_of::<Peak>() * self.peaks.capacity()
-            + size_of::<f64>() * self.turns.capacity()
+            + size_of::<f64>() * self.turns.capacity();
+        self.frames.stages(memory)
     }
 
     /// How many of the radii a frame can hold.
@@ -197,83 +190,9 @@ impl<E: EdgeDetector> StandardHough<E> {
             .take_while(|ring| ring.radius <= diagonal + self.config.cell)
             .count()
     }
-}
 
-impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
-    fn detect_into(&mut self, frame: &GrayImage, found: &mut Vec<Detection>) {
-        found.clear();
-        if self.check_frame(frame.width(), frame.height()).is_err() {
-            return;
-        }
-        let fitting = self.fitting(frame.width(), frame.height());
-        let start = Instant::now();
-        let edges = self.edge_detector.detect_edges(frame);
-        let with_edges = Instant::now();
-        let StandardHoughConfig {
-            accept,
-            cell,
-            gradient,
-            min_votes,
-            ..
-        } = self.config;
-        self.evidence.fill(edges);
-        let with_structure = Instant::now();
-
-        let rings = &self.rings[..fitting];
-        self.accumulator
-            .clear(edges.width(), edges.height(), cell, rings.len());
-        self.turns.clear();
-        if gradient {
-            self.turns.extend(edges.gradients().iter().map(|gradient| {
-                let (gx, gy) = gradient.vector();
-                gy.atan2(gx) / std::f64::consts::TAU
-            }));
-        }
-        for (layer, ring) in rings.iter().enumerate() {
-            for (index, pixel) in edges.pixels().iter().enumerate() {
-                let (x, y) = (
-                    (f64::from(pixel.x) / cell) as i32,
-                    (f64::from(pixel.y) / cell) as i32,
-                );
-                let mut slice = self.accumulator.layer(layer);
-                match self.turns.get(index) {
-                    Some(&turn) => slice.vote(x, y, ring.along(turn)),
-                    None => slice.vote(x, y, ring.cells.iter()),
-                }
-            }
-        }
-        self.accumulator
-            .find_peaks(rings, min_votes, cell, &mut self.peaks);
-
-        if let Some(candidates) = &mut self.candidates {
-            candidates.clear();
-        }
-        let reach = (1.5 * cell).max(2.0 * accept.tolerance + 1.0);
-        for peak in &self.peaks {
-            if found.len() == accept.max_circles {
-                break;
-            }
-            if let Some(candidates) = &mut self.candidates {
-                candidates.push(peak.circle);
-            }
-            let evidence = &mut self.evidence;
-            let verified = evidence
-                .fitted(edges, peak.circle, reach)
-                .filter(|circle| accept.admits(circle, found))
-                .and_then(|circle| evidence.check(circle));
-            if let Some(detection) = verified {
-                evidence.accept(edges, detection, found);
-            }
-        }
-        rank(found);
-        self.times = StageTimes {
-            edges: with_edges - start,
-            structure: with_structure - with_edges,
-            search: with_structure.elapsed(),
-        };
-    }
-
-    fn check_frame(&self, width: u32, height: u32) -> Result<(), ConfigError> {
+    /// Refuses a frame whose accumulator would take too much memory.
+    fn check_frame(&self, width: u32, height: u32) -> Result<(), FrameRefused> {
         let StandardHoughConfig {
             accept,
             cell,
@@ -290,25 +209,65 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
         if needed <= max_memory {
             return Ok(());
         }
-        Err(ConfigError::Accumulator {
+        Err(FrameRefused::Accumulator {
             frame_width: width,
             frame_height: height,
             needed,
             limit: max_memory,
         })
     }
+}
 
-    fn keep_candidates(&mut self, keep: bool) {
-        self.candidates = keep.then(Vec::new);
-    }
-
-    fn stages(&self) -> Option<Stages<'_>> {
-        Some(Stages {
-            edges: self.edges(),
-            candidates: self.candidates.as_deref().unwrap_or_default(),
-            times: self.times,
-            tolerance: self.config.accept.tolerance,
-        })
+impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
+    fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
+        self.check_frame(frame.width(), frame.height())?;
+        let StandardHoughConfig {
+            accept,
+            cell,
+            gradient,
+            min_votes,
+            ..
+        } = self.config;
+        let rings = &self.rings[..self.fitting(frame.width(), frame.height())];
+        let reach = (1.5 * cell).max(2.0 * accept.tolerance + 1.0);
+        let Self {
+            frames,
+            accumulator,
+            peaks,
+            turns,
+            ..
+        } = self;
+        Ok(frames.run(frame, |pass| {
+            let edges = pass.edges;
+            accumulator.clear(edges.width(), edges.height(), cell, rings.len());
+            turns.clear();
+            if gradient {
+                turns.extend(edges.gradients().iter().map(|gradient| {
+                    let (gx, gy) = gradient.vector();
+                    gy.atan2(gx) / std::f64::consts::TAU
+                }));
+            }
+            for (layer, ring) in rings.iter().enumerate() {
+                for (index, pixel) in edges.pixels().iter().enumerate() {
+                    let (x, y) = (
+                        (f64::from(pixel.x) / cell) as i32,
+                        (f64::from(pixel.y) / cell) as i32,
+                    );
+                    let mut slice = accumulator.layer(layer);
+                    match turns.get(index) {
+                        Some(&turn) => slice.vote(x, y, ring.along(turn)),
+                        None => slice.vote(x, y, ring.cells.iter()),
+                    }
+                }
+            }
+            accumulator.find_peaks(rings, min_votes, cell, peaks);
+            for peak in peaks.iter() {
+                if pass.is_complete() {
+                    break;
+                }
+                pass.verify(peak.circle, reach);
+            }
+        }))
     }
 }
 

@@ -87,10 +87,10 @@ fn measurements_and_effort_are_those_of_the_last_frame() {
     let mut used = plain();
     for first in &frames {
         for second in &frames {
-            used.detect(first);
-            let found = used.detect(second).len();
+            used.detect(first).unwrap();
+            let found = used.detect(second).unwrap().len();
             let mut fresh = plain();
-            fresh.detect(second);
+            fresh.detect(second).unwrap();
             assert_eq!(used.measurements(), fresh.measurements());
             assert_eq!(used.measurements().len(), found);
             assert_eq!(used.effort(), fresh.effort());
@@ -102,8 +102,14 @@ fn measurements_and_effort_are_those_of_the_last_frame() {
 fn the_seed_decides_the_order_and_little_else() {
     let (frame, balls) = SCENE.render();
     for seed in [0, 1, 2, 99, u64::MAX] {
-        let found = with(|config| config.seed = seed).detect(&frame);
-        assert_eq!(found, with(|config| config.seed = seed).detect(&frame));
+        let found = with(|config| config.seed = seed)
+            .detect(&frame)
+            .unwrap()
+            .to_vec();
+        assert_eq!(
+            found,
+            with(|config| config.seed = seed).detect(&frame).unwrap()
+        );
         for ball in &balls {
             assert!(
                 found.iter().any(|f| same(&f.circle, ball, 0.35)),
@@ -119,7 +125,7 @@ fn found_of(kind: &Kind, seed: u64, frames: u64) -> (usize, usize) {
     let (mut hits, mut others) = (0, 0);
     for number in 0..frames {
         let (frame, balls) = kind.render((768, 576), seed, number);
-        let found = detector.detect(&frame);
+        let found = detector.detect(&frame).unwrap().to_vec();
         let is_found = |ball: &&Circle| found.iter().any(|one| same(&one.circle, ball, 2.0));
         let hit = balls.iter().filter(is_found).count();
         hits += hit;
@@ -163,7 +169,7 @@ fn discs_are_found_of_which_more_than_half_is_hidden_aslant() {
                 200
             }])
         });
-        let found = plain().detect(&frame);
+        let found = plain().detect(&frame).unwrap().to_vec();
         assert_eq!(found.len(), 1, "{dx} {dy}: {found:?}");
         let disc = Circle {
             x: 160.3,
@@ -181,7 +187,7 @@ fn frames_of_any_size_pass() {
         for height in [0, 1, 2, 3, 11, 12, 13, 24, 80, 161] {
             for (w, h) in [(width, height), (height, width)] {
                 let frame = GrayImage::from_fn(w, h, |x, y| Luma([(x * 37 + y * 91) as u8]));
-                detector.detect(&frame);
+                detector.detect(&frame).unwrap();
             }
         }
     }
@@ -208,11 +214,11 @@ fn any_number_of_threads_finds_the_same() {
         let (frame, balls) = scene.render();
         let detector = || with(|config| config.max_radius = 130.0);
         let mut one = detector();
-        pool(1).install(|| one.detect(&frame));
+        pool(1).install(|| one.detect(&frame).unwrap());
         assert!(2 * one.measurements().len() > balls.len());
         for threads in [2, 3, 8] {
             let mut several = detector();
-            pool(threads).install(|| several.detect(&frame));
+            pool(threads).install(|| several.detect(&frame).unwrap());
             assert_eq!(several.measurements(), one.measurements());
             assert_eq!(several.effort(), one.effort());
         }
@@ -230,7 +236,7 @@ proptest! {
             config.min_radius = 4.0;
             config.min_score = 0.0;
         });
-        for detection in detector.detect(&frame) {
+        for detection in detector.detect(&frame).unwrap() {
             prop_assert!((0.0..=1.0).contains(&detection.score));
             prop_assert!(detection.circle.x.is_finite() && detection.circle.y.is_finite());
             prop_assert!((4.0..=60.0).contains(&detection.circle.radius));
@@ -244,7 +250,7 @@ proptest! {
     #[test]
     fn any_last_circle_can_be_followed(x in -1e3f64..1e3, y in -1e3f64..1e3, radius in -1e2f64..1e3, reach in -10f64..1e3) {
         let (frame, _) = SCENE.render();
-        plain().track(&frame, &Circle { x, y, radius }, reach, &mut Vec::new());
+        plain().track(&frame, &Circle { x, y, radius }, reach).unwrap();
     }
 }
 
@@ -256,7 +262,7 @@ fn no_pattern_takes_more_than_the_budget() {
                 config.max_radius = 140.0;
                 config.draws_per_megapixel = draws_per_megapixel;
             });
-            detector.detect(&frame);
+            detector.detect(&frame).unwrap();
             let effort = detector.effort();
             // The frame counts as one of a quarter of a megapixel.
             let draws = u64::from(draws_per_megapixel) / 4;
@@ -294,13 +300,13 @@ fn a_budget_that_allows_nothing_is_an_error_and_a_small_one_is_told() {
     }
     let (frame, _) = SCENE.render();
     let mut hasty = with(|config| config.draws_per_megapixel = 1);
-    assert!(hasty.detect(&frame).len() <= 1);
+    assert!(hasty.detect(&frame).unwrap().len() <= 1);
     assert!(hasty.effort().ended_by_budget);
     let mut late = with(|config| config.milliseconds_per_megapixel = Some(1e-6));
-    assert_eq!(late.detect(&frame), []);
+    assert_eq!(late.detect(&frame).unwrap(), []);
     assert!(late.effort().ended_by_budget);
     let mut calm = plain();
-    calm.detect(&frame);
+    calm.detect(&frame).unwrap();
     assert!(!calm.effort().ended_by_budget);
 }
 
@@ -316,7 +322,7 @@ fn a_circle_is_followed_with_less_effort() {
     let (frame, balls) = scene.render();
     let ball = balls[0];
     let mut detector = plain();
-    let found = detector.detect(&frame);
+    let found = detector.detect(&frame).unwrap().to_vec();
     let full = detector.effort();
     let one = found.iter().find(|f| same(&f.circle, &ball, 0.35)).unwrap();
 
@@ -325,14 +331,13 @@ fn a_circle_is_followed_with_less_effort() {
         y: ball.y - 4.0,
         radius: ball.radius + 1.0,
     };
-    let mut followed = Vec::new();
-    assert!(detector.track(&frame, &moved, 10.0, &mut followed));
+    assert!(detector.track(&frame, &moved, 10.0).unwrap());
+    let followed = detector.measurements().to_vec();
     assert_eq!(followed.len(), 1);
     assert!(
         same(&followed[0].circle, &one.circle, 0.1),
         "{followed:?} {one:?}"
     );
-    assert_eq!(detector.measurements()[0].circle, followed[0].circle);
     assert!(
         2 * detector.effort().looks < full.looks,
         "{:?} {full:?}",
@@ -344,11 +349,15 @@ fn a_circle_is_followed_with_less_effort() {
         x: ball.x + 30.0,
         ..ball
     };
-    assert!(!detector.track(&frame, &away, 10.0, &mut followed));
-    assert_eq!(followed, found);
+    assert!(!detector.track(&frame, &away, 10.0).unwrap());
+    assert_eq!(detector.measurements().len(), found.len());
     for nowhere in [f64::NAN, f64::INFINITY, -1e9] {
-        assert!(!detector.track(&frame, &Circle { x: nowhere, ..ball }, 10.0, &mut followed));
-        assert!(!detector.track(&frame, &ball, nowhere, &mut followed));
+        assert!(
+            !detector
+                .track(&frame, &Circle { x: nowhere, ..ball }, 10.0)
+                .unwrap()
+        );
+        assert!(!detector.track(&frame, &ball, nowhere).unwrap());
     }
 }
 
@@ -385,7 +394,7 @@ fn detections_are_the_golden_ones() {
     let discs = |(name, _): &(String, GrayImage)| name == "grid-of-discs-24";
     frames.extend(patterns(200, 160).into_iter().filter(discs));
     for (name, frame) in &frames {
-        for found in plain().detect(frame) {
+        for found in plain().detect(frame).unwrap() {
             let Circle { x, y, radius } = found.circle;
             writeln!(text, "{name}: {x:.2} {y:.2} {radius:.2} {:.3}", found.score).unwrap();
         }

@@ -22,7 +22,7 @@ fn the_score_means_what_it_says() {
         let (columns, rows) = (200 / grain, 160 / grain);
         let fine = GrayImage::from_fn(columns, rows, |_, _| Luma([rng.next_u32() as u8]));
         let frame = imageops::resize(&fine, 200, 160, imageops::FilterType::Triangle);
-        detector.detect(&frame);
+        detector.detect(&frame).unwrap();
         let least = |m: &Measurement| m.log_false_alarms <= -1.0;
         alarms += detector.measurements().iter().filter(|m| least(m)).count();
         sure += detector
@@ -51,7 +51,7 @@ fn the_standard_error_holds() {
             ..SCENE
         }
         .render();
-        detector.detect(&frame);
+        detector.detect(&frame).unwrap();
         for m in detector.measurements() {
             let Some(ball) = balls.iter().find(|ball| same(&m.circle, ball, 2.0)) else {
                 continue;
@@ -93,13 +93,13 @@ fn edge(off: f64, inside: f64, outside: f64) -> f64 {
 #[test]
 fn a_lamp_in_its_glow_is_no_circle_but_a_white_ball_is() {
     let ball = around_the_centre(|distance, _| edge(distance - 14.0, 255.0, 120.0));
-    assert_eq!(plain().detect(&ball).len(), 1);
+    assert_eq!(plain().detect(&ball).unwrap().len(), 1);
     let glow = |distance: f64| 60.0 + 110.0 * (-(distance - 14.0).max(0.0) / 8.0).exp();
     let lamp = around_the_centre(|distance, _| edge(distance - 14.0, 255.0, glow(distance)));
-    assert_eq!(plain().detect(&lamp), []);
+    assert_eq!(plain().detect(&lamp).unwrap(), []);
     // The same light below what is as bright as can be is a thing in front of a bright spot.
     let dim = around_the_centre(|distance, _| 0.8 * edge(distance - 14.0, 255.0, glow(distance)));
-    assert_eq!(plain().detect(&dim).len(), 1);
+    assert_eq!(plain().detect(&dim).unwrap().len(), 1);
 }
 
 #[test]
@@ -113,8 +113,8 @@ fn what_is_round_but_not_a_circle_is_not_reported() {
             )
         })
     };
-    assert_eq!(plain().detect(&wavy(0.01)).len(), 1);
-    assert_eq!(plain().detect(&wavy(0.07)), []);
+    assert_eq!(plain().detect(&wavy(0.01)).unwrap().len(), 1);
+    assert_eq!(plain().detect(&wavy(0.07)).unwrap(), []);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn a_slight_ellipse_is_accepted_and_told() {
         Luma([(200 - 9 * covered.count()) as u8])
     });
     let mut detector = plain();
-    detector.detect(&frame);
+    detector.detect(&frame).unwrap();
     let [m] = detector.measurements() else {
         panic!("{:?}", detector.measurements());
     };

@@ -1,10 +1,11 @@
 //! Frames of every size and content, also those that no camera delivers.
 
 use hough_heuristic::image::{GrayImage, Luma};
-use hough_heuristic::{Acceptance, CannyConfig, Circle, CircleDetector};
+use hough_heuristic::{Acceptance, CannyConfig, Circle};
 use proptest::prelude::*;
 
 use crate::detectors::{ACCEPT, all_on};
+use crate::staged::Staged;
 
 /// Thresholds that noise does not raise, so that noise is full of edges.
 const FIXED: CannyConfig = CannyConfig {
@@ -28,10 +29,10 @@ trait EdgesOf {
     fn edges_of(&mut self, frame: &GrayImage) -> usize;
 }
 
-impl EdgesOf for Box<dyn CircleDetector> {
+impl EdgesOf for Box<dyn Staged> {
     fn edges_of(&mut self, frame: &GrayImage) -> usize {
-        self.detect(frame);
-        self.stages().unwrap().edges.pixels().len()
+        self.detect(frame).unwrap();
+        self.stages().edges.pixels().len()
     }
 }
 
@@ -54,7 +55,11 @@ fn every_small_size_and_every_flat_frame_passes() {
                 );
                 for grey in [0, 255] {
                     let flat = GrayImage::from_pixel(width, height, Luma([grey]));
-                    assert_eq!(detector.detect(&flat), [], "{name} {width}x{height}");
+                    assert_eq!(
+                        detector.detect(&flat).unwrap(),
+                        [],
+                        "{name} {width}x{height}"
+                    );
                 }
             }
         }
@@ -62,7 +67,7 @@ fn every_small_size_and_every_flat_frame_passes() {
         assert!(edges > 1000, "{name}: only {edges} edge pixels");
         for (width, height) in [(1, 700), (700, 1), (2, 700), (3, 700), (700, 3)] {
             let frame = GrayImage::from_fn(width, height, |x, y| Luma([((x ^ y) * 85) as u8]));
-            detector.detect(&frame);
+            detector.detect(&frame).unwrap();
         }
     }
 }
@@ -85,8 +90,8 @@ proptest! {
             ..ACCEPT
         };
         for (name, mut detector) in all_on(accept, FIXED) {
-            let found = detector.detect(&frame);
-            let edges = detector.stages().unwrap().edges.pixels().len();
+            let found = detector.detect(&frame).unwrap().to_vec();
+            let edges = detector.stages().edges.pixels().len();
             prop_assert!(edges > 0 || width < 12 || height < 12, "{}: no edges in {}x{}", name, width, height);
             for f in &found {
                 let Circle { x, y, radius } = f.circle;
@@ -94,7 +99,7 @@ proptest! {
                 prop_assert!((min..=min + span).contains(&radius), "{}", name);
                 prop_assert!(f.score > 0.3 && f.score <= 1.0, "{}", name);
             }
-            prop_assert_eq!(detector.detect(&frame), found);
+            prop_assert_eq!(detector.detect(&frame).unwrap(), found);
         }
     }
 }

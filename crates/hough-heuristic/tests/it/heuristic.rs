@@ -1,6 +1,7 @@
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{
-    Canny, CircleDetector, ConfigError, EdgeDetector, Heuristic, HeuristicConfig, Region, Sampling,
+    Acceptance, Canny, CircleDetector, ConfigError, EdgeDetector, Heuristic, HeuristicConfig,
+    Sampling,
 };
 
 use crate::scenes::{Scene, same};
@@ -21,8 +22,8 @@ fn a_small_ball_in_clutter_is_found_reliably() {
     let mut edges = Vec::new();
     for seed in 0..30 {
         let (frame, balls) = cluttered(seed).render();
-        let found = detector.detect(&frame);
-        edges.push(detector.edges().pixels().len());
+        let found = detector.detect(&frame).unwrap().to_vec();
+        edges.push(detector.stages().edges.pixels().len());
         assert!(
             found.iter().any(|f| same(&f.circle, &balls[0], 1.0)),
             "seed {seed}: {found:?} {:?}",
@@ -50,7 +51,7 @@ fn balls_of_every_radius_are_found_to_a_third_of_a_pixel() {
             ..Scene::default()
         };
         let (frame, balls) = scene.render();
-        let found = detector.detect(&frame);
+        let found = detector.detect(&frame).unwrap().to_vec();
         assert_eq!(found.len(), 1);
         assert!(
             same(&found[0].circle, &balls[0], 0.34),
@@ -69,11 +70,18 @@ fn several_balls_come_best_first() {
     };
     let (frame, balls) = scene.render();
     let config = HeuristicConfig {
-        max_radius: 80.0,
-        max_circles: 32,
+        accept: Acceptance {
+            max_radius: 80.0,
+            max_circles: 32,
+            ..Acceptance::default()
+        },
         ..HeuristicConfig::default()
     };
-    let found = Heuristic::with_canny(config).unwrap().detect(&frame);
+    let found = Heuristic::with_canny(config)
+        .unwrap()
+        .detect(&frame)
+        .unwrap()
+        .to_vec();
     assert_eq!(found.len(), 6, "{found:?}");
     for ball in &balls {
         assert!(found.iter().any(|f| same(&f.circle, ball, 0.5)), "{ball:?}");
@@ -82,45 +90,31 @@ fn several_balls_come_best_first() {
 }
 
 #[test]
-fn only_centres_in_the_region_are_reported() {
-    let scene = Scene {
-        balls: 6,
-        radius: (20.0, 60.0),
-        ..Scene::default()
-    };
-    let (frame, balls) = scene.render();
-    let region = Region::in_frame((0, 0), (384, 576), frame.dimensions()).unwrap();
-    let config = HeuristicConfig {
-        region: Some(region),
-        max_circles: 9,
-        ..HeuristicConfig::default()
-    };
-    let found = Heuristic::with_canny(config).unwrap().detect(&frame);
-    assert_eq!(
-        found.len(),
-        balls.iter().filter(|ball| region.holds(ball)).count()
-    );
-    assert!(found.iter().all(|f| region.holds(&f.circle)));
-}
-
-#[test]
 fn frame_and_configuration_alone_decide() {
     let frames: Vec<_> = (0..3).map(|seed| cluttered(seed).render().0).collect();
     for sampling in [Sampling::Near, Sampling::Anywhere] {
         let config = HeuristicConfig {
+            accept: Acceptance {
+                max_circles: 4,
+                ..Acceptance::default()
+            },
             sampling,
-            max_circles: 4,
             ..HeuristicConfig::default()
         };
-        let fresh =
-            |frame: &GrayImage| Heuristic::with_canny(config.clone()).unwrap().detect(frame);
-        let mut used = Heuristic::with_canny(config.clone()).unwrap();
+        let fresh = |frame: &GrayImage| {
+            Heuristic::with_canny(config)
+                .unwrap()
+                .detect(frame)
+                .unwrap()
+                .to_vec()
+        };
+        let mut used = Heuristic::with_canny(config).unwrap();
         for index in [0, 1, 0, 2, 1] {
-            assert_eq!(used.detect(&frames[index]), fresh(&frames[index]));
+            assert_eq!(used.detect(&frames[index]).unwrap(), fresh(&frames[index]));
         }
-        assert_eq!(used.detect(&GrayImage::new(0, 0)), []);
-        assert_eq!(used.edges().pixels(), []);
-        assert_eq!(used.detect(&frames[2]), fresh(&frames[2]));
+        assert_eq!(used.detect(&GrayImage::new(0, 0)).unwrap(), []);
+        assert_eq!(used.stages().edges.pixels(), []);
+        assert_eq!(used.detect(&frames[2]).unwrap(), fresh(&frames[2]));
     }
 }
 
@@ -139,79 +133,32 @@ fn frames_without_circles_give_none() {
     ] {
         for grey in [0, 255] {
             let frame = GrayImage::from_pixel(width, height, Luma([grey]));
-            assert_eq!(detector.detect(&frame), []);
+            assert_eq!(detector.detect(&frame).unwrap(), []);
         }
     }
 }
 
 #[test]
 fn unusable_settings_are_refused_with_their_values() {
-    let default = HeuristicConfig::default;
+    let with = |change: fn(&mut Acceptance)| {
+        let mut config = HeuristicConfig::default();
+        change(&mut config.accept);
+        config
+    };
+    let no_draws = HeuristicConfig {
+        iterations: 0,
+        ..HeuristicConfig::default()
+    };
     for (config, value) in [
-        (
-            HeuristicConfig {
-                theta: 1.5,
-                ..default()
-            },
-            "1.5",
-        ),
-        (
-            HeuristicConfig {
-                theta: f64::NAN,
-                ..default()
-            },
-            "NaN",
-        ),
-        (
-            HeuristicConfig {
-                iterations: 0,
-                ..default()
-            },
-            "iterations is 0",
-        ),
-        (
-            HeuristicConfig {
-                min_radius: 50.0,
-                max_radius: 40.0,
-                ..default()
-            },
-            "50..=40",
-        ),
-        (
-            HeuristicConfig {
-                min_radius: -3.0,
-                ..default()
-            },
-            "-3",
-        ),
-        (
-            HeuristicConfig {
-                max_radius: f64::INFINITY,
-                ..default()
-            },
-            "inf",
-        ),
-        (
-            HeuristicConfig {
-                tolerance: 9.0,
-                ..default()
-            },
-            "9",
-        ),
-        (
-            HeuristicConfig {
-                max_circles: 0,
-                ..default()
-            },
-            "max_circles is 0",
-        ),
-        (
-            HeuristicConfig {
-                min_distance: -1.0,
-                ..default()
-            },
-            "-1",
-        ),
+        (no_draws, "iterations is 0"),
+        (with(|accept| accept.theta = 1.5), "1.5"),
+        (with(|accept| accept.theta = f64::NAN), "NaN"),
+        (with(|accept| accept.max_radius = 14.0), "15..=14"),
+        (with(|accept| accept.min_radius = -3.0), "-3"),
+        (with(|accept| accept.max_radius = f64::INFINITY), "inf"),
+        (with(|accept| accept.tolerance = 9.0), "9"),
+        (with(|accept| accept.max_circles = 0), "max_circles is 0"),
+        (with(|accept| accept.min_distance = -1.0), "-1"),
     ] {
         let error: ConfigError = Heuristic::with_canny(config).unwrap_err();
         assert!(error.to_string().contains(value), "{error}");

@@ -11,6 +11,8 @@ mod patterns;
 mod scenes;
 #[path = "../../scenes/simple.rs"]
 mod simple;
+#[path = "../../scenes/staged.rs"]
+mod staged;
 
 mod a_contrario;
 mod a_contrario_score;

@@ -1,41 +1,33 @@
 //! Settings and frames that a detector refuses, and what memory it takes for the others.
 
-use hough_heuristic::image::{GrayImage, Luma, imageops};
+use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{
-    Acceptance, Canny, Circle, CircleDetector, ConfigError, Detection, RandomizedHough,
-    RandomizedHoughConfig, Region, StandardHough, StandardHoughConfig,
+    Acceptance, Canny, CircleDetector, FrameRefused, RandomizedHough, RandomizedHoughConfig,
+    Region, StandardHough, StandardHoughConfig,
 };
 
 use crate::detectors::{ACCEPT, SCENE, all};
 
-const TINY: Circle = Circle {
-    x: 1.0,
-    y: 1.0,
-    radius: 1.0,
-};
-
 #[test]
 fn a_frame_that_the_region_sticks_out_of_is_refused() {
     let (frame, _) = SCENE.render();
-    let region = Region::in_frame((200, 100), (40, 80), (240, 180)).unwrap();
+    let region = Region {
+        left: 200,
+        top: 100,
+        width: 40,
+        height: 80,
+    };
     let accept = Acceptance {
         region: Some(region),
         ..ACCEPT
     };
     for (name, mut detector) in all(accept) {
-        detector.check_frame(240, 180).unwrap();
-        let mut found = Vec::new();
-        detector.try_detect_into(&frame, &mut found).unwrap();
+        detector.detect(&frame).unwrap();
         for (width, height) in [(239, 180), (240, 179), (192, 144), (0, 0)] {
             let small = imageops::crop_imm(&frame, 0, 0, width, height).to_image();
-            let stale = Detection {
-                circle: TINY,
-                score: 1.0,
-            };
-            let mut found = vec![stale; 2];
-            let error = detector.try_detect_into(&small, &mut found).unwrap_err();
+            let error = detector.detect(&small).unwrap_err();
             assert!(
-                matches!(error, ConfigError::Region { .. }),
+                matches!(error, FrameRefused::Region { .. }),
                 "{name}: {error}"
             );
             let (error, size) = (error.to_string(), format!("{width}x{height}"));
@@ -43,8 +35,6 @@ fn a_frame_that_the_region_sticks_out_of_is_refused() {
                 error.contains("40x80 px at (200, 100)") && error.contains(&size),
                 "{name}: {error}"
             );
-            assert_eq!(found, [], "{name}");
-            assert_eq!(detector.detect(&small), [], "{name}");
         }
     }
 }
@@ -62,37 +52,29 @@ fn the_accumulator_is_bounded() {
         Canny::default(),
     )
     .unwrap();
-    detector.check_frame(1280, 960).unwrap();
     // 1920 x 1080 centres, 995 radii and two bytes each.
-    let error = detector.check_frame(3840, 2160).unwrap_err();
+    let before = detector.stages().memory;
+    let error = detector.detect(&GrayImage::new(3840, 2160)).unwrap_err();
     assert_eq!(
         error,
-        ConfigError::Accumulator {
+        FrameRefused::Accumulator {
             frame_width: 3840,
             frame_height: 2160,
             needed: 2 * 1920 * 1080 * 995,
             limit: 1 << 29,
         }
     );
-    let mut found = Vec::new();
-    let before = detector.memory();
-    let large = GrayImage::from_fn(3840, 2160, |x, y| {
-        Luma([((x / 40 + y / 40) % 2 * 200) as u8])
-    });
-    assert_eq!(detector.try_detect_into(&large, &mut found), Err(error));
-    assert_eq!(detector.detect(&large), []);
-    assert_eq!(detector.memory(), before, "a refused frame takes no memory");
-    // No size overflows the reckoning.
-    assert!(detector.check_frame(u32::MAX, u32::MAX).is_err());
+    let memory = detector.stages().memory;
+    assert_eq!(memory, before, "a refused frame takes no memory");
 
     let tight = StandardHoughConfig {
         accept: ACCEPT,
         max_memory: 120 * 90 * 17 * 2,
         ..StandardHoughConfig::default()
     };
-    let detector = StandardHough::new(tight, Canny::default()).unwrap();
-    detector.check_frame(240, 180).unwrap();
-    assert!(detector.check_frame(241, 180).is_err());
+    let mut detector = StandardHough::new(tight, Canny::default()).unwrap();
+    detector.detect(&GrayImage::new(240, 180)).unwrap();
+    assert!(detector.detect(&GrayImage::new(241, 180)).is_err());
 }
 
 #[test]
@@ -105,8 +87,11 @@ fn the_memory_told_holds_all_tables() {
             ..StandardHoughConfig::default()
         };
         let mut detector = StandardHough::new(config, Canny::default()).unwrap();
-        detector.detect(&frame);
-        (detector.memory(), detector.edges().pixels().len())
+        detector.detect(&frame).unwrap();
+        (
+            detector.stages().memory,
+            detector.stages().edges.pixels().len(),
+        )
     };
     let ((plain, _), (with_turns, edges)) = (memory(false), memory(true));
     // The direction of each edge pixel; peaks and accumulator take about the same in both.

@@ -53,7 +53,12 @@ fn what_is_stored_comes_back() {
 #[test]
 fn settings_come_back() {
     let accept = Acceptance {
-        region: Some(Region::in_frame((5, 6), (70, 80), (768, 576)).unwrap()),
+        region: Some(Region {
+            left: 5,
+            top: 6,
+            width: 70,
+            height: 80,
+        }),
         theta: 0.5,
         ..Acceptance::default()
     };
@@ -64,7 +69,7 @@ fn settings_come_back() {
         ..CurveSearchConfig::default()
     });
     comes_back(&HeuristicConfig {
-        region: accept.region,
+        accept,
         sampling: Sampling::Anywhere,
         ..HeuristicConfig::default()
     });

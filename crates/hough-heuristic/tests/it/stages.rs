@@ -1,6 +1,7 @@
+use std::time::Duration;
+
 use hough_heuristic::{
-    Acceptance, CannyConfig, Circle, Detection, EdgeMap, EdgePixel, StageTimes, Stages, image,
-    write_stages,
+    Acceptance, CannyConfig, Circle, Detection, EdgeMap, EdgePixel, Stages, image,
 };
 
 use crate::detectors;
@@ -16,9 +17,9 @@ fn each_stage_of_each_detector_has_its_picture() {
     .render();
     for (name, mut detector) in detectors::all_on(Acceptance::default(), CannyConfig::default()) {
         detector.keep_candidates(true);
-        let found = detector.detect(&frame);
+        let found = detector.detect(&frame).unwrap().to_vec();
         assert!(!found.is_empty(), "{name}");
-        let stages = detector.stages().unwrap();
+        let stages = detector.stages();
         assert!(!stages.edges.pixels().is_empty(), "{name}");
         let near = |circle: &Circle| {
             let best = found[0].circle;
@@ -31,12 +32,12 @@ fn each_stage_of_each_detector_has_its_picture() {
             stages.candidates
         );
         assert!(
-            stages.times.search.as_nanos() > 0 && stages.times.edges.as_nanos() > 0,
+            stages.search_time.as_nanos() > 0 && stages.edge_time.as_nanos() > 0,
             "{name}"
         );
 
         let folder = tempfile::tempdir().unwrap();
-        let paths = write_stages(folder.path(), &frame, &stages, &found).unwrap();
+        let paths = stages.write(folder.path(), &frame, &found).unwrap();
         for path in &paths {
             assert_eq!(
                 image::open(path).unwrap().to_rgb8().dimensions(),
@@ -51,15 +52,15 @@ fn each_stage_of_each_detector_has_its_picture() {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
 
         let nowhere = folder.path().join("missing");
-        let error = write_stages(&nowhere, &frame, &stages, &[]).unwrap_err();
+        let error = stages.write(&nowhere, &frame, &[]).unwrap_err();
         assert!(error.to_string().contains("1_edges.png"), "{error}");
 
         // The next frame has its own candidates, and without the wish for them there are none.
-        detector.detect(&image::GrayImage::new(64, 64));
-        assert_eq!(detector.stages().unwrap().candidates, [], "{name}");
+        detector.detect(&image::GrayImage::new(64, 64)).unwrap();
+        assert_eq!(detector.stages().candidates, [], "{name}");
         detector.keep_candidates(false);
-        detector.detect(&frame);
-        assert_eq!(detector.stages().unwrap().candidates, [], "{name}");
+        detector.detect(&frame).unwrap();
+        assert_eq!(detector.stages().candidates, [], "{name}");
     }
 }
 
@@ -72,8 +73,8 @@ fn what_is_no_regular_file_is_not_replaced_by_a_picture() {
     let mut detector = detectors::all_on(Acceptance::default(), CannyConfig::default())
         .remove(0)
         .1;
-    let found = detector.detect(&frame);
-    let stages = detector.stages().unwrap();
+    let found = detector.detect(&frame).unwrap().to_vec();
+    let stages = detector.stages();
     let folder = tempfile::tempdir().unwrap();
     // A link stays a link.
     let (elsewhere, link) = (
@@ -82,14 +83,14 @@ fn what_is_no_regular_file_is_not_replaced_by_a_picture() {
     );
     std::fs::write(&elsewhere, b"older").unwrap();
     symlink(&elsewhere, &link).unwrap();
-    write_stages(folder.path(), &frame, &stages, &found).unwrap();
+    stages.write(folder.path(), &frame, &found).unwrap();
     assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
     assert!(image::open(&elsewhere).is_ok());
     // A socket cannot be written to, and stays what it is.
     let socket = folder.path().join("1_edges.png");
     std::fs::remove_file(&socket).unwrap();
     let _listening = std::os::unix::net::UnixListener::bind(&socket).unwrap();
-    let error = write_stages(folder.path(), &frame, &stages, &found).unwrap_err();
+    let error = stages.write(folder.path(), &frame, &found).unwrap_err();
     assert!(error.to_string().contains("1_edges.png"), "{error}");
     assert!(std::fs::metadata(&socket).unwrap().file_type().is_socket());
     let parts = std::fs::read_dir(folder.path()).unwrap();
@@ -122,11 +123,14 @@ fn the_picture_explains_what_the_detectors_explain() {
         let stages = Stages {
             edges: &edges,
             candidates: &[],
-            times: StageTimes::default(),
             tolerance,
+            memory: 0,
+            edge_time: Duration::ZERO,
+            structure_time: Duration::ZERO,
+            search_time: Duration::ZERO,
         };
         let folder = tempfile::tempdir().unwrap();
-        let [_, structure, ..] = write_stages(folder.path(), &frame, &stages, &found).unwrap();
+        let [_, structure, ..] = stages.write(folder.path(), &frame, &found).unwrap();
         let picture = image::open(structure).unwrap().to_rgb8();
         for x in 210..220 {
             let explained = x <= last;

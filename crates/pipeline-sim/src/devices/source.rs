@@ -96,6 +96,7 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
     ///
     /// ```
     /// use hough_heuristic::FrameSource;
+    /// use hough_heuristic::image::GrayImage;
     /// use pipeline_sim::{Ball, Cell, CellCamera, Motion, Renderer, Scene, SharedCell, Shot, Workspace};
     ///
     /// let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.15, -0.1)));
@@ -107,7 +108,9 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
     /// };
     /// let mut camera = CellCamera::new(cell, Renderer::new(&Scene::laboratory(), 1), move || pose)
     ///     .exposed(Shot::pal(0.010, 8), turning)?;
-    /// assert_eq!(camera.grab()?.dimensions(), (768, 576));
+    /// let mut frame = GrayImage::default();
+    /// camera.grab(&mut frame)?;
+    /// assert_eq!(frame.dimensions(), (768, 576));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -153,8 +156,9 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
 }
 
 impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
-        self.look().cloned()
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
+        frame.clone_from(self.look()?);
+        Ok(())
     }
 }
 

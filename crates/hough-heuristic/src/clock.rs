@@ -1,0 +1,17 @@
+//! The wall clock, which not every target has.
+
+use std::time::{Duration, Instant};
+
+/// Reads the clock; `None` on `wasm32-unknown-unknown`, where there is none and reading it panics.
+pub(crate) fn now() -> Option<Instant> {
+    const NO_CLOCK: bool = cfg!(all(target_family = "wasm", target_os = "unknown"));
+    (!NO_CLOCK).then(Instant::now)
+}
+
+/// Returns the time between two readings, zero without a clock.
+pub(crate) fn between(start: Option<Instant>, end: Option<Instant>) -> Duration {
+    match (start, end) {
+        (Some(start), Some(end)) => end.saturating_duration_since(start),
+        _ => Duration::ZERO,
+    }
+}
