@@ -1,4 +1,4 @@
-//! The event log: what happened in a run, kept, and run again.
+//! The event log of a run, and its replay.
 
 use std::cell::RefCell;
 
@@ -16,26 +16,42 @@ use crate::sight::eye::{Eye, Look};
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoggedEvent {
-    /// How many moves had been made since the ball was first seen.
+    /// Moves made since the ball was first seen.
     pub cycle: usize,
-    /// What happened.
-    #[cfg_attr(feature = "serde", serde(with = "crate::record::numbers"))]
+    /// The event.
     pub kind: EventKind,
-    /// Where the arm stood, as it reported.
-    #[cfg_attr(feature = "serde", serde(with = "crate::record::numbers"))]
+    /// Joint angles that the arm reported.
+    #[cfg_attr(feature = "serde", serde(with = "null_for_nan"))]
     pub joints: Joints,
 }
 
-/// Every event of a run, in order.
+/// Joint angles in JSON, which has no NaN: an angle that is not finite becomes `null`.
+#[cfg(feature = "serde")]
+mod null_for_nan {
+    use puma_val2::Joints;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(joints: &Joints, to: S) -> Result<S::Ok, S::Error> {
+        let angles = joints.0.map(|angle| angle.is_finite().then_some(angle));
+        angles.serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Joints, D::Error> {
+        let angles = <[Option<f64>; 6]>::deserialize(from)?;
+        Ok(Joints(angles.map(|angle| angle.unwrap_or(f64::NAN))))
+    }
+}
+
+/// Events of a run, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EventLog {
-    /// The events, the first one first.
+    /// The events, oldest first.
     pub events: Vec<LoggedEvent>,
 }
 
 impl EventLog {
-    /// Takes down an event.
+    /// Records an event.
     pub fn note(&mut self, event: &Event<'_>) {
         self.events.push(LoggedEvent {
             cycle: event.cycle,
@@ -44,13 +60,12 @@ impl EventLog {
         });
     }
 
-    /// Lets `agent` make the run again, with the arm, the sensors and the eye answering as they did
-    /// then, and returns the log of that. The same controller with the same knowledge makes the
-    /// same log.
+    /// Repeats the run with `agent` and the recorded answers of arm, sensors and camera. Returns the
+    /// outcome and the new log, which equals this one for an equal controller.
     ///
     /// # Errors
-    /// [`AgentError::Replay`] when the agent does something else than was done then; otherwise what
-    /// the run ended with, if it ended with an error.
+    /// [`AgentError::Replay`] at the first event that differs; otherwise the error that the run
+    /// ended with, if any.
     pub fn replay<C: Controller + Clone>(
         &self,
         agent: &Agent<C>,
@@ -62,7 +77,7 @@ impl EventLog {
         }
     }
 
-    /// Lets `agent` make the run again, whatever comes of it.
+    /// Repeats the run with `agent` to its end, even if it differs.
     pub(crate) fn play<C: Controller>(&self, agent: Agent<C>) -> Played {
         let tape = RefCell::new(Tape {
             events: &self.events,
@@ -89,16 +104,16 @@ impl EventLog {
     }
 }
 
-/// A run, made again.
+/// A repeated run.
 pub(crate) struct Played {
     pub(crate) end: Result<Outcome, AgentError>,
     pub(crate) log: EventLog,
-    /// The first event that was another one then.
+    /// Index of the first event that differs from the record.
     pub(crate) differs: Option<usize>,
 }
 
-/// Whether two events are the same. A failure of camera or arm comes back in the words of the
-/// replayed device, which quote those of then.
+/// Compares two events. A replayed device reports a failure in a text of its own that quotes the
+/// recorded one.
 fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
     match (&now.kind, &then.kind) {
         (EventKind::Failed(cause), EventKind::Failed(cause_then)) => {
@@ -110,25 +125,26 @@ fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
     }
 }
 
-/// Whether two values are equal, NaN being equal to NaN. In debug format every other number has a
-/// text of its own.
+/// Compares two values, NaN being equal to NaN: in debug format every other number has a distinct
+/// text.
 fn alike<T: PartialEq + std::fmt::Debug>(now: &T, then: &T) -> bool {
     now == then || format!("{now:?}") == format!("{then:?}")
 }
 
-/// Whether `now` is what ended the run `then`: the same words, or the same device failing again.
+/// Compares the cause of a failure with the recorded one: equal texts, or the replayed device's
+/// quotation.
 fn same_cause(now: &str, then: &str) -> bool {
     let quoted =
         |by: Device| by.failed_in(then) && now == by.silence(failed_then(then)).to_string();
     now == then || quoted(Device::Camera) || quoted(Device::Arm)
 }
 
-/// What a replayed device says when it is asked for the answer that failed.
+/// Text of a replayed device whose recorded answer was a failure.
 fn failed_then(cause: &str) -> String {
     format!("this failed then: {cause}")
 }
 
-/// Who failed.
+/// Device that failed.
 #[derive(Clone, Copy)]
 enum Device {
     Camera,
@@ -136,14 +152,14 @@ enum Device {
 }
 
 impl Device {
-    /// Whether `cause` begins as the errors of this device do.
+    /// Returns whether `cause` begins like an error of this device.
     fn failed_in(self, cause: &str) -> bool {
         let words = self.silence(String::new()).to_string();
         let begin = words.split_inclusive(": ").next();
         begin.is_some_and(|begin| cause.starts_with(begin))
     }
 
-    /// The error of a device that has no answer, with the reason.
+    /// Builds the error of a replayed device without an answer.
     fn silence(self, reason: String) -> AgentError {
         match self {
             Self::Camera => AgentError::Camera(unseen(reason)),
@@ -167,22 +183,22 @@ fn unmoved(reason: String) -> ArmError {
     }
 }
 
-/// A frame that differs from that of every other number: what there was to see is not in the log,
-/// only whether it was the same.
+/// Returns a small frame that is distinct for each number. The log holds no frames, only whether two
+/// were equal.
 pub(crate) fn numbered(number: u32) -> GrayImage {
     GrayImage::from_fn(4, 1, |x, _| Luma([number.to_le_bytes()[x as usize]]))
 }
 
-/// The answers of then, as a tape that plays on.
+/// Recorded answers, consumed in order.
 struct Tape<'a> {
     events: &'a [LoggedEvent],
     next: usize,
-    /// Number of the frame shown last.
+    /// Number of the latest frame.
     frame: u32,
 }
 
 impl Tape<'_> {
-    /// The next event that was an answer, and moves on behind it.
+    /// Consumes events up to and including the next answer, and returns it.
     fn answer(&mut self) -> Option<LoggedEvent> {
         while let Some(event) = self.events.get(self.next) {
             self.next += 1;
@@ -193,7 +209,7 @@ impl Tape<'_> {
         None
     }
 
-    /// Why there is no answer: what the run ended with, or that the log is too short.
+    /// Explains a missing answer: the recorded failure, or the end of the log.
     fn silence(&self) -> String {
         match self.events.last().map(|event| &event.kind) {
             Some(EventKind::Failed(cause)) => failed_then(cause),
@@ -201,7 +217,7 @@ impl Tape<'_> {
         }
     }
 
-    /// Whether the next event is `kind`; moves on only if so.
+    /// Consumes the next event if it is `kind`, and returns whether it was.
     fn next_if(&mut self, kind: &EventKind) -> bool {
         let next = self
             .events
@@ -211,8 +227,8 @@ impl Tape<'_> {
         next
     }
 
-    /// Fails if the next thing that happened was that the sensors on the arm did: their answers
-    /// make no event of their own.
+    /// Fails if the next event is a failure of the arm: an answer of the proximity sensors makes no
+    /// event of its own.
     fn sensors_hold(&self) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
             Some(EventKind::Failed(cause)) if Device::Arm.failed_in(cause) => {
@@ -222,8 +238,8 @@ impl Tape<'_> {
         }
     }
 
-    /// Fails if the next thing that happened was that this order was not answered: of the orders
-    /// that make no event when they succeed.
+    /// Fails if the next event says that `order` was not answered. Such an order makes no event when
+    /// it succeeds.
     fn answers(&self, order: Order) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
             Some(EventKind::Unanswered(then)) if *then == order => Err(unmoved(self.silence())),
@@ -232,7 +248,7 @@ impl Tape<'_> {
     }
 }
 
-/// Whether an event tells what arm or eye answered; the others follow from those.
+/// Returns whether an event records an answer of arm or camera. The others follow from those.
 fn is_answer(kind: &EventKind) -> bool {
     !matches!(
         kind,
@@ -252,10 +268,10 @@ fn is_answer(kind: &EventKind) -> bool {
     )
 }
 
-/// Arm, sensors and eye of then.
+/// Arm, sensors and camera that give the recorded answers.
 struct Player<'a, 'b>(&'a RefCell<Tape<'b>>);
 
-/// What the devices of a replay are called in messages.
+/// Name of the replayed devices in error texts.
 const NAME: &str = "replayed event log";
 
 impl Player<'_, '_> {
@@ -270,8 +286,7 @@ impl Player<'_, '_> {
 
 impl Manipulator for Player<'_, '_> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        // Asked before anything happens. An arm that failed after it had told where it stands has
-        // told it all the same.
+        // The agent asks once, before the first event. An arm that fails later has answered this.
         let tape = self.0.borrow();
         match tape.events.first() {
             Some(LoggedEvent { kind, joints, .. })
@@ -296,7 +311,7 @@ impl Manipulator for Player<'_, '_> {
         tape.answers(Order::Jaws {
             close: gripper == Gripper::Closed,
         })?;
-        // The opened gripper begins the run.
+        // Opening the gripper starts the run.
         tape.next_if(&EventKind::Started);
         Ok(())
     }
@@ -310,7 +325,7 @@ impl ProximitySensor for Player<'_, '_> {
     fn object_near(&mut self) -> Result<bool, ArmError> {
         let mut tape = self.0.borrow_mut();
         tape.sensors_hold()?;
-        // What was too near made no event where the arm could not be stopped.
+        // An arm that could not be stopped made no event for what was too near.
         Ok(tape.next_if(&EventKind::TooNear) || tape.answers(Order::Stop).is_err())
     }
 }

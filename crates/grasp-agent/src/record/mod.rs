@@ -1,12 +1,10 @@
-//! Records of runs and of what was learned: logs, replays, files.
+//! Records of runs and of learned behaviours: logs, replays, JSON.
 
 #[cfg(feature = "serde")]
-pub(crate) mod export;
-#[cfg(feature = "serde")]
-pub(crate) mod export_policy;
+pub(crate) mod behaviour_json;
 pub(crate) mod log;
 #[cfg(feature = "serde")]
-pub(crate) mod numbers;
+pub(crate) mod policy_json;
 #[cfg(feature = "serde")]
 pub(crate) mod saved_controller;
 #[cfg(feature = "serde")]

@@ -1,20 +1,18 @@
-//! A run that is complete in itself: settings, controller, and every event.
+//! Runs saved with everything that a replay needs: settings, controller, every event.
 
 use serde::{Deserialize, Serialize};
 
 use crate::controller::Controller;
 use crate::error::{AgentError, BehaviourError};
-use crate::record::export::{check_format, plain_text_of};
-use crate::record::log::{EventLog, LoggedEvent};
-use crate::record::log::{Played, numbered};
-use crate::record::saved_controller::ControllerText;
+use crate::record::behaviour_json::check_format;
+use crate::record::log::{EventLog, LoggedEvent, Played, numbered};
 use crate::record::saved_controller::SavedController;
 use crate::run::agent::Agent;
 use crate::run::config::AgentConfig;
 use crate::run::event::{Event, EventKind, Outcome};
 use crate::sight::watch::{Shown, Watch};
 
-/// A run, saved: all that it takes to make it again, and to see whether it comes out the same.
+/// One run with everything needed to repeat it and to compare the results.
 ///
 /// ```
 /// # use std::cell::RefCell;
@@ -58,24 +56,23 @@ pub struct SavedRun {
     log: EventLog,
 }
 
-/// What came of a replay.
+/// Result of a replay.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Replayed {
-    /// The same events, and this end: the outcome, or what the run failed with.
+    /// Every event was equal; the end was this outcome, or this failure.
     Same(Result<Outcome, String>),
-    /// Another course.
+    /// The runs differ.
     Differs {
-        /// The first event that differs, counted from 0.
+        /// Index of the first event that differs, from 0.
         event: usize,
-        /// That event in the saved run; `None` if it had ended there.
+        /// That event in the saved run; `None` if the saved run has ended before.
         then: Option<LoggedEvent>,
-        /// That event in the replay; `None` if it had ended there.
+        /// That event in the replay; `None` if the replay has ended before.
         now: Option<LoggedEvent>,
     },
 }
 
-/// What the camera had shown before the run: whether a look shows the same again is counted on from
-/// run to run.
+/// State of the frozen-camera check before the run. The agent counts equal frames across runs.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Camera {
     from: puma_val2::Joints,
@@ -84,11 +81,11 @@ struct Camera {
 }
 
 impl SavedRun {
-    /// A run that is about to be made by `agent`, with its controller as `controller` says.
-    /// [`SavedRun::note`] takes down what happens then.
+    /// Starts the record of a run that `agent` is about to make with `controller`.
+    /// [`SavedRun::note`] then records each event.
     ///
-    /// Modules that the agent has in the place of those of its settings are not part of it: such a
-    /// run is replayed by [`EventLog::replay`].
+    /// Search, recovery and supervision modules that replace the configured ones are not saved;
+    /// use [`EventLog::replay`] for such a run.
     pub fn before<C: Controller>(agent: &Agent<C>, controller: SavedController) -> Self {
         let watch = agent.watch();
         Self {
@@ -103,30 +100,30 @@ impl SavedRun {
         }
     }
 
-    /// Takes down an event.
+    /// Records an event.
     pub fn note(&mut self, event: &Event<'_>) {
         self.log.note(event);
     }
 
-    /// What happened.
+    /// Returns the events.
     pub fn log(&self) -> &EventLog {
         &self.log
     }
 
-    /// The settings of the agent.
+    /// Returns the settings of the agent.
     pub fn config(&self) -> &AgentConfig {
         &self.config
     }
 
-    /// The controller before the run.
+    /// Returns the controller in its state before the run.
     pub fn controller(&self) -> &SavedController {
         &self.controller
     }
 
-    /// Makes the run again, with the arm, the sensors and the eye answering as they did then.
+    /// Repeats the run with recorded answers of arm, sensors and camera.
     ///
     /// # Errors
-    /// [`AgentError::Config`] for settings that cannot work.
+    /// [`AgentError::Config`] if the settings are invalid.
     pub fn replay(&self) -> Result<Replayed, AgentError> {
         let watch = Watch {
             from: self.camera.from,
@@ -137,7 +134,7 @@ impl SavedRun {
             .watching(watch);
         let Played { end, log, differs } = self.log.play(agent);
         Ok(match differs {
-            // The replayed devices fail in words of their own.
+            // Replayed devices fail with a text of their own; report the recorded one.
             None => Replayed::Same(end.map_err(|error| match self.log.events.last() {
                 Some(LoggedEvent {
                     kind: EventKind::Failed(cause),
@@ -153,55 +150,60 @@ impl SavedRun {
         })
     }
 
-    /// The run as JSON: its format, settings, controller, what the camera had shown, and the
-    /// events, one after the other. Numbers that are not finite are written as the texts `"NaN"`,
-    /// `"inf"` and `"-inf"`.
+    /// Returns the run as JSON: format, settings, controller, camera state, and one event per line.
+    /// A joint angle that is not finite becomes `null`.
     pub fn to_json(&self) -> String {
-        let controller = ControllerText::of(&self.controller, &self.config.limits);
-        // The values of a policy in one line, an event in one line each.
-        let events: Vec<String> = self.log.events.iter().map(plain_text_of).collect();
+        let events: Vec<String> = self.log.events.iter().map(line).collect();
         format!(
-            "{{\n\"format\": {},\n\"config\": {},\n\"controller\": {},\n\"camera\": {},\n\"log\": {{\"events\": [\n{}\n]}}\n}}\n",
-            plain_text_of(&FORMAT),
-            plain_text_of(&self.config),
-            plain_text_of(&controller),
-            plain_text_of(&self.camera),
+            "{{\n\"format\": {},\n\"config\": {},\n\"controller\": {},\n\"camera\": {},\n\
+             \"log\": {{\"events\": [\n{}\n]}}\n}}\n",
+            line(&FORMAT),
+            line(&self.config),
+            line(&self.controller),
+            line(&self.camera),
             events.join(",\n")
         )
     }
 
-    /// Reads what [`SavedRun::to_json`] wrote.
+    /// Reads a run that [`SavedRun::to_json`] has written.
     ///
     /// # Errors
-    /// [`AgentError::SavedRun`], with the place where there is one: no JSON, another format, a
-    /// missing part, a policy that [`Learned::from_json`](crate::Learned::from_json) refuses, a
-    /// belief that is not finite, settings that cannot work.
+    /// [`AgentError::SavedRun`] names the fault and its place: text that is not JSON, another or an
+    /// earlier format, a missing part, a policy that
+    /// [`Learned::from_json`](crate::Learned::from_json) refuses, invalid settings.
     pub fn from_json(text: &str) -> Result<Self, AgentError> {
-        let refused = |error: BehaviourError| AgentError::SavedRun(error.to_string());
-        let document: Document =
-            serde_json::from_str(text).map_err(|error| AgentError::SavedRun(error.to_string()))?;
-        check_format(&document.format, FORMAT).map_err(refused)?;
-        let controller = document.controller.into_controller().map_err(refused)?;
+        let refused = |error: serde_json::Error| AgentError::SavedRun(error.to_string());
+        // The format comes first, since another one may lack the other parts.
+        let head: Head = serde_json::from_str(text).map_err(refused)?;
+        let format = check_format(&head.format, FORMAT);
+        format.map_err(|error: BehaviourError| AgentError::SavedRun(error.to_string()))?;
+        let run: Document = serde_json::from_str(text).map_err(refused)?;
         Ok(Self {
-            config: document.config,
-            controller,
-            camera: document.camera,
-            log: document.log,
+            config: run.config,
+            controller: run.controller,
+            camera: run.camera,
+            log: run.log,
         })
     }
 }
 
-const FORMAT: &str = "grasp-agent run 1";
+const FORMAT: &str = "grasp-agent run 2";
 
-/// What the JSON holds.
+#[derive(Debug, Deserialize)]
+struct Head {
+    format: String,
+}
+
+/// Parts of the JSON.
 #[derive(Debug, Deserialize)]
 struct Document {
-    format: String,
-    #[serde(deserialize_with = "crate::record::numbers::deserialize")]
     config: AgentConfig,
-    #[serde(deserialize_with = "crate::record::numbers::deserialize")]
-    controller: ControllerText,
-    #[serde(deserialize_with = "crate::record::numbers::deserialize")]
+    controller: SavedController,
     camera: Camera,
     log: EventLog,
+}
+
+/// Returns JSON in one line. The documents here have text keys only, so writing cannot fail.
+fn line(document: &impl Serialize) -> String {
+    serde_json::to_string(document).unwrap_or_default()
 }

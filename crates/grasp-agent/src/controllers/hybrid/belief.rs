@@ -1,4 +1,4 @@
-//! What is believed of camera, ball and gears: thirteen numbers and how sure they are.
+//! The belief about camera, ball and gears: thirteen parameters with their covariance.
 
 use hough_heuristic::Features;
 use nalgebra::{Matrix3, Point3};
@@ -7,14 +7,14 @@ use puma_val2::Joints;
 #[cfg(feature = "serde")]
 use crate::checked::above_zero;
 use crate::checked::checked;
-use crate::controllers::hybrid::numbers::{
+use crate::controllers::hybrid::parameters::{
     Information, LEARNED, Numbers, corrected, sensitivity, vector,
 };
 #[cfg(feature = "serde")]
 use crate::error::BehaviourError;
 use crate::sight::camera_model::CameraModel;
 
-/// How wrong a cell may be before anything is known of it: standard deviations.
+/// Expected errors of an uncalibrated cell, as standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -22,24 +22,24 @@ use crate::sight::camera_model::CameraModel;
     serde(remote = "Self")
 )]
 pub struct Prior {
-    /// Of the logarithm of the focal length \[0.3\].
+    /// Logarithm of the focal length \[0.3\].
     pub focal: f64,
-    /// Of the principal point, feature units \[5\].
+    /// Principal point, feature units \[5\].
     pub centre: f64,
-    /// Of roll, pitch and yaw of the camera, radians \[0.17\].
+    /// Roll, pitch and yaw of the camera, radians \[0.17\].
     pub turn: f64,
-    /// Of the camera's place along each of its axes, metres \[0.015\].
+    /// Camera position along each of its axes, metres \[0.015\].
     pub shift: f64,
-    /// Of the logarithm of the ball's radius \[0.15\].
+    /// Logarithm of the ball's radius \[0.15\].
     pub radius: f64,
-    /// Of the play in each of the first three joints, whole width, radians \[0.015\].
+    /// Backlash of each of the first three joints, whole width, radians \[0.015\].
     pub play: f64,
 }
 
 checked!(Prior);
 
 impl Prior {
-    /// A cell that was set up by eye: the values in the brackets of the fields.
+    /// Returns the errors of a cell set up by eye: the values in the brackets of the fields.
     pub fn by_eye() -> Self {
         Self {
             focal: 0.3,
@@ -51,7 +51,7 @@ impl Prior {
         }
     }
 
-    /// Whether each of them is a number above zero.
+    /// Validates that each standard deviation is above zero.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let deviations = self.deviations();
@@ -75,12 +75,12 @@ impl Prior {
     }
 }
 
-/// A normal distribution over what is wrong with the nominal model.
+/// Normal distribution of the errors of the nominal model.
 ///
-/// Thirteen numbers: logarithm of the focal length over the nominal one; shift of the principal
-/// point (units); turn of the camera about its x, y and z axes (radians) and shift along them
-/// (metres); logarithm of the ball's radius over the nominal one; play in `JT1`, `JT2` and `JT3`
-/// (whole width, radians).
+/// The thirteen parameters: logarithm of the focal length over the nominal one; shift of the
+/// principal point (feature units); rotation of the camera about its x, y and z axes (radians) and
+/// translation along them (metres); logarithm of the ball's radius over the nominal one; backlash of
+/// `JT1`, `JT2` and `JT3` (whole width, radians).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -89,13 +89,13 @@ impl Prior {
 )]
 pub struct Belief {
     mean: Vec<f64>,
-    /// Inverse of the covariance, by columns.
+    /// Inverse of the covariance, column by column.
     information: Vec<f64>,
-    /// Standard deviation of what is seen about what is expected, feature units.
+    /// Standard deviation of the image noise, feature units.
     noise: f64,
 }
 
-/// The same as it comes from a file.
+/// Serialized form, before validation.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Unchecked {
@@ -128,17 +128,17 @@ impl TryFrom<Unchecked> for Belief {
             })
         } else {
             Err(BehaviourError::Text {
-                what: "not thirteen finite numbers and what is known of them".into(),
+                what: "a belief needs thirteen finite means, their information matrix, and a noise above 0".into(),
             })
         }
     }
 }
 
-/// Noise assumed before anything is known, feature units.
+/// Image noise assumed at first, feature units.
 const FIRST_NOISE: f64 = 1.0;
 
 impl Belief {
-    /// Nothing is known but the prior.
+    /// Creates the belief of an uncalibrated cell.
     pub fn new(prior: &Prior) -> Self {
         let precisions = prior.deviations().map(|s| 1.0 / (s * s).max(1e-18));
         Self::of(
@@ -156,12 +156,12 @@ impl Belief {
         }
     }
 
-    /// The thirteen numbers as they are believed.
+    /// Returns the means of the thirteen parameters.
     pub fn mean(&self) -> &[f64] {
         &self.mean
     }
 
-    /// The standard deviation of each of them.
+    /// Returns the standard deviations of the thirteen parameters.
     pub fn deviations(&self) -> Vec<f64> {
         let covariance = self.information_matrix().try_inverse();
         (0..LEARNED)
@@ -169,16 +169,16 @@ impl Belief {
             .collect()
     }
 
-    /// Standard deviation of what is seen about what is expected, feature units.
+    /// Returns the standard deviation of the image noise, feature units.
     pub fn noise(&self) -> f64 {
         self.noise
     }
 
-    /// The same after a time in which camera, ball and gears may have changed by `share` of what
-    /// `prior` allows for: as much is believed, and less firmly.
+    /// Adds `share` of the prior's uncertainty and keeps the means: camera, ball or gears may have
+    /// changed meanwhile.
     pub(crate) fn loosened(self, prior: &Prior, share: f64) -> Self {
         if share.abs() < f64::MIN_POSITIVE {
-            // Exactly the same, without the rounding of two inversions.
+            // Avoids the rounding of two inversions.
             return self;
         }
         let change = (prior.deviations() * share).map(|s| s * s);
@@ -195,8 +195,8 @@ impl Belief {
         )
     }
 
-    /// What is believed once a ball, known to be at `ball` but for `unsure` metres along each axis,
-    /// has shown as `features` with the arm at `joints`; the same as before where that cannot be.
+    /// Updates the belief by one sighting, from `joints`, of a ball at a place known to `unsure`
+    /// metres along each axis. Returns it unchanged if the sighting is impossible.
     pub(crate) fn having_seen(
         self,
         nominal: &CameraModel,
@@ -243,7 +243,7 @@ impl Belief {
         Self { noise, ..self }
     }
 
-    /// `nominal`, put right by what is believed.
+    /// Returns `nominal` with the estimated corrections.
     pub fn corrected(&self, nominal: &CameraModel) -> CameraModel {
         corrected(nominal, &self.numbers())
     }
@@ -272,19 +272,19 @@ impl Belief {
 impl Belief {
     const FILE_KIND: &str = "grasp-agent belief/1";
 
-    /// Writes the belief to `path`, whole or not at all.
+    /// Writes the belief to `path`, atomically.
     ///
     /// # Errors
-    /// What kept the file from being written.
+    /// [`BehaviourError::File`] if the file cannot be written.
     pub fn save(&self, path: &std::path::Path) -> Result<(), BehaviourError> {
         Ok(qtable::save(path, Self::FILE_KIND, self)?)
     }
 
-    /// Reads a belief that [`Belief::save`] wrote.
+    /// Reads a belief that [`Belief::save`] has written.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged or is none of ours; numbers that are too few, too
-    /// many or not finite.
+    /// [`BehaviourError::File`] for a file that cannot be read, is damaged, has another format, or
+    /// holds a wrong number of values or one that is not finite.
     pub fn load(path: &std::path::Path) -> Result<Self, BehaviourError> {
         Ok(qtable::load(path, Self::FILE_KIND)?)
     }

@@ -1,4 +1,4 @@
-//! The controller: estimate, plan, move, and learn from what was seen.
+//! The hybrid controller: estimate, plan, move, learn.
 
 use hough_heuristic::Features;
 use nalgebra::{Point3, SMatrix, Vector3};
@@ -9,14 +9,16 @@ use crate::controller::{Consequence, Controller, GaveUp, Situation};
 use crate::controllers::hybrid::belief::{Belief, Prior};
 use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
-use crate::controllers::hybrid::numbers::{Numbers, WITH_BALL, corrected, deviations, sensitivity};
+use crate::controllers::hybrid::parameters::{
+    Numbers, WITH_BALL, corrected, deviations, sensitivity,
+};
 #[cfg(feature = "serde")]
 use crate::controllers::servo::settings::check_goal;
 use crate::controllers::taught_goal::TaughtGoal;
 use crate::limits::{JointLimits, StepLimits};
 use crate::sight::camera_model::CameraModel;
 
-/// What a [`Hybrid`] is told.
+/// Settings of a [`Hybrid`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -24,37 +26,35 @@ use crate::sight::camera_model::CameraModel;
     serde(remote = "Self")
 )]
 pub struct HybridSettings {
-    /// The camera and the arm as they should be.
+    /// Nominal camera and arm.
     pub nominal: CameraModel,
-    /// How wrong that may be.
+    /// Expected errors of the nominal model.
     pub prior: Prior,
-    /// How much of that may have come about since a belief was learned that the controller begins
-    /// with, as a share \[0.2\]; see [`Hybrid::with_belief`]. At 0 a camera that has been knocked
-    /// in the meantime is not learned again for a long time.
+    /// Fraction of the prior uncertainty added back when a saved belief is loaded, 0..=1 \[0.2\].
+    /// Larger values re-learn a knocked camera sooner; see [`Hybrid::with_belief`].
     pub drift: f64,
-    /// Features of the ball where it should be \[(103.5, 78, 33)\].
+    /// Features of the ball at the goal \[(103.5, 78, 33)\].
     pub goal: Features,
-    /// The farthest that each joint turns in one cycle [[`StepLimits::paper`]].
+    /// Largest turn of each joint in one move [[`StepLimits::paper`]].
     pub steps: StepLimits,
-    /// A move is made only if the ball will still be in view when it is seen so many standard
-    /// deviations off its expected place \[2\].
+    /// Margin to the frame's border, in standard deviations of the predicted image place \[2\].
     pub caution: f64,
-    /// Runs that are remembered, the latest ones \[400\].
+    /// Number of latest runs kept as evidence \[400\].
     pub memory: usize,
-    /// How far `JT5` turns for the grip, radians \[-18.01 degrees\].
+    /// Turn of `JT5` for the grip, radians \[-18.01 degrees\].
     pub grip_turn: f64,
-    /// How far `JT4` turns for the grip, radians \[0\].
+    /// Turn of `JT4` for the grip, radians \[0\].
     #[cfg_attr(feature = "serde", serde(default))]
     pub grip_aside: f64,
-    /// Greatest uncertainty of the ball's place, metres, up to which the grip is aimed at it and
-    /// not left to the agent's settings \[0.008\].
+    /// Largest standard deviation of the ball's place, metres, at which the controller aims the
+    /// grip itself \[0.008\]. Above it the agent's configured grip is used.
     pub grip_certainty: f64,
 }
 
 checked!(HybridSettings);
 
 impl HybridSettings {
-    /// The settings in the brackets of the fields.
+    /// Returns the defaults in the brackets of the fields.
     pub fn paper() -> Self {
         Self {
             nominal: CameraModel::paper(),
@@ -74,7 +74,7 @@ impl HybridSettings {
         }
     }
 
-    /// Whether they can be used; if not, why.
+    /// Validates the settings.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         self.nominal.check()?;
@@ -87,7 +87,9 @@ impl HybridSettings {
             ("grip_certainty", self.grip_certainty),
         ] {
             if !(value.is_finite() && value >= 0.0) {
-                return Err(format!("{name} is {value}; it must be finite, 0 or above"));
+                return Err(format!(
+                    "{name} is {value}; expected a finite number, 0 or more"
+                ));
             }
         }
         for (name, value) in [
@@ -95,28 +97,27 @@ impl HybridSettings {
             ("grip_aside", self.grip_aside),
         ] {
             if !value.is_finite() {
-                return Err(format!("{name} is {value}; it must be finite"));
+                return Err(format!("{name} is {value}; expected a finite number"));
             }
         }
         Ok(())
     }
 }
 
-/// Servoing by a model of the camera that is put right by what is seen.
+/// Visual servoing with a camera model that is calibrated from the sightings.
 ///
-/// In every cycle the ball's place and the thirteen numbers of a [`Belief`] are estimated together
-/// from all sightings of the run (least squares with the belief as prior, outliers weighing less).
-/// The arm then moves as far toward the pose in which the ball would stand at the goal as leaves
-/// the ball in view for all that is not known for certain. While it learns, every run becomes
-/// evidence for the next.
+/// Each cycle estimates the ball's place and the thirteen parameters of a [`Belief`] from all
+/// sightings of the run (robust least squares, with the belief as prior). The arm then moves towards
+/// the goal pose, as far as the ball stays in view under the remaining uncertainty. A learning
+/// hybrid uses every run as evidence for the next.
 #[derive(Clone, Debug)]
 pub struct Hybrid {
     settings: HybridSettings,
-    /// What was believed before anything of what is remembered was seen.
+    /// Belief before the remembered runs.
     before: Belief,
     belief: Belief,
     remembered: Vec<Evidence>,
-    /// Whether something is remembered that is not yet part of the belief.
+    /// Set while a remembered run is not yet part of the belief.
     news: bool,
     current: Evidence,
     estimate: Option<Estimate>,
@@ -124,16 +125,15 @@ pub struct Hybrid {
     boldness: f64,
     /// Losses since the last move that kept the ball in view.
     losses: usize,
-    /// Whether the last sighting was far from where the ball was; it is looked for once more before
-    /// that is believed.
+    /// Set after a sighting far from the expected place; a second one confirms it.
     doubt: bool,
-    /// Sightings for which a ball that has just moved is taken to be still moving.
+    /// Remaining sightings for which a ball that has moved counts as moving.
     moving: usize,
-    /// Grips in this run so far: none of them has held the ball.
+    /// Grips in this run so far; none has held the ball.
     grips: i32,
 }
 
-/// The ball and the camera as they are taken to be at the moment.
+/// Current estimate of ball and camera.
 #[derive(Clone, Debug)]
 struct Estimate {
     numbers: Numbers,
@@ -142,34 +142,34 @@ struct Estimate {
     covariance: SMatrix<f64, WITH_BALL, WITH_BALL>,
 }
 
-/// A sighting so many standard deviations off, and at least so many units, means that the ball has
-/// moved.
+/// Distance from the expected place at which the ball has moved: standard deviations, and a least
+/// number of feature units.
 const MOVED: (f64, f64) = (5.0, 3.0);
-/// What is seen so many feature units off may be no ball at all.
+/// Distance from the expected place at which a sighting needs confirmation, feature units.
 const FAR_OFF: f64 = 40.0;
-/// For so many sightings after it has moved, a ball that has moved again is believed at once.
+/// Number of sightings after a movement in which another one needs no confirmation.
 const STILL_MOVING: usize = 3;
-/// A ball that is shown between the jaws is in their middle to so many metres.
+/// Standard deviation of a ball held between the jaws from their middle, metres.
 const SHOWN: f64 = 0.002;
-/// Room to the border of the frame, feature units.
+/// Margin to the border of the frame, feature units.
 const MARGIN: f64 = 4.0;
-/// Radius up to which a ball is far enough to be seen, and the largest that a move may lead to,
-/// feature units.
+/// Radius at which the ball is still detected reliably, feature units.
 const FAR_ENOUGH: f64 = 5.5;
+/// Largest radius that a move may lead to, feature units.
 const LARGEST: f64 = 55.0;
-/// Shares of the way that are tried, the whole way first.
+/// Fractions of the way that are tried, in order.
 const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
-/// Least share of a way that is gone after any number of losses.
+/// Smallest fraction of the way, after any number of losses.
 const LEAST_BOLDNESS: f64 = 1.0 / 64.0;
 
 impl Hybrid {
-    /// A controller that knows nothing but `settings`, and learns.
+    /// Creates a learning controller that starts from the prior.
     pub fn new(settings: HybridSettings) -> Self {
         Self::beginning(settings, Belief::new(&settings.prior))
     }
 
-    /// A controller that has learned before, and goes on from there: what it sees from now on is
-    /// weighed against `belief`, held as firmly as [`HybridSettings::drift`] leaves it.
+    /// Creates a learning controller that starts from a saved belief, loosened by
+    /// [`HybridSettings::drift`].
     pub fn with_belief(settings: HybridSettings, belief: Belief) -> Self {
         Self::beginning(settings, belief.loosened(&settings.prior, settings.drift))
     }
@@ -192,8 +192,8 @@ impl Hybrid {
         }
     }
 
-    /// The same with a goal that was shown on the arm. That the ball was between the jaws then says
-    /// much of the camera: the jaws are where the arm says they are.
+    /// Sets a goal that was taught on the arm. The taught grip also calibrates the camera, since the
+    /// ball was between the jaws, whose place the arm reports.
     #[must_use]
     pub fn shown(mut self, goal: &TaughtGoal) -> Self {
         let (nominal, from) = (&self.settings.nominal, goal.seen_from());
@@ -207,26 +207,26 @@ impl Hybrid {
         self
     }
 
-    /// The same, learning nothing from one run to the next any more.
+    /// Stops learning from one run to the next.
     #[must_use]
     pub fn frozen(mut self) -> Self {
         self.learning = false;
         self
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn settings(&self) -> &HybridSettings {
         &self.settings
     }
 
-    /// What is believed of the camera, the ball and the gears.
+    /// Returns the belief about camera, ball and gears.
     pub fn belief(&self) -> &Belief {
         &self.belief
     }
 
-    /// Takes what was seen of one ball in one place as evidence for the runs to come.
+    /// Keeps the sightings of one ball in one place as evidence for later runs.
     fn remember(&mut self) {
-        // One sighting says where the ball is, and nothing of the camera.
+        // A single sighting determines the ball's place and nothing of the camera.
         if self.learning && self.current.len() >= 2 {
             self.remembered.push(self.current.clone());
             self.news = true;
@@ -235,7 +235,7 @@ impl Hybrid {
         }
     }
 
-    /// Where camera and ball are, from everything seen in this run.
+    /// Estimates camera and ball from all sightings of this run.
     fn estimate(&mut self) -> Option<Estimate> {
         let start = self
             .estimate
@@ -256,7 +256,7 @@ impl Hybrid {
         })
     }
 
-    /// How far off the ball is seen, feature units, if it cannot be where it was.
+    /// Returns the distance from the expected place, feature units, if the ball has moved.
     fn surprise(&self, seen: &Features) -> Option<f64> {
         let estimate = self.estimate.as_ref()?;
         if self.current.len() == 0 {
@@ -280,7 +280,7 @@ impl Hybrid {
         moved.then(|| off.norm())
     }
 
-    /// The longest way toward the goal after which the ball is in view for certain.
+    /// Plans the longest move towards the goal that keeps the ball in view.
     fn plan(
         &self,
         estimate: &Estimate,
@@ -292,10 +292,9 @@ impl Hybrid {
         let camera = model.arm.wrist(links.stand()) * model.mount;
         let here = camera.inverse_transform_point(&estimate.ball);
         let goal = model.in_camera(&self.settings.goal)?;
-        // On its line in the image at the distance it has: where to bring a ball that cannot be
-        // approached yet.
+        // The goal's image place at the present distance, for a ball that cannot be approached yet.
         let aside = Point3::from(goal.coords * (here.z / goal.z));
-        // A ball that is hardly large enough to be seen must not become smaller.
+        // A ball at the limit of detection must not become smaller.
         let least = model
             .outline(&here)
             .map_or(FAR_ENOUGH, |f| f.r.min(FAR_ENOUGH));
@@ -314,14 +313,12 @@ impl Hybrid {
         last
     }
 
-    /// The move to `motors` with each joint's turn cut to what a cycle allows, within the limits;
-    /// NaN stays NaN.
+    /// Returns the move to `motors`, cut to the step limits and the joint limits. NaN stays NaN.
     fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
         let target = limits.nearest(motors);
         JointDelta(std::array::from_fn(|i| {
             match self.settings.steps.0.get(i) {
-                // Not `min` and `max`, which make a whole step of NaN, nor `clamp`, which panics on
-                // a step that is NaN.
+                // `min` and `max` turn NaN into a whole step; `clamp` panics on a NaN bound.
                 Some(most) => match target.0[i] - from.0[i] {
                     turn if turn.abs() <= *most => turn,
                     turn if turn.abs() > *most => most.copysign(turn),
@@ -332,7 +329,7 @@ impl Hybrid {
         }))
     }
 
-    /// Whether the ball will be in view for all that is not known for certain, with a radius of at
+    /// Returns whether the ball stays in view within the margin of uncertainty, with a radius of at
     /// least `least` units.
     fn stays_in_view(&self, estimate: &Estimate, motors: &Joints, least: f64) -> bool {
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
@@ -373,13 +370,13 @@ impl Controller for Hybrid {
 
     fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
         if !now.is_finite() {
-            // As evidence it would make everything learned NaN.
+            // As evidence, NaN would spread to the whole belief.
             return Err(GaveUp::NoMoveLeft);
         }
         let off = self.surprise(&now.features);
         let odd = off.is_some();
         if off.is_some_and(|off| off > FAR_OFF) && !self.doubt && self.moving == 0 {
-            // A circle that is not the ball, perhaps: the arm stays, and looks again.
+            // Possibly a false circle: stay and look again.
             self.doubt = true;
             return Ok(JointDelta::default());
         }
@@ -389,8 +386,7 @@ impl Controller for Hybrid {
         } else {
             self.moving.saturating_sub(1)
         };
-        // A ball that was lost twice, though it should have stayed in view for certain, is not
-        // where it was taken to be.
+        // Two losses of a ball that should have stayed in view: the estimate is wrong.
         let mistaken = self.losses >= 2;
         if odd || mistaken {
             if !mistaken {
@@ -402,7 +398,7 @@ impl Controller for Hybrid {
         self.current.saw(now.features);
         self.estimate = self.estimate();
         if self.estimate.is_none() {
-            // What cannot be explained together is not explained; this sighting alone always is.
+            // The sightings contradict one another: start again from the latest.
             self.current.forget_sightings();
             self.current.saw(now.features);
             self.estimate = self.estimate();
@@ -413,7 +409,7 @@ impl Controller for Hybrid {
 
     fn judge(&mut self, consequence: &Consequence) {
         if *consequence == Consequence::Missed {
-            // What was seen before was seen of a ball in another place.
+            // The miss may have moved the ball.
             self.remember();
             self.current.forget_sightings();
             self.estimate = None;
@@ -437,7 +433,7 @@ impl Controller for Hybrid {
         let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
             .map(|i| estimate.covariance[(i, i)])
             .sum();
-        // What the agent's settings have missed once they miss again.
+        // The configured grip has missed; accept a less certain aim each time.
         let enough = self.settings.grip_certainty * 4_f64.powi(self.grips);
         self.grips = (self.grips + 1).min(10);
         if uncertainty.sqrt() > enough {
@@ -475,7 +471,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_turn_is_cut_to_a_step_and_what_is_no_number_stays_none() {
+    fn turns_are_cut_to_steps_and_nan_stays_nan() {
         let (hybrid, limits) = (Hybrid::new(HybridSettings::paper()), JointLimits::paper());
         let from = Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]);
         let cut = |turn: f64, hybrid: &Hybrid| {
@@ -494,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_no_evidence() {
+    fn nan_is_never_evidence() {
         let limits = JointLimits::paper();
         let seen = Situation {
             long_axis: None,

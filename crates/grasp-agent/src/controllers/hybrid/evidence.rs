@@ -1,17 +1,16 @@
-//! What was seen, from where, and where the links really stood then.
+//! Sightings, the poses they were made from, and the links' positions behind the backlash.
 
 use hough_heuristic::Features;
 use nalgebra::Point3;
 use puma_val2::Joints;
 
-use crate::controllers::hybrid::numbers::{Numbers, at};
+use crate::controllers::hybrid::parameters::{Numbers, at};
 use crate::sight::camera_model::CameraModel;
 
-/// The poses the arm went through in one run, and what was seen of a ball that lay still in the
-/// meantime.
+/// Path of the arm in one run, and the sightings of a ball at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Evidence {
-    /// Joint angles as the arm reported them, first three, radians, in the order they were taken.
+    /// Reported joint angles, radians, in order.
     path: Vec<Joints>,
     sightings: Vec<(usize, Features)>,
 }
@@ -21,7 +20,7 @@ impl Evidence {
         self.path.push(*joints);
     }
 
-    /// Notes what is seen from where the arm stands.
+    /// Records a sighting from the current pose.
     pub(crate) fn saw(&mut self, features: Features) {
         if let Some(last) = self.path.len().checked_sub(1) {
             self.sightings.push((last, features));
@@ -32,12 +31,12 @@ impl Evidence {
         self.sightings.len()
     }
 
-    /// Forgets what was seen, but not how the arm has come to where it is.
+    /// Drops the sightings and keeps the path, which determines the backlash.
     pub(crate) fn forget_sightings(&mut self) {
         self.sightings.clear();
     }
 
-    /// Where the links stood at each sighting, and what was seen.
+    /// Returns the links' angles at each sighting, with its features.
     pub(crate) fn views(&self, numbers: &Numbers) -> Vec<(Joints, Features)> {
         let mut links = Links::new(numbers);
         let mut views = Vec::with_capacity(self.sightings.len());
@@ -51,7 +50,7 @@ impl Evidence {
         views
     }
 
-    /// The links, where they stand now.
+    /// Returns the links at the end of the path.
     pub(crate) fn links(&self, numbers: &Numbers) -> Links {
         let mut links = Links::new(numbers);
         for motors in &self.path {
@@ -61,8 +60,7 @@ impl Evidence {
     }
 }
 
-/// The links of the first three joints, which follow their motors as soon as the play of the gears
-/// is used up.
+/// Links of the first three joints. A link follows its motor once the backlash is taken up.
 #[derive(Clone, Debug)]
 pub(crate) struct Links {
     half: [f64; 3],
@@ -79,12 +77,12 @@ impl Links {
         }
     }
 
-    /// The motors have turned to `motors`.
+    /// Turns the motors to `motors`.
     pub(crate) fn follow(&mut self, motors: &Joints) {
         for i in 0..6 {
             let half = if i < 3 { self.half[i] } else { 0.0 };
             let motor = motors.0[i];
-            // Not `max` and `min`, which make a number of NaN.
+            // `max` and `min` would hide NaN.
             self.stand.0[i] = match self.stand.0[i] {
                 _ if !self.begun || motor.is_nan() => motor,
                 at if at < motor - half => motor - half,
@@ -95,12 +93,12 @@ impl Links {
         self.begun = true;
     }
 
-    /// Where the links stand.
+    /// Returns the links' angles.
     pub(crate) fn stand(&self) -> &Joints {
         &self.stand
     }
 
-    /// Where the motors must turn so that the links come to stand at `target`.
+    /// Returns the motor angles that bring the links to `target`.
     pub(crate) fn motors_for(&self, target: &Joints, motors: &Joints) -> Joints {
         Joints(std::array::from_fn(|i| {
             let way = target.0[i] - self.stand.0[i];
@@ -115,7 +113,7 @@ impl Links {
     }
 }
 
-/// A first guess of where the ball is, from one sighting.
+/// Locates the ball from one sighting.
 pub(crate) fn first_guess(model: &CameraModel, view: &(Joints, Features)) -> Option<Point3<f64>> {
     model.locate(&view.0, &view.1)
 }

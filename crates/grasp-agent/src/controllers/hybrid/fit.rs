@@ -1,4 +1,4 @@
-//! Least squares on evidence: what is wrong with the model, and where the balls lay.
+//! Robust least squares: model parameters and ball positions from evidence.
 
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Matrix3, Point3, SMatrix, Vector3};
@@ -6,34 +6,34 @@ use puma_val2::Joints;
 
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::evidence::{Evidence, first_guess};
-use crate::controllers::hybrid::numbers::{
+use crate::controllers::hybrid::parameters::{
     Information, LEARNED, METRE_STEP, Numbers, STEPS, ThreeBy, WITH_BALL, at, corrected, vector,
 };
 use crate::sight::camera_model::CameraModel;
 
-/// What a fit came to.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) numbers: Numbers,
-    /// The ball of each piece of evidence that has one.
+    /// Ball position of each piece of evidence; `None` without a sighting.
     pub(crate) balls: Vec<Option<Point3<f64>>>,
-    /// Information on the numbers, the balls' places having been integrated out.
+    /// Information matrix of the parameters, marginal over the ball positions.
     pub(crate) information: Information,
-    /// Information on the numbers and the last ball together.
+    /// Joint information matrix of the parameters and the last ball.
     pub(crate) with_last_ball: SMatrix<f64, WITH_BALL, WITH_BALL>,
-    /// Sum of squared residuals, units squared, without outliers, and how many more residuals there
-    /// are than numbers fitted.
+    /// Weighted sum of squared residuals, feature units squared.
     squares: f64,
+    /// Degrees of freedom: residuals minus fitted values.
     spare: f64,
 }
 
-/// Most iterations of one fit.
+/// Largest number of iterations.
 const ITERATIONS: usize = 12;
-/// Residuals beyond so many standard deviations count less (Huber 1964): a circle that is not the
-/// ball.
+/// Threshold of the Huber loss (Huber 1964), standard deviations. False circles exceed it.
 const OUTLIER: f64 = 3.0;
+
 impl Fit {
-    /// The most probable numbers and balls given what was believed before and what was seen since.
+    /// Finds the most probable parameters and ball positions by Levenberg–Marquardt iteration.
     pub(crate) fn of(
         belief: &Belief,
         start: &Numbers,
@@ -71,7 +71,7 @@ impl Fit {
                 continue;
             };
             let now = cost_of(&next, &moved);
-            // A cost that is not a number is no progress.
+            // False for a NaN cost, too.
             if now < least {
                 let settled = least - now < 1e-6 * (1.0 + least);
                 (numbers, balls, least) = (next, moved, now);
@@ -102,12 +102,12 @@ impl Fit {
         })
     }
 
-    /// What is believed now.
+    /// Returns the posterior belief.
     pub(crate) fn belief(&self, noise: f64) -> Belief {
         Belief::of(self.numbers, self.information, noise)
     }
 
-    /// The standard deviation of the residuals; `None` if there are too few.
+    /// Returns the standard deviation of the residuals; `None` if there are too few.
     pub(crate) fn noise(&self) -> Option<f64> {
         const LEAST: f64 = 0.05;
         const MOST: f64 = 4.0;
@@ -115,7 +115,7 @@ impl Fit {
     }
 }
 
-/// What would be seen of `ball` from a camera on the hand at `wrist`.
+/// Projects `ball` into the camera on the hand at `wrist`.
 fn seen(model: &CameraModel, wrist: &Isometry3<f64>, ball: &Point3<f64>) -> Option<Vector3<f64>> {
     let place = model
         .mount
@@ -123,7 +123,7 @@ fn seen(model: &CameraModel, wrist: &Isometry3<f64>, ball: &Point3<f64>) -> Opti
     model.outline(&place).map(|f| vector(&f))
 }
 
-/// What a sighting costs that the model cannot explain at all, in squared standard deviations.
+/// Cost of a sighting that the model excludes, squared standard deviations.
 const INEXPLICABLE: f64 = 1e3;
 
 fn huber(residual: f64) -> f64 {
@@ -158,7 +158,7 @@ fn cost(
     views.iter().map(one).sum()
 }
 
-/// The normal equations, by blocks: the numbers, and for each ball its own three columns.
+/// Normal equations in blocks: the parameters, and three columns for each ball.
 struct Normal {
     numbers: Information,
     gradient: Numbers,
@@ -198,7 +198,7 @@ impl Normal {
         normal
     }
 
-    /// Adds what one piece of evidence says.
+    /// Adds one piece of evidence.
     fn add(
         &mut self,
         varied: &Varied,
@@ -257,7 +257,7 @@ impl Normal {
         block
     }
 
-    /// The next numbers and balls.
+    /// Returns the next parameters and balls.
     fn step(
         &self,
         numbers: &Numbers,
@@ -292,7 +292,7 @@ impl Normal {
         Some((numbers - step, moved.collect()))
     }
 
-    /// Information on the numbers alone.
+    /// Returns the information matrix of the parameters, marginal over the balls.
     fn marginal(&self) -> Information {
         let mut reduced = self.numbers;
         for block in self.balls.iter().flatten() {
@@ -303,7 +303,7 @@ impl Normal {
         0.5 * (reduced + reduced.transpose())
     }
 
-    /// Information on the numbers and the last ball.
+    /// Returns the joint information matrix of the parameters and the last ball.
     fn with_last_ball(&self) -> SMatrix<f64, WITH_BALL, WITH_BALL> {
         let mut joint = SMatrix::<f64, WITH_BALL, WITH_BALL>::identity();
         joint
@@ -332,7 +332,7 @@ fn inverse_of(own: &Matrix3<f64>, damping: f64) -> Option<Matrix3<f64>> {
     damped.try_inverse()
 }
 
-/// The model, and the models that differ from it in one number each.
+/// The model, and one variation of it for each parameter, for numerical derivatives.
 struct Varied {
     numbers: Numbers,
     model: CameraModel,

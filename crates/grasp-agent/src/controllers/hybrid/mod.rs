@@ -1,12 +1,11 @@
-//! The hybrid: prewired geometry, and learning what is wrong with it.
+//! The hybrid controller: known geometry, and learned corrections of it.
 //!
 //! The paper's outlook names "hybrid controllers that embed prewired knowledge to speed-up the
-//! learning process". Here the prewired knowledge is a [`CameraModel`](crate::CameraModel) with the
-//! arm's kinematics; what is learned is how far the real camera, ball and gears are from it, by
-//! least squares on everything that was seen in the runs so far.
+//! learning process". The prewired knowledge is a [`CameraModel`](crate::CameraModel) with the arm's
+//! kinematics. Least squares on the sightings of all runs learn the errors of camera, ball and gears.
 
 pub(crate) mod belief;
 pub(crate) mod controller;
 pub(crate) mod evidence;
 pub(crate) mod fit;
-pub(crate) mod numbers;
+pub(crate) mod parameters;

@@ -168,8 +168,14 @@ impl Run<'_> {
     }
 }
 
-/// A detector may be anyone's: what is not a number is no ball.
+/// Returns whether every number of a sighting is usable. User-supplied detectors may report NaN.
 fn is_finite(sighting: &Sighting) -> bool {
-    let f = sighting.features;
-    f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0
+    let Sighting {
+        detection,
+        features: f,
+        long_axis,
+    } = sighting;
+    let c = detection.circle;
+    let numbers = [f.x, f.y, f.r, c.x, c.y, c.radius, detection.score];
+    numbers.into_iter().chain(*long_axis).all(f64::is_finite) && f.r > 0.0
 }

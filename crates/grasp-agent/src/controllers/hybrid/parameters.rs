@@ -1,4 +1,4 @@
-//! The thirteen learned numbers: their order, the model they stand for, and its derivatives.
+//! The thirteen parameters: their order, the model they define, and its derivatives.
 
 use hough_heuristic::Features;
 use nalgebra::{
@@ -7,10 +7,10 @@ use nalgebra::{
 
 use crate::sight::camera_model::CameraModel;
 
-/// How many numbers are learned.
+/// Number of parameters.
 pub(crate) const LEARNED: usize = 13;
 
-/// Position of each number in the vector.
+/// Index of each parameter in the vector.
 pub(crate) mod at {
     pub(crate) const FOCAL: usize = 0;
     pub(crate) const CENTRE: usize = 1;
@@ -23,19 +23,19 @@ pub(crate) mod at {
 pub(crate) type Numbers = SVector<f64, LEARNED>;
 pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
 
-/// The learned numbers and the three coordinates of one ball.
+/// Number of parameters and coordinates of one ball together.
 pub(crate) const WITH_BALL: usize = LEARNED + 3;
 
-/// Steps for numerical derivatives, of each number and of a coordinate.
+/// Steps of the numerical derivatives, for each parameter.
 pub(crate) const STEPS: [f64; LEARNED] = [
     1e-5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5,
 ];
+/// Step of the derivatives by a coordinate, metres.
 pub(crate) const METRE_STEP: f64 = 1e-6;
 
 pub(crate) type ThreeBy<const N: usize> = SMatrix<f64, 3, N>;
 
-/// `nominal` with the camera and the ball as `numbers` say; the play of the joints is not part of a
-/// model.
+/// Applies the parameters to `nominal`. Backlash is not part of a camera model.
 pub(crate) fn corrected(nominal: &CameraModel, numbers: &Numbers) -> CameraModel {
     let three = |i: usize| Vector3::new(numbers[i], numbers[i + 1], numbers[i + 2]);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_scaled_axis(three(at::TURN)));
@@ -55,8 +55,8 @@ pub(crate) fn vector(f: &Features) -> Vector3<f64> {
     Vector3::new(f.x, f.y, f.r)
 }
 
-/// How what would be seen changes with the numbers and the ball's place, by differences; `None`
-/// where nothing would be seen.
+/// Returns the predicted features and their derivatives by parameters and ball place; `None` if the
+/// ball would be out of view.
 pub(crate) fn sensitivity(
     numbers: &Numbers,
     ball: &Point3<f64>,
@@ -84,7 +84,7 @@ pub(crate) fn sensitivity(
     Some((here, by_all))
 }
 
-/// Standard deviations of x, y and r as they will be seen, from the covariance of numbers and ball.
+/// Returns the standard deviations of the predicted x, y and r.
 pub(crate) fn deviations(
     by_all: &ThreeBy<WITH_BALL>,
     covariance: &SMatrix<f64, WITH_BALL, WITH_BALL>,
