@@ -13,6 +13,8 @@
     reason = "a program for the terminal"
 )]
 
+mod overview;
+
 use std::error::Error;
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -31,7 +33,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 /// Draws the simulated cell.
 #[derive(Parser)]
 struct Options {
-    /// Folder to write to; made if it is not there.
+    /// Folder for the pictures, created if missing.
     #[arg(long, default_value = "out/pictures")]
     out: PathBuf,
     /// Seed of the ball's place and of the textures.
@@ -51,7 +53,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     let save = |name: &str, bytes: &[u8]| {
         let path = options.out.join(name);
         write_whole(&path, bytes)?;
-        // A reader who has seen enough does not keep the other pictures from being written.
+        // A reader that has gone away does not keep the other pictures from being written.
         let _ = writeln!(std::io::stdout(), "{}", path.display());
         Ok::<(), Box<dyn Error>>(())
     };
@@ -67,7 +69,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
         .ok_or("the ball is out of reach")?;
     let path = reach(&cell, &start, &goal, options.frames.max(4));
 
-    let overview = cell.overview_svg(&workspace, &path[..=path.len() * 3 / 4]);
+    let overview = overview::overview(&cell, &workspace, &path[..=path.len() * 3 / 4])?;
     save("overview.svg", overview.as_bytes())?;
     let mut renderer = Renderer::new(&Scene::laboratory(), options.seed);
     for (name, pose) in [("search.png", &start), ("goal.png", &goal)] {
@@ -82,7 +84,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
         video.write(renderer.render(&cell, pose))?;
     }
     save("run.y4m", &video.finish()?)?;
-    // Noise cannot be compressed; the animated picture goes without.
+    // Without noise the animated picture compresses well.
     let quiet = Sensor {
         read_noise: 0.0,
         shot_noise: 0.0,
@@ -103,8 +105,8 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// From the search pose to the goal, slowing down, then the turn of the wrist that brings the
-/// gripper to the ball.
+/// Returns the way from the search pose to the goal, slowing down, then the turn of the wrist that
+/// brings the gripper to the ball.
 fn reach(cell: &Cell, start: &Joints, goal: &Joints, frames: u32) -> Vec<Joints> {
     let mut grip = *goal;
     grip.0[Joint::J5.index()] = cell.grip_angle(goal);

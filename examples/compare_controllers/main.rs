@@ -1,5 +1,5 @@
-//! Every controller on the same balls in the same wrong cells: the paper's learned behaviours, its
-//! rivals, and the hybrid.
+//! Compares all controllers on the same balls in the same cells with errors: the paper's learned
+//! behaviours, its alternatives, and the hybrid.
 //!
 //! ```text
 //! cargo run --release --example compare_controllers -- --help
@@ -35,34 +35,36 @@ use world::World;
 mod table;
 mod world;
 
-/// Compare controllers: drawn errors of arm and camera, drawn balls, the same for all. On the
-/// feature shortcut, or, with --full-chain, on rendered frames, circle detection and VAL II on a
-/// line; then fewer --draws and --starts will do.
+/// Compares controllers on randomly drawn errors of arm and camera and randomly drawn balls, the
+/// same for all.
 ///
-/// A run succeeds when the ball's features are at the goal within 60 moves, with --grip when the
-/// jaws hold the ball in the end. All controllers have the same search, recovery and limits, and
-/// none turns a joint farther in one move than the largest step of the paper's behaviours. The
-/// hybrid first makes up to --moves moves in each drawn cell, on other balls than those it is
-/// compared on; `hybrid, untaught` makes none.
+/// Features come straight from the geometry. With --full-chain they come from rendered frames and
+/// circle detection, and the arm is driven through VAL II; fewer --draws and --starts are enough
+/// then.
+///
+/// A run succeeds if the ball's features reach the goal within 60 moves; with --grip, if the jaws
+/// hold the ball at the end. All controllers have the same search, recovery and limits, and none
+/// turns a joint farther in one move than the paper's behaviours do. The hybrid first learns each
+/// cell by up to --moves moves toward other balls; `hybrid, untaught` does not.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for comparison.csv and comparison.svg
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     out: PathBuf,
 
-    /// Seed of everything random
+    /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 2000)]
     seed: u64,
 
-    /// Cells to draw for each level of errors
+    /// Cells per level of errors
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
     draws: u64,
 
-    /// Balls to go for in each cell
+    /// Balls per cell
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..))]
     starts: u64,
 
-    /// Moves that the hybrid may make in each cell to learn it
+    /// Moves by which the hybrid learns each cell
     #[arg(long, value_name = "N", default_value_t = 1000)]
     moves: usize,
 
@@ -70,30 +72,28 @@ struct Options {
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', default_values_t = ErrorLevel::ALL)]
     levels: Vec<ErrorLevel>,
 
-    /// Only controllers whose name contains this
+    /// Compare only controllers whose name contains this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
 
-    /// Success is the ball in the jaws; on the feature shortcut the hand has its bodies then and
-    /// can run into the ball
+    /// Count a run as success if the jaws hold the ball. Without --full-chain the hand can run into
+    /// the ball only with this option
     #[arg(long)]
     grip: bool,
 
-    /// In each cell, show the goal on the arm first, the ball between the jaws, and let every
-    /// controller have it
+    /// Teach every controller the goal in each cell, with the ball between the jaws
     #[arg(long, conflicts_with = "full_chain")]
     taught_goal: bool,
 
-    /// Render frames, find the circle in them, and talk VAL II to an emulated controller
+    /// Render frames, detect the circle in them, and drive an emulated controller by VAL II
     #[arg(long)]
     full_chain: bool,
 
-    /// How the circle is found in rendered frames: a-contrario, heuristic, rht, sht
+    /// Circle detector for rendered frames: a-contrario, heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t, requires = "full_chain")]
     detector: BallDetector,
 
-    /// Write every run that fails or is broken off to failures/ in the folder, complete, for
-    /// `replay`
+    /// Write every failed or broken-off run to failures/ in the folder, for the example replay
     #[arg(long)]
     logs: bool,
 }
@@ -109,7 +109,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         .filter(|rival| rival.name.contains(&options.only))
         .collect();
     if rivals.is_empty() {
-        return Err(format!("there is no controller with {:?} in its name", options.only).into());
+        return Err(format!("no controller has {:?} in its name", options.only).into());
     }
     let failures = Failures {
         folder: options.logs.then(|| options.out.join("failures")),
@@ -127,7 +127,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             } else {
                 None
             };
-            // Where the goal cannot be shown, the cell is left with the one there is.
+            // A cell in which the goal cannot be shown keeps the paper's.
             unshown += usize::from(options.taught_goal && goal.is_none());
             let untaught = world.agent_config(options);
             let config = goal.map_or(untaught.clone(), |goal| goal.applied_to(untaught));
@@ -140,7 +140,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                             Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
                         let seed = seed_of(options.seed, &[2, draw]);
                         let (hybrid, fault) = taught_hybrid(&mut world, agent, seed, options.moves);
-                        // What had been learned until then goes to work.
+                        // The hybrid works with what it had learned by then.
                         if let Some(Fault { run, saved, error }) = fault {
                             failures.broken_off(
                                 &run_of(format!("teaching {run}")),
@@ -224,7 +224,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Where the runs that failed are kept, if they are.
+/// Folder of the failed runs, if they are kept.
 struct Failures {
     folder: Option<PathBuf>,
 }
@@ -241,7 +241,7 @@ impl Failures {
         )
     }
 
-    /// A run that did not even come to an end.
+    /// Reports and keeps a run that was broken off.
     fn broken_off(
         &self,
         run: &str,
@@ -253,17 +253,17 @@ impl Failures {
     }
 }
 
-/// A controller in the comparison, and how it is made.
+/// A controller in the comparison and its maker.
 struct Rival {
     name: String,
     made: Made,
 }
 
-/// Makes a controller, as data, for a goal that was taught, if one was.
+/// Makes a controller, as data, for the taught goal if there is one.
 type Make = Box<dyn Fn(Option<&TaughtGoal>) -> SavedController>;
 
 enum Made {
-    /// The same for every cell.
+    /// One for every cell.
     Once(Make),
     /// The hybrid, which learns each cell first.
     InEachCell,
@@ -338,7 +338,7 @@ fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
     Ok(rivals)
 }
 
-/// The hybrid before it has made a move.
+/// Returns the hybrid before its first move.
 fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
     let hybrid = Hybrid::new(HybridSettings::paper());
     match goal {
@@ -347,8 +347,8 @@ fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
     }
 }
 
-/// The paper's controller, learned in simulation without errors: in the regression simulator, and
-/// in the exact plane. Nothing is learned where none of them is asked for.
+/// Learns the paper's controller without errors, in the regression simulator and in the exact
+/// plane. Learns nothing if none of them is compared.
 fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Error>> {
     const NAMES: [&str; 5] = [
         "Q 90, linear regression",
@@ -391,8 +391,8 @@ struct Fault {
     error: Box<dyn Error>,
 }
 
-/// The hybrid after at most `moves` moves in `cell`, learning nothing more; after fewer if a run
-/// was broken off.
+/// Returns the hybrid after at most `moves` moves in `world`, frozen, and the fault that ended
+/// teaching early, if any.
 fn taught_hybrid(
     world: &mut World,
     mut agent: Agent<Hybrid>,
@@ -402,7 +402,7 @@ fn taught_hybrid(
     let longest = agent.config().max_cycles;
     let (mut made, mut fault) = (0, None);
     for run in 0.. {
-        // A run more could take this many moves; a ball found nowhere takes none.
+        // One more run could take this many moves; a ball that is not found takes none.
         if made + longest > moves || run > moves as u64 {
             break;
         }
@@ -420,7 +420,7 @@ fn taught_hybrid(
     (agent.into_controller().frozen(), fault)
 }
 
-/// A seed of its own for each use.
+/// Derives a seed for each use.
 fn seed_of(seed: u64, uses: &[u64]) -> u64 {
     uses.iter().fold(seed, |seed, part| {
         (seed ^ part.wrapping_mul(0x9e37_79b9_7f4a_7c15))
@@ -452,7 +452,7 @@ mod tests {
             let arguments = one.into_iter().chain(kept).chain(["--only", only]);
             run(&Options::parse_from(arguments)).expect("a comparison");
         }
-        // With another camera's goal none of them grasps.
+        // None of them grasps with such a camera.
         let files = std::fs::read_dir(folder.path().join("failures")).expect("they failed");
         let replayed = files.map(|file| {
             let text = std::fs::read_to_string(file.expect("a file").path()).expect("text");

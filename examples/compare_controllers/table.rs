@@ -1,4 +1,4 @@
-//! What the runs came to: shares with intervals, as a table, a file and a picture.
+//! Results of the runs: shares with intervals, as a table, a file and a picture.
 
 use std::error::Error;
 use std::fmt;
@@ -16,7 +16,7 @@ pub(crate) struct Tally {
     draws: Vec<(usize, usize)>,
     cycles: usize,
     losses: usize,
-    /// How often the hand ran into something; counted through the full chain only.
+    /// Collisions of the hand; counted through the full chain only.
     pub(crate) collisions: Option<usize>,
 }
 
@@ -34,27 +34,26 @@ impl Tally {
         self.losses += outcome.losses;
     }
 
-    /// A run that was broken off.
+    /// Adds a run that was broken off.
     pub(crate) fn add_broken_off(&mut self) {
         if let Some((_, runs)) = self.draws.last_mut() {
             *runs += 1;
         }
     }
 
-    /// Mean share of successes over the cells, percent.
+    /// Returns the mean share of successes over the cells, percent.
     fn success(&self) -> f64 {
         let shares = self.shares();
         100.0 * shares.iter().sum::<f64>() / shares.len() as f64
     }
 
-    /// Its 95 % interval, percent: Wilson's, with each cell counting as one. It holds however much
-    /// the runs in one cell are alike, and says something where all runs succeed, or none; for
-    /// cells whose runs are not alike it is wider than it need be. Not a number without cells.
+    /// Returns its 95 % interval by Wilson, percent, with each cell counting as one trial. The
+    /// interval holds however alike the runs of a cell are. NaN without cells.
     fn interval(&self) -> [f64; 2] {
         wilson(0.01 * self.success(), self.shares().len() as f64)
     }
 
-    /// In how many cells all runs succeeded.
+    /// Returns the number of cells in which all runs succeeded.
     fn whole_cells(&self) -> usize {
         self.shares().iter().filter(|share| **share >= 1.0).count()
     }
@@ -119,7 +118,7 @@ impl fmt::Display for Row {
         } = self;
         let interval = number(*low, |low| format!("{low:.1}..{high:.1}"));
         let whole = format!("{whole_cells} of {cells}");
-        // No success, no moves.
+        // NaN without a success.
         let cycles = number(*cycles, |cycles| format!("{cycles:.1}"));
         let collisions = collisions.map_or("-".into(), |count| count.to_string());
         write!(
@@ -130,7 +129,7 @@ impl fmt::Display for Row {
     }
 }
 
-/// A number in words, none for what is none.
+/// Formats a finite number; empty for any other.
 fn number(value: f64, words: impl FnOnce(f64) -> String) -> String {
     if value.is_finite() {
         words(value)
@@ -166,8 +165,8 @@ pub(crate) fn csv(rows: &[Row]) -> String {
     csv
 }
 
-/// A bar for each controller and level: how long it is says how often it succeeded, in what
-/// `success` names, a line across its end how sure that is, and words how many moves it took.
+/// Draws a bar per controller and level: the share of success, which `success` names, its interval
+/// as a line, and the mean number of moves in words.
 pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>> {
     const NAMES: i32 = 210;
     const COLUMN: i32 = 190;
@@ -263,7 +262,8 @@ mod tests {
         assert!(all.success() > 99.999 && all.whole_cells() == 16);
         let [low, high] = tally(&[(0, 30); 16]).interval();
         assert!(low < 1e-9 && (high - 19.4).abs() < 0.1, "{low}..{high}");
-        // More runs in as many cells say no more; a cell without runs says nothing.
+        // More runs in as many cells do not narrow the interval; a cell without runs does not
+        // count.
         assert!((tally(&[(300, 300); 16]).interval()[0] - all.interval()[0]).abs() < 1e-9);
         assert!((tally(&[(3, 6), (0, 0), (6, 6)]).success() - 75.0).abs() < 1e-9);
         assert!(tally(&[]).interval()[0].is_nan());

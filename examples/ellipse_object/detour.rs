@@ -1,22 +1,23 @@
-//! The way of a turned hand to an egg and back: the jaws open aside then, and a hand that swung in
-//! from there would run a finger into it.
+//! The way of a turned hand to an egg and back. A hand that swung in from the side would run a
+//! finger into the egg.
 
 use nalgebra::Translation3;
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, PumaParams};
 
-/// How far before the egg the hand turns, metres along the tool axis.
+/// Distance from the egg at which the hand turns, metres along the tool axis.
 const ASIDE: f64 = 0.08;
-/// A turn of `JT6` from which on it matters, radians.
+/// Smallest turn of `JT6` that needs the detour, radians.
 const TURNED: f64 = 0.05;
 
-/// An arm that goes to a pose with a turned hand along the tool axis, and leaves it so.
+/// An arm that approaches and leaves a pose with a turned hand along the tool axis.
 pub(crate) struct Detour<'a> {
     pub(crate) arm: &'a mut dyn Manipulator,
     pub(crate) params: PumaParams,
 }
 
 impl Detour<'_> {
-    /// Back along the tool axis from `joints`, if the hand is turned there and can go.
+    /// Returns the pose back along the tool axis from `joints` if the hand is turned there and can
+    /// go.
     fn before(&self, joints: &Joints) -> Option<Joints> {
         let back = self.params.forward(joints) * Translation3::new(0.0, 0.0, -ASIDE);
         let posture = self.params.configuration(joints);

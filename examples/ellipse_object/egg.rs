@@ -18,15 +18,14 @@ pub(crate) struct Egg {
 }
 
 impl Egg {
-    /// The direction of its length.
+    /// Returns the direction of its length.
     pub(crate) fn axis(&self) -> Vector3<f64> {
         let (sin, cos) = self.heading.sin_cos();
         Vector3::new(cos, sin, 0.0)
     }
 }
 
-/// A camera that shows the egg where the cell has its ball. The ball lies wholly inside the egg, so
-/// nothing of it is left.
+/// A camera that shows the egg in the place of the cell's ball, which lies inside it.
 pub(crate) struct EggCamera<'a> {
     pub(crate) frames: &'a mut dyn FrameSource,
     pub(crate) cell: SharedCell,
@@ -36,10 +35,10 @@ pub(crate) struct EggCamera<'a> {
     pub(crate) noise: Xoshiro256PlusPlus,
 }
 
-/// Reflectance of the shell, and half the range of its noise in grey levels.
+/// Reflectance of the shell, and half the range of its noise in gray levels.
 const ALBEDO: f64 = 0.82;
 const GRAIN: f64 = 4.0;
-/// Grey level is the light to this power.
+/// Exponent from light to gray level.
 const GAMMA: f64 = 0.6;
 
 impl<'a> EggCamera<'a> {
@@ -61,7 +60,7 @@ impl<'a> EggCamera<'a> {
         }
     }
 
-    /// Draws the egg: for every pixel, where its ray meets the spheroid, and how that place is lit.
+    /// Draws the egg: the ray of every pixel meets the spheroid, and the point met is lit.
     fn paint(&mut self, frame: &mut GrayImage) {
         let cell = self.cell.get();
         let camera = cell.camera_pose(&(self.pose)());
@@ -108,7 +107,7 @@ impl<'a> EggCamera<'a> {
                 let formed = form * ray;
                 let (a, b) = (ray.dot(&formed), ray.dot(&pulled));
                 let under = b * b - a * beyond;
-                // Distance to the outline in pixels: what is under the root over its slope.
+                // Distance to the outline in pixels: the discriminant over its slope.
                 let slope = (2.0 / focal) * (pulled * b - formed * beyond).xy().norm();
                 let share = (0.5 + under / slope.max(1e-12)).clamp(0.0, 1.0);
                 if share <= 0.0 {
@@ -119,10 +118,10 @@ impl<'a> EggCamera<'a> {
                 let lit: f64 = lamps.iter().map(|(l, i)| i * l.dot(&normal).max(0.0)).sum();
                 let light = ALBEDO * (lit + self.scene.ambient * (0.5 + 0.5 * up.dot(&normal)));
                 let grain = self.noise.random_range(-GRAIN..GRAIN);
-                let grey = 255.0 * light.clamp(0.0, 1.0).powf(GAMMA) + grain;
+                let gray = 255.0 * light.clamp(0.0, 1.0).powf(GAMMA) + grain;
                 let pixel = frame.get_pixel_mut(x, y);
                 pixel.0[0] =
-                    (f64::from(pixel.0[0]) * (1.0 - share) + grey * share).clamp(0.0, 255.0) as u8;
+                    (f64::from(pixel.0[0]) * (1.0 - share) + gray * share).clamp(0.0, 255.0) as u8;
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Another object: an egg, found as an ellipse, reached by the behaviours that were learned for a
-//! ball, and gripped across.
+//! Another object: an egg, found as an ellipse, reached by behaviours learned for a ball, and
+//! gripped across.
 //!
 //! "It is possible to extend the grasping behavior to objects of different shapes, characterizing
 //! them uniquely, simply by considering a different set of features of the images" (section 2.1 of
@@ -45,30 +45,30 @@ use example_support::program::ended;
 mod detour;
 mod egg;
 
-/// Find, reach and grip eggs through rendered frames, ellipse detection and VAL II.
+/// Finds, reaches and grips eggs through rendered frames, ellipse detection and VAL II.
 ///
-/// The behaviours are learned for a ball that is as thick as the egg; in the place of its radius
-/// the controller is told the shorter half-axis of the egg's outline. For the grip the hand is
-/// turned so that the jaws close across the egg.
+/// The behaviours are learned for a ball as thick as the egg; the controller is given the shorter
+/// half-axis of the egg's outline for the radius. For the grip the hand turns so that the jaws
+/// close across the egg.
 ///
-/// What the camera shows is an egg; what the hand can touch and hold in the simulated cell is the
-/// ball of 40 mm inside it. That the jaws close across the egg is therefore asked for beside that
-/// they hold the ball. A run that fails is kept in the folder, complete, for `replay`.
+/// The camera shows an egg, but the hand touches and holds the ball of 40 mm inside it. Success
+/// therefore also requires that the jaws close across the egg. Failed runs are kept in the folder
+/// for the example replay.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Folder for a picture of each egg as it was seen last
+    /// Folder for a picture of the last view of each egg
     #[arg(long, value_name = "DIR", default_value = "out/egg")]
     out: PathBuf,
 
-    /// Seed of everything random
+    /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 2000)]
     seed: u64,
 
-    /// How many eggs to go for
+    /// Number of eggs
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..))]
     runs: u16,
 
-    /// Length of the egg, millimetres; it is 40 thick
+    /// Length of the egg, millimetres; its thickness is 40
     #[arg(long, value_name = "MM", default_value_t = 56.0, value_parser = length)]
     length: f64,
 }
@@ -80,7 +80,7 @@ fn length(text: &str) -> Result<f64, String> {
     }
 }
 
-/// How far the jaws may be from closing straight across the egg, degrees.
+/// Largest angle of the jaws from straight across the egg, degrees.
 const ACROSS_TOLERANCE: f64 = 20.0;
 
 fn main() -> ExitCode {
@@ -130,8 +130,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         } = rig.parts();
         let mut camera =
             EggCamera::new(camera, cell.clone(), pose, egg, scene.clone(), rng.random());
-        // The last look at the egg, and where the jaws closed: from the ball's centre, metres, and
-        // off straight across, degrees.
+        // The last view of the egg; and, when the jaws closed, their distance from the ball's
+        // centre, metres, and their angle from straight across, degrees.
         let (mut last, mut closed) = (None, None);
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
@@ -156,7 +156,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 }
             },
         );
-        // The camera holds the rig until here.
+        // The camera borrows the rig until here.
         drop(eye);
         drop(camera);
         let outcome = match end {
@@ -213,7 +213,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Ellipses among the edges of the frame.
+/// Builds a detector of ellipses among the edges of the frame.
 fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
     let edges = Canny::new(CannyConfig {
         low: 20.0,
@@ -239,7 +239,7 @@ fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
     ))
 }
 
-/// Features whose ellipse others can look at.
+/// Features that share their ellipse.
 struct Watched {
     features: EggFeatures,
     outline: Rc<Cell<Option<Ellipse>>>,
@@ -253,7 +253,7 @@ impl ObjectFeatures for Watched {
     }
 }
 
-/// How far the jaws of the arm at `joints` are from closing straight across the egg, degrees.
+/// Returns the angle of the jaws from straight across the egg, degrees.
 fn off_across(cell: &pipeline_sim::Cell, joints: &Joints, egg: &Egg) -> f64 {
     let along_the_jaws = cell.params.wrist(joints).rotation * Vector3::y();
     along_the_jaws

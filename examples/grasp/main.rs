@@ -12,7 +12,6 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -33,7 +32,7 @@ use rand::{Rng, SeedableRng};
 use example_support::files::{writable_folder, write_png, write_whole};
 use example_support::learning::{ACTIONS, TRIALS};
 use example_support::plane::search_percepts;
-use example_support::program::ended;
+use example_support::program::{self, ended};
 use example_support::stages::{Stages, Timed};
 use example_support::trial::{Devices, Trial};
 use options::{FormName, Options, RewardName};
@@ -57,7 +56,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
-    // Whatever can be found wrong is found before the long work.
+    // Checks all input before the long work.
     options.check()?;
     writable_folder(&options.out)?;
     if let Some(path) = &options.export {
@@ -79,7 +78,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         &format!("connected to the VAL II controller on {}", rig.name()),
     );
 
-    // Only now, when nothing but the work itself can fail, does what an earlier run has left go.
+    // Results of an earlier run are removed only now, after everything that can be refused.
     let frames = Frames::new(&options.out.join("frames"))?;
     let failures = emptied(&options.out.join("failures"))?;
     let saved_runs = emptied(&options.out.join("saved"))?;
@@ -117,7 +116,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut agent = Agent::with_controller(config, stages.around(taught.learned))?;
     let mut records = Vec::new();
     let mut sheet = ContactSheet::default();
-    // What has been done until a fault is worth keeping.
+    // The results until a fault are kept.
     let mut broken_off = None;
     let bar = progress_bar(options, options.runs as u64, "balls");
     for run in 1..=options.runs {
@@ -125,8 +124,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             broken_off = Some("no place of the workspace is in view from a search pose".into());
             break;
         };
-        // Each run tries by a seed of its own, so that it can be made again without those before
-        // it.
+        // Each run has a seed of its own, so that it can be replayed without those before it.
         let learning = options
             .keep_learning
             .then(|| OnlineLearning::careful(options.seed.wrapping_add(run as u64)));
@@ -167,7 +165,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         ] {
             let path = folder.join(format!("run{run:03}.json"));
             if keep && let Err(error) = write_whole(&path, record.saved.to_json().as_bytes()) {
-                // No reason to lose what was learned.
+                // A file that cannot be written does not lose what was learned.
                 broken_off.get_or_insert(format!("run {run} was not kept: {error}"));
             }
         }
@@ -178,7 +176,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     bar.finish_and_clear();
     if options.keep_learning {
-        // Also what was learned in a run that was broken off.
+        // Includes what was learned in a run that was broken off.
         let limits = agent.config().limits;
         let learned = agent.into_controller().inner;
         let (centering, approaching) = learned.clone().into_behaviours();
@@ -190,13 +188,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let summary = Summary::new(options.seed, training, &records);
     write_results(&options.out, &summary, &records, &sheet)?;
-    print_out(&summary.table());
+    program::say(&summary.table());
     say(options, &stages.to_string());
     say(options, &format!("results: {}", options.out.display()));
     broken_off.map_or(Ok(()), |reason| Err(reason.into()))
 }
 
-/// The arm: an emulated controller of our own, or one that is there already.
+/// Opens the arm: an emulated controller, or one on a line.
 fn open_rig(options: &Options) -> Result<Rig, RigError> {
     let (scene, seed) = (bright_ball_scene(), options.seed);
     match (&options.port, &options.tcp) {
@@ -206,7 +204,7 @@ fn open_rig(options: &Options) -> Result<Rig, RigError> {
     }
 }
 
-/// What was learned, and how.
+/// Learned behaviours and their origin.
 struct Taught {
     learned: Learned,
     limits: JointLimits,
@@ -243,7 +241,7 @@ impl Taught {
             );
             r2.insert(quality.output, quality.r2);
         }
-        // The literal rewards are left as they come: nothing is chosen.
+        // With the literal rewards the last table is kept.
         let trials = match options.reward() {
             RewardName::Literal => 0,
             RewardName::Mended => TRIALS,
@@ -272,7 +270,7 @@ impl Taught {
             rng,
         )?;
 
-        // What goes to work is what lies on the disk.
+        // Uses the policies as saved.
         for behaviour in [&first.behaviour, &second.behaviour] {
             behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
         }
@@ -288,7 +286,7 @@ impl Taught {
         })
     }
 
-    /// Reads what was saved before: a folder with two policies, or an exported file.
+    /// Reads saved policies: a folder with two of them, or an exported file.
     fn load(path: &Path, pair: &BehaviourPair) -> Result<Self, Box<dyn Error>> {
         let (learned, limits) = if path.is_file() {
             let text = std::fs::read_to_string(path)
@@ -302,7 +300,7 @@ impl Taught {
                 .any(|(found, spec)| found.goal != spec.goal)
             {
                 return Err(format!(
-                    "{}: its goal is another one; give the --y-goal that it was learned for",
+                    "{}: learned for another goal; give the --y-goal it was learned with",
                     path.display()
                 )
                 .into());
@@ -322,7 +320,7 @@ impl Taught {
     }
 }
 
-/// Writes the policy as JSON, if that is asked for.
+/// Writes the policy as JSON if asked for.
 fn export(
     options: &Options,
     learned: &Learned,
@@ -389,7 +387,7 @@ fn teach(
     Ok(lesson)
 }
 
-/// Takes down an event, if it can.
+/// Observer that records an event and may fail to.
 type Observe<'a> = dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>> + 'a;
 
 /// Places the ball and lets the agent go for it. A picture that cannot be written ends the writing
@@ -424,8 +422,7 @@ fn reach_for(
     written.map(|()| trial)
 }
 
-/// Makes a folder, or takes out of it what this program wrote there before: files of an earlier run
-/// must not mix with those of this one.
+/// Creates a folder, or removes from it the files that an earlier run of this program wrote.
 fn emptied(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     writable_folder(folder)?;
     for entry in std::fs::read_dir(folder)? {
@@ -439,7 +436,8 @@ fn emptied(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
     Ok(folder.to_owned())
 }
 
-/// Whether a file is named as a saved run or a frame is: `run001.json`, `run001-frame002.png`.
+/// Returns whether a file has the name of a saved run or of a frame: `run001.json`,
+/// `run001-frame002.png`.
 fn is_ours(name: &str) -> bool {
     let number = |text: &str| text.len() >= 3 && text.bytes().all(|byte| byte.is_ascii_digit());
     let Some((stem, kind)) = name
@@ -457,7 +455,7 @@ fn is_ours(name: &str) -> bool {
     }
 }
 
-/// The folder of the frames: a picture is written when it is made.
+/// Folder of the frames. Each picture is written when it is made.
 struct Frames(PathBuf);
 
 impl Frames {
@@ -505,13 +503,8 @@ fn one_line(run: usize, record: &RunRecord) -> String {
 
 fn say(options: &Options, words: &str) {
     if !options.quiet {
-        print_out(words);
+        program::say(words);
     }
-}
-
-/// Prints; a reader who has gone away is no reason to stop.
-fn print_out(words: &str) {
-    let _ = writeln!(std::io::stdout(), "{words}");
 }
 
 fn progress_bar(options: &Options, length: u64, unit: &str) -> ProgressBar {
@@ -521,7 +514,7 @@ fn progress_bar(options: &Options, length: u64, unit: &str) -> ProgressBar {
         ProgressDrawTarget::stderr()
     };
     let style =
-        ProgressStyle::with_template("  {bar:40} {pos}/{len} {msg}  {elapsed} (still {eta})")
+        ProgressStyle::with_template("  {bar:40} {pos}/{len} {msg}  {elapsed} ({eta} left)")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(length), target)
         .with_style(style)

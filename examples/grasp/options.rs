@@ -2,63 +2,62 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, ValueEnum};
+use example_support::program::at_least_one;
 use grasp_agent::YGoal;
 use puma_grasp::BallDetector;
 
-/// Learn to reach a ball in simulation, then see, reach and grasp it with a (simulated) PUMA 560
+/// Learns to reach a ball in simulation, then sees, reaches and grasps balls with a PUMA 560
 /// through VAL II.
 ///
-/// Without options everything runs here: a controller emulator is started on a pseudo-terminal,
-/// opened like a serial line, and the camera's frames are rendered from the pose of the emulated
-/// arm.
+/// Without options no hardware is needed: a controller emulator is started on a pseudo-terminal and
+/// opened like a serial line, and camera frames are rendered from the pose of the emulated arm.
 #[derive(Parser, Debug)]
 pub(crate) struct Options {
-    /// Folder for the results, among them each run that failed, for the example replay (failures/);
-    /// made if need be, files of an earlier run in it are replaced
+    /// Folder for the results, created if missing. Failed runs go to failures/ for the example
+    /// replay; files of an earlier run are replaced
     #[arg(long, value_name = "DIR", default_value = "out/grasp")]
     pub(crate) out: PathBuf,
 
-    /// Seed of everything random; the same seed gives the same run
+    /// Seed of all random draws; the same seed gives the same run
     #[arg(long, value_name = "N", default_value_t = 2000)]
     pub(crate) seed: u64,
 
-    /// How many balls to go for
+    /// Number of balls
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
     pub(crate) runs: usize,
 
-    /// Serial device of a VAL II controller (or of an emulator), 9600 8N1, instead of starting one
+    /// Serial device of a VAL II controller or emulator, 9600 8N1; none is started then
     #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     pub(crate) port: Option<String>,
 
-    /// Socket of a VAL II controller behind a terminal server (or of an emulator), as HOST:PORT
+    /// Socket of a VAL II controller or emulator, as HOST:PORT
     #[arg(long, value_name = "ADDR")]
     pub(crate) tcp: Option<String>,
 
-    /// What was learned before: a folder with centering.policy and approaching.policy of an earlier
-    /// run, or a file written by --export; skips training. A folder is read with the --fine and
-    /// --reward that it was learned with; a file says itself what is in it
+    /// Policy of an earlier run; skips training. A folder with centering.policy and
+    /// approaching.policy is read with the --fine and --reward it was learned with; a file written
+    /// by --export needs neither
     #[arg(long, value_name = "PATH", conflicts_with = "simulator")]
     pub(crate) policy: Option<PathBuf>,
 
-    /// Write the policy as JSON that other programs can run, as docs/run_policy.py does
+    /// Write the policy as JSON for other programs; docs/run_policy.py runs it
     #[arg(long, value_name = "FILE")]
     pub(crate) export: Option<PathBuf>,
 
-    /// Keep every run for the example replay (saved/), not only those that fail
+    /// Keep every run in saved/ for the example replay, not only failed ones
     #[arg(long)]
     pub(crate) save_runs: bool,
 
-    /// Go on learning at work, and save what was learned to the output folder
+    /// Go on learning during the runs, and save the policies to the output folder
     #[arg(long)]
     pub(crate) keep_learning: bool,
 
-    /// How the circle is found
-    #[arg(long, value_name = "NAME", default_value_t, value_parser = detectors())]
+    /// Circle detector: a-contrario, heuristic, rht, sht
+    #[arg(long, value_name = "NAME", default_value_t)]
     pub(crate) detector: BallDetector,
 
-    /// Reward while learning: the paper's formulas as printed do not teach the goal [default:
+    /// Reward during training; the paper's formulas as printed do not teach the goal [default:
     /// mended]
     #[arg(long, value_enum)]
     pub(crate) reward: Option<RewardName>,
@@ -67,7 +66,7 @@ pub(crate) struct Options {
     #[arg(long)]
     pub(crate) fine: bool,
 
-    /// Which of the paper's two goal intervals of y
+    /// Goal interval of y; the paper gives two
     #[arg(long, value_enum, default_value_t = YGoalName::Equation6)]
     pub(crate) y_goal: YGoalName,
 
@@ -75,7 +74,7 @@ pub(crate) struct Options {
     #[arg(long, value_enum)]
     pub(crate) simulator: Option<FormName>,
 
-    /// Let the emulated arm take the time that a real one would
+    /// Run the emulated arm at the speed of a real one
     #[arg(long, conflicts_with_all = ["port", "tcp"])]
     pub(crate) realtime: bool,
 
@@ -85,16 +84,16 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The reward asked for.
+    /// Returns the reward, by default the mended one.
     pub(crate) fn reward(&self) -> RewardName {
         self.reward.unwrap_or(RewardName::Mended)
     }
 
-    /// Refuses what would have no effect.
+    /// Refuses options that would have no effect.
     pub(crate) fn check(&self) -> Result<(), String> {
         match &self.policy {
             Some(path) if path.is_file() && (self.fine || self.reward.is_some()) => Err(format!(
-                "{}: an exported policy says itself how it was learned; leave out --fine and --reward",
+                "{}: an exported policy records how it was learned; leave out --fine and --reward",
                 path.display()
             )),
             _ => Ok(()),
@@ -102,24 +101,11 @@ impl Options {
     }
 }
 
-fn at_least_one(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(0) => Err("at least one ball is needed".into()),
-        Ok(count) => Ok(count),
-        Err(error) => Err(format!("{error}")),
-    }
-}
-
-fn detectors() -> impl TypedValueParser<Value = BallDetector> {
-    let names = BallDetector::ALL.map(BallDetector::name);
-    PossibleValuesParser::new(names).try_map(|name| name.parse())
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum YGoalName {
     /// 74 to 82
     Equation6,
-    /// 74 to 92: the hand stops farther from where the grip is aimed
+    /// 74 to 92; the hand stops farther from the point the grip aims at
     Section4,
 }
 

@@ -1,4 +1,4 @@
-//! Keeps what happens in the runs: a row an event, a picture a frame.
+//! Records of the runs: a row per event, a picture per frame.
 
 use grasp_agent::{Event, EventKind, Outcome, SavedRun};
 use hough_heuristic::Features;
@@ -9,26 +9,25 @@ use puma_val2::{JointDelta, Joints};
 use example_support::overlay::Overlay;
 use example_support::trial::Trial;
 
-/// Everything that was recorded of one run.
+/// Record of one run.
 pub(crate) struct RunRecord {
     /// The ball's centre, millimetres in the arm's world frame.
     pub(crate) ball_mm: [f64; 3],
     pub(crate) rows: Vec<Row>,
-    /// The same, complete: it can be replayed.
+    /// The run for the example `replay`.
     pub(crate) saved: SavedRun,
-    /// Frames looked at.
+    /// Number of frames.
     frames: usize,
-    /// Whether the jaws are closed: what is seen then is not the ball, or is about to be told to
-    /// have been missed.
+    /// Set while the jaws are closed, when sightings do not count.
     gripped: bool,
     pub(crate) outcome: Option<Outcome>,
-    /// Why the run was broken off, if it was.
+    /// Fault that ended the run.
     pub(crate) fault: Option<String>,
-    /// Whether the jaws hold the ball and the agent says so.
+    /// Set if the jaws hold the ball and the agent reports it.
     pub(crate) grasped: bool,
-    /// How often the hand ran into something.
+    /// Number of collisions of the hand.
     pub(crate) collisions: usize,
-    /// From the gripper to the ball's centre when the jaws closed, millimetres.
+    /// Distance of the gripper from the ball's centre when the jaws closed, millimetres.
     pub(crate) miss_mm: Option<f64>,
 }
 
@@ -41,20 +40,20 @@ pub(crate) struct Row {
     pub(crate) action: Option<JointDelta>,
 }
 
-/// A frame with what was found in it drawn in, at half size.
+/// A frame at half size with the detected circle drawn in.
 pub(crate) struct Picture {
     pub(crate) run: usize,
-    /// From 1, in each run.
+    /// Number of the frame, from 1 in each run.
     pub(crate) number: usize,
     pub(crate) step: usize,
-    /// Whether the ball was found.
+    /// Set if the ball was found.
     pub(crate) seen: bool,
     pub(crate) image: RgbImage,
     words: String,
 }
 
 impl Picture {
-    /// The picture below a caption, which covers nothing of it.
+    /// Returns the picture below a caption.
     pub(crate) fn captioned(&self) -> RgbImage {
         Overlay::from(self.image.clone())
             .captioned(&self.words)
@@ -78,7 +77,7 @@ impl RunRecord {
         }
     }
 
-    /// Takes down an event; returns the picture of its frame, if it has one.
+    /// Records an event. Returns the picture of its frame if there is one.
     pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
         self.saved.note(event);
         match event.kind {
@@ -126,24 +125,24 @@ impl RunRecord {
         })
     }
 
-    /// The jaws are about to close, `miss` metres from the ball's centre.
+    /// Records that the jaws close `miss` metres from the ball's centre.
     pub(crate) fn gripped_at(&mut self, miss: f64) {
         self.miss_mm = Some(miss * 1000.0);
     }
 
-    /// The run is over.
+    /// Records the end of the run.
     pub(crate) fn ended(&mut self, trial: &Trial, collisions: usize) {
         self.grasped = trial.outcome.gave_up.is_none() && trial.held;
         self.collisions = collisions;
         self.outcome = Some(trial.outcome);
     }
 
-    /// The features at every step from the first sighting on: what Fig. 7 of the paper plots.
+    /// Returns the features at every step from the first sighting on, as in Fig. 7 of the paper.
     pub(crate) fn track(&self) -> Vec<(usize, Features)> {
         let mut track: Vec<(usize, Features)> = Vec::new();
         for row in &self.rows {
             if let Some(features) = row.features {
-                // A ball seen twice without a move between counts as last seen.
+                // The last of several sightings without a move between counts.
                 if track.last().is_some_and(|(step, _)| *step == row.step) {
                     track.pop();
                 }

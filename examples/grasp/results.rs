@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::record::{Picture, RunRecord};
 use example_support::overlay::{CAPTION, Overlay};
 
-/// What `summary.json` holds.
+/// Content of `summary.json`.
 #[derive(Serialize)]
 pub(crate) struct Summary {
     pub(crate) seed: u64,
@@ -21,7 +21,7 @@ pub(crate) struct Summary {
 
 #[derive(Serialize)]
 pub(crate) struct TrainingSummary {
-    /// False when the policies were read from files.
+    /// False if the policies were read from files.
     pub(crate) trained: bool,
     pub(crate) actions: u64,
     pub(crate) seconds: f64,
@@ -35,7 +35,7 @@ pub(crate) struct RunSummary {
     pub(crate) grasped: bool,
     pub(crate) cycles: usize,
     pub(crate) losses: usize,
-    /// How often the hand ran into ball, holder or table.
+    /// Number of collisions with ball, holder or table.
     pub(crate) collisions: usize,
     #[serde(rename = "final")]
     pub(crate) last_seen: Option<FinalFeatures>,
@@ -71,7 +71,7 @@ impl Summary {
         }
     }
 
-    /// The table that ends the program.
+    /// Returns the table that the program prints at the end.
     pub(crate) fn table(&self) -> String {
         let mut table = String::from(
             "\n run   ball x,y,z (mm)          cycles  lost   final x, y, r            miss (mm)  result\n",
@@ -86,9 +86,7 @@ impl Summary {
             let result = match (&run.reason, run.grasped) {
                 (_, true) => "grasped".into(),
                 (Some(reason), false) => format!("not grasped: {reason}"),
-                (None, false) => {
-                    "not grasped: the jaws hold no ball, though none is seen either".into()
-                }
+                (None, false) => "not grasped: the jaws hold no ball, and none is seen".into(),
             };
             let _ = writeln!(
                 table,
@@ -146,7 +144,7 @@ impl RunSummary {
     }
 }
 
-/// `features.csv`: a row an event.
+/// Returns `features.csv`: a row per event.
 pub(crate) fn features_csv(records: &[RunRecord]) -> String {
     let mut csv = String::from("run,step,x,y,r,jt1,jt2,jt3,jt4,jt5,jt6,d1,d2,d3,event\n");
     for (run, record) in records.iter().enumerate() {
@@ -175,7 +173,7 @@ pub(crate) fn features_csv(records: &[RunRecord]) -> String {
     csv
 }
 
-/// The frames in which the ball was seen, run after run, in rows; a run begins a new row.
+/// Contact sheet of the frames in which the ball was seen; each run begins a new row.
 #[derive(Default)]
 pub(crate) struct ContactSheet(Vec<Tile>);
 
@@ -188,7 +186,7 @@ struct Tile {
 const SMALL: (u32, u32) = (156, 117);
 /// Size of a tile with its caption and its border.
 const TILE: (u32, u32) = (SMALL.0 + 4, SMALL.1 + CAPTION + 4);
-/// Runs that are shown, the first ones.
+/// Number of runs that are shown.
 const RUNS_SHOWN: usize = 20;
 
 impl ContactSheet {
@@ -205,7 +203,7 @@ impl ContactSheet {
         });
     }
 
-    /// The sheet, with `columns` tiles to a row.
+    /// Draws the sheet with `columns` tiles per row.
     pub(crate) fn drawn(&self, columns: u32) -> RgbImage {
         let mut places: Vec<(&Tile, u32, u32)> = Vec::new();
         for tile in &self.0 {

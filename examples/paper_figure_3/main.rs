@@ -30,10 +30,10 @@ use example_support::files::{writable_folder, write_png};
 use example_support::overlay::Overlay;
 use example_support::program::ended;
 
-/// Draw original, edges, structure D and the found circle of a rendered scene.
+/// Draws original, edges, structure D and the detected circle of a rendered scene.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Where to write the picture, PNG
+    /// Picture to write, PNG
     #[arg(value_name = "FILE", default_value = "out/figure_3.png")]
     picture: PathBuf,
 
@@ -96,7 +96,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What the camera sees from the first of the search poses that has the ball in full view.
+/// Renders the first search pose that has the ball in full view.
 fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
     let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
     let inside = |circle: &Circle| {
@@ -113,8 +113,8 @@ fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
         .clone())
 }
 
-/// `D` over a dark ground, and the first draw of three pixels whose circle has a radius of 20 to
-/// 250 px, with that circle. It is a draw as most are: not yet the circle that is found.
+/// Draws `D` over a dark ground, and the first draw of three pixels whose circle has a radius of 20
+/// to 250 px. Like most draws it is not yet the circle that is found.
 fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
     let ground = GrayImage::from_fn(frame.width(), frame.height(), |x, y| {
         Luma([frame.get_pixel(x, y).0[0] / 4])
@@ -165,7 +165,7 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         .into_image()
 }
 
-/// The belonging of a circle at the default tolerance of one pixel, counted pixel by pixel.
+/// Returns the belonging of a circle at the default tolerance of one pixel, counted pixel by pixel.
 fn matched(edges: &EdgeMap, circle: &Circle) -> f64 {
     let lit = |x: i32, y: i32| {
         let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else {
@@ -189,7 +189,7 @@ fn matched(edges: &EdgeMap, circle: &Circle) -> f64 {
     f64::from(matched) / f64::from(pixels)
 }
 
-/// Four panels of one size, two by two.
+/// Lays out four panels of one size, two by two.
 fn sheet(panels: &[RgbImage; 4]) -> Result<RgbImage, Box<dyn Error>> {
     const GAP: u32 = 6;
     let (width, height) = panels[0].dimensions();

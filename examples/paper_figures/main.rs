@@ -36,36 +36,36 @@ use example_support::trial::TrialCell;
 mod on_the_arm;
 mod snapshots;
 
-/// Make the figures of the paper again, as SVG, PNG and CSV: Fig. 6 to 8 on the feature shortcut,
-/// Fig. 9 through the full chain; and what becomes of the behaviours when they are taken from
-/// simulation to an arm with errors, and go on learning there.
+/// Reproduces the paper's figures 6 to 9 as SVG, PNG and CSV: 6 to 8 with features straight from
+/// the geometry, 9 through rendered frames and VAL II. Also measures the behaviours on arms with
+/// errors, before and after learning on there.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for the figures
     #[arg(long, value_name = "DIR", default_value = "out/figures")]
     out: PathBuf,
 
-    /// Seeds to learn from
+    /// Number of seeds to learn with
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     seeds: u64,
 
-    /// The first of them
+    /// First seed
     #[arg(long, value_name = "N", default_value_t = 0)]
     first_seed: u64,
 
-    /// Balls where the search finds them, to try what was learned on
+    /// Balls, placed where the search finds them, to test the learned tables with
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(1..))]
     starts: u16,
 
-    /// Figure 6 and its table only
+    /// Make figure 6 and its table only
     #[arg(long)]
     learning_only: bool,
 
-    /// Actions to learn by with the fine preset of 540 states
+    /// Training actions of the fine preset of 540 states
     #[arg(long, value_name = "N", default_value_t = 4_000_000)]
     fine: u64,
 
-    /// Arms, each with errors of its own, to take the behaviours to
+    /// Number of arms, each with errors of its own
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     arms: u64,
 }
@@ -93,8 +93,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Learning, many seeds: curves of both behaviours, and how the learned tables do from the search
-/// poses.
+/// Learns with many seeds: curves of both behaviours, and the results of the learned tables from
+/// the search poses.
 fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     let starts = search_starts(
         usize::from(options.starts),
@@ -243,8 +243,8 @@ fn scored(lesson: &Result<Lesson, LearnError>, starts: &[PlaneStart]) -> String 
     }
 }
 
-/// Features per step while reaching, by distance and elbow, and while the ball is pushed away again
-/// and again.
+/// Draws features per step while reaching, by distance and elbow, and while the ball is pushed away
+/// repeatedly.
 fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Error>> {
     let cell = TrialCell::draw(ErrorLevel::None, 0)?;
     let mut config = cell.agent_config();
@@ -254,7 +254,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
     for (figure, pushes, runs) in [(7, 0, 60), (8, 3, 3)] {
         for run in 0..runs {
             let mut agent = Agent::with_controller(config.clone(), taught.clone())?;
-            // What was seen before each move; of several looks the last one.
+            // The last sighting before each move.
             let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
             let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
                 let there = cell.features(joints).is_some_and(|f| {
@@ -347,12 +347,12 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
     )
 }
 
-/// How far off the goal a ball shows in the image, in halves of its sides.
+/// Returns the distance of a ball from the goal in the image, in halves of its sides.
 fn off_centre(f: &hough_heuristic::Features) -> f64 {
     ((f.x - 103.5) / 96.0).hypot((f.y - 78.0) / 72.0)
 }
 
-/// A feature: its name, its goal, and how to read it.
+/// A feature: its name, its goal, and its reader.
 type Feature = (
     &'static str,
     (f64, f64),

@@ -1,5 +1,4 @@
-//! From simulation to the arm: what the behaviours are worth there at once, and what learning on
-//! the arm adds.
+//! From simulation to the arm: success of the behaviours at once, and after learning on the arm.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -15,21 +14,21 @@ use example_support::plot::{Panel, drawn};
 use example_support::trial::TrialCell;
 use example_support::wilson::wilson;
 
-/// Moves on the arm after which the behaviours are looked at.
+/// Moves on the arm after which the behaviours are measured.
 const MOVES: [usize; 4] = [0, 500, 2_000, 10_000];
-/// Balls in a row that may come to no move: then there is nothing to learn from.
+/// Balls in a row without a move after which learning gives up.
 const IDLE: usize = 100;
-/// Balls by which they are judged, frozen.
+/// Balls by which the frozen behaviours are measured.
 const BALLS: u64 = 40;
 
-/// What came of it: figure and table.
+/// Figure and table.
 pub(crate) struct Report {
     pub(crate) svg: String,
     pub(crate) csv: String,
 }
 
-/// `seeds` times: learns in both regression simulators, takes the behaviours to an arm with errors
-/// drawn anew, and lets them go on learning there.
+/// Learns in both regression simulators, takes the behaviours to `seeds` arms with errors drawn
+/// anew, and lets them go on learning there.
 pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn Error>> {
     println!(
         "\nFrom simulation to the arm: the behaviours at once, and after learning on there from so many moves"
@@ -47,7 +46,7 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
     ] {
         let mut lines = Vec::new();
         for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
-            // For each seed: centering at once, then the whole task after each number of moves.
+            // Per seed: centering at once, then the whole task after each number of moves.
             let mut scores: Vec<Vec<(f64, f64)>> = Vec::new();
             for seed in 0..seeds {
                 scores.push(one_arm(form, level, seed)?);
@@ -60,7 +59,7 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
                 let success: Vec<f64> = scores.iter().map(|score| score[column].0).collect();
                 let arms = success.len() as f64;
                 let mean = success.iter().sum::<f64>() / arms;
-                // Each arm counts as one: the balls on it share its errors.
+                // Each arm counts as one trial: its balls share its errors.
                 let [low, high] = wilson(0.01 * mean, arms);
                 let moves: Vec<f64> = scores
                     .iter()
@@ -69,7 +68,7 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
                     .collect();
                 let moves = moves.iter().sum::<f64>() / moves.len() as f64;
                 let interval = format!("{low:.1}..{high:.1}");
-                // No success, no moves.
+                // NaN without a success.
                 let moves = if moves.is_finite() {
                     format!("{moves:.1}")
                 } else {
@@ -98,8 +97,8 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
     })
 }
 
-/// Success in percent and moves of a success, on one arm: centering at once, then the whole task
-/// after each of [`MOVES`].
+/// Returns success in percent and moves per success on one arm: centering at once, then the whole
+/// task after each of [`MOVES`].
 fn one_arm(
     form: ReachForm,
     level: ErrorLevel,

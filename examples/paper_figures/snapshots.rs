@@ -1,4 +1,4 @@
-//! Figure 9: what the arm looks like and what its camera sees, at four moments of a reach.
+//! Figure 9: the pose of the arm and the camera's view at four moments of a reach.
 
 use std::error::Error;
 
@@ -19,7 +19,7 @@ use example_support::overlay::{CAPTION, Overlay};
 
 /// Size of each picture, below its caption.
 const TILE: (u32, u32) = (384, 288);
-/// Pixels a metre, and where the shoulder is, in the drawing of the pose.
+/// Pixels per metre, and the shoulder's place, in the drawing of the pose.
 const SCALE: f64 = 290.0;
 const SHOULDER: (f64, f64) = (80.0, 165.0);
 
@@ -31,8 +31,8 @@ struct Moment {
     moves: usize,
 }
 
-/// Four columns: from the first sighting to the goal; three rows: the pose from the side, the frame
-/// with the circle, its edges.
+/// Draws four columns, from the first sighting to the goal, of three rows: the pose from the side,
+/// the frame with the circle, its edges.
 pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dyn Error>> {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
     let mut detector = BallDetector::default().build(seed)?;
@@ -76,7 +76,7 @@ pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dy
     Ok(sheet)
 }
 
-/// The arm from the side, in the plane that it moves in.
+/// Draws the arm from the side, in the plane that it moves in.
 fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
     let (dark, blue) = (Rgb888::new(60, 60, 75), Rgb888::new(30, 90, 180));
     let (model, joints) = (CameraModel::paper(), &moment.joints);
@@ -102,7 +102,7 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
         3,
     );
     drawing.line(SHOULDER, (SHOULDER.0, surface), dark, 12);
-    // What the camera sees: the upper and the lower border of its image.
+    // The upper and the lower border of the camera's view.
     let slope = 0.5 * 144.0 / model.focal;
     for border in [-slope, slope] {
         let far = camera * Point3::new(0.0, 0.55 * border, 0.55);
@@ -144,7 +144,7 @@ fn edges(moment: &Moment) -> Result<RgbImage, Box<dyn Error>> {
         high: 50.0,
         ..CannyConfig::default()
     })?;
-    // At half size already, so that the thin lines stay bright.
+    // Drawn at half size, so that the thin lines stay bright.
     let mut image = RgbImage::new(TILE.0, TILE.1);
     for pixel in canny.detect_edges(&moment.frame).pixels() {
         let (x, y) = (

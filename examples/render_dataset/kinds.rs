@@ -1,4 +1,4 @@
-//! What the options of `render_dataset` mean: kinds of frames, sizes, shares.
+//! Options of `render_dataset`: kinds of frames, sizes, shares.
 
 use std::str::FromStr;
 
@@ -46,7 +46,7 @@ impl Kind {
         }
     }
 
-    /// A generator that no other kind and no other seed shares.
+    /// Returns a generator that no other kind and no other seed shares.
     pub(crate) fn generator(self, seed: u64) -> Xoshiro256PlusPlus {
         // FNV-1a over the name and the seed.
         let bytes = self
@@ -61,14 +61,14 @@ impl Kind {
     }
 }
 
-/// The first kind that is named twice: its files would be written over.
+/// Returns the first kind that is named twice: its files would be overwritten.
 pub(crate) fn repeated(kinds: &[Kind]) -> Option<String> {
     let names: Vec<String> = kinds.iter().map(|kind| kind.name()).collect();
     let again = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
     again.map(|i| names[i].clone())
 }
 
-/// A share of a whole.
+/// Parses a share from 0 to 1.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     let number: Option<f64> = text
         .parse()
@@ -77,7 +77,7 @@ pub(crate) fn share(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("{text} is not a share from 0 to 1"))
 }
 
-/// Width and height, as in `768x576`.
+/// Parses width and height, as in `768x576`.
 pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
     let number = |part: &str| part.parse().ok().filter(|n| (16..=8192).contains(n));
     text.split_once('x')

@@ -7,16 +7,15 @@
 //! ```
 //!
 //! writes `out/rendered/KIND_NNN.png`, `truth.csv` (file,cx,cy,r,what,visible) and `frames.csv`
-//! (file,scene). (0, 0) is the centre of the top-left pixel. Truth holds every outline that is
-//! round to 5 % (axis ratio), at least 60 % visible and at least 5 px in radius (of a frame 768
-//! wide; balls of the benchmark kinds always): the ball (`Target`) and whatever else is round,
-//! since a detector that finds the rim of a disc seen from above is right. What is less visible
-//! (`--visible`) has no row: a frame whose ball is just below that shows most of a ball, yet looks
-//! empty in the truth. Ask for `--visible 0` and judge by the column `visible` where that matters.
+//! (file,scene). (0, 0) is the centre of the top-left pixel. The truth lists every outline that is
+//! round to 5 % (axis ratio), at least 60 % visible (`--visible`) and at least 5 px in radius for a
+//! frame 768 wide (balls of the benchmark kinds have no least radius): the ball (`Target`) and all
+//! other round outlines, such as the rim of a disc seen from above. A frame with a less visible
+//! ball has no row for it; use `--visible 0` and the column `visible` where that matters.
 //!
-//! Kinds are those of `SceneKind` (the arm at work, as hard as it gets there), and those of
-//! `BenchmarkKind` (one difficulty at a time), with `cell` and `benchmark` for all of either. A
-//! kind's frames depend on the seed and on nothing else, whatever other kinds are drawn.
+//! Kinds are those of `SceneKind` (the arm at work) and of `BenchmarkKind` (one difficulty at a
+//! time); `cell` and `benchmark` stand for all of either. The frames of a kind depend on the seed
+//! only, not on the other kinds drawn.
 
 #![allow(
     clippy::print_stdout,
@@ -34,6 +33,7 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
+use example_support::cpu::cpu_time;
 use example_support::files::{writable_folder, write_whole};
 use example_support::program::ended;
 use image::ImageFormat;
@@ -41,33 +41,30 @@ use indicatif::{ProgressBar, ProgressStyle};
 use kinds::{Kind, Kinds, repeated, share, size};
 use pipeline_sim::{Camera, Renderer, Round, Scene, Sighting, Snapshot};
 use rand::RngExt;
-use rustix::time::{ClockId, clock_gettime};
 
 /// Renders labelled frames of the simulated cell.
 #[derive(Parser)]
 struct Options {
-    /// Folder to write to; made if it is not there.
+    /// Folder for the frames, created if missing.
     #[arg(long, default_value = "out/rendered")]
     out: PathBuf,
     /// Frames of each kind.
     #[arg(long, default_value_t = 20)]
     frames: u64,
-    /// Kinds of scenes, separated by commas, each once; `cell` and `benchmark` stand for all of
-    /// theirs.
+    /// Kinds of scenes, separated by commas; `cell` and `benchmark` stand for all of either group.
     #[arg(long, value_delimiter = ',', default_value = "cell")]
     kinds: Vec<Kinds>,
     /// Width and height of the frames, pixels.
     #[arg(long, default_value = "768x576", value_parser = size)]
     size: (u32, u32),
-    /// Frames that share a scene (table, lamps, things); ball and pose are new in every frame.
-    /// Benchmark frames share nothing.
+    /// Frames that share a scene (table, lamps, objects). Ball and pose are new in every frame;
+    /// benchmark frames share nothing.
     #[arg(long, default_value_t = 5)]
     per_scene: u64,
-    /// Seed: same seed, same files.
+    /// Seed; the same seed gives the same files.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Least visible share of an outline in the truth, 0 to 1. A frame whose ball is less visible
-    /// has no row for it and looks empty; with 0 everything that shows at all is listed.
+    /// Least visible share of an outline in the truth, 0 to 1; 0 lists all that show at all.
     #[arg(long, default_value_t = 0.6, value_parser = share)]
     visible: f64,
 }
@@ -115,9 +112,9 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
                 }
             };
             let file = format!("{name}_{i:03}.png");
-            let before = cpu_seconds();
+            let before = cpu_time();
             let frame = snapshot.take(&mut renderer);
-            milliseconds.push(1000.0 * (cpu_seconds() - before));
+            milliseconds.push(1e3 * cpu_time().saturating_sub(before).as_secs_f64());
             let mut png = std::io::Cursor::new(Vec::new());
             frame.write_to(&mut png, ImageFormat::Png)?;
             write_whole(&options.out.join(&file), png.get_ref())?;
@@ -161,16 +158,10 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Whether an outline is one that a detector should find.
+/// Returns whether a detector should find the outline.
 fn counts(sighting: &Sighting, visible: f64, least_radius: f64) -> bool {
     let ellipse = &sighting.ellipse;
     let round = matches!(sighting.what, Round::Target | Round::Ball)
         || ellipse.minor >= 0.95 * ellipse.major;
     round && sighting.visible >= visible && ellipse.circle().radius >= least_radius
-}
-
-/// CPU time of this process.
-fn cpu_seconds() -> f64 {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }

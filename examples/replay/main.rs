@@ -1,4 +1,4 @@
-//! Makes saved runs again, and says whether they come out the same.
+//! Replays saved runs and compares them with their logs.
 //!
 //! ```text
 //! cargo run --release --example replay -- out/grasp/failures/run003.json
@@ -7,22 +7,19 @@
 #![allow(clippy::print_stderr, reason = "a program for a terminal")]
 
 use std::error::Error;
-use std::io::{Write as _, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{LoggedEvent, Replayed, SavedRun};
 
-use example_support::program::ended;
+use example_support::program::{ended, say};
 
-/// Make runs again that `grasp` (failures/, with --save-runs saved/), `track`,
-/// `compare_controllers` (--logs) or `ellipse_object` has kept, and say whether they come out the
-/// same.
+/// Replays runs that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers`
+/// (--logs) or `ellipse_object` have saved, and reports whether they take the same course.
 ///
 /// A file holds the settings, the controller before the run, and every event. Arm, sensors and
-/// camera answer as they did then; what the controller and the state machine decide is decided
-/// anew.
+/// camera answer as logged; the controller and the state machine decide anew.
 #[derive(Parser, Debug)]
 struct Options {
     /// Saved runs
@@ -41,7 +38,7 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let (mut others, mut unread) = (0, 0);
     for file in &options.files {
-        // The rest can be made again all the same.
+        // The other files can still be replayed.
         let (saved, replayed) = match read(file) {
             Ok(read) => read,
             Err(error) => {
@@ -61,7 +58,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             Replayed::Same(end) => {
                 let end = match end {
                     Ok(outcome) => outcome.gave_up.map_or_else(
-                        || "the jaws hold the ball, as far as can be told".into(),
+                        || "grasped (verified by camera only)".into(),
                         |reason| reason.to_string(),
                     ),
                     Err(cause) => cause,
@@ -89,7 +86,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// A run, and what comes of making it again.
+/// Reads a run and replays it.
 fn read(file: &Path) -> Result<(SavedRun, Replayed), String> {
     let named = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
     let text = std::fs::read_to_string(file).map_err(|error| named(&error))?;
@@ -98,12 +95,7 @@ fn read(file: &Path) -> Result<(SavedRun, Replayed), String> {
     Ok((saved, replayed))
 }
 
-/// Prints; a reader who has gone away is no reason to stop.
-fn say(words: &str) {
-    let _ = writeln!(stdout(), "{words}");
-}
-
-/// An event in a line: the move it happened in, what it was, and where the arm stood.
+/// Formats an event: its cycle, its kind, and the pose of the arm.
 fn told(event: &LoggedEvent) -> String {
     format!("{:4} {:?} at {}", event.cycle, event.kind, event.joints)
 }

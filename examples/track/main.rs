@@ -1,5 +1,5 @@
-//! A ball that does not stay where it is, through the full chain: rendered frames, circle
-//! detection, VAL II on a line.
+//! Follows and grasps a moving ball through the full chain: rendered frames, circle detection, VAL
+//! II.
 //!
 //! ```text
 //! cargo run --release --example track -- --help
@@ -40,12 +40,12 @@ use world::{Fate, World};
 mod tally;
 mod world;
 
-/// Track, reach and grasp a ball that is moved, with the self-calibrating hybrid controller.
+/// Tracks, reaches and grasps a ball that is moved, with the self-calibrating hybrid controller.
 ///
-/// In each cell the controller makes --teach runs on balls at rest first, to learn the camera; then
-/// come the runs that count. A ball is grasped when the jaws hold it and the controller says so.
-/// Grasps before what was to happen to the ball had happened are left out and told apart; a run
-/// that failed before that counts as failed.
+/// In each cell the controller first makes --teach runs on resting balls to learn the camera; then
+/// come the runs that count. A grasp counts if the jaws hold the ball and the controller reports
+/// it. Grasps before anything happened to the ball are reported apart; a failure before that
+/// counts.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the runs that
@@ -53,7 +53,7 @@ struct Options {
     #[arg(long, value_name = "DIR", default_value = "out/track")]
     out: PathBuf,
 
-    /// Seed of everything random
+    /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 2000)]
     seed: u64,
 
@@ -61,19 +61,19 @@ struct Options {
     #[arg(long, value_name = "N", default_value_t = 10)]
     runs: usize,
 
-    /// Runs to learn from before, in each cell
+    /// Runs to learn from first, in each cell
     #[arg(long, value_name = "N", default_value_t = 40)]
     teach: usize,
 
-    /// Cells that the runs are spread over, each with errors drawn anew
+    /// Number of cells that the runs are spread over, each with errors drawn anew
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     cells: usize,
 
-    /// What happens to the ball
+    /// Movement of the ball
     #[arg(long, value_enum, default_value_t = Fate::Push)]
     ball: Fate,
 
-    /// How the circle is found: a-contrario, heuristic, rht, sht
+    /// Circle detector: a-contrario, heuristic, rht, sht
     #[arg(
         long,
         value_name = "NAME",
@@ -82,17 +82,16 @@ struct Options {
     )]
     detector: BallDetector,
 
-    /// No frames and no line: features straight from the geometry. Only runs that failed are
+    /// Use features straight from the geometry, without frames and VAL II. Only failed runs are
     /// written, and collisions are not counted
     #[arg(long)]
     shortcut: bool,
 
-    /// Noise of the camera in the dark, grey levels; that of the scene unless given
+    /// Read noise of the camera, gray levels [default: that of the scene]
     #[arg(long, value_name = "LEVELS", conflicts_with = "shortcut")]
     noise: Option<f64>,
 
-    /// Begin with what an earlier run learned of the camera: its camera.belief; learning goes on
-    /// from there in the --teach runs
+    /// Start from the camera.belief of an earlier run; the --teach runs go on learning from it
     #[arg(long, value_name = "FILE", conflicts_with = "shortcut")]
     belief: Option<PathBuf>,
 
@@ -102,7 +101,7 @@ struct Options {
 }
 
 impl Options {
-    /// How many of the runs fall to this cell, the first being 0.
+    /// Returns the number of runs in this cell, the first being 0.
     fn runs_in(&self, cell: usize) -> usize {
         (self.runs + self.cells - 1 - cell) / self.cells
     }

@@ -1,4 +1,4 @@
-//! What the runs came to.
+//! Counts of the runs.
 
 use std::fmt;
 
@@ -7,25 +7,25 @@ use example_support::wilson::wilson;
 /// A run that counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counted {
-    /// Whether what was to happen to the ball has.
+    /// Set if all that was due has happened to the ball.
     pub(crate) happened: bool,
     pub(crate) success: bool,
     pub(crate) moves: usize,
     /// Stops by the proximity sensors.
     pub(crate) near: usize,
-    /// None where they are not counted.
+    /// `None` where they are not counted.
     pub(crate) collisions: Option<usize>,
 }
 
 impl Counted {
-    /// Whether it is in the denominator: a grasp of a ball to which nothing had happened yet is no
-    /// answer to what was asked, a failure always is.
+    /// Returns whether it is in the denominator: a grasp before anything happened to the ball does
+    /// not count, a failure always does.
     fn counts(&self) -> bool {
         self.happened || !self.success
     }
 }
 
-/// All of them, by cell.
+/// Runs by cell.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     cells: Vec<Vec<Counted>>,
@@ -86,7 +86,7 @@ impl fmt::Display for Tally {
         if !others.is_empty() {
             write!(
                 f,
-                "\nnot counted: {} grasps before what was to happen to the ball had happened",
+                "\nnot counted: {} grasps before anything happened to the ball",
                 others.len(),
             )?;
         }
@@ -117,11 +117,7 @@ mod tests {
         let told = told(&[(true, true), (false, false), (false, true)], Some(1));
         assert!(told.starts_with("1 of 2 grasped (50.0 %"), "{told}");
         assert!(told.contains("3 collisions"), "{told}");
-        assert!(
-            told.ends_with(
-                "not counted: 1 grasps before what was to happen to the ball had happened"
-            )
-        );
+        assert!(told.ends_with("not counted: 1 grasps before anything happened to the ball"));
     }
 
     #[test]

@@ -10,14 +10,14 @@ use rand::{RngExt, SeedableRng};
 /// The events that happen to a ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Fate {
-    /// It stays where it is
+    /// Stays at rest
     Rest,
-    /// Whenever it is reached it is pushed toward the camera, to a radius of 60 units, three times
-    /// (Fig. 8 of the paper)
+    /// Pushed toward the camera, to a radius of 60 units, each of the first three times it is
+    /// reached (Fig. 8 of the paper)
     Push,
-    /// When it is first reached it jumps 150 mm away
+    /// Jumps 150 mm away when first reached
     Jump,
-    /// It drifts by 20 mm in every move, ten times
+    /// Drifts by 20 mm in each of ten moves
     Drift,
 }
 
@@ -59,7 +59,7 @@ impl World {
                 self.events += usize::from(cell.push_to_radius(joints, 60.0));
             }
             Fate::Jump if reached && self.events < 1 => {
-                // To a place where the search can find it again.
+                // To a place in view of the search.
                 for _ in 0..100 {
                     let Some(place) =
                         workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng)
@@ -82,7 +82,7 @@ impl World {
             Fate::Drift if self.events < 10 => {
                 let (centre, rng) = (cell.ball.centre, &mut self.rng);
                 let (x, y) = *self.heading.get_or_insert_with(|| {
-                    // One of the directions in which it stays in the workspace.
+                    // One of the directions that keep it in the workspace.
                     let ways =
                         (0..100).map(|_| rng.random_range(0.0..std::f64::consts::TAU).sin_cos());
                     let stays = |(x, y): &(f64, f64)| {

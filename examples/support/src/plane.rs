@@ -32,7 +32,7 @@ pub struct PlaneScore {
     pub starts: usize,
     /// Steps of the successful runs, on average.
     pub steps: f64,
-    /// The same steps over the breadth-first optimum from the same starts.
+    /// Ratio of these steps to the breadth-first optimum from the same starts.
     pub over_optimum: f64,
 }
 

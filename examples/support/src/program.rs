@@ -1,4 +1,4 @@
-//! What programs print, and their exit codes.
+//! Output, exit codes and counts of the programs.
 
 use std::error::Error;
 use std::io::Write as _;

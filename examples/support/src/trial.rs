@@ -60,7 +60,7 @@ pub struct Trial {
     pub outcome: Outcome,
     /// Moves until the ball stood at the goal for the first time, `None` if it never did.
     pub at_goal: Option<usize>,
-    /// Whether the jaws hold the ball at the end.
+    /// Set if the jaws hold the ball at the end.
     pub held: bool,
     /// Stops by the proximity sensors.
     pub near: usize,
@@ -182,7 +182,7 @@ impl TrialCell {
     /// Both are turns of the wrist, which move jaws and camera alike wherever the arm stands.
     ///
     /// # Errors
-    /// What the arm reports.
+    /// Faults that the arm reports.
     pub fn teach_goal(&self, seed: u64) -> Result<Option<TaughtGoal>, ArmError> {
         /// Angles added to the grip's turn, degrees, in the order of trial.
         const TURNS: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
