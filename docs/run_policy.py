@@ -136,7 +136,7 @@ class Behaviour:
 
 
 def run(policy, ball):
-    """Returns the moves to the goal; None if not reached, "unseen" if no search pose shows the ball."""
+    """Returns the moves to the goal; None if not reached, "unseen" if no pose shows the ball."""
     limits, breaker = policy["limits_degrees"], policy["loop_breaker"]
     names = ("centering", "approaching")
     behaviours = [
