@@ -3,6 +3,7 @@
 mod canny;
 mod dispatch;
 mod gradient;
+#[cfg(feature = "imageproc")]
 mod imageproc_canny;
 mod maxima;
 mod noise;
@@ -16,6 +17,7 @@ pub use canny::{Canny, CannyConfig};
 pub use dispatch::{Vectorized, widest};
 pub use gradient::EdgeGradient;
 pub(crate) use gradient::Geometry;
+#[cfg(feature = "imageproc")]
 pub use imageproc_canny::ImageprocCanny;
 pub(crate) use maxima::Maxima;
 pub(crate) use noise::{ROW_STEP, noise_deviation};

@@ -75,6 +75,10 @@ mod detect;
 mod edges;
 mod error;
 mod frame;
+#[cfg(feature = "files")]
+mod output;
+#[cfg(feature = "cli")]
+pub mod program;
 mod region;
 mod sampling;
 mod stages;
@@ -85,9 +89,9 @@ pub use acceptance::Acceptance;
 pub use circle::{Circle, Features};
 pub use curve::{Curve, Ellipse, Line};
 pub use detect::{CircleDetector, Detection, FrameRefused};
-pub use edges::{
-    Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel, ImageprocCanny,
-};
+#[cfg(feature = "imageproc")]
+pub use edges::ImageprocCanny;
+pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel};
 pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
 #[cfg(feature = "files")]

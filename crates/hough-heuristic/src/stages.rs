@@ -3,6 +3,9 @@
 #[cfg(feature = "files")]
 mod pictures;
 
+#[cfg(feature = "cli")]
+pub(crate) use pictures::with_circles;
+
 use std::time::Duration;
 
 use crate::acceptance::explained_band;
