@@ -5,7 +5,7 @@
     cargo build --release --example detect_circles --example render_dataset
     venv/bin/python docs/benchmarks/compare_circles.py FOLDER... --csv circles.csv
     venv/bin/python docs/benchmarks/compare_circles.py --scenes benchmark --frames 20
-    cargo build --release -p hough-heuristic --example scenes
+    cargo build --release -p circle-benches --example scenes
     venv/bin/python docs/benchmarks/compare_circles.py --scenes simple --frames 20
 
 A FOLDER is a set. It holds images and may hold the tables that `render_dataset` writes: truth.csv

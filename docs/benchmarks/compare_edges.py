@@ -2,7 +2,7 @@
 """Compares the crate's Canny with OpenCV's GaussianBlur and Canny on the same frames in one run.
 
     python3 -m venv venv && venv/bin/pip install numpy 'opencv-contrib-python-headless<5'
-    cargo build --release -p hough-heuristic --example edges
+    cargo build --release -p circle-benches --features imageproc --example edges
     venv/bin/python docs/benchmarks/compare_edges.py FOLDER...
 
 Prints CSV with a row for each folder of images: CPU time per frame (one thread, the least of the

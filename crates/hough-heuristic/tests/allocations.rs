@@ -15,12 +15,8 @@ use hough_heuristic::{
     RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
 };
 
-#[path = "../scenes/scenes.rs"]
-mod scenes;
-#[path = "../scenes/staged.rs"]
-mod staged;
-
-use staged::Staged;
+use circle_scenes::scene::Scene;
+use circle_scenes::staged::Staged;
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -102,14 +98,14 @@ fn detectors() -> Vec<(String, Box<dyn Staged>)> {
 }
 
 fn frame(width: u32, height: u32, balls: usize, distractors: usize, seed: u64) -> GrayImage {
-    let scene = scenes::Scene {
+    let scene = Scene {
         width,
         height,
         balls,
         distractors,
         radius: (16.0, 30.0),
         seed,
-        ..scenes::Scene::default()
+        ..Scene::default()
     };
     scene.render().0
 }

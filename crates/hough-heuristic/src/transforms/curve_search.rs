@@ -5,8 +5,7 @@ use super::belonging::NearEdges;
 use crate::acceptance::MAX_TOLERANCE;
 use crate::curve::Curve;
 use crate::edges::{EdgeMap, EdgePixel};
-use crate::error::ConfigError;
-use crate::error::require;
+use crate::error::{ConfigError, require, require_iterations};
 use crate::sampling::structure::Structure;
 
 /// The settings of [`CurveSearch`].
@@ -102,12 +101,7 @@ impl CurveSearch {
             "between 0 and 1, both excluded",
             theta > 0.0 && theta < 1.0,
         )?;
-        require(
-            "iterations",
-            config.iterations.into(),
-            "at least 1",
-            config.iterations > 0,
-        )?;
+        require_iterations(config.iterations)?;
         require(
             "tolerance",
             tolerance,

@@ -12,9 +12,9 @@ use proptest::prelude::*;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-use crate::patterns::patterns;
-use crate::scenes::{Scene, same};
-use crate::simple::{Difficulty, Kind, ONE};
+use circle_scenes::patterns::patterns;
+use circle_scenes::scene::{Scene, same};
+use circle_scenes::simple::{Difficulty, Kind, ONE};
 
 pub(crate) const SCENE: Scene = Scene {
     width: 240,

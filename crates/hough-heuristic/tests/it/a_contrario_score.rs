@@ -7,7 +7,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
 use crate::a_contrario::{SCENE, plain, with};
-use crate::scenes::{Scene, same};
+use circle_scenes::scene::{Scene, same};
 
 /// Chance alone gives a number of false alarms of 1/10 or less in at most one frame of ten.
 #[test]

@@ -5,7 +5,7 @@ use hough_heuristic::{Acceptance, CannyConfig, Circle};
 use proptest::prelude::*;
 
 use crate::detectors::{ACCEPT, all_on};
-use crate::staged::Staged;
+use circle_scenes::staged::Staged;
 
 /// Thresholds that noise does not raise, so that noise is full of edges.
 const FIXED: CannyConfig = CannyConfig {

@@ -7,8 +7,8 @@ use hough_heuristic::{
     Sampling, StandardHough, StandardHoughConfig,
 };
 
-use crate::scenes::{Scene, same};
-use crate::staged::Staged;
+use circle_scenes::scene::{Scene, same};
+use circle_scenes::staged::Staged;
 
 /// All detectors with these settings, by name.
 pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetector>)> {

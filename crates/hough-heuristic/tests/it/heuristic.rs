@@ -4,7 +4,7 @@ use hough_heuristic::{
     Sampling,
 };
 
-use crate::scenes::{Scene, same};
+use circle_scenes::scene::{Scene, same};
 
 /// A small ball amid a few thousand edge pixels of clutter.
 fn cluttered(seed: u64) -> Scene {

@@ -5,15 +5,6 @@
     reason = "a test may fail that way, also in a function that several tests share"
 )]
 
-#[path = "../../scenes/patterns.rs"]
-mod patterns;
-#[path = "../../scenes/scenes.rs"]
-mod scenes;
-#[path = "../../scenes/simple.rs"]
-mod simple;
-#[path = "../../scenes/staged.rs"]
-mod staged;
-
 mod a_contrario;
 mod a_contrario_score;
 mod any_frame;

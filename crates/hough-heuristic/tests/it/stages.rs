@@ -5,7 +5,7 @@ use hough_heuristic::{
 };
 
 use crate::detectors;
-use crate::scenes::Scene;
+use circle_scenes::scene::Scene;
 
 #[test]
 fn each_stage_of_each_detector_has_its_picture() {

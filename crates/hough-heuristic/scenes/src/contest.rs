@@ -1,18 +1,16 @@
 //! The scenes and the detectors of the comparison, for the benchmarks and the example `compare`.
 
-#![allow(dead_code, unreachable_pub, missing_docs)]
-
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Acceptance, Canny, CannyConfig, ConfigError, EdgeDetector, EdgeMap, Heuristic, HeuristicConfig,
     RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
 };
 
-use crate::scenes::Scene;
+use crate::scene::Scene;
 use crate::staged::Staged;
 
 /// A scene of the comparison.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Round {
     pub name: &'static str,
     pub scene: Scene,
@@ -116,8 +114,11 @@ pub const DETECTORS: [&str; 6] = [
 
 /// A detector for a scene, which knows the radius range and how many balls to look for, on edges
 /// that are already found.
-pub fn detector(name: &str, scene: &Scene, edges: EdgeMap) -> Result<Box<dyn Staged>, ConfigError> {
-    let edges = Found(edges);
+pub fn detector(
+    name: &str,
+    scene: &Scene,
+    edges: impl EdgeDetector + 'static,
+) -> Result<Box<dyn Staged>, ConfigError> {
     let small = scene.width < 400;
     let accept = Acceptance {
         min_radius: if small { 8.0 } else { 15.0 },
@@ -152,8 +153,9 @@ pub fn detector(name: &str, scene: &Scene, edges: EdgeMap) -> Result<Box<dyn Sta
     })
 }
 
-/// The edges of the one frame that is looked at.
-struct Found(EdgeMap);
+/// Edges found beforehand, so that only the circle search is timed.
+#[derive(Clone, Debug)]
+pub struct Found(pub EdgeMap);
 
 impl EdgeDetector for Found {
     fn detect_edges<'a>(&'a mut self, _frame: &GrayImage) -> &'a EdgeMap {

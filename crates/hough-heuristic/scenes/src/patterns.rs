@@ -1,8 +1,6 @@
 //! Frames that wear out circle detectors: noise, dense texture, and patterns that are full of arcs
 //! or of mirrored edges.
 
-#![allow(dead_code, unreachable_pub, missing_docs)]
-
 use std::f64::consts::TAU;
 
 use hough_heuristic::image::{GrayImage, Luma};

@@ -1,13 +1,11 @@
-//! The edge detectors on one frame of 768x576 pixels.
+//! The edge detectors on one frame of 768x576 pixels; with `--features imageproc` that of the crate
+//! `imageproc` too.
 
 #![allow(missing_docs)]
 
-#[path = "../scenes/scenes.rs"]
-mod scenes;
-
+use circle_scenes::scene::Scene;
 use criterion::{Criterion, criterion_group, criterion_main};
-use hough_heuristic::{Canny, EdgeDetector, ImageprocCanny};
-use scenes::Scene;
+use hough_heuristic::{Canny, EdgeDetector};
 
 fn edges(criterion: &mut Criterion) {
     let scenes = [
@@ -34,11 +32,15 @@ fn edges(criterion: &mut Criterion) {
         group.bench_function(format!("Canny/{name}"), |bencher| {
             bencher.iter(|| canny.detect_edges(&frame).pixels().len());
         });
-        let mut imageproc = ImageprocCanny::new(30.0, 70.0).expect("usable thresholds");
-        group.sample_size(10);
-        group.bench_function(format!("imageproc/{name}"), |bencher| {
-            bencher.iter(|| imageproc.detect_edges(&frame).pixels().len());
-        });
+        #[cfg(feature = "imageproc")]
+        {
+            let mut imageproc =
+                hough_heuristic::ImageprocCanny::new(30.0, 70.0).expect("usable thresholds");
+            group.sample_size(10);
+            group.bench_function(format!("imageproc/{name}"), |bencher| {
+                bencher.iter(|| imageproc.detect_edges(&frame).pixels().len());
+            });
+        }
     }
     group.finish();
 }

@@ -4,8 +4,6 @@
 //! Lengths are for frames of 768x576 pixels and scale with the size; noise is in grey levels and
 //! does not.
 
-#![allow(dead_code, unreachable_pub, missing_docs)]
-
 use std::f64::consts::{PI, TAU};
 
 use hough_heuristic::Circle;
@@ -13,7 +11,7 @@ use hough_heuristic::image::GrayImage;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::scenes::{Canvas, convex};
+use crate::scene::{Canvas, convex};
 
 /// What a kind of scene shows.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 //! what kind each is of.
 //!
 //! ```text
-//! cargo run --release -p hough-heuristic --example scenes -- --out out/scenes --frames 20 --seed 1 --size 768x576
+//! cargo run --release -p circle-benches --example scenes -- --out out/scenes --frames 20 --seed 1 --size 768x576
 //! ```
 //!
 //! writes `out/scenes/KIND_NNN.png`, `truth.csv` (file,cx,cy,r; (0, 0) is the centre of the
@@ -11,24 +11,17 @@
 
 #![allow(clippy::print_stderr, reason = "what an example is for")]
 
-#[path = "../scenes/patterns.rs"]
-mod patterns;
-#[path = "../scenes/scenes.rs"]
-mod scenes;
-#[path = "../scenes/simple.rs"]
-mod simple;
-
 use std::error::Error;
 use std::fmt::Write as _;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use circle_scenes::patterns;
+use circle_scenes::simple::{KINDS, Kind};
 use clap::Parser;
 use hough_heuristic::Circle;
 use hough_heuristic::image::{GrayImage, ImageFormat};
-
-use simple::{KINDS, Kind};
 
 /// Renders scenes with one difficulty each.
 #[derive(Parser)]

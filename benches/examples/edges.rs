@@ -1,6 +1,6 @@
 //! Writes the edge images of a folder of frames, and the CPU time of every frame as CSV.
 //!
-//! cargo run --release -p hough-heuristic --example edges -- frames/ --edges edges/ --times
+//! cargo run --release -p circle-benches --features imageproc --example edges -- frames/ --edges edges/ --times
 //! times.csv
 
 #![allow(
@@ -14,6 +14,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use circle_benches::least_cpu_time;
 use clap::{Parser, ValueEnum};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
@@ -114,7 +115,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 .and_then(|path| path.file_name())
                 .unwrap_or_default(),
         );
-        let micros = least_micros(options.reps, &frame, detector.operator());
+        let micros = 1e6
+            * least_cpu_time(options.reps, || {
+                detector.operator().detect_edges(&frame);
+            })
+            .as_secs_f64();
         all.push(micros);
         let (low, high) = match &detector {
             Edges::Canny(canny) => canny.thresholds(),
@@ -147,19 +152,4 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         at(1.0)
     );
     Ok(())
-}
-
-/// CPU time of this process, the least over the repetitions, microseconds.
-fn least_micros(reps: u32, frame: &GrayImage, detector: &mut dyn EdgeDetector) -> f64 {
-    let now = || {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        time.tv_sec as f64 * 1e6 + time.tv_nsec as f64 * 1e-3
-    };
-    (0..reps.max(1))
-        .map(|_| {
-            let start = now();
-            detector.detect_edges(frame);
-            now() - start
-        })
-        .fold(f64::INFINITY, f64::min)
 }

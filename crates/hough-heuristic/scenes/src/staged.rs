@@ -1,7 +1,5 @@
 //! The three transforms behind one trait, stages included.
 
-#![allow(dead_code, unreachable_pub, missing_docs)]
-
 use hough_heuristic::{
     CircleDetector, EdgeDetector, Heuristic, RandomizedHough, Stages, StandardHough,
 };

@@ -1,8 +1,6 @@
 //! Seeded scenes for tests and benchmarks: shaded balls amid straight-edged distractors, with
 //! noise.
 
-#![allow(dead_code, unreachable_pub, missing_docs)]
-
 use hough_heuristic::Circle;
 use hough_heuristic::image::GrayImage;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -77,7 +75,7 @@ impl Scene {
 }
 
 /// A picture in work.
-pub struct Canvas {
+pub(crate) struct Canvas {
     pub width: u32,
     pub height: u32,
     /// Grey levels, row by row.
@@ -104,7 +102,7 @@ impl Canvas {
 
     /// Paints where `inside` (signed distance to the border, pixels, positive inside) says, softly
     /// over one pixel.
-    pub fn paint(
+    pub(crate) fn paint(
         &mut self,
         (left, top, right, bottom): (f64, f64, f64, f64),
         inside: impl Fn(f64, f64) -> f64,
@@ -180,7 +178,7 @@ impl Canvas {
     }
 
     /// The picture in whole grey levels, with noise of this deviation.
-    pub fn develop(self, noise: f64, rng: &mut Xoshiro256PlusPlus) -> GrayImage {
+    pub(crate) fn develop(self, noise: f64, rng: &mut Xoshiro256PlusPlus) -> GrayImage {
         let mut bytes = Vec::with_capacity(self.grey.len());
         for grey in self.grey {
             let (u, v): (f64, f64) = (rng.random(), rng.random());
@@ -192,7 +190,7 @@ impl Canvas {
 }
 
 /// How far inside of a convex polygon a point lies, pixels; its corners turn from x to y.
-pub fn convex(corners: &[(f64, f64)]) -> impl Fn(f64, f64) -> f64 {
+pub(crate) fn convex(corners: &[(f64, f64)]) -> impl Fn(f64, f64) -> f64 {
     move |px, py| {
         corners
             .iter()

@@ -1,25 +1,20 @@
 //! The comparison of docs/BENCHMARKS.md: every detector on every scene, over many seeds, as CSV and
 //! as a picture.
 //!
-//! cargo run --release -p hough-heuristic --example compare -- --seeds 20 --csv scenes.csv --svg
+//! cargo run --release -p circle-benches --example compare -- --seeds 20 --csv scenes.csv --svg
 //! scenes.svg
 
 #![allow(clippy::print_stdout, reason = "what an example is for")]
 
-#[path = "../scenes/contest.rs"]
-mod contest;
-#[path = "../scenes/scenes.rs"]
-mod scenes;
-#[path = "../scenes/staged.rs"]
-mod staged;
-
 use std::error::Error;
 use std::path::PathBuf;
 
+use circle_benches::least_cpu_time;
+use circle_scenes::contest;
+use circle_scenes::scene::{Scene, same};
 use clap::Parser;
 use hough_heuristic::EdgeDetector;
 use plotters::prelude::*;
-use scenes::same;
 
 /// Compares the circle detectors on rendered scenes.
 #[derive(Parser)]
@@ -74,7 +69,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut canny = round.canny();
         let mut times: Vec<f64> = (0..options.seeds)
             .map(|seed| {
-                let (frame, _) = scenes::Scene {
+                let (frame, _) = Scene {
                     seed: 100 + seed,
                     ..round.scene
                 }
@@ -110,14 +105,14 @@ fn measure(
     let (mut times, mut errors) = (Vec::new(), Vec::new());
     let mut row = Row::new(round, detector_name, seeds);
     for seed in 0..seeds {
-        let scene = scenes::Scene {
+        let scene = Scene {
             seed: 100 + seed,
             ..round.scene
         };
         let (frame, balls) = scene.render();
         let edges = round.canny().detect_edges(&frame).clone();
         row.edges += edges.pixels().len();
-        let mut detector = contest::detector(detector_name, &scene, edges)?;
+        let mut detector = contest::detector(detector_name, &scene, contest::Found(edges))?;
         // Slow ones need no repetition to be timed.
         let found = detector.detect(&frame)?.to_vec();
         let reps = if detector_name == "SHT" { 1 } else { 3 };
@@ -184,19 +179,8 @@ fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// CPU time of this process, the least over the repetitions, milliseconds.
-fn least_millis(reps: u32, mut work: impl FnMut()) -> f64 {
-    let now = || {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
-    };
-    (0..reps)
-        .map(|_| {
-            let start = now();
-            work();
-            now() - start
-        })
-        .fold(f64::INFINITY, f64::min)
+fn least_millis(repetitions: u32, work: impl FnMut()) -> f64 {
+    1e3 * least_cpu_time(repetitions, work).as_secs_f64()
 }
 
 /// The median time of each detector (a colour) on each scene (a column), on a logarithmic scale.

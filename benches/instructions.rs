@@ -9,16 +9,10 @@
     reason = "its counts are for reading"
 )]
 
-#[path = "../scenes/contest.rs"]
-mod contest;
-#[path = "../scenes/scenes.rs"]
-mod scenes;
-#[path = "../scenes/staged.rs"]
-mod staged;
-
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
+use circle_scenes::contest;
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{AContrario, AContrarioConfig, Canny, CircleDetector, EdgeDetector};
 
@@ -108,7 +102,7 @@ fn run(scene: &str, case: &str) {
         );
     } else {
         count_circles(
-            &mut *contest::detector(case, &scene, edges).expect("usable settings"),
+            &mut *contest::detector(case, &scene, contest::Found(edges)).expect("usable settings"),
             &frame,
         );
     }
