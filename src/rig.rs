@@ -4,7 +4,7 @@ use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use grasp_agent::{Agent, AgentError, CameraEye, Controller, Event, Outcome};
+use grasp_agent::{Agent, AgentError, CameraEye, Controller, RunEvent, RunOutcome};
 use hough_heuristic::{CircleDetector, FrameSource};
 use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
 #[cfg(feature = "serial")]
@@ -247,8 +247,8 @@ impl Rig {
         &mut self,
         agent: &mut Agent<C>,
         detector: &mut dyn CircleDetector,
-        observe: &mut dyn FnMut(&Event<'_>),
-    ) -> Result<Outcome, AgentError> {
+        observe: &mut dyn FnMut(&RunEvent<'_>),
+    ) -> Result<RunOutcome, AgentError> {
         let RigParts {
             camera,
             arm,

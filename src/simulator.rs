@@ -1,6 +1,6 @@
 //! The simulator in which both behaviours are learned, as in section 4 of the paper.
 
-use grasp_agent::{BehaviourSpec, LearnError, Lesson, Percept, schedule};
+use grasp_agent::{BehaviourSpec, JointLimits, LearnError, Lesson, Percept, schedule};
 use pipeline_sim::{
     CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample,
 };
@@ -21,10 +21,7 @@ pub struct Simulator {
 const ELBOW_EDGES: [f64; 2] = [175.0, 190.0];
 
 /// Working range of `JT3`, degrees. A move beyond it changes nothing.
-const ELBOW_RANGE: (f64, f64) = (120.0, 215.0);
-
-/// `JT3` where theta 3 is zero, degrees.
-const THETA3_ZERO: f64 = 170.0;
+const ELBOW_RANGE: (f64, f64) = JointLimits::PAPER_DEGREES[2];
 
 impl Simulator {
     /// Fits the simulator to samples of the cell by least squares.
@@ -43,7 +40,7 @@ impl Simulator {
                 .iter()
                 .map(|sample| Percept {
                     features: sample.before,
-                    theta3: sample.jt3_degrees - THETA3_ZERO,
+                    theta3: sample.jt3_degrees - Percept::THETA3_ZERO,
                 })
                 .collect(),
         })
@@ -65,7 +62,7 @@ impl Simulator {
     /// Returns what the camera shows after the move, `None` when the ball is out of view.
     fn predict(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let [d1, d2, d3, ..] = delta.degrees();
-        let elbow = percept.theta3 + THETA3_ZERO;
+        let elbow = percept.theta3 + Percept::THETA3_ZERO;
         if !(ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&(elbow + d3)) {
             return Some(*percept);
         }

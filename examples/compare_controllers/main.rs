@@ -17,8 +17,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, Hybrid, HybridSettings, JacobianAt, Learned, Percept, SavedController,
-    SavedRun, ServoSettings, TaughtGoal,
+    Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, Retargeted,
+    SavedRun, Servo, ServoLaw, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::{BallDetector, Simulator};
@@ -130,7 +130,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             // A cell in which the goal cannot be shown keeps the paper's.
             unshown += usize::from(options.taught_goal && goal.is_none());
             let untaught = world.agent_config(options);
-            let config = goal.map_or(untaught.clone(), |goal| goal.applied_to(untaught));
+            let config = goal.map_or_else(
+                || untaught.clone(),
+                |goal| untaught.clone().with_taught_goal(&goal),
+            );
             for (rival, tally) in rivals.iter().zip(&mut tallies) {
                 let run_of = |run: String| format!("{level} {} cell {draw} {run}", rival.name);
                 let controller = match rival.made {
@@ -149,14 +152,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                             )?;
                             world = new_world()?;
                         }
-                        SavedController::of_hybrid(&hybrid)
+                        Box::new(hybrid)
                     }
                 };
                 tally.begin_draw();
-                let mut agent = Agent::with_controller(config.clone(), controller.controller())?;
+                let mut agent = Agent::with_controller(config.clone(), controller)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
-                    let mut saved = SavedRun::before(&agent, controller.clone());
+                    let mut saved = SavedRun::before(&agent);
                     let run = world.run(&mut agent, seed, &mut |event| saved.note(event));
                     let (mut trial, collisions) = match run {
                         Ok(Some(run)) => run,
@@ -259,8 +262,8 @@ struct Rival {
     made: Made,
 }
 
-/// Makes a controller, as data, for the taught goal if there is one.
-type Make = Box<dyn Fn(Option<&TaughtGoal>) -> SavedController>;
+/// Makes a controller for the taught goal if there is one.
+type Make = Box<dyn Fn(Option<&TaughtGoal>) -> Box<dyn Controller>>;
 
 enum Made {
     /// One for every cell.
@@ -285,51 +288,41 @@ fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
     for (gain, tag) in [(1.0, "gain 1"), (0.5, "gain 0.5")] {
         rivals.push(fixed(
             &format!("position-based, {tag}"),
-            Box::new(move |goal| SavedController::PositionBased {
-                settings: servo(gain, goal),
-            }),
+            Box::new(move |goal| Box::new(Servo::new(ServoLaw::PositionBased, servo(gain, goal)))),
         ));
-        for (at, which) in [(JacobianAt::Goal, "goal J"), (JacobianAt::Now, "current J")] {
+        for (law, which) in [
+            (ServoLaw::ImageBasedAtGoal, "goal J"),
+            (ServoLaw::ImageBased, "current J"),
+        ] {
             let name = format!("image-based {which}, {tag}");
             rivals.push(fixed(
                 &name,
-                Box::new(move |goal| SavedController::ImageBased {
-                    settings: servo(gain, goal),
-                    at,
-                }),
+                Box::new(move |goal| Box::new(Servo::new(law, servo(gain, goal)))),
             ));
         }
     }
     for (gain, tag) in [(1.0, "gain 1"), (0.7, "gain 0.7"), (0.5, "gain 0.5")] {
         rivals.push(fixed(
             &format!("fuzzy, {tag}"),
-            Box::new(move |goal| SavedController::Fuzzy {
-                settings: servo(gain, goal),
-            }),
+            Box::new(move |goal| Box::new(Servo::new(ServoLaw::Fuzzy, servo(gain, goal)))),
         ));
     }
     rivals.push(fixed(
         "look-ahead",
-        Box::new(move |goal| SavedController::LookAhead {
-            settings: servo(1.0, goal),
-        }),
+        Box::new(move |goal| Box::new(Servo::new(ServoLaw::LookAhead, servo(1.0, goal)))),
     ));
     for (name, learned) in learned(options)? {
-        let learned = SavedController::of_learned(&learned, None);
         rivals.push(fixed(
             name,
             Box::new(move |goal| match goal {
-                None => learned.clone(),
-                Some(goal) => SavedController::Retargeted {
-                    controller: Box::new(learned.clone()),
-                    goal: *goal,
-                },
+                None => Box::new(learned.clone()),
+                Some(goal) => Box::new(Retargeted::new(learned.clone(), *goal)),
             }),
         ));
     }
     rivals.push(fixed(
         "hybrid, untaught",
-        Box::new(|goal| SavedController::of_hybrid(&new_hybrid(goal))),
+        Box::new(|goal| Box::new(new_hybrid(goal).frozen())),
     ));
     rivals.push(Rival {
         name: "hybrid".into(),
@@ -406,7 +399,7 @@ fn taught_hybrid(
         if made + longest > moves || run > moves as u64 {
             break;
         }
-        let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
+        let mut saved = SavedRun::before(&agent);
         match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| {
             saved.note(event)
         }) {

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-use grasp_agent::Outcome;
+use grasp_agent::RunOutcome;
 use pipeline_sim::ErrorLevel;
 use plotters::prelude::*;
 
@@ -25,7 +25,7 @@ impl Tally {
         self.draws.push((0, 0));
     }
 
-    pub(crate) fn add(&mut self, success: bool, outcome: &Outcome) {
+    pub(crate) fn add(&mut self, success: bool, outcome: &RunOutcome) {
         if let Some((successes, runs)) = self.draws.last_mut() {
             *successes += usize::from(success);
             *runs += 1;

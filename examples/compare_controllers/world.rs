@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use example_support::trial::{Devices, Trial, TrialCell};
-use grasp_agent::{Agent, AgentConfig, CameraEye, Controller, Event, TaughtGoal};
+use grasp_agent::{Agent, AgentConfig, CameraEye, Controller, RunEvent, TaughtGoal};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Workspace};
 use puma_grasp::{Rig, RigParts, bright_ball_scene};
@@ -66,7 +66,7 @@ impl World {
         &mut self,
         agent: &mut Agent<C>,
         seed: u64,
-        observe: &mut dyn FnMut(&Event<'_>),
+        observe: &mut dyn FnMut(&RunEvent<'_>),
     ) -> Result<Option<(Trial, Option<usize>)>, Box<dyn Error>> {
         let (rig, detector) = match self {
             Self::Shortcut(cell) => {

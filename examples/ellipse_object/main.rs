@@ -23,11 +23,10 @@ use std::rc::Rc;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourPair, CameraEye, EggFeatures, EggLimits, EventKind, GripAcross,
-    ObjectFeatures, SavedController, SavedRun, Sighting,
+    Agent, AgentConfig, BehaviourPair, CameraEye, EggTarget, EventKind, SavedRun, Sighting, Target,
 };
 use hough_heuristic::image::GrayImage;
-use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse};
+use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse, FrameError};
 use nalgebra::Vector3;
 use pipeline_sim::{ReachForm, Workspace, sample_moves};
 use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene};
@@ -97,16 +96,15 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         outline: Rc::default(),
     };
     let workspace = Workspace::paper();
-    let config = AgentConfig::paper(workspace.search_poses());
+    let config = AgentConfig {
+        grip_across: true,
+        ..AgentConfig::paper(workspace.search_poses())
+    };
     let (centering, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, &mut rng);
     let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
     let pair = BehaviourPair::paper_mended();
     let learned = learn_both(&simulator, pair, options.seed, &mut rng)?;
-    let controller = SavedController::GripAcross {
-        controller: Box::new(SavedController::of_learned(&learned, None)),
-        grip: config.grip,
-    };
-    let agent = Agent::with_controller(config.clone(), GripAcross::new(learned, config.grip))?;
+    let agent = Agent::with_controller(config.clone(), learned)?;
 
     let run_file = |run: usize| options.out.join(format!("egg{run:03}.json"));
     let (mut gripped, mut moves) = (0, 0);
@@ -136,7 +134,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let outline = Rc::clone(&features.outline);
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
         let params = cell.get().params;
-        let mut saved = SavedRun::before(&agent, controller.clone());
+        let mut saved = SavedRun::before(&agent);
         let end = agent.run(
             &mut eye,
             &mut Detour { arm, params },
@@ -214,7 +212,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 }
 
 /// Builds a detector of ellipses among the edges of the frame.
-fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
+fn egg_features(seed: u64) -> Result<EggTarget, Box<dyn Error>> {
     let edges = Canny::new(CannyConfig {
         low: 20.0,
         high: 50.0,
@@ -228,25 +226,17 @@ fn egg_features(seed: u64) -> Result<EggFeatures, Box<dyn Error>> {
         reach: Some(150.0),
         seed,
     })?;
-    Ok(EggFeatures::new(
-        edges,
-        search,
-        EggLimits {
-            min_minor: 20.0,
-            max_minor: 272.0,
-            elongation: 2.2,
-        },
-    ))
+    Ok(EggTarget::new(edges, search, 20.0..=272.0, 2.2))
 }
 
 /// Features that share their ellipse.
 struct Watched {
-    features: EggFeatures,
+    features: EggTarget,
     outline: Rc<Cell<Option<Ellipse>>>,
 }
 
-impl ObjectFeatures for Watched {
-    fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
+impl Target for Watched {
+    fn find(&mut self, frame: &GrayImage) -> Result<Option<Sighting>, FrameError> {
         let found = self.features.find(frame);
         self.outline.set(self.features.outline());
         found

@@ -18,8 +18,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, Event, EventKind,
-    JointLimits, Learned, Lesson, OnlineLearning, Percept, SavedController, SavedRun,
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, EventKind, JointLimits,
+    Learned, Lesson, OnlineLearning, Percept, RunEvent, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -129,11 +129,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             .keep_learning
             .then(|| OnlineLearning::careful(options.seed.wrapping_add(run as u64)));
         let learned = &mut agent.controller_mut().inner;
-        let controller = SavedController::of_learned(learned, learning);
         if let Some(settings) = learning {
             *learned = learned.clone().learning(settings);
         }
-        let saved = SavedRun::before(&agent, controller);
+        let saved = SavedRun::before(&agent);
         let mut record = RunRecord::new((ball.centre.coords * 1000.0).into(), saved);
         let cell = rig.cell().clone();
         let done = reach_for(&mut agent, &mut rig, &mut *detector, &ball, &mut |event| {
@@ -388,7 +387,7 @@ fn teach(
 }
 
 /// Observer that records an event and may fail to.
-type Observe<'a> = dyn FnMut(&Event<'_>) -> Result<(), Box<dyn Error>> + 'a;
+type Observe<'a> = dyn FnMut(&RunEvent<'_>) -> Result<(), Box<dyn Error>> + 'a;
 
 /// Places the ball and lets the agent go for it. A picture that cannot be written ends the writing
 /// of pictures, not the run.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 use example_support::program::at_least_one;
-use grasp_agent::YGoal;
+use grasp_agent::GoalInterval;
 use puma_grasp::BallDetector;
 
 /// Learns to reach a ball in simulation, then sees, reaches and grasps balls with a PUMA 560
@@ -110,10 +110,10 @@ pub(crate) enum YGoalName {
 }
 
 impl YGoalName {
-    pub(crate) fn goal(self) -> YGoal {
+    pub(crate) fn goal(self) -> GoalInterval {
         match self {
-            Self::Equation6 => YGoal::Equation6,
-            Self::Section4 => YGoal::Section4,
+            Self::Equation6 => GoalInterval::Y,
+            Self::Section4 => GoalInterval::Y_SECTION_4,
         }
     }
 }

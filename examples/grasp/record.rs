@@ -1,6 +1,6 @@
 //! Records of the runs: a row per event, a picture per frame.
 
-use grasp_agent::{Event, EventKind, Outcome, SavedRun};
+use grasp_agent::{EventKind, RunEvent, RunOutcome, SavedRun};
 use hough_heuristic::Features;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
@@ -20,7 +20,7 @@ pub(crate) struct RunRecord {
     frames: usize,
     /// Set while the jaws are closed, when sightings do not count.
     gripped: bool,
-    pub(crate) outcome: Option<Outcome>,
+    pub(crate) outcome: Option<RunOutcome>,
     /// Fault that ended the run.
     pub(crate) fault: Option<String>,
     /// Set if the jaws hold the ball and the agent reports it.
@@ -78,7 +78,7 @@ impl RunRecord {
     }
 
     /// Records an event. Returns the picture of its frame if there is one.
-    pub(crate) fn note(&mut self, run: usize, event: &Event<'_>) -> Option<Picture> {
+    pub(crate) fn note(&mut self, run: usize, event: &RunEvent<'_>) -> Option<Picture> {
         self.saved.note(event);
         match event.kind {
             EventKind::Gripped => self.gripped = true,
@@ -102,7 +102,7 @@ impl RunRecord {
         let mut overlay = Overlay::new(event.frame?);
         self.frames += 1;
         if let Some(sighting) = sighting {
-            overlay.circle(&sighting.detection.circle);
+            overlay.circle(&sighting.features.to_circle(event.frame?.width()));
         }
         let full = overlay.into_image();
         let half = resize(

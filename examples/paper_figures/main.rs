@@ -18,7 +18,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourPair, BehaviourSpec, EventKind, LearnError, Learned, Lesson, Percept, YGoal,
+    Agent, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, LearnError, Learned, Lesson,
+    Percept,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
 use puma_grasp::Simulator;
@@ -125,7 +126,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         );
         let (fine, wide) = (
             BehaviourPair::fine(),
-            mended.clone().with_y_goal(YGoal::Section4)?,
+            mended.clone().with_y_goal(GoalInterval::Y_SECTION_4)?,
         );
         let mut floored = literal.approaching.clone();
         floored.reward.floor = 1.0;
@@ -274,7 +275,10 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                     if looked_at.replace(event.cycle) == Some(event.cycle) {
                         path.pop();
                     }
-                    path.push((sighting.features, grasp_agent::theta3(&event.joints)));
+                    path.push((
+                        sighting.features,
+                        Percept::new(sighting.features, &event.joints).theta3,
+                    ));
                 }
             })?;
             for (step, (f, theta3)) in path.iter().enumerate() {

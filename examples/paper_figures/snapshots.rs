@@ -133,7 +133,7 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
 
 fn seen(moment: &Moment) -> RgbImage {
     let mut overlay = Overlay::new(&moment.frame);
-    overlay.circle(&moment.sighting.detection.circle);
+    overlay.circle(&moment.sighting.features.to_circle(moment.frame.width()));
     let f = moment.sighting.features;
     small(overlay, &format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r))
 }

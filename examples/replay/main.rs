@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{LoggedEvent, Replayed, SavedRun};
+use grasp_agent::{Replayed, RunEvent, SavedRun};
 
 use example_support::program::{ended, say};
 
@@ -67,8 +67,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
             Replayed::Differs { event, then, now } => {
                 others += 1;
-                let told =
-                    |event: Option<LoggedEvent>| event.as_ref().map_or("the end".into(), told);
+                let told = |event: Option<RunEvent<'static>>| {
+                    event.as_ref().map_or("the end".into(), told)
+                };
                 say(&format!("{name}: another course from event {event} on"));
                 say(&format!("  then: {}\n  now:  {}", told(then), told(now)));
             }
@@ -96,6 +97,6 @@ fn read(file: &Path) -> Result<(SavedRun, Replayed), String> {
 }
 
 /// Formats an event: its cycle, its kind, and the pose of the arm.
-fn told(event: &LoggedEvent) -> String {
+fn told(event: &RunEvent<'_>) -> String {
     format!("{:4} {:?} at {}", event.cycle, event.kind, event.joints)
 }

@@ -22,8 +22,8 @@ use example_support::program::{at_least_one, ended};
 use example_support::stages::{Stages, Timed};
 use example_support::trial::{Devices, Trial, TrialCell};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Belief, CameraEye, Event, EventKind, Hybrid, HybridSettings,
-    SavedController, SavedRun,
+    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, Hybrid, HybridSettings, RunEvent,
+    SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use image::GrayImage;
@@ -200,10 +200,7 @@ impl Runs<'_> {
             }
             let fate = if teaching { Fate::Rest } else { options.ball };
             let counted = (!teaching).then(|| self.tally.runs() + 1);
-            let mut saved = SavedRun::before(
-                &agent,
-                SavedController::of_hybrid(&agent.controller().inner),
-            );
+            let mut saved = SavedRun::before(&agent);
             let (end, happened, collisions) = match &mut place {
                 Place::Shortcut(cell) => {
                     let seed = seed.wrapping_mul(1_000).wrapping_add(ball as u64);
@@ -273,7 +270,7 @@ impl Runs<'_> {
     ) -> Result<Trial, AgentError> {
         let (shared, mut gripped) = (rig.cell().clone(), false);
         let (csv, film, stages) = (&mut self.csv, &mut self.film, &self.stages);
-        let mut observe = |event: &Event<'_>| {
+        let mut observe = |event: &RunEvent<'_>| {
             saved.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),

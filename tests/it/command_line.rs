@@ -10,7 +10,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use grasp_agent::{
-    Behaviour, BehaviourPair, BehaviourSpec, EventKind, JointLimits, Learned, SavedRun, YGoal,
+    Behaviour, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, JointLimits, Learned,
+    SavedRun,
 };
 use qtable::QTable;
 
@@ -144,7 +145,7 @@ fn grasp_refuses_policies_that_it_cannot_run_and_says_why() {
     let argument = path.to_str().expect("a plain path").to_owned();
     let paper = blank_policy(BehaviourPair::paper_mended());
     let wide = BehaviourPair::paper_mended()
-        .with_y_goal(YGoal::Section4)
+        .with_y_goal(GoalInterval::Y_SECTION_4)
         .expect("it fits");
     let cases = [
         ("this is no policy".to_owned(), "expected"),

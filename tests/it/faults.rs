@@ -4,7 +4,7 @@
 
 use grasp_agent::{
     Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, GaveUp, Hybrid,
-    HybridSettings, Outcome, Prior,
+    HybridSettings, Prior, RunOutcome,
 };
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{Circle, CircleDetector, Detection, FrameError, FrameRefused, FrameSource};
@@ -55,7 +55,7 @@ impl Between<'_> {
         &mut self,
         rig: &mut Rig,
         agent: &mut Agent<Hybrid>,
-    ) -> (Result<Outcome, AgentError>, EventLog) {
+    ) -> (Result<RunOutcome, AgentError>, EventLog) {
         let mut log = EventLog::default();
         let RigParts {
             camera: inner,
@@ -120,7 +120,7 @@ impl Manipulator for Arm<'_> {
 
 /// The error of a run that failed, which is also its last event; the arm stands where it was then,
 /// with the jaws open.
-fn failure(end: Result<Outcome, AgentError>, log: &EventLog, rig: &Rig) -> AgentError {
+fn failure(end: Result<RunOutcome, AgentError>, log: &EventLog, rig: &Rig) -> AgentError {
     let error = end.expect_err("a fault");
     let last = log.events.last().expect("an event");
     assert_eq!(last.kind, EventKind::Failed(error.to_string()));

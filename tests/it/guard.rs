@@ -4,8 +4,8 @@
 
 use example_support::trial::{FeatureEye, TrialCell};
 use grasp_agent::{
-    Agent, AgentConfig, Consequence, Controller, EventKind, EventLog, GaveUp, JointLimits,
-    PositionBased, ServoSettings, Situation,
+    Agent, AgentConfig, Controller, Decision, EventKind, EventLog, Feedback, GaveUp, Request,
+    Servo, ServoLaw, ServoSettings, Sighting,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, FeatureCamera, Grasp, Workspace};
 use puma_grasp::{Rig, RigParts, bright_ball_scene};
@@ -105,25 +105,27 @@ struct Clumsy {
 }
 
 impl Controller for Clumsy {
-    fn name(&self) -> &str {
-        "clumsy"
-    }
-
-    fn begin(&mut self) {
-        *self = Self::default();
-    }
-
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        if now.features.r > 29.0 && !self.slipped {
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+        if ball.features.r > 29.0 && !self.slipped && !request.grip {
             self.slipped = true;
             // A finger lands where the middle between them should.
-            return Ok(JointDelta::from_degrees([3.5, 0.0, 0.0, 0.0, -18.01, 0.0]));
+            let onto_it = JointDelta::from_degrees([3.5, 0.0, 0.0, 0.0, -18.01, 0.0]);
+            return Ok(Decision::Move(onto_it));
         }
-        PositionBased::new(ServoSettings::paper().with_gain(0.6)).decide(now, limits)
+        let settings = ServoSettings::paper().with_gain(0.6);
+        Servo::new(ServoLaw::PositionBased, settings).decide(ball, request)
     }
 
-    fn judge(&mut self, consequence: &Consequence) {
-        self.taken_back += usize::from(*consequence == Consequence::TakenBack);
+    fn notice(&mut self, feedback: &Feedback) {
+        match feedback {
+            Feedback::Begin => *self = Self::default(),
+            Feedback::TakenBack => self.taken_back += 1,
+            _ => {}
+        }
+    }
+
+    fn describe(&self) -> &str {
+        "clumsy"
     }
 }
 

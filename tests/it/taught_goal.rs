@@ -2,7 +2,7 @@
 
 use example_support::trial::TrialCell;
 use grasp_agent::{
-    Agent, AgentConfig, Controller, Hybrid, HybridSettings, PositionBased, ServoSettings,
+    Agent, AgentConfig, Controller, Hybrid, HybridSettings, Servo, ServoLaw, ServoSettings,
     TaughtGoal,
 };
 use pipeline_sim::ErrorLevel;
@@ -46,8 +46,12 @@ fn servoing_grasps_with_a_wrong_camera_once_it_was_shown_the_goal() {
             goal: goal.features(),
             ..paper
         };
-        without += held(&cell, &config, &PositionBased::new(paper));
-        with += held(&cell, &goal.applied_to(config), &PositionBased::new(shown));
+        without += held(&cell, &config, &Servo::new(ServoLaw::PositionBased, paper));
+        with += held(
+            &cell,
+            &config.with_taught_goal(&goal),
+            &Servo::new(ServoLaw::PositionBased, shown),
+        );
     }
     assert!(
         with >= 23 && without <= 6,
@@ -68,7 +72,11 @@ fn what_was_shown_tells_the_hybrid_of_the_camera() {
     let (mut with, mut without) = (0, 0);
     for (cell, goal) in &shown {
         let hybrid_shown = hybrid.clone().shown(goal);
-        with += held(cell, &goal.applied_to(cell.agent_config()), &hybrid_shown);
+        with += held(
+            cell,
+            &cell.agent_config().with_taught_goal(goal),
+            &hybrid_shown,
+        );
         without += held(cell, &cell.agent_config(), &hybrid);
         // What it believes now explains what it was shown.
         let nominal = HybridSettings::paper().nominal;

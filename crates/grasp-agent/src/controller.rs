@@ -1,138 +1,153 @@
-//! The door of everything that decides how the arm moves while the ball is in view.
+//! The trait of everything that decides how the arm moves while the ball is in view.
 
-use hough_heuristic::Features;
+#[cfg(feature = "serde")]
+use std::sync::Arc;
+
 use puma_val2::{JointDelta, Joints};
 
+#[cfg(feature = "serde")]
+use crate::error::BehaviourError;
 use crate::limits::JointLimits;
-use crate::percept::Percept;
+use crate::percept::Sighting;
 
-/// What a [`Controller`] decides by: the ball in the image, and the pose it is seen from.
+/// Question of an agent to its controller, beside the ball that is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Situation {
-    /// Centre and radius of the ball's outline, feature units (192x144).
-    pub features: Features,
-    /// The joint angles that the arm reports.
+pub struct Request {
+    /// Joint angles that the arm reports.
     pub joints: Joints,
-    /// [`Sighting::long_axis`](crate::Sighting::long_axis) of what is seen.
-    pub long_axis: Option<f64>,
+    /// Working limits that every move must stay within.
+    pub limits: JointLimits,
+    /// `false`: asks for a move toward the goal. `true`: asks for the move that brings the gripper
+    /// to the ball.
+    pub grip: bool,
 }
 
-impl Situation {
-    /// Whether every number of it is one.
-    pub(crate) fn is_finite(&self) -> bool {
-        let Features { x, y, r } = self.features;
-        [x, y, r]
-            .iter()
-            .chain(&self.joints.0)
-            .all(|v| v.is_finite())
-    }
-
-    /// The part of it that the paper's behaviours look at.
-    pub fn percept(&self) -> Percept {
-        Percept::new(self.features, &self.joints)
-    }
-}
-
-/// What came of a move that a [`Controller`] decided on.
+/// Answer of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Consequence {
-    /// The ball is in view, here.
-    Seen(Situation),
-    /// The ball has left the view.
+pub enum Decision {
+    /// Move the arm by this, which may be nothing.
+    Move(JointDelta),
+    /// Bring the gripper to the ball by this move.
+    Grip(JointDelta),
+}
+
+/// Things that a controller is told between two decisions, in the order in which they happen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Feedback {
+    /// A run begins. What is known of the ball of the run before is void.
+    Begin,
+    /// The arm reports these joint angles: at the beginning of a run, and after each move, whoever
+    /// ordered it.
+    Arm(Joints),
+    /// The move decided on last was made, and the ball is in view from the pose `joints`.
+    Seen {
+        /// The ball.
+        ball: Sighting,
+        /// Joint angles that the arm reports.
+        joints: Joints,
+    },
+    /// The move decided on last was made, and the ball has left the view.
     Lost,
-    /// Supervision has taken the arm back to where it was: something was too near, or the approach
+    /// Supervision has taken the move decided on last back: something was too near, or the approach
     /// too fast.
     TakenBack,
-    /// It was not a move decided on: the gripper went for the ball, and was stopped or missed it.
-    /// The ball may lie elsewhere now.
+    /// The gripper was stopped on its way to the ball, or missed it. The ball may have moved.
     Missed,
+    /// The run is over.
+    End,
 }
 
-/// Decides, from one sighting of the ball to the next, how the arm moves.
+/// Decides how the arm moves while the ball is in view.
 ///
-/// [`Agent`](crate::Agent) calls [`decide`](Controller::decide) whenever the ball is in view and
-/// not yet at the goal; searching, recovering a lost ball, gripping and supervision are the
-/// agent's. The other methods tell what happens in between and may be left out.
+/// [`Agent`](crate::Agent) calls [`decide`](Controller::decide) whenever the ball is in view; it
+/// searches, recovers a lost ball, grips and supervises by itself.
+///
+/// ```
+/// use grasp_agent::puma_val2::{Joint, JointDelta};
+/// use grasp_agent::{Controller, Decision, GaveUp, Request, Sighting};
+///
+/// /// Turns the first joint until the ball is in the middle of the image.
+/// struct Turn;
+///
+/// impl Controller for Turn {
+///     fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+///         let turn = JointDelta::of(Joint::J1, (0.002 * (96.0 - ball.features.x)).clamp(-0.08, 0.08));
+///         if request.limits.admit(&(request.joints + turn)) {
+///             Ok(Decision::Move(turn))
+///         } else {
+///             Err(GaveUp::NoMoveLeft)
+///         }
+///     }
+///
+///     fn describe(&self) -> &str {
+///         "turn"
+///     }
+/// }
+/// ```
 pub trait Controller {
-    /// What it is called, in tables and logs.
-    fn name(&self) -> &str;
-
-    /// How the arm should move now. The move must stay within `limits`, and it may be none.
+    /// Decides what to do about the `ball` that is seen.
+    ///
+    /// Asked for a grip ([`Request::grip`]), a controller without an aim of its own returns an
+    /// error or any [`Decision::Move`]: the agent then uses
+    /// [`AgentConfig::grip`](crate::AgentConfig::grip), or reaches on. Asked for a move, it may
+    /// answer [`Decision::Grip`]; the agent then looks once more and asks for the grip.
     ///
     /// # Errors
-    /// The reason for giving up, [`GaveUp::NoMoveLeft`] in particular.
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp>;
+    /// The reason to give up, [`GaveUp::NoMoveLeft`] in particular.
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp>;
 
-    /// What came of the move decided on last.
-    fn judge(&mut self, consequence: &Consequence) {
-        let _ = consequence;
+    /// Takes note of what happened since the last decision.
+    fn notice(&mut self, feedback: &Feedback) {
+        let _ = feedback;
     }
 
-    /// The arm stands at `joints`: at the beginning of a run, and after each move, whoever ordered
-    /// it.
-    fn arm_at(&mut self, joints: &Joints) {
-        let _ = joints;
-    }
+    /// Returns the controller's name, for tables and logs.
+    fn describe(&self) -> &str;
 
-    /// The move that brings the gripper to the ball, seen at the goal; `None` to leave it to the
-    /// agent's settings.
-    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
-        let _ = (now, limits);
+    /// Returns the controller as data, from which a [`SavedRun`](crate::SavedRun) makes it again;
+    /// `None` for controllers that cannot be saved.
+    #[cfg(feature = "serde")]
+    fn save(&self) -> Option<SavedController> {
         None
     }
-
-    /// A run begins: whatever was remembered of the last one's ball is void.
-    fn begin(&mut self) {}
-
-    /// The run is over.
-    fn end(&mut self) {}
 }
 
 impl<C: Controller + ?Sized> Controller for Box<C> {
-    fn name(&self) -> &str {
-        (**self).name()
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+        (**self).decide(ball, request)
     }
 
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        (**self).decide(now, limits)
+    fn notice(&mut self, feedback: &Feedback) {
+        (**self).notice(feedback);
     }
 
-    fn judge(&mut self, consequence: &Consequence) {
-        (**self).judge(consequence);
+    fn describe(&self) -> &str {
+        (**self).describe()
     }
 
-    fn arm_at(&mut self, joints: &Joints) {
-        (**self).arm_at(joints);
-    }
-
-    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
-        (**self).grip(now, limits)
-    }
-
-    fn begin(&mut self) {
-        (**self).begin();
-    }
-
-    fn end(&mut self) {
-        (**self).end();
+    #[cfg(feature = "serde")]
+    fn save(&self) -> Option<SavedController> {
+        (**self).save()
     }
 }
 
-/// Why a run ended without a grip.
+/// Reason why a run ended without a grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum GaveUp {
     /// The ball is in view from none of the search poses, or of the first
     /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) of them.
     NotFound,
-    /// The goal was not reached within the allowed number of moves.
+    /// The goal was not reached within
+    /// [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles) moves.
     OutOfCycles,
-    /// Every move that the controller could make leads out of the working limits, or the grip at
-    /// the goal does, or the lift after it.
+    /// Every move that the controller could make leads out of the working limits, or the grip or
+    /// the lift does.
     NoMoveLeft,
-    /// Something was too near to the hand on its last way to the ball, again and again, or when
-    /// what it had gripped was lifted; or on the way to every viewpoint of a search, so that there
-    /// was no look at all.
+    /// Something was too near to the hand: on three ways to the ball, when the closed hand was
+    /// lifted, or on the way to every viewpoint of a search.
     Obstructed,
 }
 
@@ -142,7 +157,88 @@ impl std::fmt::Display for GaveUp {
             Self::NotFound => "the ball is in view from no search pose",
             Self::OutOfCycles => "the goal was not reached within the allowed number of moves",
             Self::NoMoveLeft => "every move leads out of the working limits",
-            Self::Obstructed => "something was too near to the hand: on its way to every search pose, or as it went for the ball or lifted it",
+            Self::Obstructed => {
+                "something was too near to the hand on the way to every search pose, to the ball, \
+                 or when the hand was lifted"
+            }
         })
+    }
+}
+
+/// A controller as data: its kind, and the settings and knowledge of that kind.
+#[cfg(feature = "serde")]
+#[derive(Clone, Debug)]
+pub struct SavedController {
+    kind: String,
+    data: Arc<dyn Data>,
+}
+
+/// Data that is written only when it is asked for.
+#[cfg(feature = "serde")]
+trait Data: std::fmt::Debug + Send + Sync {
+    fn json(&self) -> serde_json::Result<serde_json::Value>;
+}
+
+#[cfg(feature = "serde")]
+impl<T: serde::Serialize + std::fmt::Debug + Send + Sync> Data for T {
+    fn json(&self) -> serde_json::Result<serde_json::Value> {
+        serde_json::to_value(self)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl SavedController {
+    /// Creates the data of a controller of this `kind`.
+    pub fn new(
+        kind: &str,
+        data: impl serde::Serialize + std::fmt::Debug + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            kind: kind.into(),
+            data: Arc::new(data),
+        }
+    }
+
+    /// Returns the kind.
+    pub fn kind(&self) -> &str {
+        &self.kind
+    }
+
+    /// Reads the data.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Text`] for data of another type, or that the type refuses.
+    pub fn data<T: serde::de::DeserializeOwned>(&self) -> Result<T, BehaviourError> {
+        let read = self.data.json().and_then(serde_json::from_value);
+        read.map_err(|error| BehaviourError::Text {
+            what: format!("controller of kind {:?}: {error}", self.kind),
+        })
+    }
+}
+
+/// A [`SavedController`] as it is written.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Written {
+    kind: String,
+    data: serde_json::Value,
+}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for SavedController {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let written = Written {
+            kind: self.kind.clone(),
+            data: self.data.json().map_err(serde::ser::Error::custom)?,
+        };
+        serde::Serialize::serialize(&written, to)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for SavedController {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let Written { kind, data } = serde::Deserialize::deserialize(from)?;
+        Ok(Self::new(&kind, data))
     }
 }

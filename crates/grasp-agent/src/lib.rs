@@ -123,40 +123,34 @@ pub use qtable;
 
 pub use behaviour::learning::{LearnError, Lesson, learn, schedule};
 pub use behaviour::policy::{Behaviour, Episode};
-pub use behaviour::preset::{BehaviourPair, YGoal};
+pub use behaviour::preset::BehaviourPair;
 pub use behaviour::reward::{Reward, RewardTerm};
 pub use behaviour::spec::{BehaviourSpec, GoalInterval, JointSteps};
 pub use behaviour::task::BehaviourTask;
-pub use controller::{Consequence, Controller, GaveUp, Situation};
-pub use controllers::grip_across::GripAcross;
+#[cfg(feature = "serde")]
+pub use controller::SavedController;
+pub use controller::{Controller, Decision, Feedback, GaveUp, Request};
 pub use controllers::hybrid::belief::{Belief, Prior};
 pub use controllers::hybrid::controller::{Hybrid, HybridSettings};
 pub use controllers::learned::{Learned, OnlineLearning};
-pub use controllers::servo::fuzzy::Fuzzy;
-pub use controllers::servo::image_based::{ImageBased, JacobianAt};
-pub use controllers::servo::look_ahead::LookAhead;
-pub use controllers::servo::position_based::PositionBased;
+pub use controllers::servo::controller::{Servo, ServoLaw};
 pub use controllers::servo::settings::ServoSettings;
 pub use controllers::taught_goal::{Retargeted, TaughtGoal};
 pub use error::{AgentError, BehaviourError};
-pub use limits::{JointLimits, StepLimits};
-pub use percept::{Input, Percept, Sighting, theta3};
-pub use record::log::{EventLog, LoggedEvent};
-#[cfg(feature = "serde")]
-pub use record::saved_controller::SavedController;
+pub use limits::JointLimits;
+pub use percept::{Input, Percept, Sighting};
+pub use record::log::EventLog;
 #[cfg(feature = "serde")]
 pub use record::saved_run::{Replayed, SavedRun};
 pub use run::agent::Agent;
-pub use run::config::{AgentConfig, ApproachLimit};
-pub use run::event::{Event, EventKind, Order, Outcome, Phase};
-pub use run::gripper::{GripEnd, GripperActivation, Hand, Went};
-pub use run::recovery::{Recovery, RecoveryMoves};
-pub use run::search::{LastLook, PoseSearch, Search, Viewpoint};
-pub use run::supervision::{Arrival, Guard, Supervision, Verdict};
+pub use run::config::AgentConfig;
+pub use run::event::{EventKind, Order, Phase, RunEvent, RunOutcome};
+pub use run::search::{PoseSearch, RecoveryMoves, Search, Viewpoint};
+pub use run::supervision::{Guard, Supervision, Verdict};
 pub use sight::arm_plane::ArmPlane;
 pub use sight::camera_model::CameraModel;
-pub use sight::eye::{CameraEye, Eye, Look};
-pub use sight::target::{BallFeatures, EggFeatures, EggLimits, ObjectFeatures};
+pub use sight::eye::{CameraEye, Eye};
+pub use sight::target::{EggTarget, Target};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,12 +1,10 @@
-//! Ranges that a task keeps the joints in, and the longest steps.
+//! Working limits: the ranges that a task keeps the joints in, and its longest steps.
 
 use puma_val2::{Joint, JointDelta, Joints};
 
-#[cfg(feature = "serde")]
-use crate::checked::above_zero;
 use crate::checked::checked;
 
-/// The range that a task keeps each joint in, radians (low, high), `JT1` first; closed.
+/// Range that a task keeps each joint in, radians (low, high), `JT1` first; both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -18,23 +16,27 @@ pub struct JointLimits(pub [(f64, f64); 6]);
 checked!(JointLimits);
 
 impl JointLimits {
-    /// The reaching task's: -160..160, -150..-20, 120..215, -110..170, -100..100, -266..266
-    /// degrees.
+    /// Largest turns of `JT1` to `JT3` in one move of the paper's behaviours (section 3.1),
+    /// radians: 5, 20 and 16 degrees.
+    pub const PAPER_STEPS: [f64; 3] =
+        [5_f64.to_radians(), 20_f64.to_radians(), 16_f64.to_radians()];
+
+    /// Limits of the reaching task, degrees (low, high), `JT1` first.
+    pub const PAPER_DEGREES: [(f64, f64); 6] = [
+        (-160.0, 160.0),
+        (-150.0, -20.0),
+        (120.0, 215.0),
+        (-110.0, 170.0),
+        (-100.0, 100.0),
+        (-266.0, 266.0),
+    ];
+
+    /// Returns the limits of the reaching task, [`JointLimits::PAPER_DEGREES`].
     pub fn paper() -> Self {
-        Self(
-            [
-                (-160.0_f64, 160.0_f64),
-                (-150.0, -20.0),
-                (120.0, 215.0),
-                (-110.0, 170.0),
-                (-100.0, 100.0),
-                (-266.0, 266.0),
-            ]
-            .map(|(low, high)| (low.to_radians(), high.to_radians())),
-        )
+        Self(Self::PAPER_DEGREES.map(|(low, high)| (low.to_radians(), high.to_radians())))
     }
 
-    /// Whether they are ranges; if not, why.
+    /// Checks that every range is one.
     pub(crate) fn check(&self) -> Result<(), String> {
         for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.0) {
             if !(low.is_finite() && high.is_finite() && low <= high) {
@@ -44,7 +46,7 @@ impl JointLimits {
         Ok(())
     }
 
-    /// Whether every joint is in its range, to a millionth of a degree.
+    /// Returns `true` if every joint is in its range, to a millionth of a degree.
     pub fn admit(&self, joints: &Joints) -> bool {
         const SLACK: f64 = 2e-8;
         self.0
@@ -53,12 +55,12 @@ impl JointLimits {
             .all(|(&(low, high), angle)| (low - SLACK..=high + SLACK).contains(&angle))
     }
 
-    /// The pose nearest to `joints` in which every joint is in its range; NaN stays NaN.
+    /// Returns the pose nearest to `joints` in which every joint is in its range; NaN stays NaN.
     pub fn nearest(&self, joints: &Joints) -> Joints {
         Joints(std::array::from_fn(|i| {
             let (low, high) = self.0[i];
-            // Not `clamp`, which panics on a range that is none, nor `min` and `max`, which make a
-            // number of NaN.
+            // Not `clamp`, which panics on a range that is none, nor `min` and `max`, which turn
+            // NaN into a number.
             match joints.0[i] {
                 angle if angle < low => low,
                 angle if angle > high => high,
@@ -66,44 +68,18 @@ impl JointLimits {
             }
         }))
     }
-}
 
-/// The farthest that a continuous controller turns each joint in one cycle, radians, `JT1` first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
-pub struct StepLimits(pub [f64; 3]);
-
-checked!(StepLimits);
-
-impl StepLimits {
-    /// The largest steps of the paper's behaviours (section 3.1): 5, 20 and 16 degrees.
-    pub fn paper() -> Self {
-        Self([5.0_f64, 20.0, 16.0].map(f64::to_radians))
-    }
-
-    /// Whether they are steps; if not, why.
-    #[cfg(feature = "serde")]
-    pub(crate) fn check(&self) -> Result<(), String> {
-        let steps = Joint::ALL.into_iter().zip(self.0);
-        steps
-            .into_iter()
-            .try_for_each(|(joint, most)| above_zero(&format!("the longest step of {joint}"), most))
-    }
-
-    /// The longest move in the direction of `wanted` (JT1, JT2, JT3, radians), no longer than that,
-    /// in which no joint turns farther than it may; joints that would leave `limits` stop there. Of
-    /// what is not finite, or steps that are NaN, a move that is NaN, which no limits admit.
-    pub fn apply(&self, wanted: [f64; 3], joints: &Joints, limits: &JointLimits) -> JointDelta {
+    /// Shortens `wanted` (`JT1` to `JT3`, radians) until no joint turns farther than `most` allows,
+    /// keeping its direction; joints that would leave their range from `joints` stop at its end.
+    ///
+    /// Returns a move of NaN, which no limits admit, if `wanted` is not finite or a step is NaN.
+    pub fn step(&self, joints: &Joints, wanted: [f64; 3], most: &[f64; 3]) -> JointDelta {
         let shares = wanted
             .iter()
-            .zip(self.0)
+            .zip(most)
             .map(|(wanted, most)| most / wanted.abs());
-        // `min` makes a number of NaN.
-        let known = wanted.iter().all(|v| v.is_finite()) && !self.0.iter().any(|v| v.is_nan());
+        // `min` turns NaN into a number.
+        let known = wanted.iter().all(|v| v.is_finite()) && !most.iter().any(|v| v.is_nan());
         let share = if known {
             shares.fold(1.0, f64::min)
         } else {
@@ -113,7 +89,7 @@ impl StepLimits {
         for (i, wanted) in wanted.into_iter().enumerate() {
             target.0[i] += share * wanted;
         }
-        let reached = limits.nearest(&target);
+        let reached = self.nearest(&target);
         JointDelta(std::array::from_fn(|i| {
             if i < 3 {
                 reached.0[i] - joints.0[i]
@@ -124,37 +100,44 @@ impl StepLimits {
     }
 }
 
+/// Checks the longest steps of a continuous controller, `JT1` first.
+#[cfg(feature = "serde")]
+pub(crate) fn check_steps(steps: &[f64; 3]) -> Result<(), String> {
+    let mut steps = Joint::ALL.into_iter().zip(steps);
+    steps.try_for_each(|(joint, most)| {
+        crate::checked::above_zero(&format!("the longest step of {joint}"), *most)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn steps_keep_their_direction_and_end_within_the_limits() {
-        let at = Joints::from_degrees([0.0, -26.0, 180.0, 0.0, 45.0, 0.0]);
+        let (at, limits) = (
+            Joints::from_degrees([0.0, -26.0, 180.0, 0.0, 45.0, 0.0]),
+            JointLimits::paper(),
+        );
         let wanted = [10.0_f64, 16.0, -3.0].map(f64::to_radians);
-        let delta = StepLimits::paper()
-            .apply(wanted, &at, &JointLimits::paper())
+        let delta = limits
+            .step(&at, wanted, &JointLimits::PAPER_STEPS)
             .degrees();
         let expected = [5.0, 6.0, -1.5, 0.0, 0.0, 0.0];
-        assert!(
-            delta
-                .iter()
-                .zip(expected)
-                .all(|(a, b)| (a - b).abs() < 1e-9),
-            "{delta:?}"
-        );
-        assert!(JointLimits::paper().nearest(&Joints([f64::NAN; 6])).0[0].is_nan());
+        let close = delta
+            .iter()
+            .zip(expected)
+            .all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(close, "{delta:?}");
+        assert!(limits.nearest(&Joints([f64::NAN; 6])).0[0].is_nan());
         let (nan, turn) = (f64::NAN, 0.01);
         for (steps, wanted) in [
-            (StepLimits::paper(), [nan, turn, turn]),
-            (StepLimits::paper(), [f64::INFINITY, turn, turn]),
-            (StepLimits([nan, 1.0, 1.0]), [turn; 3]),
+            (JointLimits::PAPER_STEPS, [nan, turn, turn]),
+            (JointLimits::PAPER_STEPS, [f64::INFINITY, turn, turn]),
+            ([nan, 1.0, 1.0], [turn; 3]),
         ] {
-            let delta = steps.apply(wanted, &at, &JointLimits::paper());
-            assert!(
-                !JointLimits::paper().admit(&(at + delta)),
-                "{wanted:?}: {delta:?}"
-            );
+            let delta = limits.step(&at, wanted, &steps);
+            assert!(!limits.admit(&(at + delta)), "{wanted:?}: {delta:?}");
         }
     }
 }

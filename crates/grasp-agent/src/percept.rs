@@ -1,53 +1,66 @@
-//! What the controller perceives at one moment.
+//! What is seen: the object in one frame, and the percept that behaviours decide by.
 
-use hough_heuristic::{Detection, Features};
+use hough_heuristic::Features;
 use puma_val2::{Joint, Joints};
 
-/// A ball in a frame.
+/// An object found in one frame, the ball for example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sighting {
-    /// The circle in pixels of the frame, with its score.
-    pub detection: Detection,
-    /// The same in feature units.
+    /// Centre and radius of its outline, feature units (192x144).
     pub features: Features,
-    /// Where the longer axis of its outline points in the image, radians from x toward y; `None`
-    /// for what is round, or where that is not known.
-    #[cfg_attr(feature = "serde", serde(default))]
+    /// Score of the detection; the scale is the detector's own.
+    pub score: f64,
+    /// Direction of the longer axis of its outline, radians from x toward y in the image. `None`
+    /// for round outlines and where the direction is unknown.
     pub long_axis: Option<f64>,
 }
 
-/// The ball in the image and the elbow: everything a behaviour decides by.
+impl Sighting {
+    /// Creates a sighting of a round object with the score 1.
+    pub fn new(features: Features) -> Self {
+        Self {
+            features,
+            score: 1.0,
+            long_axis: None,
+        }
+    }
+
+    /// Returns `true` if every number is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Features { x, y, r } = self.features;
+        let numbers = [x, y, r, self.score].into_iter();
+        numbers.chain(self.long_axis).all(f64::is_finite)
+    }
+}
+
+/// Inputs of a behaviour at one moment: the ball in the image and the elbow angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Percept {
-    /// Centre and radius of the ball's outline, in feature units (192x144).
+    /// Centre and radius of the ball's outline, feature units (192x144).
     pub features: Features,
-    /// The paper's third joint angle, degrees: see [`theta3`].
+    /// The paper's angle theta 3 "between J2 and J3", degrees: `JT3` -
+    /// [`THETA3_ZERO`](Percept::THETA3_ZERO).
     pub theta3: f64,
 }
 
 impl Percept {
-    /// The percept of `features`, seen from the pose `joints`.
+    /// `JT3` at which theta 3 is zero, degrees.
+    ///
+    /// The paper gives no zero. With this one the goal poses of a reachable ball fill its interval
+    /// \[0 : 40\] (10th to 90th percentile: -1 to 33).
+    pub const THETA3_ZERO: f64 = 170.0;
+
+    /// Creates the percept of `features` seen from the pose `joints`.
     pub fn new(features: Features, joints: &Joints) -> Self {
         Self {
             features,
-            theta3: theta3(joints),
+            theta3: joints[Joint::J3].to_degrees() - Self::THETA3_ZERO,
         }
     }
 }
 
-/// `JT3` where theta 3 is zero, degrees.
-pub(crate) const THETA3_ZERO: f64 = 170.0;
-
-/// The paper's angle theta 3 "between J2 and J3" in degrees: `JT3` - 170.
-///
-/// The paper gives no zero. With this one the goal poses of a reachable ball fill its interval \[0
-/// : 40\] (10th to 90th percentile: -1 to 33).
-pub fn theta3(joints: &Joints) -> f64 {
-    joints[Joint::J3].to_degrees() - THETA3_ZERO
-}
-
-/// One quantity of a [`Percept`] that a behaviour's state is made of.
+/// One quantity of a [`Percept`]; behaviours build their states from these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Input {
@@ -62,7 +75,7 @@ pub enum Input {
 }
 
 impl Input {
-    /// The value of this quantity in `percept`.
+    /// Returns the value of this quantity in `percept`.
     pub fn of(self, percept: &Percept) -> f64 {
         match self {
             Self::X => percept.features.x,

@@ -5,7 +5,7 @@ use std::fmt;
 use std::rc::Rc;
 use std::time::Duration;
 
-use grasp_agent::{Consequence, Controller, GaveUp, JointLimits, Situation};
+use grasp_agent::{Controller, Decision, Feedback, GaveUp, Request, SavedController, Sighting};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{CircleDetector, Detection, FrameError, FrameRefused, FrameSource};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
@@ -93,36 +93,24 @@ impl CircleDetector for Timed<&mut dyn CircleDetector> {
 }
 
 impl<C: Controller> Controller for Timed<C> {
-    fn name(&self) -> &str {
-        self.inner.name()
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+        self.stages.measured(
+            |spent| &mut spent.decide,
+            || self.inner.decide(ball, request),
+        )
     }
 
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
+    fn notice(&mut self, feedback: &Feedback) {
         self.stages
-            .measured(|spent| &mut spent.decide, || self.inner.decide(now, limits))
+            .measured(|spent| &mut spent.decide, || self.inner.notice(feedback));
     }
 
-    fn judge(&mut self, consequence: &Consequence) {
-        self.stages
-            .measured(|spent| &mut spent.decide, || self.inner.judge(consequence));
+    fn describe(&self) -> &str {
+        self.inner.describe()
     }
 
-    fn arm_at(&mut self, joints: &Joints) {
-        self.inner.arm_at(joints);
-    }
-
-    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
-        self.stages
-            .measured(|spent| &mut spent.decide, || self.inner.grip(now, limits))
-    }
-
-    fn begin(&mut self) {
-        self.inner.begin();
-    }
-
-    fn end(&mut self) {
-        self.stages
-            .measured(|spent| &mut spent.decide, || self.inner.end());
+    fn save(&self) -> Option<SavedController> {
+        self.inner.save()
     }
 }
 

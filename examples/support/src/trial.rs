@@ -3,10 +3,10 @@
 use std::fmt;
 
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Controller, Event, EventKind, Eye, ImageBased, Look, Outcome,
-    Sighting, TaughtGoal,
+    Agent, AgentConfig, AgentError, Controller, EventKind, Eye, RunEvent, RunOutcome,
+    ServoSettings, Sighting, TaughtGoal,
 };
-use hough_heuristic::{Detection, Features, FrameError};
+use hough_heuristic::{Features, FrameError};
 use pipeline_sim::{
     Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Hand, SharedCell, SimulatedArm,
     Workspace,
@@ -20,18 +20,8 @@ use rand::{RngExt, SeedableRng};
 pub struct FeatureEye<P>(pub FeatureCamera<P>);
 
 impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
-    fn look(&mut self) -> Result<Look, FrameError> {
-        /// Width that the circle of a sighting is given for: that of the paper's frame.
-        const FRAME: u32 = 768;
-        let ball = self.0.look().map(|features| Sighting {
-            long_axis: None,
-            features,
-            detection: Detection {
-                circle: features.to_circle(FRAME),
-                score: 1.0,
-            },
-        });
-        Ok(Look { frame: None, ball })
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
+        Ok(self.0.look().map(Sighting::new))
     }
 }
 
@@ -57,7 +47,7 @@ impl fmt::Debug for Devices<'_> {
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The agent's own account.
-    pub outcome: Outcome,
+    pub outcome: RunOutcome,
     /// Moves until the ball stood at the goal for the first time, `None` if it never did.
     pub at_goal: Option<usize>,
     /// Set if the jaws hold the ball at the end.
@@ -74,7 +64,7 @@ impl Devices<'_> {
     pub fn run<C: Controller>(
         self,
         agent: &mut Agent<C>,
-        observe: &mut dyn FnMut(&Event<'_>),
+        observe: &mut dyn FnMut(&RunEvent<'_>),
     ) -> Result<Trial, AgentError> {
         let (mut at_goal, mut near) = (None, 0);
         let outcome = agent.run_and_learn(self.eye, self.arm, self.sensor, &mut |event| {
@@ -188,7 +178,7 @@ impl TrialCell {
         const TURNS: [f64; 7] = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0];
         /// Turns of `JT4`, degrees, in the order of trial.
         const ASIDE: [f64; 8] = [4.0, -4.0, 8.0, -8.0, 12.0, -12.0, 16.0, -16.0];
-        let from = Joints::from_degrees(ImageBased::GOAL_POSE);
+        let from = Joints::from_degrees(ServoSettings::GOAL_POSE);
         let config = self.agent_config();
         let upright = TURNS.map(|more| (0.0, more));
         let turned = TURNS
@@ -248,7 +238,7 @@ impl TrialCell {
         agent: &mut Agent<C>,
         seed: u64,
         world: &mut dyn FnMut(&mut Cell, &Joints),
-        observe: &mut dyn FnMut(&Event<'_>),
+        observe: &mut dyn FnMut(&RunEvent<'_>),
     ) -> Result<Option<Trial>, AgentError> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let Some(ball) = self.sample_seen_ball(&mut rng)? else {
@@ -284,7 +274,7 @@ struct ChangingWorld<'a, E, P> {
 }
 
 impl<E: Eye, P: FnMut() -> Joints> Eye for ChangingWorld<'_, E, P> {
-    fn look(&mut self) -> Result<Look, FrameError> {
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
         let joints = (self.pose)();
         self.cell.with(|cell| (self.world)(cell, &joints));
         self.eye.look()

@@ -10,10 +10,11 @@ use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
 use crate::behaviour::spec::BehaviourSpec;
 use crate::behaviour::task::BehaviourTask;
 use crate::error::BehaviourError;
-use crate::percept::{Percept, THETA3_ZERO};
+use crate::limits::JointLimits;
+use crate::percept::Percept;
 
 /// Working range of `JT3`, degrees: a move beyond it is refused, and nothing changes.
-const ELBOW_RANGE: (f64, f64) = (120.0, 215.0);
+const ELBOW_RANGE: (f64, f64) = JointLimits::PAPER_DEGREES[2];
 
 /// A behaviour just learned, and how that went.
 #[derive(Clone, Debug)]
@@ -157,7 +158,7 @@ impl Trials {
                 if spec.at_goal(&now) {
                     return Some(step);
                 }
-                let elbow = now.theta3 + THETA3_ZERO;
+                let elbow = now.theta3 + Percept::THETA3_ZERO;
                 let admitted = |action: Action| {
                     let turned = elbow + deltas[action.0][Joint::J3].to_degrees();
                     (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)

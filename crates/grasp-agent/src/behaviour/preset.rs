@@ -16,32 +16,6 @@ pub struct BehaviourPair {
     pub approaching: BehaviourSpec,
 }
 
-/// The two goal intervals that the paper gives for y.
-///
-/// Everything here uses that of Eq. 6 unless told otherwise: its middle is the 78 that the reward
-/// of the same equation aims at, and from anywhere in it the paper's fixed turn of the fifth joint
-/// brings the gripper to within 6.3 mm of the ball. The other one is wider, is reached in fewer
-/// moves, and leaves the gripper up to 10.6 mm beside the ball.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum YGoal {
-    /// 74 to 82, as in Eq. 6.
-    #[default]
-    Equation6,
-    /// 74 to 92, as in section 4.
-    Section4,
-}
-
-impl YGoal {
-    /// Lowest and highest good y, feature units.
-    pub fn ends(self) -> (f64, f64) {
-        match self {
-            Self::Equation6 => (74.0, 82.0),
-            Self::Section4 => (74.0, 92.0),
-        }
-    }
-}
-
 impl BehaviourPair {
     /// The paper as it is printed: 42 states by 9 actions, 90 by 81, the rewards of Eq. 5 and 6.
     /// They do not teach the goal, see [`Reward`].
@@ -69,14 +43,14 @@ impl BehaviourPair {
         }
     }
 
-    /// The same with the goal interval of y that is asked for.
+    /// Returns the pair with another goal interval of y for approaching.
     ///
     /// # Errors
-    /// Intervals of approaching into which that goal does not fit; those of the presets take both.
-    pub fn with_y_goal(self, goal: YGoal) -> Result<Self, DiscretiseError> {
-        let (low, high) = goal.ends();
+    /// Intervals of approaching into which that goal does not fit; those of the presets take both
+    /// of the paper's.
+    pub fn with_y_goal(self, goal: GoalInterval) -> Result<Self, DiscretiseError> {
         Ok(Self {
-            approaching: self.approaching.with_y_goal(low, high)?,
+            approaching: self.approaching.with_y_goal(goal)?,
             ..self
         })
     }
@@ -128,9 +102,9 @@ mod tests {
 
     /// From the gripper to the ball after the paper's turn of the fifth joint, at the worst place
     /// of the goal, metres.
-    fn worst_miss(goal: YGoal) -> f64 {
+    fn worst_miss(goal: GoalInterval) -> f64 {
         let model = CameraModel::paper();
-        let (low, high) = goal.ends();
+        let GoalInterval { low, high, .. } = goal;
         let mut worst: f64 = 0.0;
         for (x, y, r) in [99.0, 108.0]
             .into_iter()
@@ -146,7 +120,10 @@ mod tests {
 
     #[test]
     fn the_gripper_comes_nearer_with_the_narrower_goal() {
-        let (narrow, wide) = (worst_miss(YGoal::Equation6), worst_miss(YGoal::Section4));
+        let (narrow, wide) = (
+            worst_miss(GoalInterval::Y),
+            worst_miss(GoalInterval::Y_SECTION_4),
+        );
         assert!(narrow < 0.0065, "{narrow}");
         assert!((0.0100..0.0110).contains(&wide), "{wide}");
     }
@@ -159,16 +136,15 @@ mod tests {
             BehaviourPair::fine(),
         ] {
             let states = pair.approaching.states();
-            for goal in [YGoal::Equation6, YGoal::Section4] {
+            for goal in [GoalInterval::Y, GoalInterval::Y_SECTION_4] {
                 let pair = pair.clone().with_y_goal(goal).unwrap();
                 assert!(pair.approaching.states() <= states);
                 let of_y: Vec<_> = pair
                     .goal()
                     .into_iter()
                     .filter(|i| i.input == Input::Y)
-                    .map(|i| (i.low, i.high))
                     .collect();
-                assert_eq!(of_y, [goal.ends()]);
+                assert_eq!(of_y, [goal]);
             }
         }
         let config = AgentConfig::paper([Joints::default()]);

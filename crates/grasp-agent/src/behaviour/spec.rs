@@ -1,6 +1,7 @@
 //! A behaviour as data: its states, its actions, its goal and its reward, with the paper's values
 //! as presets.
 
+use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta};
 use qtable::{Action, DiscretiseError, Intervals, Product, State};
 
@@ -83,7 +84,43 @@ pub struct GoalInterval {
 checked!(GoalInterval);
 
 impl GoalInterval {
-    /// Whether `percept` lies in the interval.
+    /// The paper's goal interval of x, feature units.
+    pub const X: Self = Self::new(Input::X, 99.0, 108.0);
+    /// The paper's goal interval of y in Eq. 6, feature units. Its middle is the 78 that the reward
+    /// of the same equation aims at; from anywhere in it the paper's fixed turn of the fifth joint
+    /// brings the gripper to within 6.3 mm of the ball.
+    pub const Y: Self = Self::new(Input::Y, 74.0, 82.0);
+    /// The paper's goal interval of y in section 4, feature units. It is reached in fewer moves
+    /// than that of Eq. 6, and leaves the gripper up to 10.6 mm beside the ball.
+    pub const Y_SECTION_4: Self = Self::new(Input::Y, 74.0, 92.0);
+    /// The paper's goal interval of r, feature units.
+    pub const R: Self = Self::new(Input::R, 32.0, 34.0);
+
+    /// Creates an interval.
+    pub const fn new(input: Input, low: f64, high: f64) -> Self {
+        Self { input, low, high }
+    }
+
+    /// Returns the features in the middle of the paper's goal intervals: (103.5, 78, 33).
+    pub(crate) fn paper_features() -> Features {
+        Features {
+            x: Self::X.middle(),
+            y: Self::Y.middle(),
+            r: Self::R.middle(),
+        }
+    }
+
+    /// Returns the middle.
+    pub(crate) fn middle(&self) -> f64 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// Returns half the width.
+    pub(crate) fn half_width(&self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+
+    /// Returns `true` if `percept` lies in the interval.
     pub fn holds(&self, percept: &Percept) -> bool {
         (self.low..=self.high).contains(&self.input.of(percept))
     }
@@ -99,7 +136,9 @@ impl GoalInterval {
 }
 
 /// Edges of the radius, common to both behaviours; the goal is \[32, 34\].
-const R_EDGES: [f64; 5] = [14.0, 22.0, 32.0, 34.0, 47.0];
+const R_EDGES: [f64; 5] = [14.0, 22.0, R.low, R.high, 47.0];
+const Y: GoalInterval = GoalInterval::Y;
+const R: GoalInterval = GoalInterval::R;
 
 checked!(BehaviourSpec);
 
@@ -113,16 +152,25 @@ impl BehaviourSpec {
         Self {
             name: "centering".into(),
             inputs: vec![Input::X, Input::R],
-            space: product([(&[50.0, 82.0, 99.0, 108.0, 125.0, 157.0], 3), (&R_EDGES, 3)]),
+            space: product([
+                (
+                    &[
+                        50.0,
+                        82.0,
+                        GoalInterval::X.low,
+                        GoalInterval::X.high,
+                        125.0,
+                        157.0,
+                    ],
+                    3,
+                ),
+                (&R_EDGES, 3),
+            ]),
             moves: vec![JointSteps {
                 joint: Joint::J1,
                 degrees: vec![-5.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 5.0],
             }],
-            goal: vec![GoalInterval {
-                input: Input::X,
-                low: 99.0,
-                high: 108.0,
-            }],
+            goal: vec![GoalInterval::X],
             reward: Reward::centering_literal().mended(),
         }
     }
@@ -137,8 +185,8 @@ impl BehaviourSpec {
             name: "approaching".into(),
             inputs: vec![Input::Y, Input::R, Input::Theta3],
             space: product([
-                (&[43.0, 74.0, 82.0, 98.0], 2),
-                (&[15.0, 27.0, 32.0, 34.0, 50.0], 3),
+                (&[43.0, Y.low, Y.high, 98.0], 2),
+                (&[15.0, 27.0, R.low, R.high, 50.0], 3),
                 (&[6.0, 27.0], NO_GOAL),
             ]),
             moves: vec![
@@ -151,18 +199,7 @@ impl BehaviourSpec {
                     degrees: vec![-16.0, -5.0, -1.6, -0.5, 0.0, 0.5, 1.6, 5.0, 16.0],
                 },
             ],
-            goal: vec![
-                GoalInterval {
-                    input: Input::Y,
-                    low: 74.0,
-                    high: 82.0,
-                },
-                GoalInterval {
-                    input: Input::R,
-                    low: 32.0,
-                    high: 34.0,
-                },
-            ],
+            goal: vec![GoalInterval::Y, GoalInterval::R],
             reward: Reward::approaching_literal().mended(),
         }
     }
@@ -182,23 +219,24 @@ impl BehaviourSpec {
                 ..approaching.reward
             },
             space: product([
-                (&[20.0, 40.0, 60.0, 74.0, 82.0, 96.0, 114.0, 130.0], 4),
-                (&[9.5, 12.0, 16.0, 21.0, 27.0, 32.0, 34.0, 40.0, 50.0], 6),
+                (&[20.0, 40.0, 60.0, Y.low, Y.high, 96.0, 114.0, 130.0], 4),
+                (&[9.5, 12.0, 16.0, 21.0, 27.0, R.low, R.high, 40.0, 50.0], 6),
                 (&[-3.0, 5.0, 15.0, 25.0, 33.0], NO_GOAL),
             ]),
             ..approaching
         }
     }
 
-    /// The same behaviour with another goal interval of y: section 4 of the paper gives \[74, 92\]
-    /// where its Eq. 6 has \[74, 82\].
+    /// Returns the behaviour with another goal interval of y, [`GoalInterval::Y_SECTION_4`] for
+    /// example.
     ///
-    /// The interval replaces the goal bin in the state space too; edges that it swallows are
-    /// dropped. Specifications without y stay as they are.
+    /// The interval replaces the goal bin in the state space too; edges inside it are dropped.
+    /// Specifications without y stay as they are.
     ///
     /// # Errors
     /// Edges that do not increase: ends that are not finite or not in order.
-    pub fn with_y_goal(mut self, low: f64, high: f64) -> Result<Self, DiscretiseError> {
+    pub fn with_y_goal(mut self, goal: GoalInterval) -> Result<Self, DiscretiseError> {
+        let GoalInterval { low, high, .. } = goal;
         let mut axes = self.space.quantities().to_vec();
         for (input, axis) in self.inputs.iter().zip(&mut axes) {
             let Some(bin) = axis.goal() else {
@@ -221,12 +259,10 @@ impl BehaviourSpec {
             }
         }
         self.space = Product::new(axes)?;
-        for interval in self
-            .goal
-            .iter_mut()
-            .filter(|interval| interval.input == Input::Y)
-        {
-            (interval.low, interval.high) = (low, high);
+        for interval in &mut self.goal {
+            if interval.input == Input::Y {
+                (interval.low, interval.high) = (low, high);
+            }
         }
         Ok(self)
     }
@@ -358,7 +394,6 @@ fn product<const N: usize>(axes: [(&[f64], usize); N]) -> Product {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hough_heuristic::Features;
 
     fn percept(x: f64, y: f64, r: f64, theta3: f64) -> Percept {
         Percept {
@@ -393,7 +428,7 @@ mod tests {
     #[test]
     fn the_goal_of_y_can_be_that_of_section_4() {
         let spec = BehaviourSpec::approaching()
-            .with_y_goal(74.0, 92.0)
+            .with_y_goal(GoalInterval::Y_SECTION_4)
             .unwrap();
         assert_eq!(spec.states(), 90);
         assert!(
@@ -405,7 +440,7 @@ mod tests {
         assert_eq!(spec.state(&percept(0.0, 92.0, 33.0, 10.0)).unwrap(), inside);
         assert!(
             BehaviourSpec::approaching()
-                .with_y_goal(92.0, 74.0)
+                .with_y_goal(GoalInterval::new(Input::Y, 92.0, 74.0))
                 .is_err()
         );
     }

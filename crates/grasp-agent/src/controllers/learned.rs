@@ -1,17 +1,18 @@
 //! The paper's controller: two learned behaviours side by side, and learning that goes on while
 //! they work.
 
-use puma_val2::{JointDelta, Joints};
+use puma_val2::JointDelta;
 use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::rand::{RngExt, SeedableRng};
 use qtable::{Action, QTable, State};
 
 use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
 use crate::behaviour::spec::BehaviourSpec;
-use crate::controller::{Consequence, Controller, GaveUp, Situation};
+#[cfg(feature = "serde")]
+use crate::controller::SavedController;
+use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::error::BehaviourError;
-use crate::limits::JointLimits;
-use crate::percept::Percept;
+use crate::percept::{Percept, Sighting};
 
 /// Centering and approaching (section 3 of the paper), each choosing for its own joints in every
 /// cycle.
@@ -22,7 +23,36 @@ use crate::percept::Percept;
 pub struct Learned {
     centering: Half,
     approaching: Half,
-    learning: Option<(OnlineLearning, Xoshiro256PlusPlus)>,
+    learning: Option<Learning>,
+}
+
+/// Learning that goes on, and its random numbers.
+#[derive(Clone, Debug)]
+struct Learning {
+    settings: OnlineLearning,
+    rng: Xoshiro256PlusPlus,
+    /// Numbers drawn so far.
+    draws: u64,
+}
+
+impl Learning {
+    /// Goes on after so many draws.
+    fn after(settings: OnlineLearning, draws: u64) -> Self {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
+        for _ in 0..draws {
+            let _: f64 = rng.random();
+        }
+        Self {
+            settings,
+            rng,
+            draws,
+        }
+    }
+
+    fn draw(&mut self) -> f64 {
+        self.draws += 1;
+        self.rng.random()
+    }
 }
 
 /// How learning goes on at work.
@@ -180,7 +210,14 @@ impl Learned {
     /// The same, learning from what happens.
     #[must_use]
     pub fn learning(mut self, settings: OnlineLearning) -> Self {
-        self.learning = Some((settings, Xoshiro256PlusPlus::seed_from_u64(settings.seed)));
+        self.learning = Some(Learning::after(settings, 0));
+        self
+    }
+
+    /// Goes on learning after so many random numbers.
+    #[cfg(feature = "serde")]
+    pub(crate) fn resumed(mut self, (settings, draws): (OnlineLearning, u64)) -> Self {
+        self.learning = Some(Learning::after(settings, draws));
         self
     }
 
@@ -208,51 +245,49 @@ impl Learned {
 }
 
 impl Controller for Learned {
-    fn name(&self) -> &str {
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+        if request.grip {
+            return Err(GaveUp::NoMoveLeft);
+        }
+        let percept = Percept::new(ball.features, &request.joints);
+        let admitted = |delta: JointDelta| request.limits.admit(&(request.joints + delta));
+        let turn = self
+            .centering
+            .decide(&percept, self.learning.as_mut(), admitted)?;
+        let reach = self
+            .approaching
+            .decide(&percept, self.learning.as_mut(), admitted)?;
+        let both = std::array::from_fn(|i| turn.0[i] + reach.0[i]);
+        Ok(Decision::Move(JointDelta(both)))
+    }
+
+    fn notice(&mut self, feedback: &Feedback) {
+        for half in [&mut self.centering, &mut self.approaching] {
+            match feedback {
+                Feedback::Begin => half.begin(),
+                Feedback::Seen { ball, joints } => {
+                    let now = Percept::new(ball.features, joints);
+                    half.learn(self.learning.as_ref(), Some(&now));
+                }
+                Feedback::Lost | Feedback::TakenBack => {
+                    half.learn(self.learning.as_ref(), None);
+                    half.bar_last();
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn describe(&self) -> &str {
         "learned"
     }
 
-    fn begin(&mut self) {
-        self.centering.begin();
-        self.approaching.begin();
+    #[cfg(feature = "serde")]
+    fn save(&self) -> Option<SavedController> {
+        let learning = self.learning.as_ref();
+        let learning = learning.map(|learning| (learning.settings, learning.draws));
+        Some(SavedController::new("learned", (self.clone(), learning)))
     }
-
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        let percept = now.percept();
-        let admitted = |delta: JointDelta| limits.admit(&(now.joints + delta));
-        let mut explore = self
-            .learning
-            .as_mut()
-            .map(|(settings, rng)| (settings.temperature, rng));
-        let turn = self.centering.decide(
-            &percept,
-            explore.as_mut().map(|(t, rng)| (*t, &mut **rng)),
-            admitted,
-        )?;
-        let reach = self.approaching.decide(
-            &percept,
-            explore.as_mut().map(|(t, rng)| (*t, &mut **rng)),
-            admitted,
-        )?;
-        Ok(JointDelta(std::array::from_fn(|i| turn.0[i] + reach.0[i])))
-    }
-
-    fn judge(&mut self, consequence: &Consequence) {
-        if *consequence == Consequence::Missed {
-            // No action of theirs has come to this.
-            return;
-        }
-        for half in [&mut self.centering, &mut self.approaching] {
-            if let Some((settings, _)) = &self.learning {
-                half.learn(settings, consequence);
-            }
-            if !matches!(consequence, Consequence::Seen(_)) {
-                half.bar_last();
-            }
-        }
-    }
-
-    fn arm_at(&mut self, _joints: &Joints) {}
 }
 
 /// One behaviour during one run.
@@ -264,9 +299,6 @@ struct Half {
     /// What was perceived, and what was chosen then.
     last: Option<(Percept, State, Action)>,
 }
-
-/// Temperature at work and the generator.
-type Exploring<'a> = Option<(f64, &'a mut Xoshiro256PlusPlus)>;
 
 impl Half {
     fn new(behaviour: Behaviour, kappa: f64) -> Self {
@@ -283,11 +315,11 @@ impl Half {
         self.last = None;
     }
 
-    /// The move that the behaviour wants, none at its goal.
+    /// Returns the move that the behaviour chooses, none at its goal.
     fn decide(
         &mut self,
         percept: &Percept,
-        exploring: Exploring<'_>,
+        learning: Option<&mut Learning>,
         admitted: impl Fn(JointDelta) -> bool,
     ) -> Result<JointDelta, GaveUp> {
         self.last = None;
@@ -297,16 +329,16 @@ impl Half {
         }
         let state = spec.state(percept).map_err(|_| GaveUp::NoMoveLeft)?;
         let allowed = |action| admitted(spec.delta(action));
-        let action = match exploring {
+        let action = match learning {
             None => self
                 .behaviour
                 .choose(state, &self.episode, self.kappa, allowed),
-            Some((temperature, rng)) => self.behaviour.explore(
+            Some(learning) => self.behaviour.explore(
                 state,
                 &self.episode,
                 self.kappa,
-                temperature,
-                rng.random(),
+                learning.settings.temperature,
+                learning.draw(),
                 allowed,
             ),
         };
@@ -316,21 +348,22 @@ impl Half {
         Ok(spec.delta(action))
     }
 
-    /// The action chosen last is not chosen again in its state during this run.
+    /// Bars the action chosen last in its state for the rest of this run.
     fn bar_last(&mut self) {
         if let Some((_, state, action)) = self.last {
             self.episode.lost_by(state, action);
         }
     }
 
-    fn learn(&mut self, settings: &OnlineLearning, consequence: &Consequence) {
-        let Some((before, state, action)) = self.last else {
+    /// Learns from the action chosen last, after which `now` is perceived, or the ball is lost.
+    fn learn(&mut self, learning: Option<&Learning>, now: Option<&Percept>) {
+        let (Some((before, state, action)), Some(learning)) = (self.last, learning) else {
             return;
         };
-        let value = match consequence {
-            Consequence::Seen(now) => self.worth(settings.gamma, &before, &now.percept()),
-            Consequence::Lost | Consequence::TakenBack => Some(self.behaviour.spec().reward.lost),
-            Consequence::Missed => None,
+        let settings = &learning.settings;
+        let value = match now {
+            Some(now) => self.worth(settings.gamma, &before, now),
+            None => Some(self.behaviour.spec().reward.lost),
         };
         let Some(value) = value else { return };
         let old = self.behaviour.table().value(state, action);

@@ -1,6 +1,5 @@
 //! The controllers: learned, servoing, hybrid, and wrappers about them.
 
-pub(crate) mod grip_across;
 pub(crate) mod hybrid;
 pub(crate) mod learned;
 pub(crate) mod servo;

@@ -4,9 +4,10 @@ use hough_heuristic::Features;
 use puma_val2::{JointDelta, Joints};
 
 use crate::behaviour::spec::GoalInterval;
-use crate::controller::{Consequence, Controller, GaveUp, Situation};
-use crate::limits::JointLimits;
-use crate::percept::Input;
+#[cfg(feature = "serde")]
+use crate::controller::SavedController;
+use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
+use crate::percept::{Input, Sighting};
 
 /// What the camera shows where the gripper's turn brings the jaws around the ball, found by showing
 /// it once.
@@ -140,21 +141,19 @@ impl TaughtGoal {
         intervals.iter().map(moved).collect()
     }
 
-    /// What is seen, moved so that this goal is where the other one was.
-    fn as_untaught(&self, situation: &Situation) -> Situation {
-        let (
-            seen,
-            Self {
-                untaught, taught, ..
-            },
-        ) = (situation.features, self);
-        Situation {
+    /// Moves what is seen so that this goal shows where the other one was.
+    fn as_untaught(&self, ball: &Sighting) -> Sighting {
+        let Self {
+            untaught, taught, ..
+        } = self;
+        let seen = ball.features;
+        Sighting {
             features: Features {
                 x: seen.x + untaught.x - taught.x,
                 y: seen.y + untaught.y - taught.y,
                 r: seen.r * untaught.r / taught.r,
             },
-            ..*situation
+            ..*ball
         }
     }
 }
@@ -180,35 +179,29 @@ impl<C> Retargeted<C> {
 }
 
 impl<C: Controller> Controller for Retargeted<C> {
-    fn name(&self) -> &str {
-        self.controller.name()
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+        self.controller
+            .decide(&self.goal.as_untaught(ball), request)
     }
 
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        self.controller.decide(&self.goal.as_untaught(now), limits)
-    }
-
-    fn judge(&mut self, consequence: &Consequence) {
-        self.controller.judge(&match consequence {
-            Consequence::Seen(now) => Consequence::Seen(self.goal.as_untaught(now)),
+    fn notice(&mut self, feedback: &Feedback) {
+        self.controller.notice(&match feedback {
+            Feedback::Seen { ball, joints } => Feedback::Seen {
+                ball: self.goal.as_untaught(ball),
+                joints: *joints,
+            },
             other => *other,
         });
     }
 
-    fn arm_at(&mut self, joints: &Joints) {
-        self.controller.arm_at(joints);
+    fn describe(&self) -> &str {
+        self.controller.describe()
     }
 
-    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
-        self.controller.grip(&self.goal.as_untaught(now), limits)
-    }
-
-    fn begin(&mut self) {
-        self.controller.begin();
-    }
-
-    fn end(&mut self) {
-        self.controller.end();
+    #[cfg(feature = "serde")]
+    fn save(&self) -> Option<SavedController> {
+        let data = (self.controller.save()?, self.goal);
+        Some(SavedController::new("retargeted", data))
     }
 }
 
@@ -229,17 +222,12 @@ mod tests {
         };
         let new = |intervals: &[_], seen| TaughtGoal::new(intervals, seen, Joints::default(), grip);
         let goal = new(&intervals, seen).unwrap();
-        let situation = Situation {
-            features: seen,
-            joints: Joints::default(),
-            long_axis: None,
-        };
         let moved = goal.intervals(&intervals);
-        let holds = |intervals: &[GoalInterval], situation: &Situation| {
-            let percept = Percept::new(situation.features, &situation.joints);
+        let holds = |intervals: &[GoalInterval], ball: &Sighting| {
+            let percept = Percept::new(ball.features, &Joints::default());
             intervals.iter().all(|interval| interval.holds(&percept))
         };
-        assert!(holds(&moved, &situation) && !holds(&intervals, &situation));
+        assert!(holds(&moved, &Sighting::new(seen)) && !holds(&intervals, &Sighting::new(seen)));
         // Inside and outside agree, at every end of every interval.
         for (dx, dy, dr) in [
             (4.4, 3.9, 1.05),
@@ -252,10 +240,7 @@ mod tests {
                 y: seen.y + dy,
                 r: seen.r + dr,
             };
-            let there = Situation {
-                features,
-                ..situation
-            };
+            let there = Sighting::new(features);
             assert_eq!(
                 holds(&moved, &there),
                 holds(&intervals, &goal.as_untaught(&there)),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::behaviour::policy::Behaviour;
 use crate::behaviour::spec::BehaviourSpec;
 use crate::error::BehaviourError;
-use crate::percept::THETA3_ZERO;
+use crate::percept::Percept;
 
 /// Largest table that is read: states times actions.
 const MOST_ENTRIES: usize = 1 << 24;
@@ -124,7 +124,7 @@ impl Default for Conventions {
         ];
         Self {
             frame: [Features::WIDTH, Features::HEIGHT],
-            theta3_zero_degrees: THETA3_ZERO,
+            theta3_zero_degrees: Percept::THETA3_ZERO,
             words: words.map(Into::into).into(),
         }
     }

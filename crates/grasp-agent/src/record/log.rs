@@ -8,56 +8,23 @@ use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySen
 
 use crate::controller::Controller;
 use crate::error::AgentError;
+use crate::percept::Sighting;
 use crate::run::agent::Agent;
-use crate::run::event::{Event, EventKind, Order, Outcome};
-use crate::sight::eye::{Eye, Look};
+use crate::run::event::{EventKind, Order, RunEvent, RunOutcome};
+use crate::sight::eye::Eye;
 
-/// An [`Event`] without its frame.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LoggedEvent {
-    /// Moves made since the ball was first seen.
-    pub cycle: usize,
-    /// The event.
-    pub kind: EventKind,
-    /// Joint angles that the arm reported.
-    #[cfg_attr(feature = "serde", serde(with = "null_for_nan"))]
-    pub joints: Joints,
-}
-
-/// Joint angles in JSON, which has no NaN: an angle that is not finite becomes `null`.
-#[cfg(feature = "serde")]
-mod null_for_nan {
-    use puma_val2::Joints;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(joints: &Joints, to: S) -> Result<S::Ok, S::Error> {
-        let angles = joints.0.map(|angle| angle.is_finite().then_some(angle));
-        angles.serialize(to)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Joints, D::Error> {
-        let angles = <[Option<f64>; 6]>::deserialize(from)?;
-        Ok(Joints(angles.map(|angle| angle.unwrap_or(f64::NAN))))
-    }
-}
-
-/// Events of a run, in order.
+/// Events of a run, in order, without the frames.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EventLog {
     /// The events, oldest first.
-    pub events: Vec<LoggedEvent>,
+    pub events: Vec<RunEvent<'static>>,
 }
 
 impl EventLog {
     /// Records an event.
-    pub fn note(&mut self, event: &Event<'_>) {
-        self.events.push(LoggedEvent {
-            cycle: event.cycle,
-            kind: event.kind.clone(),
-            joints: event.joints,
-        });
+    pub fn note(&mut self, event: &RunEvent<'_>) {
+        self.events.push(event.logged());
     }
 
     /// Repeats the run with `agent` and the recorded answers of arm, sensors and camera. Returns the
@@ -69,7 +36,7 @@ impl EventLog {
     pub fn replay<C: Controller + Clone>(
         &self,
         agent: &Agent<C>,
-    ) -> Result<(Outcome, Self), AgentError> {
+    ) -> Result<(RunOutcome, Self), AgentError> {
         let Played { end, log, differs } = self.play(agent.clone());
         match (differs, end) {
             (Some(event), _) => Err(AgentError::Replay { event }),
@@ -86,9 +53,9 @@ impl EventLog {
         });
         let mut log = Self::default();
         let end = agent.having_seen(numbered(0)).run_and_learn(
-            &mut Player(&tape),
-            &mut Player(&tape),
-            &mut Player(&tape),
+            &mut Player::new(&tape),
+            &mut Player::new(&tape),
+            &mut Player::new(&tape),
             &mut |event| {
                 log.note(event);
             },
@@ -106,7 +73,7 @@ impl EventLog {
 
 /// A repeated run.
 pub(crate) struct Played {
-    pub(crate) end: Result<Outcome, AgentError>,
+    pub(crate) end: Result<RunOutcome, AgentError>,
     pub(crate) log: EventLog,
     /// Index of the first event that differs from the record.
     pub(crate) differs: Option<usize>,
@@ -114,7 +81,7 @@ pub(crate) struct Played {
 
 /// Compares two events. A replayed device reports a failure in a text of its own that quotes the
 /// recorded one.
-fn same(now: &LoggedEvent, then: &LoggedEvent) -> bool {
+fn same(now: &RunEvent<'_>, then: &RunEvent<'_>) -> bool {
     match (&now.kind, &then.kind) {
         (EventKind::Failed(cause), EventKind::Failed(cause_then)) => {
             now.cycle == then.cycle
@@ -191,7 +158,7 @@ pub(crate) fn numbered(number: u32) -> GrayImage {
 
 /// Recorded answers, consumed in order.
 struct Tape<'a> {
-    events: &'a [LoggedEvent],
+    events: &'a [RunEvent<'static>],
     next: usize,
     /// Number of the latest frame.
     frame: u32,
@@ -199,7 +166,7 @@ struct Tape<'a> {
 
 impl Tape<'_> {
     /// Consumes events up to and including the next answer, and returns it.
-    fn answer(&mut self) -> Option<LoggedEvent> {
+    fn answer(&mut self) -> Option<RunEvent<'static>> {
         while let Some(event) = self.events.get(self.next) {
             self.next += 1;
             if is_answer(&event.kind) {
@@ -269,14 +236,24 @@ fn is_answer(kind: &EventKind) -> bool {
 }
 
 /// Arm, sensors and camera that give the recorded answers.
-struct Player<'a, 'b>(&'a RefCell<Tape<'b>>);
+struct Player<'a, 'b> {
+    tape: &'a RefCell<Tape<'b>>,
+    frame: GrayImage,
+}
 
 /// Name of the replayed devices in error texts.
 const NAME: &str = "replayed event log";
 
-impl Player<'_, '_> {
+impl<'a, 'b> Player<'a, 'b> {
+    fn new(tape: &'a RefCell<Tape<'b>>) -> Self {
+        Self {
+            tape,
+            frame: numbered(0),
+        }
+    }
+
     fn stand(&self) -> Result<Joints, ArmError> {
-        let mut tape = self.0.borrow_mut();
+        let mut tape = self.tape.borrow_mut();
         match tape.answer() {
             Some(event) => Ok(event.joints),
             None => Err(unmoved(tape.silence())),
@@ -287,9 +264,9 @@ impl Player<'_, '_> {
 impl Manipulator for Player<'_, '_> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
         // The agent asks once, before the first event. An arm that fails later has answered this.
-        let tape = self.0.borrow();
+        let tape = self.tape.borrow();
         match tape.events.first() {
-            Some(LoggedEvent { kind, joints, .. })
+            Some(RunEvent { kind, joints, .. })
                 if !matches!(kind, EventKind::Failed(_)) || *joints != Joints::default() =>
             {
                 Ok(*joints)
@@ -307,7 +284,7 @@ impl Manipulator for Player<'_, '_> {
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        let mut tape = self.0.borrow_mut();
+        let mut tape = self.tape.borrow_mut();
         tape.answers(Order::Jaws {
             close: gripper == Gripper::Closed,
         })?;
@@ -317,13 +294,13 @@ impl Manipulator for Player<'_, '_> {
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {
-        self.0.borrow().answers(Order::Stop)
+        self.tape.borrow().answers(Order::Stop)
     }
 }
 
 impl ProximitySensor for Player<'_, '_> {
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        let mut tape = self.0.borrow_mut();
+        let mut tape = self.tape.borrow_mut();
         tape.sensors_hold()?;
         // An arm that could not be stopped made no event for what was too near.
         Ok(tape.next_if(&EventKind::TooNear) || tape.answers(Order::Stop).is_err())
@@ -331,19 +308,21 @@ impl ProximitySensor for Player<'_, '_> {
 }
 
 impl Eye for Player<'_, '_> {
-    fn look(&mut self) -> Result<Look, FrameError> {
-        let mut tape = self.0.borrow_mut();
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
+        let mut tape = self.tape.borrow_mut();
         let ball = match tape.answer().map(|event| event.kind) {
-            Some(EventKind::Seen(sighting)) => Some(sighting),
+            Some(EventKind::Seen(ball)) => Some(ball),
             Some(EventKind::NotSeen) => None,
             _ => return Err(unseen(tape.silence())),
         };
         if !tape.next_if(&EventKind::SameFrame) {
             tape.frame = tape.frame.wrapping_add(1);
         }
-        Ok(Look {
-            frame: Some(numbered(tape.frame)),
-            ball,
-        })
+        self.frame = numbered(tape.frame);
+        Ok(ball)
+    }
+
+    fn frame(&self) -> Option<&GrayImage> {
+        Some(&self.frame)
     }
 }

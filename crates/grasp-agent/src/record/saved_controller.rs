@@ -1,128 +1,51 @@
-//! Controllers as data.
+//! Controllers of this crate, made again from their data.
 
-use puma_val2::JointDelta;
-use serde::{Deserialize, Serialize};
-
-use crate::controller::Controller;
-use crate::controllers::grip_across::GripAcross;
+use crate::controller::{Controller, SavedController};
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::controller::{Hybrid, HybridSettings};
-use crate::controllers::learned::{Learned, OnlineLearning};
-use crate::controllers::servo::fuzzy::Fuzzy;
-use crate::controllers::servo::image_based::{ImageBased, JacobianAt};
-use crate::controllers::servo::look_ahead::LookAhead;
-use crate::controllers::servo::position_based::PositionBased;
-use crate::controllers::servo::settings::ServoSettings;
+use crate::controllers::learned::Learned;
+use crate::controllers::servo::controller::Servo;
 use crate::controllers::taught_goal::{Retargeted, TaughtGoal};
-
-/// Controller of a [`SavedRun`](crate::SavedRun), in its state before the run.
-///
-/// ```
-/// use grasp_agent::{Controller, SavedController, ServoSettings};
-///
-/// let saved = SavedController::Fuzzy { settings: ServoSettings::paper().with_gain(0.7) };
-/// assert_eq!(saved.controller().name(), "fuzzy");
-/// ```
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[non_exhaustive]
-pub enum SavedController {
-    /// The paper's controller.
-    Learned {
-        /// Both behaviours and their repetition penalties.
-        learned: Box<Learned>,
-        /// Settings and seed of learning at work; `None` for frozen behaviours.
-        learning: Option<OnlineLearning>,
-    },
-    /// The [`Hybrid`].
-    Hybrid {
-        /// Its settings.
-        settings: Box<HybridSettings>,
-        /// Its belief.
-        belief: Belief,
-    },
-    /// A [`PositionBased`] servo.
-    PositionBased {
-        /// Its settings.
-        settings: ServoSettings,
-    },
-    /// An [`ImageBased`] servo.
-    ImageBased {
-        /// Its settings.
-        settings: ServoSettings,
-        /// Place at which its Jacobian is taken.
-        at: JacobianAt,
-    },
-    /// A [`Fuzzy`] controller.
-    Fuzzy {
-        /// Its settings.
-        settings: ServoSettings,
-    },
-    /// A [`LookAhead`] controller.
-    LookAhead {
-        /// Its settings.
-        settings: ServoSettings,
-    },
-    /// A [`Retargeted`] controller.
-    Retargeted {
-        /// The controller inside.
-        controller: Box<SavedController>,
-        /// Its goal.
-        goal: TaughtGoal,
-    },
-    /// A [`GripAcross`] controller.
-    GripAcross {
-        /// The controller inside.
-        controller: Box<SavedController>,
-        /// Grip used where the controller inside does not aim.
-        grip: JointDelta,
-    },
-}
+use crate::error::BehaviourError;
 
 impl SavedController {
-    /// Saves two behaviours, frozen, or learning at work from the seed in `learning`.
-    pub fn of_learned(learned: &Learned, learning: Option<OnlineLearning>) -> Self {
-        Self::Learned {
-            learned: Box::new(learned.clone().frozen()),
-            learning,
-        }
-    }
-
-    /// Saves a hybrid. Its belief changes after a run only, so a replay needs no learning.
-    pub fn of_hybrid(hybrid: &Hybrid) -> Self {
-        Self::Hybrid {
-            settings: Box::new(*hybrid.settings()),
-            belief: hybrid.belief().clone(),
-        }
-    }
-
-    /// Builds the controller; a hybrid is frozen.
-    pub fn controller(&self) -> Box<dyn Controller> {
-        match self {
-            Self::Learned { learned, learning } => {
-                let learned = (**learned).clone();
+    /// Makes the controller again; a hybrid comes back frozen, as it decides within a run by what
+    /// it believed before.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Text`] for settings that cannot work, and for a kind that is not one of
+    /// this crate's controllers.
+    pub fn controller(&self) -> Result<Box<dyn Controller>, BehaviourError> {
+        Ok(match self.kind() {
+            "learned" => {
+                let (learned, learning): (Learned, Option<_>) = self.data()?;
                 Box::new(match learning {
-                    Some(settings) => learned.learning(*settings),
+                    Some(learning) => learned.resumed(learning),
                     None => learned,
                 })
             }
-            Self::Hybrid { settings, belief } => {
-                // A replay starts from the saved belief as it was, without added uncertainty.
+            "servo" => {
+                let (law, settings) = self.data()?;
+                Box::new(Servo::new(law, settings))
+            }
+            "hybrid" => {
+                let (settings, belief): (HybridSettings, Belief) = self.data()?;
+                // The belief is held as firmly as it was.
                 let settings = HybridSettings {
                     drift: 0.0,
-                    ..**settings
+                    ..settings
                 };
-                Box::new(Hybrid::with_belief(settings, belief.clone()).frozen())
+                Box::new(Hybrid::with_belief(settings, belief).frozen())
             }
-            Self::PositionBased { settings } => Box::new(PositionBased::new(*settings)),
-            Self::ImageBased { settings, at } => Box::new(ImageBased::new(*settings, *at)),
-            Self::Fuzzy { settings } => Box::new(Fuzzy::new(*settings)),
-            Self::LookAhead { settings } => Box::new(LookAhead::new(*settings)),
-            Self::Retargeted { controller, goal } => {
-                Box::new(Retargeted::new(controller.controller(), *goal))
+            "retargeted" => {
+                let (controller, goal): (Self, TaughtGoal) = self.data()?;
+                Box::new(Retargeted::new(controller.controller()?, goal))
             }
-            Self::GripAcross { controller, grip } => {
-                Box::new(GripAcross::new(controller.controller(), *grip))
+            kind => {
+                return Err(BehaviourError::Text {
+                    what: format!("{kind:?} is not a kind of controller of this crate"),
+                });
             }
-        }
+        })
     }
 }

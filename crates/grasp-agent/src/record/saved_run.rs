@@ -2,15 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::controller::Controller;
+use crate::controller::{Controller, SavedController};
 use crate::error::{AgentError, BehaviourError};
 use crate::record::behaviour_json::check_format;
-use crate::record::log::{EventLog, LoggedEvent, Played, numbered};
-use crate::record::saved_controller::SavedController;
+use crate::record::log::{EventLog, Played, numbered};
 use crate::run::agent::Agent;
 use crate::run::config::AgentConfig;
-use crate::run::event::{Event, EventKind, Outcome};
-use crate::sight::watch::{Shown, Watch};
+use crate::run::event::{EventKind, RunEvent, RunOutcome};
+use crate::sight::frozen::{FrozenCheck, Shown};
 
 /// One run with everything needed to repeat it and to compare the results.
 ///
@@ -18,7 +17,7 @@ use crate::sight::watch::{Shown, Watch};
 /// # use std::cell::RefCell;
 /// # use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 /// # use grasp_agent::hough_heuristic::FrameError;
-/// use grasp_agent::{Agent, AgentConfig, Eye, Hybrid, HybridSettings, Look, Replayed, SavedController, SavedRun};
+/// use grasp_agent::{Agent, AgentConfig, Eye, Hybrid, HybridSettings, Replayed, SavedRun, Sighting};
 /// # struct Arm(Joints);
 /// # impl Manipulator for Arm {
 /// #     fn joints(&mut self) -> Result<Joints, ArmError> { Ok(self.0) }
@@ -33,12 +32,12 @@ use crate::sight::watch::{Shown, Watch};
 /// # }
 /// # struct Dark;
 /// # impl Eye for Dark {
-/// #     fn look(&mut self) -> Result<Look, FrameError> { Ok(Look::default()) }
+/// #     fn look(&mut self) -> Result<Option<Sighting>, FrameError> { Ok(None) }
 /// # }
 ///
 /// let pose = Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
 /// let mut agent = Agent::with_controller(AgentConfig::paper([pose]), Hybrid::new(HybridSettings::paper()).frozen())?;
-/// let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
+/// let mut saved = SavedRun::before(&agent);
 /// # let (mut eye, mut arm, mut sensor) = (Dark, Arm(pose), Free);
 /// let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| saved.note(event))?;
 ///
@@ -51,7 +50,7 @@ use crate::sight::watch::{Shown, Watch};
 #[derive(Clone, Debug)]
 pub struct SavedRun {
     config: AgentConfig,
-    controller: SavedController,
+    controller: Option<SavedController>,
     camera: Camera,
     log: EventLog,
 }
@@ -60,15 +59,15 @@ pub struct SavedRun {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Replayed {
     /// Every event was equal; the end was this outcome, or this failure.
-    Same(Result<Outcome, String>),
+    Same(Result<RunOutcome, String>),
     /// The runs differ.
     Differs {
         /// Index of the first event that differs, from 0.
         event: usize,
         /// That event in the saved run; `None` if the saved run has ended before.
-        then: Option<LoggedEvent>,
+        then: Option<RunEvent<'static>>,
         /// That event in the replay; `None` if the replay has ended before.
-        now: Option<LoggedEvent>,
+        now: Option<RunEvent<'static>>,
     },
 }
 
@@ -81,27 +80,27 @@ struct Camera {
 }
 
 impl SavedRun {
-    /// Starts the record of a run that `agent` is about to make with `controller`.
-    /// [`SavedRun::note`] then records each event.
+    /// Starts the record of a run that `agent` is about to make. [`SavedRun::note`] then records
+    /// each event.
     ///
     /// Search, recovery and supervision modules that replace the configured ones are not saved;
     /// use [`EventLog::replay`] for such a run.
-    pub fn before<C: Controller>(agent: &Agent<C>, controller: SavedController) -> Self {
-        let watch = agent.watch();
+    pub fn before<C: Controller>(agent: &Agent<C>) -> Self {
+        let camera = agent.camera();
         Self {
             config: agent.config().clone(),
-            controller,
+            controller: agent.controller().save(),
             camera: Camera {
-                from: watch.from,
-                showed: watch.shown.is_some(),
-                same: watch.same(),
+                from: camera.from,
+                showed: camera.shown.is_some(),
+                same: camera.same(),
             },
             log: EventLog::default(),
         }
     }
 
     /// Records an event.
-    pub fn note(&mut self, event: &Event<'_>) {
+    pub fn note(&mut self, event: &RunEvent<'_>) {
         self.log.note(event);
     }
 
@@ -115,28 +114,42 @@ impl SavedRun {
         &self.config
     }
 
-    /// Returns the controller in its state before the run.
-    pub fn controller(&self) -> &SavedController {
-        &self.controller
+    /// Returns the controller in its state before the run; `None` for one that cannot be saved.
+    pub fn controller(&self) -> Option<&SavedController> {
+        self.controller.as_ref()
     }
 
-    /// Repeats the run with recorded answers of arm, sensors and camera.
+    /// Repeats the run with the saved controller and the recorded answers of arm, sensors and
+    /// camera.
+    ///
+    /// # Errors
+    /// [`AgentError::Config`] if the settings are invalid, [`AgentError::SavedRun`] if the
+    /// controller cannot be made again.
+    pub fn replay(&self) -> Result<Replayed, AgentError> {
+        let Some(controller) = &self.controller else {
+            let what = "its controller was not saved; replay it with a controller of yours";
+            return Err(AgentError::SavedRun(what.into()));
+        };
+        let controller = controller.controller();
+        self.replay_with(controller.map_err(|error| AgentError::SavedRun(error.to_string()))?)
+    }
+
+    /// Repeats the run with this controller and the recorded answers of arm, sensors and camera.
     ///
     /// # Errors
     /// [`AgentError::Config`] if the settings are invalid.
-    pub fn replay(&self) -> Result<Replayed, AgentError> {
-        let watch = Watch {
+    pub fn replay_with(&self, controller: impl Controller) -> Result<Replayed, AgentError> {
+        let camera = FrozenCheck {
             from: self.camera.from,
             shown: self.camera.showed.then(|| Shown::Frame(numbered(0))),
             same: self.camera.same,
         };
-        let agent = Agent::with_controller(self.config.clone(), self.controller.controller())?
-            .watching(watch);
+        let agent = Agent::with_controller(self.config.clone(), controller)?.with_camera(camera);
         let Played { end, log, differs } = self.log.play(agent);
         Ok(match differs {
             // Replayed devices fail with a text of their own; report the recorded one.
             None => Replayed::Same(end.map_err(|error| match self.log.events.last() {
-                Some(LoggedEvent {
+                Some(RunEvent {
                     kind: EventKind::Failed(cause),
                     ..
                 }) => cause.clone(),
@@ -169,8 +182,7 @@ impl SavedRun {
     ///
     /// # Errors
     /// [`AgentError::SavedRun`] names the fault and its place: text that is not JSON, another or an
-    /// earlier format, a missing part, a policy that
-    /// [`Learned::from_json`](crate::Learned::from_json) refuses, invalid settings.
+    /// earlier format, a missing part, invalid settings.
     pub fn from_json(text: &str) -> Result<Self, AgentError> {
         let refused = |error: serde_json::Error| AgentError::SavedRun(error.to_string());
         // The format comes first, since another one may lack the other parts.
@@ -198,7 +210,7 @@ struct Head {
 #[derive(Debug, Deserialize)]
 struct Document {
     config: AgentConfig,
-    controller: SavedController,
+    controller: Option<SavedController>,
     camera: Camera,
     log: EventLog,
 }

@@ -1,4 +1,4 @@
-//! The events of a run, as they happen.
+//! Events of a run, in the order in which they happen, and its outcome.
 
 use hough_heuristic::image::GrayImage;
 use puma_val2::{JointDelta, Joints};
@@ -6,126 +6,154 @@ use puma_val2::{JointDelta, Joints};
 use crate::controller::GaveUp;
 use crate::percept::Sighting;
 
-/// One thing that happened.
-#[derive(Clone, Debug)]
-pub struct Event<'a> {
-    /// How many moves have been made since the ball was first seen.
+/// One event of a run.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RunEvent<'a> {
+    /// Moves made since the ball was first seen.
     pub cycle: usize,
-    /// What happened.
+    /// Kind of the event, with its data.
     pub kind: EventKind,
-    /// Where the arm stands, as it reports.
+    /// Joint angles that the arm reports.
+    #[cfg_attr(feature = "serde", serde(with = "null_for_nan"))]
     pub joints: Joints,
-    /// The frame, for events that come of one.
+    /// Frame of a look, for [`EventKind::Seen`] and [`EventKind::NotSeen`]; logs do not keep it.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub frame: Option<&'a GrayImage>,
 }
 
-/// Where the state machine of a run stands; it is drawn on the [front
-/// page](crate#the-state-machine).
+/// Joint angles in JSON, which has no NaN: an angle that is not finite becomes `null`.
+#[cfg(feature = "serde")]
+mod null_for_nan {
+    use puma_val2::Joints;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(joints: &Joints, to: S) -> Result<S::Ok, S::Error> {
+        let angles = joints.0.map(|angle| angle.is_finite().then_some(angle));
+        angles.serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Joints, D::Error> {
+        let angles = <[Option<f64>; 6]>::deserialize(from)?;
+        Ok(Joints(angles.map(|angle| angle.unwrap_or(f64::NAN))))
+    }
+}
+
+impl RunEvent<'_> {
+    /// Returns the event without its frame, for logs.
+    pub fn logged(&self) -> RunEvent<'static> {
+        RunEvent {
+            cycle: self.cycle,
+            kind: self.kind.clone(),
+            joints: self.joints,
+            frame: None,
+        }
+    }
+}
+
+/// A state of the state machine that is drawn on the [front page](crate#the-state-machine).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Phase {
-    /// Looking around in the workspace ([`Search`](crate::Search)).
+    /// The workspace is searched for the ball.
     Search,
-    /// The ball is in view, and the controller moves the hand to it
-    /// ([`Controller`](crate::Controller)).
+    /// The ball is in view, and the controller moves the hand to it.
     Reach,
-    /// Looking around where the ball was in view a moment ago ([`Recovery`](crate::Recovery)).
+    /// A ball that was in view a moment ago is looked for near there.
     Recover,
-    /// The gripper goes for the ball ([`GripperActivation`](crate::GripperActivation)).
+    /// The gripper goes for the ball.
     Grip,
     /// The run is over.
     End,
 }
 
-/// What the arm is told to do.
+/// An order to the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
-    /// To turn its joints by this.
+    /// Turn the joints by this.
     MoveBy(JointDelta),
-    /// To go to this pose.
+    /// Go to this pose.
     MoveTo(Joints),
-    /// To close the jaws, or to open them.
+    /// Move the jaws.
     Jaws {
-        /// Whether to close them.
+        /// `true` to close them, `false` to open them.
         close: bool,
     },
-    /// To stop.
+    /// Stop.
     Stop,
 }
 
-/// What can happen in a run.
+/// Kinds of events.
 ///
 /// Every order to the arm, every answer of arm, sensor and camera and every transition of the state
-/// machine ([`EventKind::enters`]) makes an event, in the order in which they happen, so that the
-/// events determine the run: see [`EventLog::replay`](crate::EventLog::replay). An order that is
-/// carried out makes the event that says so, one that ends in nothing but an error makes
-/// [`EventKind::Unanswered`].
+/// machine ([`EventKind::enters`]) makes an event, so that the events determine the run
+/// ([`EventLog::replay`](crate::EventLog::replay)). An order that was carried out makes the event
+/// that says so, one that was answered by an error makes [`EventKind::Unanswered`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum EventKind {
-    /// The run begins with the arm here and the gripper open.
+    /// The run begins. The gripper is open.
     Started,
     /// A search of the workspace begins.
     Searching,
     /// The ball has come into view, and the controller begins to reach for it.
     Reaching,
-    /// The arm stands at the search pose with this index and is about to look, or is on its way
-    /// there if [`EventKind::TooNear`] follows. Indices go on counting when the poses are tried
-    /// again with a displacement.
+    /// The arm stands at the search pose with this number, or is on its way there if
+    /// [`EventKind::TooNear`] follows. Numbers go on when the poses are tried again with a
+    /// displacement.
     AtSearchPose(usize),
     /// The ball is in the frame.
     Seen(Sighting),
     /// No ball is in the frame.
     NotSeen,
-    /// What was just looked at is the same, to the last pixel, as from the pose before: the camera
-    /// may have stopped.
+    /// The arm has moved and the image has not changed, to the last pixel: the camera may have
+    /// frozen.
     SameFrame,
-    /// The controller chose this move and the arm has made it, or a part of it if
-    /// [`EventKind::TooNear`] follows.
+    /// The arm has made this move of the controller, or a part of it if [`EventKind::TooNear`]
+    /// follows.
     Moved(JointDelta),
-    /// The ball has left the frame, and its recovery begins.
+    /// The ball has left the frame. Its recovery begins.
     Lost,
-    /// The arm has gone back to the pose from which the ball was last seen (0), or made the
-    /// recovery move with this number; or it is on its way there if [`EventKind::TooNear`] follows.
+    /// The arm has gone back to the pose of the last sighting (0), or made the recovery move with
+    /// this number, or a part of it if [`EventKind::TooNear`] follows.
     Recovering(usize),
-    /// Something is too near to the hand; the arm has been stopped, on its way to the pose of the
-    /// event before or there.
+    /// Something is too near to the hand. The arm has been stopped on its way to the pose of the
+    /// event before, or there.
     TooNear,
     /// The ball came nearer too fast.
     TooFast,
-    /// The arm has gone back by one move, or, if [`EventKind::TooNear`] follows, a part of the way.
+    /// The arm has gone back by one move, or by a part of it if [`EventKind::TooNear`] follows.
     TakenBack,
-    /// Centre and radius are at the goal, and the activation of the gripper begins.
+    /// Centre and radius of the ball are at the goal. The gripper activation begins.
     AtGoal,
-    /// Moves have been taken back again and again: what is too near may be the ball itself. The
-    /// activation of the gripper begins from here, for a controller that can aim.
+    /// The gripper activation begins away from the goal: moves were taken back again and again, so
+    /// that the thing too near may be the ball itself, or the controller asked for the grip.
     Cornered,
-    /// The gripper has been brought to the ball by this move, the last one of two where the arm has
-    /// to be moved first.
+    /// The gripper was brought to the ball by this move, the last of two if the arm has to be moved
+    /// first.
     Gripping(JointDelta),
     /// The gripper has closed.
     Gripped,
-    /// The hand, closed, has gone back by a move of the grip, the last one to where the ball was
-    /// last seen from.
+    /// The closed hand has gone back by a move of the grip, the last time to the pose from which
+    /// the ball was last seen.
     Withdrawn,
-    /// The arm has lifted what it gripped.
+    /// The arm has lifted the closed hand.
     Lifted,
-    /// The ball was not in the jaws, which have opened again; its recovery begins.
+    /// The ball was not in the jaws, which have opened again. Its recovery begins.
     Missed,
-    /// The run is over, with the ball in the jaws as far as can be told.
+    /// The run is over. The ball is grasped, verified by the camera only.
     Grasped,
     /// The run is over without a grip.
     GaveUp(GaveUp),
-    /// This order was given, and the arm has failed to say what came of it; [`EventKind::Failed`]
-    /// follows.
+    /// The arm answered this order with an error; [`EventKind::Failed`] follows.
     Unanswered(Order),
-    /// Arm or camera failed, for this reason; the arm has been told to stop. The run is over.
+    /// The run is over. Arm or camera failed for this reason, and the arm was told to stop.
     Failed(String),
 }
 
 impl EventKind {
-    /// One word for tables and logs.
+    /// Returns one word for tables and logs.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Started => "started",
@@ -155,8 +183,8 @@ impl EventKind {
         }
     }
 
-    /// The phase that begins with this event, if one does. Every transition of the state machine
-    /// has exactly one such event.
+    /// Returns the phase that begins with this event, if one does. Every transition of the state
+    /// machine has exactly one such event.
     pub fn enters(&self) -> Option<Phase> {
         match self {
             Self::Searching => Some(Phase::Search),
@@ -169,20 +197,19 @@ impl EventKind {
     }
 }
 
-/// How a run ended.
+/// Result of a run that was not broken off.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
-    /// `None` when the gripper has closed at the goal and, unless [`AgentConfig::lift`] is `None`,
-    /// what was seen there has been lifted; otherwise why not. What is lifted is known from the
-    /// camera alone, see there.
+pub struct RunOutcome {
+    /// Reason why nothing was gripped. `None` if the gripper has closed at the goal and the grip
+    /// was verified, or [`AgentConfig::lift`](crate::AgentConfig::lift) is `None`.
     pub gave_up: Option<GaveUp>,
-    /// Moves after the first sighting, recovery moves included, the grip not; and one for each grip
-    /// that failed, or was not begun because two looks at the goal differed.
+    /// Moves after the first sighting, those of a recovery included, that of the grip not; and one
+    /// for each grip that failed, or was not begun because two looks at the goal differed.
     pub cycles: usize,
-    /// How often the ball was lost.
+    /// Number of times the ball was lost.
     pub losses: usize,
-    /// The ball as it was last seen.
+    /// Last sighting of the ball.
     pub last_seen: Option<Sighting>,
-    /// Where the arm stands.
+    /// Joint angles at the end.
     pub joints: Joints,
 }

@@ -24,7 +24,7 @@ const LEAST_LIFT: f64 = 0.5;
 
 /// What an order to move came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Went {
+pub(crate) enum Went {
     /// The arm stands where it should.
     There,
     /// Something was too near; the arm has gone back to where it came from.
@@ -34,7 +34,7 @@ pub enum Went {
 /// What a [`GripperActivation`] acts by: arm, jaws and camera, supervised.
 ///
 /// An [`Agent`](crate::Agent) has one; another serves to use or test the module alone.
-pub trait Hand {
+pub(crate) trait Hand {
     /// Where the arm stands, as it reports.
     fn joints(&self) -> Joints;
 
@@ -68,7 +68,7 @@ pub trait Hand {
 
 /// What an activation of the gripper came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum GripEnd {
+pub(crate) enum GripEnd {
     /// The jaws hold the ball, as far as can be told.
     Held(Sighting),
     /// The jaws are closed, and what they hold cannot be told, for this reason.
@@ -97,7 +97,7 @@ pub enum GripEnd {
 /// one that goes where the hand goes. A ball that left both views in another way, rolled off or
 /// knocked aside, passes for one that is held.
 #[derive(Clone, Debug)]
-pub struct GripperActivation {
+pub(crate) struct GripperActivation {
     grip: JointDelta,
     lift: Option<JointDelta>,
     left_behind: f64,
@@ -110,7 +110,7 @@ pub struct GripperActivation {
 
 impl GripperActivation {
     /// The module with the settings of `config`, for one run within `limits`.
-    pub fn new(config: &AgentConfig, limits: JointLimits) -> Self {
+    pub(crate) fn new(config: &AgentConfig, limits: JointLimits) -> Self {
         Self {
             grip: config.grip,
             lift: config.lift,
@@ -127,7 +127,7 @@ impl GripperActivation {
     ///
     /// # Errors
     /// What `hand` reports.
-    pub fn activate(
+    pub(crate) fn activate(
         &mut self,
         hand: &mut dyn Hand,
         seen: &Sighting,
@@ -310,19 +310,10 @@ pub(crate) fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hough_heuristic::{Detection, Features};
+    use hough_heuristic::Features;
 
     fn ball(x: f64, y: f64, r: f64) -> Sighting {
-        let features = Features { x, y, r };
-        let detection = Detection {
-            circle: features.to_circle(768),
-            score: 1.0,
-        };
-        Sighting {
-            detection,
-            features,
-            long_axis: None,
-        }
+        Sighting::new(Features { x, y, r })
     }
 
     /// A hand whose looks and moves come to what is written down.

@@ -1,38 +1,29 @@
-//! Target search: where to look for a ball that is nowhere in view.
+//! Target search and recovery: poses to look from for a ball that is not in view.
 
 use puma_val2::{JointDelta, Joints};
+
+use crate::percept::Sighting;
 
 /// A pose to look from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Its number, for the event log.
+    /// Number, for the event log.
     pub number: usize,
-    /// The pose. What lies outside the working limits is replaced by the nearest pose that does
-    /// not; what is not finite ends the run with
-    /// [`AgentError::Viewpoint`](crate::AgentError::Viewpoint).
+    /// The pose. A pose outside the working limits is replaced by the nearest one within; one that
+    /// is not finite ends the run with [`AgentError::Viewpoint`](crate::AgentError::Viewpoint).
     pub pose: Joints,
 }
 
-/// What came of the viewpoint that was named last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastLook {
-    /// There was none: the looking around begins.
-    None,
-    /// The ball was not in view from there.
-    Nothing,
-    /// Something too near kept the hand from getting there; nothing was looked at.
-    Barred,
-}
-
-/// The paper's target search module (section 2.2): says from where to look next, until the ball is
-/// in view.
+/// A module that names poses to look from, until the ball is in view: the paper's target search and
+/// its recovery of a lost target (section 2.2).
 ///
-/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) puts another one in
-/// the place of [`PoseSearch`].
+/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) replaces the
+/// search, [`PoseSearch`] by default, and [`Agent::recovering_by`](crate::Agent::recovering_by) the
+/// recovery, [`RecoveryMoves`] by default.
 ///
 /// ```
 /// use grasp_agent::puma_val2::Joints;
-/// use grasp_agent::{Agent, AgentConfig, LastLook, PositionBased, Search, ServoSettings, Viewpoint};
+/// use grasp_agent::{Search, Sighting, Viewpoint};
 ///
 /// /// Turns round once, 30 degrees at a time.
 /// #[derive(Clone, Debug, Default)]
@@ -41,11 +32,15 @@ pub enum LastLook {
 /// }
 ///
 /// impl Search for Panorama {
-///     fn next_view(&mut self, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
-///         self.seen = if last == LastLook::None { 0 } else { self.seen + 1 };
+///     fn begin(&mut self, _at: &Joints, _lost: Option<(&Sighting, &Joints)>) {
+///         self.seen = 0;
+///     }
+///
+///     fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
 ///         let pan = -150.0 + 30.0 * self.seen as f64;
 ///         let pose = Joints::from_degrees([pan, -110.0, 210.0, 0.0, 45.0, 0.0]);
-///         (self.seen <= 10).then_some(Viewpoint { number: self.seen, pose })
+///         self.seen += 1;
+///         (self.seen <= 11).then_some(Viewpoint { number: self.seen - 1, pose })
 ///     }
 ///
 ///     fn boxed(&self) -> Box<dyn Search> {
@@ -53,26 +48,27 @@ pub enum LastLook {
 ///     }
 /// }
 ///
-/// // Alone:
 /// let mut panorama = Panorama::default();
-/// let first = panorama.next_view(&Joints::default(), LastLook::None).unwrap();
+/// panorama.begin(&Joints::default(), None);
+/// let first = panorama.next_view(&Joints::default(), false).unwrap();
 /// assert!((first.pose.degrees()[0] + 150.0).abs() < 1e-9);
-/// // In an agent:
-/// let config = AgentConfig::paper([first.pose]);
-/// let agent = Agent::with_controller(config, PositionBased::new(ServoSettings::paper()))?.searching_by(panorama);
-/// # let _ = agent;
-/// # Ok::<(), grasp_agent::AgentError>(())
 /// ```
 pub trait Search: std::fmt::Debug + Send + Sync {
-    /// Where to look from next, with the arm at `at`, after what came of the last viewpoint;
-    /// [`LastLook::None`] begins a new search. `None` when there is nowhere left to look from: the
-    /// run ends with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
-    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) where every viewpoint was barred. A search
-    /// that never says so ends in the same way after
-    /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) viewpoints.
-    fn next_view(&mut self, at: &Joints, last: LastLook) -> Option<Viewpoint>;
+    /// Begins anew with the arm at `at`. For a recovery, `lost` is the last sighting of the ball
+    /// and the pose it was seen from.
+    fn begin(&mut self, at: &Joints, lost: Option<(&Sighting, &Joints)>);
 
-    /// A copy, for the copies of an agent: `Box::new(self.clone())`.
+    /// Returns the next pose to look from, with the arm at `at`. `barred` is `true` if something
+    /// too near kept the hand from getting to the pose before, so that there was no look.
+    ///
+    /// `None` ends a search with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
+    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) if every way was barred, and leaves a
+    /// recovery to the search. A search that never returns `None` ends after
+    /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) viewpoints. Each viewpoint of a
+    /// recovery costs a cycle of [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles).
+    fn next_view(&mut self, at: &Joints, barred: bool) -> Option<Viewpoint>;
+
+    /// Returns a copy, for copies of an agent: `Box::new(self.clone())`.
     fn boxed(&self) -> Box<dyn Search>;
 }
 
@@ -82,8 +78,8 @@ impl Clone for Box<dyn Search> {
     }
 }
 
-/// The paper's search: from fixed poses, the one with the nearest pan angle first; then from beside
-/// them.
+/// The paper's search: from fixed poses, the one with the nearest pan angle first, and then from
+/// beside them.
 #[derive(Clone, Debug)]
 pub struct PoseSearch {
     poses: Vec<Joints>,
@@ -94,8 +90,8 @@ pub struct PoseSearch {
 }
 
 impl PoseSearch {
-    /// A search from `poses` and then, for each displacement of `again` in turn, from all of them
-    /// displaced by that. Viewpoints are numbered on from round to round.
+    /// Creates a search from `poses` and then, for each displacement of `again` in turn, from all
+    /// of them displaced by that. Viewpoints are numbered on from round to round.
     pub fn new(poses: impl Into<Vec<Joints>>, again: impl Into<Vec<JointDelta>>) -> Self {
         Self {
             poses: poses.into(),
@@ -105,7 +101,7 @@ impl PoseSearch {
         }
     }
 
-    /// The indices of all poses, the one whose first joint is nearest to that of `at` last.
+    /// Returns the indices of all poses, the one whose first joint is nearest to that of `at` last.
     fn nearest_last(&self, at: &Joints) -> Vec<usize> {
         let pan = |pose: usize| (self.poses[pose].0[0] - at.0[0]).abs();
         let mut order: Vec<usize> = (0..self.poses.len()).collect();
@@ -116,11 +112,13 @@ impl PoseSearch {
 }
 
 impl Search for PoseSearch {
-    fn next_view(&mut self, at: &Joints, last: LastLook) -> Option<Viewpoint> {
-        if last == LastLook::None {
-            self.round = 0;
-            self.left = self.nearest_last(at);
-        } else if self.left.is_empty() && self.round < self.again.len() {
+    fn begin(&mut self, at: &Joints, _lost: Option<(&Sighting, &Joints)>) {
+        self.round = 0;
+        self.left = self.nearest_last(at);
+    }
+
+    fn next_view(&mut self, at: &Joints, _barred: bool) -> Option<Viewpoint> {
+        if self.left.is_empty() && self.round < self.again.len() {
             self.round += 1;
             self.left = self.nearest_last(at);
         }
@@ -140,9 +138,51 @@ impl Search for PoseSearch {
     }
 }
 
+/// The paper's recovery: back to the pose of the last sighting (viewpoint 0), then fixed moves from
+/// there.
+#[derive(Clone, Debug)]
+pub struct RecoveryMoves {
+    moves: Vec<JointDelta>,
+    from: Joints,
+    next: usize,
+}
+
+impl RecoveryMoves {
+    /// Creates a recovery by `moves`, all relative to the pose of the last sighting.
+    pub fn new(moves: impl Into<Vec<JointDelta>>) -> Self {
+        Self {
+            moves: moves.into(),
+            from: Joints::default(),
+            next: 0,
+        }
+    }
+}
+
+impl Search for RecoveryMoves {
+    fn begin(&mut self, at: &Joints, lost: Option<(&Sighting, &Joints)>) {
+        self.from = lost.map_or(*at, |(_, from)| *from);
+        self.next = 0;
+    }
+
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+        let number = self.next;
+        self.next += 1;
+        let pose = match number {
+            0 => self.from,
+            number => self.from + *self.moves.get(number - 1)?,
+        };
+        Some(Viewpoint { number, pose })
+    }
+
+    fn boxed(&self) -> Box<dyn Search> {
+        Box::new(self.clone())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hough_heuristic::Features;
 
     fn pan(degrees: f64) -> Joints {
         Joints::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -151,17 +191,17 @@ mod tests {
     /// The numbers of all viewpoints of a search that finds nothing, from an arm that goes where it
     /// is sent.
     fn all(search: &mut PoseSearch, mut at: Joints) -> Vec<usize> {
-        let mut last = LastLook::None;
+        search.begin(&at, None);
         let mut numbers = Vec::new();
-        while let Some(view) = search.next_view(&at, last) {
-            (at, last) = (view.pose, LastLook::Nothing);
+        while let Some(view) = search.next_view(&at, false) {
+            at = view.pose;
             numbers.push(view.number);
         }
         numbers
     }
 
     #[test]
-    fn the_nearest_pan_angle_comes_first_in_every_round_and_in_every_search() {
+    fn the_nearest_pan_angle_comes_first_in_every_round() {
         let poses = [-75.0, -50.0, -25.0, 0.0, 25.0, 50.0].map(pan);
         let mut search = PoseSearch::new(
             poses,
@@ -172,28 +212,47 @@ mod tests {
         assert_eq!(all(&mut search, pan(20.0)), expected);
         assert_eq!(all(&mut search, pan(20.0)), expected);
         // One that is broken off begins anew as well.
-        search.next_view(&pan(20.0), LastLook::None);
-        assert_eq!(
-            search
-                .next_view(&pan(-80.0), LastLook::None)
-                .unwrap()
-                .number,
-            0
-        );
+        search.begin(&pan(20.0), None);
+        search.next_view(&pan(20.0), false);
+        search.begin(&pan(-80.0), None);
+        assert_eq!(search.next_view(&pan(-80.0), false).unwrap().number, 0);
     }
 
     #[test]
     fn a_viewpoint_beside_a_pose_is_displaced() {
         let beside = JointDelta::from_degrees([12.5, 6.0, 0.0, 0.0, 0.0, 0.0]);
         let mut search = PoseSearch::new([pan(10.0)], [beside]);
-        search.next_view(&pan(0.0), LastLook::None);
-        let second = search.next_view(&pan(10.0), LastLook::Barred).unwrap();
+        search.begin(&pan(0.0), None);
+        search.next_view(&pan(0.0), false);
+        let second = search.next_view(&pan(10.0), true).unwrap();
         assert_eq!((second.number, second.pose), (1, pan(10.0) + beside));
-        assert_eq!(search.next_view(&second.pose, LastLook::Nothing), None);
+        assert_eq!(search.next_view(&second.pose, false), None);
     }
 
     #[test]
     fn without_poses_there_is_nowhere_to_look_from() {
         assert!(all(&mut PoseSearch::new([], [JointDelta::default()]), pan(0.0)).is_empty());
+    }
+
+    #[test]
+    fn recovery_goes_back_to_the_last_sighting_and_moves_from_there() {
+        let turn = |degrees: f64| JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let mut recovery = RecoveryMoves::new([turn(15.0), turn(-15.0)]);
+        let ball = Sighting::new(Features {
+            x: 96.0,
+            y: 72.0,
+            r: 20.0,
+        });
+        let joints = Joints::from_degrees([30.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
+        for _ in 0..2 {
+            // Wherever the arm has got to.
+            recovery.begin(&Joints::default(), Some((&ball, &joints)));
+            let mut next = |barred| recovery.next_view(&Joints::default(), barred);
+            let views = [false, false, true].map(|barred| next(barred).unwrap());
+            assert_eq!(views.map(|view| view.number), [0, 1, 2]);
+            let expected = [joints, joints + turn(15.0), joints + turn(-15.0)];
+            assert_eq!(views.map(|view| view.pose), expected);
+            assert_eq!(next(false), None);
+        }
     }
 }

@@ -1,48 +1,35 @@
-//! Supervision: whether what came of a move may go on.
+//! Supervision: bounds of the joints, and a judgement of every move.
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, Joints};
 
 use crate::limits::JointLimits;
-use crate::run::config::{AgentConfig, ApproachLimit};
+use crate::run::config::AgentConfig;
 
-/// What the arm answered to an order to move, and what its sensors say then.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arrival {
-    /// Where the arm was sent.
-    pub target: Joints,
-    /// Where it says it is.
-    pub reached: Joints,
-    /// Whether something is too near to the hand: the arm has been halted by its own guard, or its
-    /// sensors say so now.
-    pub near: bool,
-}
-
-/// What a move came to.
+/// Judgement of a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The arm stands where it was sent.
     There,
-    /// Something is too near; the arm is stopped and goes back to where it came from.
+    /// Something is too near: the arm is stopped and goes back to where it came from.
     TooNear,
-    /// The arm says that it has moved, and this joint has not got there: the run is broken off.
+    /// The arm says that it has moved, but this joint has not arrived: the run is broken off.
     Stuck(Joint),
 }
 
 /// The paper's constant control of the approach (section 2.2: collisions with unexpected objects,
-/// "or a rapid approach that could damage the camera"): judges every move by what came back.
+/// "or a rapid approach that could damage the camera").
 ///
-/// It moves nothing itself, and what it remembers it remembers from run to run.
-/// [`Agent::supervised_by`](crate::Agent::supervised_by) puts another one in the place of
-/// [`Guard`]. What a camera shows is supervised too, by the agent itself: see
-/// [`AgentConfig::same_frames`](crate::AgentConfig::same_frames).
+/// It moves nothing itself, and keeps its memory from run to run.
+/// [`Agent::supervised_by`](crate::Agent::supervised_by) replaces [`Guard`]. The agent itself
+/// watches the camera: see [`AgentConfig::same_frames`](crate::AgentConfig::same_frames).
 ///
 /// ```
 /// use grasp_agent::hough_heuristic::Features;
 /// use grasp_agent::puma_val2::Joints;
-/// use grasp_agent::{Agent, AgentConfig, Arrival, Guard, JointLimits, PositionBased, ServoSettings, Supervision, Verdict};
+/// use grasp_agent::{Guard, JointLimits, Supervision, Verdict};
 ///
-/// /// As the paper's, and an upper arm that is less than 30 degrees above the level goes back.
+/// /// Sends an upper arm back that is less than 30 degrees above the level.
 /// #[derive(Clone, Debug)]
 /// struct Steep(Guard);
 ///
@@ -51,8 +38,9 @@ pub enum Verdict {
 ///         self.0.limits()
 ///     }
 ///
-///     fn judge_move(&mut self, arrival: &Arrival) -> Verdict {
-///         if arrival.reached.degrees()[1] > -30.0 { Verdict::TooNear } else { self.0.judge_move(arrival) }
+///     fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict {
+///         let low = reached.degrees()[1] > -30.0;
+///         self.0.judge_move(target, reached, near || low)
 ///     }
 ///
 ///     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
@@ -63,26 +51,21 @@ pub enum Verdict {
 ///         Box::new(self.clone())
 ///     }
 /// }
-///
-/// let config = AgentConfig::paper([Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0])]);
-/// let guard = Steep(Guard::of(&config));
-/// let agent = Agent::with_controller(config, PositionBased::new(ServoSettings::paper()))?.supervised_by(guard);
-/// # let _ = agent;
-/// # Ok::<(), grasp_agent::AgentError>(())
 /// ```
 pub trait Supervision: std::fmt::Debug + Send + Sync {
-    /// The range that each joint is kept in. A controller is told it, and what it decides against
-    /// it is not done; viewpoints are cut to it.
+    /// Returns the range that each joint is kept in. Moves that lead out of it are not made, and
+    /// viewpoints are cut to it.
     fn limits(&self) -> &JointLimits;
 
-    /// What a move came to.
-    fn judge_move(&mut self, arrival: &Arrival) -> Verdict;
+    /// Judges a move to `target` after which the arm reports to be at `reached`. `near` is `true`
+    /// if the arm was halted by its own guard, or a sensor reports something near now.
+    fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict;
 
-    /// Whether a move that took the ball in the image from `before` to `after` came nearer too
-    /// fast; then the arm goes back.
+    /// Returns `true` if a move that took the ball in the image from `before` to `after` came
+    /// nearer too fast; the arm then goes back.
     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool;
 
-    /// A copy, for the copies of an agent: `Box::new(self.clone())`.
+    /// Returns a copy, for copies of an agent: `Box::new(self.clone())`.
     fn boxed(&self) -> Box<dyn Supervision>;
 }
 
@@ -92,28 +75,24 @@ impl Clone for Box<dyn Supervision> {
     }
 }
 
-/// Supervision by fixed bounds.
+/// Supervision by the fixed bounds of an [`AgentConfig`].
 #[derive(Clone, Debug)]
 pub struct Guard {
     limits: JointLimits,
-    approach: ApproachLimit,
+    approach_radius: f64,
+    approach_growth: f64,
     reach_tolerance: f64,
 }
 
 impl Guard {
-    /// A guard of these working limits, this greatest speed of approach, and so many radians that a
-    /// joint may stand from where it was sent.
-    pub fn new(limits: JointLimits, approach: ApproachLimit, reach_tolerance: f64) -> Self {
-        Self {
-            limits,
-            approach,
-            reach_tolerance,
-        }
-    }
-
-    /// The guard that an agent with these settings has.
+    /// Creates the guard that an agent with these settings has.
     pub fn of(config: &AgentConfig) -> Self {
-        Self::new(config.limits, config.approach, config.reach_tolerance)
+        Self {
+            limits: config.limits,
+            approach_radius: config.approach_radius,
+            approach_growth: config.approach_growth,
+            reach_tolerance: config.reach_tolerance,
+        }
     }
 }
 
@@ -122,11 +101,11 @@ impl Supervision for Guard {
         &self.limits
     }
 
-    fn judge_move(&mut self, arrival: &Arrival) -> Verdict {
-        if arrival.near {
+    fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict {
+        if near {
             return Verdict::TooNear;
         }
-        let off = |joint: Joint| (arrival.reached[joint] - arrival.target[joint]).abs();
+        let off = |joint: Joint| (reached[joint] - target[joint]).abs();
         let stuck = Joint::ALL
             .into_iter()
             .find(|joint| off(*joint).is_nan() || off(*joint) > self.reach_tolerance);
@@ -134,7 +113,7 @@ impl Supervision for Guard {
     }
 
     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
-        self.approach.exceeded(before.r, after.r)
+        after.r > self.approach_radius && after.r > self.approach_growth * before.r
     }
 
     fn boxed(&self) -> Box<dyn Supervision> {
@@ -151,33 +130,19 @@ mod tests {
     }
 
     #[test]
-    fn a_move_is_judged_by_sensors_and_by_where_the_arm_stands() {
+    fn moves_are_judged_by_sensors_and_by_the_pose_reached() {
         let target = Joints::from_degrees([10.0, -90.0, 180.0, 0.0, 45.0, 0.0]);
-        let judged = |degrees: [f64; 6], near| {
-            let reached = Joints::from_degrees(degrees);
-            guard().judge_move(&Arrival {
-                target,
-                reached,
-                near,
-            })
-        };
-        assert_eq!(
-            judged([10.9, -90.0, 180.0, 0.0, 45.0, 0.0], false),
-            Verdict::There
-        );
-        assert_eq!(
-            judged([10.0, -90.0, 178.5, 0.0, 45.0, 0.0], false),
-            Verdict::Stuck(Joint::J3)
-        );
-        assert_eq!(
-            judged([10.0, f64::NAN, 180.0, 0.0, 45.0, 0.0], false),
-            Verdict::Stuck(Joint::J2)
-        );
-        // An arm that was halted on its way is not stuck.
-        assert_eq!(
-            judged([5.0, -90.0, 180.0, 0.0, 45.0, 0.0], true),
-            Verdict::TooNear
-        );
+        for (first_three, near, expected) in [
+            ([10.9, -90.0, 180.0], false, Verdict::There),
+            ([10.0, -90.0, 178.5], false, Verdict::Stuck(Joint::J3)),
+            ([10.0, f64::NAN, 180.0], false, Verdict::Stuck(Joint::J2)),
+            // An arm that was halted on its way is not stuck.
+            ([5.0, -90.0, 180.0], true, Verdict::TooNear),
+        ] {
+            let [j1, j2, j3] = first_three;
+            let reached = Joints::from_degrees([j1, j2, j3, 0.0, 45.0, 0.0]);
+            assert_eq!(guard().judge_move(&target, &reached, near), expected);
+        }
     }
 
     #[test]
@@ -187,8 +152,16 @@ mod tests {
             y: 72.0,
             r,
         };
-        assert!(!guard().is_too_fast(&ball(10.0), &ball(61.0)));
-        assert!(guard().is_too_fast(&ball(40.0), &ball(63.0)));
-        assert!(!guard().is_too_fast(&ball(50.0), &ball(63.0)));
+        // Up to the radius of 62 anything, beyond it up to a growth of 1.5, ends included.
+        for (before, after, too_fast) in [
+            (10.0, 62.0, false),
+            (10.0, 62.1, true),
+            (42.0, 63.0, false),
+            (41.9, 63.0, true),
+            (80.0, 63.0, false),
+        ] {
+            let judged = guard().is_too_fast(&ball(before), &ball(after));
+            assert_eq!(judged, too_fast, "{before} to {after}");
+        }
     }
 }

@@ -5,7 +5,6 @@ use puma_val2::{Joint, JointDelta, Joints};
 
 use crate::limits::JointLimits;
 use crate::percept::Percept;
-use crate::percept::THETA3_ZERO;
 use crate::sight::camera_model::CameraModel;
 
 /// An exact simulator of approaching: what is perceived after a move of `JT2` and `JT3`.
@@ -48,7 +47,7 @@ impl ArmPlane {
     pub fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let turned = delta[Joint::J3];
         let theta3 = percept.theta3 + turned.to_degrees();
-        let jt3 = (theta3 + THETA3_ZERO).to_radians();
+        let jt3 = (theta3 + Percept::THETA3_ZERO).to_radians();
         let (low, high) = self.limits.0[Joint::J3.index()];
         if !(low..=high).contains(&jt3) {
             return Some(*percept);

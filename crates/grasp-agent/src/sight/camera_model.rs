@@ -10,7 +10,6 @@ use puma_val2::{Joint, JointDelta, Joints, PumaParams};
 use crate::checked::above_zero;
 use crate::limits::JointLimits;
 use crate::percept::Percept;
-use crate::percept::THETA3_ZERO;
 
 /// An arm with a camera on its hand, as a controller believes it to be, and the size of the ball.
 ///
@@ -102,8 +101,14 @@ impl CameraModel {
     ) -> Option<Percept> {
         // The plane of the upper arm and the forearm looks the same at every angle of the first two
         // joints.
-        let joints =
-            Joints::from_degrees([0.0, -60.0, percept.theta3 + THETA3_ZERO, 0.0, 45.0, 0.0]);
+        let joints = Joints::from_degrees([
+            0.0,
+            -60.0,
+            percept.theta3 + Percept::THETA3_ZERO,
+            0.0,
+            45.0,
+            0.0,
+        ]);
         let moved = joints + *delta;
         let (low, high) = limits.0[Joint::J3.index()];
         if !(low..=high).contains(&moved[Joint::J3]) {

@@ -1,61 +1,58 @@
-//! The eye: where the features of the ball come from.
+//! The eye of an agent: a camera, and what is looked for in its frames.
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{CircleDetector, FrameError, FrameSource};
 
 use crate::percept::Sighting;
+use crate::sight::target::{BallTarget, Target};
 
-use crate::sight::target::{BallFeatures, ObjectFeatures};
-
-/// Looks for the ball from where the camera is now.
+/// Looks for the ball, or an object in its place, from the camera's present pose.
 pub trait Eye {
-    /// One look.
+    /// Takes a new frame and returns the ball in it, if there is one.
     ///
     /// # Errors
-    /// Whatever kept the camera from delivering a frame.
-    fn look(&mut self) -> Result<Look, FrameError>;
+    /// Reason why the camera delivered no frame, or the frame could not be searched.
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError>;
+
+    /// Returns the frame of the last look; `None` for eyes without frames.
+    fn frame(&self) -> Option<&GrayImage> {
+        None
+    }
 }
 
-/// What one look brought.
-#[derive(Clone, Debug, Default)]
-pub struct Look {
-    /// The frame that was looked at; `None` from an eye that needs none.
-    pub frame: Option<GrayImage>,
-    /// The ball, or the object in its place, if it was found.
-    pub ball: Option<Sighting>,
-}
-
-/// A camera, and what is looked for in its frames.
+/// A camera and the target that is looked for in its frames.
 pub struct CameraEye<'a> {
     source: &'a mut dyn FrameSource,
-    object: Box<dyn ObjectFeatures + 'a>,
+    target: Box<dyn Target + 'a>,
+    frame: Option<GrayImage>,
 }
 
 impl<'a> CameraEye<'a> {
-    /// An eye that takes frames from `source` and looks for the ball with `detector`: see
-    /// [`BallFeatures`].
+    /// Creates an eye that looks for a ball: the best circle of `detector` with its centre in the
+    /// frame.
     pub fn new(source: &'a mut dyn FrameSource, detector: &'a mut dyn CircleDetector) -> Self {
-        Self::looking_for(source, BallFeatures::new(detector))
+        Self::looking_for(source, BallTarget::new(detector))
     }
 
-    /// An eye that takes frames from `source` and looks for any object in them.
-    pub fn looking_for(source: &'a mut dyn FrameSource, object: impl ObjectFeatures + 'a) -> Self {
+    /// Creates an eye that looks for any target.
+    pub fn looking_for(source: &'a mut dyn FrameSource, target: impl Target + 'a) -> Self {
         Self {
             source,
-            object: Box::new(object),
+            target: Box::new(target),
+            frame: None,
         }
     }
 }
 
 impl Eye for CameraEye<'_> {
-    fn look(&mut self) -> Result<Look, FrameError> {
-        let mut frame = GrayImage::default();
-        self.source.grab(&mut frame)?;
-        let ball = self.object.find(&frame);
-        Ok(Look {
-            frame: Some(frame),
-            ball,
-        })
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
+        let frame = self.frame.get_or_insert_default();
+        self.source.grab(frame)?;
+        self.target.find(frame)
+    }
+
+    fn frame(&self) -> Option<&GrayImage> {
+        self.frame.as_ref()
     }
 }
 

@@ -4,5 +4,5 @@ pub(crate) mod aiming;
 pub(crate) mod arm_plane;
 pub(crate) mod camera_model;
 pub(crate) mod eye;
+pub(crate) mod frozen;
 pub(crate) mod target;
-pub(crate) mod watch;

@@ -1,174 +1,136 @@
-//! What is looked for in a frame: the ball by its circle, or another object by another set of
-//! features.
+//! Targets that are looked for in a frame: the ball by its circle, an egg by its ellipse, others by
+//! features of their own.
+
+use std::ops::RangeInclusive;
 
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{
     Canny, Circle, CircleDetector, CurveSearch, Detection, EdgeDetector, Ellipse, Features,
+    FrameError,
 };
 
-use crate::checked::checked;
 use crate::percept::Sighting;
 
-/// A set of image features that describes one kind of object: the door through which objects other
-/// than balls come in.
+/// A kind of object that can be found in a frame by its image features.
 ///
 /// Section 2.1 of the paper: "it is possible to extend the grasping behavior to objects of
 /// different shapes, characterizing them uniquely, simply by considering a different set of
-/// features of the images". Whatever the object, what the controllers are told is a place in the
-/// image and a size that is inversely proportional to the distance.
-pub trait ObjectFeatures {
-    /// The object in `frame`; `None` if it is not there.
-    fn find(&mut self, frame: &GrayImage) -> Option<Sighting>;
+/// features of the images". Controllers expect a place in the image, and a radius that is inversely
+/// proportional to the distance.
+pub trait Target {
+    /// Finds the object in `frame`; `None` if it is not there.
+    ///
+    /// # Errors
+    /// Reason why this frame cannot be searched.
+    fn find(&mut self, frame: &GrayImage) -> Result<Option<Sighting>, FrameError>;
 }
 
-/// The paper's object: a ball, by centre and radius of the best circle whose centre lies in the
-/// frame.
-pub struct BallFeatures<'a> {
-    detector: &'a mut dyn CircleDetector,
-}
-
-impl<'a> BallFeatures<'a> {
-    /// By the circles that `detector` finds.
-    pub fn new(detector: &'a mut dyn CircleDetector) -> Self {
-        Self { detector }
-    }
-}
-
-impl<O: ObjectFeatures + ?Sized> ObjectFeatures for &mut O {
-    fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
+impl<T: Target + ?Sized> Target for &mut T {
+    fn find(&mut self, frame: &GrayImage) -> Result<Option<Sighting>, FrameError> {
         (**self).find(frame)
     }
 }
 
-impl ObjectFeatures for BallFeatures<'_> {
-    fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
-        let found = self.detector.detect(frame).unwrap_or_default();
-        found
-            .iter()
-            .find_map(|detection| sighting(*detection, None, frame))
+/// The paper's object: a ball, by the best circle whose centre lies in the frame.
+pub(crate) struct BallTarget<'a> {
+    detector: &'a mut dyn CircleDetector,
+}
+
+impl<'a> BallTarget<'a> {
+    pub(crate) fn new(detector: &'a mut dyn CircleDetector) -> Self {
+        Self { detector }
     }
 }
 
-impl std::fmt::Debug for BallFeatures<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("BallFeatures").finish_non_exhaustive()
+impl Target for BallTarget<'_> {
+    fn find(&mut self, frame: &GrayImage) -> Result<Option<Sighting>, FrameError> {
+        let found = self.detector.detect(frame);
+        let found = found.map_err(|refused| FrameError::Failed {
+            origin: "circle detector".into(),
+            reason: refused.to_string(),
+        })?;
+        let mut found = found.iter();
+        Ok(found.find_map(|detection| sighting(detection, None, frame)))
     }
 }
 
-/// An egg: a body of revolution that is longer than it is thick, by centre and *shorter* half-axis
-/// of its outline.
+/// An egg, a body of revolution that is longer than it is thick, by the ellipse of its outline.
 ///
-/// The outline of such a body is (nearly) an ellipse. Its longer half-axis depends on where one
-/// looks from, its shorter one is the radius of a ball that is as thick as the egg at the same
-/// distance, from everywhere: with it in the place of the radius, behaviours learned for that ball
-/// reach the egg. Where the outline is longer than it is wide by a tenth, its direction is
-/// [`Sighting::long_axis`], by which [`GripAcross`](crate::GripAcross) turns the hand.
+/// The longer half-axis of the outline depends on the direction of view. The shorter one is the
+/// radius of a ball as thick as the egg at the same distance, from every direction: as the radius
+/// of the [`Sighting`] it lets behaviours that were learned for that ball reach the egg. An outline
+/// that is longer than it is wide by a tenth has a [`Sighting::long_axis`], across which
+/// [`AgentConfig::grip_across`](crate::AgentConfig::grip_across) closes the jaws.
 #[derive(Clone, Debug)]
-pub struct EggFeatures<E = Canny> {
+pub struct EggTarget<E = Canny> {
     edge_detector: E,
     search: CurveSearch,
-    limits: EggLimits,
+    minor: RangeInclusive<f64>,
+    elongation: f64,
     last: Option<Ellipse>,
 }
 
-/// Which ellipses can be the outline of an egg.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
-pub struct EggLimits {
-    /// Least shorter half-axis, pixels.
-    pub min_minor: f64,
-    /// Greatest shorter half-axis, pixels.
-    pub max_minor: f64,
-    /// How many times as long as the shorter half-axis the longer one may be at most.
-    pub elongation: f64,
-}
+/// Least ratio of the half-axes at which the direction of the longer one is known.
+const LONG: f64 = 1.1;
 
-checked!(EggLimits);
-
-#[cfg(feature = "serde")]
-impl EggLimits {
-    /// Whether an ellipse can be within them; if not, why.
-    fn check(&self) -> Result<(), String> {
-        let Self {
-            min_minor,
-            max_minor,
-            elongation,
-        } = *self;
-        if min_minor >= 0.0 && max_minor >= min_minor && elongation >= 1.0 {
-            return Ok(());
-        }
-        Err(format!(
-            "an outline with a shorter half-axis of {min_minor} to {max_minor} pixels and a longer one of up to {elongation} times that is none"
-        ))
-    }
-}
-
-impl<E: EdgeDetector> EggFeatures<E> {
-    /// By the ellipses that `search` finds among the edges of `edge_detector`.
-    pub fn new(edge_detector: E, search: CurveSearch, limits: EggLimits) -> Self {
+impl<E: EdgeDetector> EggTarget<E> {
+    /// Creates a target of the ellipses that `search` finds among the edges of `edge_detector`,
+    /// with a shorter half-axis in `minor`, pixels, and a longer one of at most `elongation` times
+    /// that.
+    pub fn new(
+        edge_detector: E,
+        search: CurveSearch,
+        minor: RangeInclusive<f64>,
+        elongation: f64,
+    ) -> Self {
         Self {
             edge_detector,
             search,
-            limits,
+            minor,
+            elongation,
             last: None,
         }
     }
 
-    /// The outline seen last, pixels: its angle says how the object lies. `None` if nothing was
-    /// found.
+    /// Returns the outline found last, pixels; `None` if the last frame showed no egg.
     pub fn outline(&self) -> Option<Ellipse> {
         self.last
     }
 }
 
-impl<E: EdgeDetector> ObjectFeatures for EggFeatures<E> {
-    fn find(&mut self, frame: &GrayImage) -> Option<Sighting> {
+impl<E: EdgeDetector> Target for EggTarget<E> {
+    fn find(&mut self, frame: &GrayImage) -> Result<Option<Sighting>, FrameError> {
         let edges = self.edge_detector.detect_edges(frame);
-        let limits = self.limits;
         let found = self.search.find::<Ellipse>(edges, |ellipse| {
-            (limits.min_minor..=limits.max_minor).contains(&ellipse.minor)
-                && ellipse.major <= limits.elongation * ellipse.minor
+            self.minor.contains(&ellipse.minor) && ellipse.major <= self.elongation * ellipse.minor
         });
         let seen = found.into_iter().find_map(|found| {
+            let ellipse = found.curve;
             let detection = Detection {
                 circle: Circle {
-                    x: found.curve.x,
-                    y: found.curve.y,
-                    radius: found.curve.minor,
+                    x: ellipse.x,
+                    y: ellipse.y,
+                    radius: ellipse.minor,
                 },
                 score: found.beta,
             };
-            let Ellipse {
-                major,
-                minor,
-                angle,
-                ..
-            } = found.curve;
-            let long_axis = (major > LONG * minor).then_some(angle);
-            Some((found.curve, sighting(detection, long_axis, frame)?))
+            let long_axis = (ellipse.major > LONG * ellipse.minor).then_some(ellipse.angle);
+            Some((ellipse, sighting(&detection, long_axis, frame)?))
         });
         self.last = seen.map(|(ellipse, _)| ellipse);
-        seen.map(|(_, sighting)| sighting)
+        Ok(seen.map(|(_, sighting)| sighting))
     }
 }
 
-/// How many times as long as the shorter half-axis the longer one must be for its direction to be
-/// known.
-const LONG: f64 = 1.1;
-
-/// A detection in feature units, if its centre lies in the frame.
-fn sighting(detection: Detection, long_axis: Option<f64>, frame: &GrayImage) -> Option<Sighting> {
+/// Converts a detection to feature units; `None` if its centre lies outside the frame.
+fn sighting(detection: &Detection, long_axis: Option<f64>, frame: &GrayImage) -> Option<Sighting> {
     let height = Features::WIDTH * f64::from(frame.height()) / f64::from(frame.width());
     let features = Features::from_circle(&detection.circle, frame.width());
     let inside =
         (0.0..=Features::WIDTH).contains(&features.x) && (0.0..=height).contains(&features.y);
     (inside && features.r.is_finite()).then_some(Sighting {
-        detection,
         features,
+        score: detection.score,
         long_axis,
     })
 }

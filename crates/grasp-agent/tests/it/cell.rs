@@ -4,13 +4,14 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
-use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
+use grasp_agent::hough_heuristic::{Features, FrameError};
 use grasp_agent::nalgebra::Point3;
 use grasp_agent::puma_val2::{
     ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor,
 };
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, CameraModel, Controller, EventLog, Eye, Look, Outcome, Sighting,
+    Agent, AgentConfig, AgentError, CameraModel, Controller, EventLog, Eye, RunOutcome, Servo,
+    ServoLaw, ServoSettings, Sighting,
 };
 
 /// What can go wrong, and after how many looks or moves.
@@ -111,36 +112,39 @@ impl Cell {
 }
 
 #[derive(Clone)]
-pub(crate) struct Shared(pub(crate) Rc<RefCell<Cell>>);
+pub(crate) struct Shared(pub(crate) Rc<RefCell<Cell>>, pub(crate) Option<GrayImage>);
 
 impl Shared {
     pub(crate) fn new(truth: CameraModel, ball: [f64; 3], fault: Fault) -> Self {
-        Self(Rc::new(RefCell::new(Cell {
-            truth,
-            ball: Point3::from(ball),
-            fault,
-            joints: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
-            closed: false,
-            held: false,
-            slippery: false,
-            stops: 0,
-            looks: 0,
-            looked_first: None,
-            moves: 0,
-            grips: 0,
-            halts: 0,
-            closed_moves: 0,
-            looks_held: 0,
-            closed_at: None,
-            old: None,
-        })))
+        Self(
+            Rc::new(RefCell::new(Cell {
+                truth,
+                ball: Point3::from(ball),
+                fault,
+                joints: Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]),
+                closed: false,
+                held: false,
+                slippery: false,
+                stops: 0,
+                looks: 0,
+                looked_first: None,
+                moves: 0,
+                grips: 0,
+                halts: 0,
+                closed_moves: 0,
+                looks_held: 0,
+                closed_at: None,
+                old: None,
+            })),
+            None,
+        )
     }
 
     pub(crate) fn run<C: Controller>(
         &self,
         agent: &mut Agent<C>,
         log: &mut EventLog,
-    ) -> Result<Outcome, AgentError> {
+    ) -> Result<RunOutcome, AgentError> {
         agent.run_and_learn(
             &mut self.clone(),
             &mut self.clone(),
@@ -155,13 +159,18 @@ impl Shared {
     }
 }
 
+/// The plainest controller.
+pub(crate) fn servo() -> Servo {
+    Servo::new(ServoLaw::PositionBased, ServoSettings::paper())
+}
+
 pub(crate) fn config() -> AgentConfig {
     let poses = [-75.0, -50.0, -25.0, 0.0, 25.0, 50.0];
     AgentConfig::paper(poses.map(|pan| Joints::from_degrees([pan, -110.0, 210.0, 0.0, 45.0, 0.0])))
 }
 
 impl Eye for Shared {
-    fn look(&mut self) -> Result<Look, FrameError> {
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
         let mut cell = self.0.borrow_mut();
         cell.looks += 1;
         let seen = cell.truth.view(&cell.joints, &cell.ball).filter(|f| {
@@ -250,15 +259,13 @@ impl Eye for Shared {
                 (seen, None)
             }
         };
-        let ball = seen.map(|features| Sighting {
-            long_axis: None,
-            features,
-            detection: Detection {
-                circle: features.to_circle(768),
-                score: 1.0,
-            },
-        });
-        Ok(Look { frame, ball })
+        drop(cell);
+        self.1 = frame;
+        Ok(seen.map(Sighting::new))
+    }
+
+    fn frame(&self) -> Option<&GrayImage> {
+        self.1.as_ref()
     }
 }
 

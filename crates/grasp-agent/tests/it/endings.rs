@@ -1,13 +1,14 @@
 //! Runs that have to end, and with the right word: by eyes, sensors and modules that are of no use.
 
+use crate::cell::servo;
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
-use grasp_agent::hough_heuristic::{Detection, Features, FrameError};
+use grasp_agent::hough_heuristic::{Features, FrameError};
 use grasp_agent::puma_val2::{
     ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor,
 };
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, LastLook, LoggedEvent, Look,
-    Outcome, PositionBased, Recovery, Search, ServoSettings, Sighting, Situation, Viewpoint,
+    Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, RunEvent, RunOutcome, Search,
+    Servo, Sighting, Viewpoint,
 };
 
 const AT_GOAL: Features = Features {
@@ -62,26 +63,21 @@ impl ProximitySensor for Sensor {
 struct Scene {
     looks: u32,
     finds: fn(u32) -> Option<Features>,
+    frame: GrayImage,
 }
 
 impl Eye for Scene {
-    fn look(&mut self) -> Result<Look, FrameError> {
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
         let bytes = self.looks.to_le_bytes();
-        let frame = GrayImage::from_fn(4, 1, |x, _| Luma([bytes[x as usize]]));
-        let ball = (self.finds)(self.looks).map(|features| Sighting {
-            long_axis: None,
-            features,
-            detection: Detection {
-                circle: features.to_circle(768),
-                score: 1.0,
-            },
-        });
+        self.frame = GrayImage::from_fn(4, 1, |x, _| Luma([bytes[x as usize]]));
+        let ball = (self.finds)(self.looks).map(Sighting::new);
         self.looks += 1;
         assert!(self.looks < 5000, "the run does not end");
-        Ok(Look {
-            frame: Some(frame),
-            ball,
-        })
+        Ok(ball)
+    }
+
+    fn frame(&self) -> Option<&GrayImage> {
+        Some(&self.frame)
     }
 }
 
@@ -89,19 +85,23 @@ fn pose() -> Joints {
     Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0])
 }
 
-fn agent(poses: usize) -> Agent<PositionBased> {
+fn agent(poses: usize) -> Agent<Servo> {
     let config = AgentConfig::paper(vec![pose(); poses]);
-    Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap()
+    Agent::with_controller(config, servo()).unwrap()
 }
 
 fn run(
-    mut agent: Agent<PositionBased>,
+    mut agent: Agent<Servo>,
     near: bool,
     finds: fn(u32) -> Option<Features>,
-) -> (Result<Outcome, AgentError>, EventLog) {
+) -> (Result<RunOutcome, AgentError>, EventLog) {
     let mut log = EventLog::default();
     let (mut arm, mut sensor) = (Arm(pose()), Sensor(near));
-    let mut eye = Scene { looks: 0, finds };
+    let mut eye = Scene {
+        looks: 0,
+        finds,
+        frame: GrayImage::new(4, 1),
+    };
     let end = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| {
         log.note(event)
     });
@@ -110,25 +110,27 @@ fn run(
 
 /// Names this viewpoint once, or none.
 #[derive(Clone, Debug)]
-struct Once(Option<Joints>);
+struct Once {
+    pose: Option<Joints>,
+    named: bool,
+}
+
+fn once(pose: Option<Joints>) -> Once {
+    Once { pose, named: false }
+}
 
 impl Search for Once {
-    fn next_view(&mut self, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
-        let pose = self.0.filter(|_| last == LastLook::None)?;
+    fn begin(&mut self, _at: &Joints, _lost: Option<(&Sighting, &Joints)>) {
+        self.named = false;
+    }
+
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+        let pose = self.pose.filter(|_| !self.named)?;
+        self.named = true;
         Some(Viewpoint { number: 3, pose })
     }
 
     fn boxed(&self) -> Box<dyn Search> {
-        Box::new(self.clone())
-    }
-}
-
-impl Recovery for Once {
-    fn next_view(&mut self, _seen: &Situation, at: &Joints, last: LastLook) -> Option<Viewpoint> {
-        Search::next_view(self, at, last)
-    }
-
-    fn boxed(&self) -> Box<dyn Recovery> {
         Box::new(self.clone())
     }
 }
@@ -155,7 +157,7 @@ fn a_circle_that_keeps_its_place_in_the_image_is_no_grasp_whatever_was_seen_befo
 #[test]
 fn a_recovery_that_offers_nothing_ends_with_the_cycles() {
     // At the goal in the first look, and not in the next ones.
-    let (end, _) = run(agent(1).recovering_by(Once(None)), false, |n| {
+    let (end, _) = run(agent(1).recovering_by(once(None)), false, |n| {
         n.is_multiple_of(3).then_some(AT_GOAL)
     });
     let outcome = end.unwrap();
@@ -164,7 +166,7 @@ fn a_recovery_that_offers_nothing_ends_with_the_cycles() {
         (Some(GaveUp::OutOfCycles), 60)
     );
     // At the goal, gripped, and missed each time.
-    let (end, log) = run(agent(1).recovering_by(Once(None)), false, |_| Some(AT_GOAL));
+    let (end, log) = run(agent(1).recovering_by(once(None)), false, |_| Some(AT_GOAL));
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::OutOfCycles));
     assert!(log.events.iter().any(|e| e.kind == EventKind::Missed));
 }
@@ -174,8 +176,8 @@ fn a_viewpoint_that_is_not_finite_is_an_error_and_no_pose() {
     for number in [f64::NAN, f64::INFINITY] {
         let mut nowhere = pose();
         nowhere.0[1] = number;
-        let searching = agent(1).searching_by(Once(Some(nowhere)));
-        let recovering = agent(1).recovering_by(Once(Some(nowhere)));
+        let searching = agent(1).searching_by(once(Some(nowhere)));
+        let recovering = agent(1).recovering_by(once(Some(nowhere)));
         for agent in [searching, recovering] {
             let (end, log) = run(agent, false, |n| (n == 0).then_some(ASIDE));
             let error = end.unwrap_err();
@@ -202,7 +204,9 @@ fn a_viewpoint_that_is_not_finite_is_an_error_and_no_pose() {
 struct Endless;
 
 impl Search for Endless {
-    fn next_view(&mut self, _at: &Joints, _last: LastLook) -> Option<Viewpoint> {
+    fn begin(&mut self, _at: &Joints, _lost: Option<(&Sighting, &Joints)>) {}
+
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
         let pose = pose();
         Some(Viewpoint { number: 0, pose })
     }
@@ -221,7 +225,7 @@ fn a_search_that_never_ends_has_found_nothing_after_so_many_viewpoints() {
         (Some(GaveUp::NotFound), 0)
     );
     let views = |log: &EventLog| {
-        let at_pose = |e: &&LoggedEvent| matches!(e.kind, EventKind::AtSearchPose(_));
+        let at_pose = |e: &&RunEvent<'_>| matches!(e.kind, EventKind::AtSearchPose(_));
         log.events.iter().filter(at_pose).count()
     };
     assert_eq!(views(&log), 1000);
@@ -231,9 +235,9 @@ fn a_search_that_never_ends_has_found_nothing_after_so_many_viewpoints() {
             max_views,
             ..AgentConfig::paper([pose()])
         };
-        let servo = PositionBased::new(ServoSettings::paper());
+        let servo = servo();
         let agent = Agent::with_controller(config, servo).unwrap();
-        agent.searching_by(Endless).recovering_by(Once(None))
+        agent.searching_by(Endless).recovering_by(once(None))
     };
     let (end, log) = run(few(7), true, |_| None);
     assert_eq!(
@@ -255,6 +259,6 @@ fn a_search_that_never_got_to_look_was_obstructed() {
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::Obstructed));
     let (end, _) = run(agent(3), false, |_| None);
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
-    let (end, _) = run(agent(3).searching_by(Once(None)), true, |_| None);
+    let (end, _) = run(agent(3).searching_by(once(None)), true, |_| None);
     assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
 }

@@ -3,16 +3,21 @@
 
 use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, ApproachLimit, CameraModel, EventKind, EventLog, GaveUp,
-    Hybrid, HybridSettings, LoggedEvent, PositionBased, ServoSettings,
+    Agent, AgentConfig, AgentError, CameraModel, EventKind, EventLog, GaveUp, Hybrid,
+    HybridSettings, RunEvent, Servo, ServoLaw, ServoSettings,
 };
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, config, servo};
 
-pub(crate) fn end_of(fault: Fault) -> (Result<grasp_agent::Outcome, AgentError>, EventLog, Shared) {
+pub(crate) fn end_of(
+    fault: Fault,
+) -> (
+    Result<grasp_agent::RunOutcome, AgentError>,
+    EventLog,
+    Shared,
+) {
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], fault);
-    let mut agent =
-        Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent = Agent::with_controller(config(), servo()).unwrap();
     let mut log = EventLog::default();
     (cell.run(&mut agent, &mut log), log, cell)
 }
@@ -101,8 +106,7 @@ fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
             "{moves}: {error}"
         );
         assert!(cell.0.borrow().stops > 0 && cell.0.borrow().joints.non_finite().is_none());
-        let before =
-            Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+        let before = Agent::with_controller(config(), servo()).unwrap();
         let replayed = log.replay(&before).unwrap_err();
         assert_eq!(replayed.to_string(), error.to_string());
     }
@@ -112,8 +116,7 @@ fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
 fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
     let mut without_lift = config();
     without_lift.lift = None;
-    let mut agent =
-        Agent::with_controller(without_lift, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent = Agent::with_controller(without_lift, servo()).unwrap();
     let cell = Shared::new(
         CameraModel::paper(),
         [0.6, 0.1, -0.1],
@@ -150,33 +153,15 @@ fn a_camera_that_froze_between_two_runs_brings_about_no_grip() {
 
 #[test]
 fn too_rapid_an_approach_is_taken_back_and_made_more_slowly() {
-    let limit = ApproachLimit {
-        radius: 20.0,
-        growth: 1.5,
-    };
-    // Up to the radius anything, beyond it up to the growth; the ends are still slow enough.
-    for (before, after, exceeded) in [
-        (5.0, 20.0, false),
-        (5.0, 20.1, true),
-        (20.0, 30.0, false),
-        (20.0, 30.1, true),
-        (40.0, 30.0, false),
-    ] {
-        assert_eq!(
-            limit.exceeded(before, after),
-            exceeded,
-            "{before} to {after}"
-        );
-    }
-
+    let exceeded = |before: f64, after: f64| after > 20.0 && after > 1.5 * before;
     let mut slow = config();
-    slow.approach = limit;
+    (slow.approach_radius, slow.approach_growth) = (20.0, 1.5);
     let mut agent = Agent::with_controller(slow, Hybrid::new(HybridSettings::paper())).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
     assert_eq!(outcome.gave_up, None);
-    let radius = |event: &LoggedEvent| match event.kind {
+    let radius = |event: &RunEvent<'_>| match event.kind {
         EventKind::Seen(sighting) => Some(sighting.features.r),
         _ => None,
     };
@@ -199,7 +184,7 @@ fn too_rapid_an_approach_is_taken_back_and_made_more_slowly() {
             .is_some_and(|next| next.kind == EventKind::TooFast);
         if let Some(r) = radius(event).filter(|_| !taken_back) {
             assert!(
-                last.is_none_or(|last| !limit.exceeded(last, r)),
+                last.is_none_or(|last| !exceeded(last, r)),
                 "{last:?} to {r}"
             );
             last = Some(r);
@@ -338,7 +323,9 @@ fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a
     let checked = config();
     for gain in [1.0, 0.5] {
         let servo = ServoSettings::paper().with_gain(gain);
-        let mut agent = Agent::with_controller(checked.clone(), PositionBased::new(servo)).unwrap();
+        let mut agent =
+            Agent::with_controller(checked.clone(), Servo::new(ServoLaw::PositionBased, servo))
+                .unwrap();
         let cell = Shared::new(CameraModel::paper(), [-0.6, 0.0, -0.1], Fault::Phantoms);
         let mut log = EventLog::default();
         let outcome = cell.run(&mut agent, &mut log).unwrap();
@@ -413,9 +400,9 @@ fn settings_that_cannot_work_are_refused() {
         }),
         ("goal of Y", |c| c.goal[1].low = f64::NAN),
         ("goal of R", |c| c.goal[2].high = f64::INFINITY),
-        ("approach.growth", |c| c.approach.growth = f64::NAN),
-        ("approach.growth", |c| c.approach.growth = f64::INFINITY),
-        ("approach.radius", |c| c.approach.radius = f64::NAN),
+        ("approach_growth", |c| c.approach_growth = f64::NAN),
+        ("approach_growth", |c| c.approach_growth = f64::INFINITY),
+        ("approach_radius", |c| c.approach_radius = f64::NAN),
         ("reach_tolerance", |c| c.reach_tolerance = f64::INFINITY),
         ("reach_tolerance", |c| c.reach_tolerance = f64::NAN),
         ("reach_tolerance", |c| c.reach_tolerance = -0.1),
@@ -428,8 +415,7 @@ fn settings_that_cannot_work_are_refused() {
     for (name, change) in changes {
         let mut config = config();
         change(&mut config);
-        let refused =
-            Agent::with_controller(config, PositionBased::new(ServoSettings::paper())).unwrap_err();
+        let refused = Agent::with_controller(config, servo()).unwrap_err();
         assert!(refused.to_string().contains(name), "{name}: {refused}");
     }
 }
@@ -447,7 +433,7 @@ fn a_camera_that_freezes_at_any_look_brings_about_no_success() {
                 Fault::FrozenPicture(after),
             );
             cell.0.borrow_mut().slippery = slippery;
-            let servo = PositionBased::new(ServoSettings::paper());
+            let servo = servo();
             let mut agent = Agent::with_controller(config(), servo).unwrap();
             let mut log = EventLog::default();
             let end = cell.run(&mut agent, &mut log);

@@ -2,11 +2,11 @@
 
 use grasp_agent::puma_val2::JointDelta;
 use grasp_agent::{
-    Agent, AgentConfig, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp, Outcome,
-    PositionBased, ServoSettings, YGoal,
+    Agent, AgentConfig, BehaviourPair, CameraModel, EventKind, EventLog, GaveUp, GoalInterval,
+    RunOutcome,
 };
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, config, servo};
 use crate::faults::{end_of, words_from};
 
 #[test]
@@ -82,8 +82,7 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
     let mut short = config();
     short.max_cycles = 12;
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
-    let mut agent =
-        Agent::with_controller(short, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent = Agent::with_controller(short, servo()).unwrap();
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
     let missed = log
@@ -124,7 +123,7 @@ fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
 fn two_places_in_the_goal_in_turn_do_not_keep_a_run_going_for_ever() {
     let mut wide = config();
     wide.goal = BehaviourPair::paper_mended()
-        .with_y_goal(YGoal::Section4)
+        .with_y_goal(GoalInterval::Y_SECTION_4)
         .unwrap()
         .goal();
     let cell = Shared::new(
@@ -132,20 +131,18 @@ fn two_places_in_the_goal_in_turn_do_not_keep_a_run_going_for_ever() {
         [0.6, 0.1, -0.1],
         Fault::Restless(10_000),
     );
-    let mut agent =
-        Agent::with_controller(wide, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent = Agent::with_controller(wide, servo()).unwrap();
     let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
     assert_eq!(outcome.gave_up, Some(GaveUp::OutOfCycles));
     assert!(!cell.0.borrow().closed);
 }
 
 /// The end of a run under the paper's settings, changed.
-fn end_with(change: impl Fn(&mut AgentConfig)) -> (Outcome, Shared) {
+fn end_with(change: impl Fn(&mut AgentConfig)) -> (RunOutcome, Shared) {
     let mut changed = config();
     change(&mut changed);
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
-    let mut agent =
-        Agent::with_controller(changed, PositionBased::new(ServoSettings::paper())).unwrap();
+    let mut agent = Agent::with_controller(changed, servo()).unwrap();
     (
         cell.run(&mut agent, &mut EventLog::default()).unwrap(),
         cell,

@@ -4,8 +4,8 @@ use grasp_agent::hough_heuristic::Features;
 use grasp_agent::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use grasp_agent::puma_val2::{JointDelta, Joints};
 use grasp_agent::{
-    Agent, CameraModel, Controller, EventLog, GaveUp, Hybrid, HybridSettings, JointLimits,
-    Situation, TaughtGoal,
+    Agent, CameraModel, Controller, Decision, EventLog, Feedback, GaveUp, Hybrid, HybridSettings,
+    JointLimits, Request, Sighting, TaughtGoal,
 };
 #[cfg(feature = "serde")]
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
@@ -158,43 +158,45 @@ fn a_controller_that_begins_with_a_belief_goes_on_learning_from_there() {
 }
 
 #[test]
-fn what_the_fixed_grip_has_missed_is_aimed_at() {
-    let limits = JointLimits::paper();
-    let mut hybrid = Hybrid::new(HybridSettings::paper());
-    hybrid.begin();
-    let at_goal = Situation {
-        long_axis: None,
-        features: Features {
-            x: 103.5,
-            y: 78.0,
-            r: 33.0,
-        },
-        joints: Joints::from_degrees([0.0, -55.0, 184.0, 0.0, 45.0, 0.0]),
+fn a_ball_that_the_fixed_grip_has_missed_is_aimed_at() {
+    let features = Features {
+        x: 103.5,
+        y: 78.0,
+        r: 33.0,
     };
-    hybrid.arm_at(&at_goal.joints);
+    let ball = Sighting::new(features);
+    let joints = Joints::from_degrees([0.0, -55.0, 184.0, 0.0, 45.0, 0.0]);
+    let request = Request {
+        joints,
+        limits: JointLimits::paper(),
+        grip: true,
+    };
+    let begin = |hybrid: &mut Hybrid| {
+        hybrid.notice(&Feedback::Begin);
+        hybrid.notice(&Feedback::Arm(joints));
+    };
+    let aim = |hybrid: &mut Hybrid| match hybrid.decide(&ball, &request) {
+        Ok(Decision::Grip(delta)) => Some(delta.degrees()),
+        _ => None,
+    };
+    let mut hybrid = Hybrid::new(HybridSettings::paper());
+    begin(&mut hybrid);
     // One sighting with a camera of which nothing is known: where the ball is, is not certain
     // enough.
-    assert_eq!(hybrid.grip(&at_goal, &limits), None);
-    let tries = (0..4).map(|_| hybrid.grip(&at_goal, &limits));
-    let aim = tries
-        .flatten()
-        .next()
-        .expect("an aim of its own, sooner or later");
-    assert!((aim.degrees()[4] + 18.01).abs() < 1e-6, "{aim:?}");
+    assert_eq!(aim(&mut hybrid), None);
+    let mut tries = (0..4).filter_map(|_| aim(&mut hybrid));
+    let own = tries.next().expect("an aim of its own, sooner or later");
+    assert!((own[4] + 18.01).abs() < 1e-6, "{own:?}");
     // A goal that was shown with a turn of JT4 is aimed at with that turn.
     let grip = JointDelta::from_degrees([0.0, 0.0, 0.0, 8.0, -14.0, 0.0]);
-    let goal = TaughtGoal::new(&config().goal, at_goal.features, at_goal.joints, grip).unwrap();
+    let goal = TaughtGoal::new(&config().goal, features, joints, grip).unwrap();
     let mut shown = Hybrid::new(HybridSettings::paper()).shown(&goal);
-    shown.begin();
-    shown.arm_at(&at_goal.joints);
-    let mut tries = (0..4).filter_map(|_| shown.grip(&at_goal, &limits));
-    let aim = tries.next().expect("an aim of its own").degrees();
-    assert!(
-        (aim[3] - 8.0).abs() < 1e-6 && (aim[4] + 14.0).abs() < 1e-6,
-        "{aim:?}"
-    );
+    begin(&mut shown);
+    let mut tries = (0..4).filter_map(|_| aim(&mut shown));
+    let own = tries.next().expect("an aim of its own");
+    let close = (own[3] - 8.0).abs() < 1e-6 && (own[4] + 14.0).abs() < 1e-6;
+    assert!(close, "{own:?}");
     // In the next run it is as careful as ever.
-    hybrid.begin();
-    hybrid.arm_at(&at_goal.joints);
-    assert_eq!(hybrid.grip(&at_goal, &limits), None);
+    begin(&mut hybrid);
+    assert_eq!(aim(&mut hybrid), None);
 }

@@ -33,7 +33,7 @@ fn learning_goes_on_within_the_limits_until_it_is_frozen() {
     let mut agent = Agent::with_controller(config(), new().learning(settings)).unwrap();
     let mut log = EventLog::default();
     some_runs(&mut agent, &mut log);
-    let moved = |event: &&grasp_agent::LoggedEvent| matches!(event.kind, EventKind::Moved(_));
+    let moved = |event: &&grasp_agent::RunEvent<'_>| matches!(event.kind, EventKind::Moved(_));
     assert!(log.events.iter().filter(moved).count() > 100);
     assert!(
         log.events

@@ -3,10 +3,10 @@
 use grasp_agent::qtable::QTable;
 use grasp_agent::{
     Agent, AgentError, BehaviourPair, CameraModel, Controller, EventKind, EventLog, Hybrid,
-    HybridSettings, ImageBased, JacobianAt, Learned, OnlineLearning, PositionBased, ServoSettings,
+    HybridSettings, Learned, OnlineLearning, Servo, ServoLaw, ServoSettings,
 };
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, config, servo};
 
 const FAULTS: [Fault; 10] = [
     Fault::None,
@@ -50,8 +50,8 @@ fn replays<C: Controller + Clone>(controller: C, fault: Fault) {
 fn logs_replay_to_the_same_run() {
     let servo = ServoSettings::paper();
     for fault in FAULTS {
-        replays(PositionBased::new(servo), fault);
-        replays(ImageBased::new(servo, JacobianAt::Goal), fault);
+        replays(Servo::new(ServoLaw::PositionBased, servo), fault);
+        replays(Servo::new(ServoLaw::ImageBasedAtGoal, servo), fault);
         replays(Hybrid::new(HybridSettings::paper()), fault);
     }
 }
@@ -89,14 +89,13 @@ fn logs_of_runs_that_failed_replay_to_the_same_failure() {
         Fault::StopDead(3),
         Fault::StoppedShort(3),
     ] {
-        replays(PositionBased::new(servo), fault);
+        replays(Servo::new(ServoLaw::PositionBased, servo), fault);
     }
 }
 
 #[test]
 fn a_failure_of_another_kind_is_another_run() {
-    let agent =
-        Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap();
+    let agent = Agent::with_controller(config(), servo()).unwrap();
     let log_of = |fault| {
         let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
         let mut log = EventLog::default();
@@ -136,11 +135,16 @@ fn a_failure_of_another_kind_is_another_run() {
 #[test]
 fn another_controller_is_told_apart() {
     let servo = ServoSettings::paper();
-    let agent = Agent::with_controller(config(), PositionBased::new(servo)).unwrap();
+    let agent =
+        Agent::with_controller(config(), Servo::new(ServoLaw::PositionBased, servo)).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], Fault::None);
     let mut log = EventLog::default();
     cell.run(&mut agent.clone(), &mut log).unwrap();
-    let other = Agent::with_controller(config(), PositionBased::new(servo.with_gain(0.5))).unwrap();
+    let other = Agent::with_controller(
+        config(),
+        Servo::new(ServoLaw::PositionBased, servo.with_gain(0.5)),
+    )
+    .unwrap();
     assert!(matches!(log.replay(&other), Err(AgentError::Replay { .. })));
     let cut = EventLog {
         events: log.events[..log.events.len() / 2].to_vec(),
@@ -153,7 +157,7 @@ mod saved {
     use grasp_agent::qtable::{Action, QTable, State};
     use grasp_agent::{
         Agent, AgentError, Behaviour, BehaviourPair, CameraModel, Controller, EventLog, Hybrid,
-        HybridSettings, Learned, OnlineLearning, Replayed, SavedController, SavedRun,
+        HybridSettings, Learned, OnlineLearning, Replayed, SavedRun,
     };
 
     use super::FAULTS;
@@ -170,12 +174,8 @@ mod saved {
     }
 
     /// Makes a run, saves it, and reads it again: all that the replay gets is the text.
-    fn saved<C: Controller + Clone>(
-        agent: &mut Agent<C>,
-        controller: SavedController,
-        cell: &Shared,
-    ) -> String {
-        let mut saved = SavedRun::before(agent, controller);
+    fn saved<C: Controller + Clone>(agent: &mut Agent<C>, cell: &Shared) -> String {
+        let mut saved = SavedRun::before(agent);
         let end = agent.run_and_learn(
             &mut cell.clone(),
             &mut cell.clone(),
@@ -207,11 +207,7 @@ mod saved {
         for fault in FAULTS.into_iter().chain(more) {
             let cell = || Shared::new(CameraModel::paper(), [0.55, -0.2, -0.05], fault);
             let mut agent = Agent::with_controller(config(), learned()).unwrap();
-            saved(
-                &mut agent,
-                SavedController::of_learned(&learned(), None),
-                &cell(),
-            );
+            saved(&mut agent, &cell());
 
             // Learning, in the third run: what was learned in the first two is part of it.
             let mut agent = Agent::with_controller(config(), learned()).unwrap();
@@ -219,8 +215,7 @@ mod saved {
                 let learning = OnlineLearning::careful(run);
                 let now = agent.controller().clone().learning(learning);
                 *agent.controller_mut() = now;
-                let before = SavedController::of_learned(agent.controller(), Some(learning));
-                saved(&mut agent, before, &cell());
+                saved(&mut agent, &cell());
             }
 
             // Not the paper's settings, which belong to it too.
@@ -234,8 +229,7 @@ mod saved {
             };
             let mut agent = Agent::with_controller(config(), Hybrid::new(bold)).unwrap();
             for _ in 0..3 {
-                let before = SavedController::of_hybrid(agent.controller());
-                saved(&mut agent, before, &cell());
+                saved(&mut agent, &cell());
             }
         }
     }
@@ -252,19 +246,14 @@ mod saved {
         cell.run(&mut agent, &mut EventLog::default()).unwrap();
         let looks = cell.0.borrow().looks;
         cell.0.borrow_mut().fault = Fault::FrozenPicture(looks);
-        let before = SavedController::of_hybrid(agent.controller());
-        assert!(saved(&mut agent, before, &cell).contains("frozen"));
+        assert!(saved(&mut agent, &cell).contains("frozen"));
     }
 
     #[test]
     fn another_course_is_told_with_the_event() {
         let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
         let mut agent = Agent::with_controller(config(), learned()).unwrap();
-        let text = saved(
-            &mut agent,
-            SavedController::of_learned(&learned(), None),
-            &cell,
-        );
+        let text = saved(&mut agent, &cell);
         let differs = |text: &str| match SavedRun::from_json(text).unwrap().replay().unwrap() {
             Replayed::Differs { event, then, now } => (event, then, now),
             same => panic!("{same:?}"),
@@ -287,7 +276,8 @@ mod saved {
             Behaviour::new(pair.centering, table).unwrap(),
             blank(pair.approaching),
         );
-        let mut saved = SavedRun::before(&agent, SavedController::of_learned(&other, None));
+        *agent.controller_mut() = other;
+        let mut saved = SavedRun::before(&agent);
         let mut log = EventLog::default();
         cell.run(
             &mut Agent::with_controller(config(), learned()).unwrap(),
@@ -295,7 +285,7 @@ mod saved {
         )
         .unwrap();
         for event in &log.events {
-            saved.note(&grasp_agent::Event {
+            saved.note(&grasp_agent::RunEvent {
                 cycle: event.cycle,
                 kind: event.kind.clone(),
                 joints: event.joints,
@@ -309,11 +299,7 @@ mod saved {
     fn damaged_saved_runs_are_refused_with_the_reason() {
         let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
         let mut agent = Agent::with_controller(config(), learned()).unwrap();
-        let text = saved(
-            &mut agent,
-            SavedController::of_learned(&learned(), None),
-            &cell,
-        );
+        let text = saved(&mut agent, &cell);
         let cases = [
             ("grasp-agent run 2", "grasp-agent run 9", "run 9"),
             ("grasp-agent run 2", "grasp-agent run 1", "earlier version"),
@@ -329,7 +315,8 @@ mod saved {
         for (old, new, said) in cases {
             let changed = text.replace(old, new);
             assert_ne!(changed, text, "{old}");
-            let refused = SavedRun::from_json(&changed).unwrap_err();
+            let read = SavedRun::from_json(&changed);
+            let refused = read.and_then(|saved| saved.replay()).unwrap_err();
             assert!(
                 refused.to_string().contains(said),
                 "{refused} does not say {said}"
@@ -343,7 +330,7 @@ mod saved {
     fn a_pose_that_is_not_finite_is_kept_and_replayed() {
         let hybrid = Hybrid::new(HybridSettings::paper()).frozen();
         let agent = Agent::with_controller(config(), hybrid).unwrap();
-        let mut saved = SavedRun::before(&agent, SavedController::of_hybrid(agent.controller()));
+        let mut saved = SavedRun::before(&agent);
         let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Nowhere(3));
         let mut log = EventLog::default();
         let end = cell.run(&mut agent.clone(), &mut log);
@@ -354,12 +341,7 @@ mod saved {
             })
         ));
         for event in &log.events {
-            saved.note(&grasp_agent::Event {
-                cycle: event.cycle,
-                kind: event.kind.clone(),
-                joints: event.joints,
-                frame: None,
-            });
+            saved.note(event);
         }
         let text = saved.to_json();
         assert!(text.contains("null"));
@@ -374,8 +356,7 @@ mod saved {
     fn a_hybrid_that_cannot_work_is_refused() {
         let hybrid = Hybrid::new(HybridSettings::paper()).frozen();
         let agent = Agent::with_controller(config(), hybrid).unwrap();
-        let text =
-            SavedRun::before(&agent, SavedController::of_hybrid(agent.controller())).to_json();
+        let text = SavedRun::before(&agent).to_json();
         let cases = [
             ("\"mean\":[0.0,", "\"mean\":[", "thirteen"),
             ("\"noise\":1.0", "\"noise\":0.0", "thirteen"),
@@ -386,7 +367,8 @@ mod saved {
         for (old, new, said) in cases {
             let changed = text.replace(old, new);
             assert_ne!(changed, text, "{old}");
-            let refused = SavedRun::from_json(&changed).unwrap_err().to_string();
+            let read = SavedRun::from_json(&changed).unwrap();
+            let refused = read.replay().unwrap_err().to_string();
             assert!(refused.contains(said), "{refused} does not say {said}");
         }
     }

@@ -10,10 +10,11 @@ mod hybrid;
 mod learned;
 mod log;
 mod modules;
-mod object;
+
 mod phases;
 mod rivals;
 #[cfg(feature = "serde")]
 mod saved_controllers;
 #[cfg(feature = "serde")]
 mod settings;
+mod target;

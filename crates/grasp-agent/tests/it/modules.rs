@@ -3,22 +3,30 @@
 use grasp_agent::hough_heuristic::Features;
 use grasp_agent::puma_val2::Joints;
 use grasp_agent::{
-    Agent, Arrival, CameraModel, EventKind, EventLog, GaveUp, Guard, JointLimits, LastLook,
-    PositionBased, Recovery, Search, ServoSettings, Situation, Supervision, Verdict, Viewpoint,
+    Agent, CameraModel, EventKind, EventLog, GaveUp, Guard, JointLimits, Search, Servo, Sighting,
+    Supervision, Verdict, Viewpoint,
 };
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, config, servo};
 use crate::faults::words_from;
 
 /// Looks from one pose, and from there only.
 #[derive(Clone, Debug)]
-struct FromThere(Joints);
+struct FromThere {
+    pose: Joints,
+    named: bool,
+}
 
 impl Search for FromThere {
-    fn next_view(&mut self, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
-        (last == LastLook::None).then_some(Viewpoint {
+    fn begin(&mut self, _at: &Joints, _lost: Option<(&Sighting, &Joints)>) {
+        self.named = false;
+    }
+
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+        let named = std::mem::replace(&mut self.named, true);
+        (!named).then_some(Viewpoint {
             number: 7,
-            pose: self.0,
+            pose: self.pose,
         })
     }
 
@@ -27,19 +35,21 @@ impl Search for FromThere {
     }
 }
 
-/// Looks for the ball where it was, and nowhere else; counts how often it was asked.
+/// Looks for the ball where it was, and nowhere else.
 #[derive(Clone, Debug, Default)]
-struct WhereItWas;
+struct WhereItWas(Option<Joints>);
 
-impl Recovery for WhereItWas {
-    fn next_view(&mut self, seen: &Situation, _at: &Joints, last: LastLook) -> Option<Viewpoint> {
-        (last == LastLook::None).then_some(Viewpoint {
-            number: 0,
-            pose: seen.joints,
-        })
+impl Search for WhereItWas {
+    fn begin(&mut self, _at: &Joints, lost: Option<(&Sighting, &Joints)>) {
+        self.0 = lost.map(|(_, from)| *from);
     }
 
-    fn boxed(&self) -> Box<dyn Recovery> {
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+        let pose = self.0.take()?;
+        Some(Viewpoint { number: 0, pose })
+    }
+
+    fn boxed(&self) -> Box<dyn Search> {
         Box::new(self.clone())
     }
 }
@@ -57,12 +67,12 @@ impl Supervision for Nervous {
         self.guard.limits()
     }
 
-    fn judge_move(&mut self, arrival: &Arrival) -> Verdict {
+    fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict {
         self.moves += 1;
         if (self.near)(self.moves) {
             return Verdict::TooNear;
         }
-        self.guard.judge_move(arrival)
+        self.guard.judge_move(target, reached, near)
     }
 
     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
@@ -74,14 +84,14 @@ impl Supervision for Nervous {
     }
 }
 
-fn agent() -> Agent<PositionBased> {
-    Agent::with_controller(config(), PositionBased::new(ServoSettings::paper())).unwrap()
+fn agent() -> Agent<Servo> {
+    Agent::with_controller(config(), servo()).unwrap()
 }
 
 #[test]
 fn a_search_of_ones_own_is_what_is_searched_by() {
     let pose = Joints::from_degrees([8.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
-    let agent = agent().searching_by(FromThere(pose));
+    let agent = agent().searching_by(FromThere { pose, named: false });
     for (y, found) in [(0.1, true), (-0.5, false)] {
         let cell = Shared::new(CameraModel::paper(), [0.6, y, -0.1], Fault::None);
         let mut log = EventLog::default();
@@ -100,7 +110,10 @@ fn a_search_of_ones_own_is_what_is_searched_by() {
 
 #[test]
 fn a_viewpoint_out_of_the_limits_is_cut_to_them() {
-    let agent = agent().searching_by(FromThere(Joints::from_degrees([400.0; 6])));
+    let agent = agent().searching_by(FromThere {
+        pose: Joints::from_degrees([400.0; 6]),
+        named: false,
+    });
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
     let mut log = EventLog::default();
     cell.run(&mut agent.clone(), &mut log).unwrap();
@@ -113,7 +126,7 @@ fn a_viewpoint_out_of_the_limits_is_cut_to_them() {
 
 #[test]
 fn a_recovery_of_ones_own_is_what_is_recovered_by() {
-    let mut agent = agent().recovering_by(WhereItWas);
+    let mut agent = agent().recovering_by(WhereItWas(None));
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::PhantomOnce);
     let mut log = EventLog::default();
     cell.run(&mut agent, &mut log).unwrap();

@@ -2,12 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use grasp_agent::{
-    Agent, CameraModel, EventKind, EventLog, Hybrid, HybridSettings, Order, Phase, PositionBased,
-    ServoSettings,
-};
+use grasp_agent::{Agent, CameraModel, EventKind, EventLog, Hybrid, HybridSettings, Order, Phase};
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, config, servo};
 use crate::faults::{end_of, words_from};
 
 /// The transitions in the diagram on the crate's front page.
@@ -172,7 +169,7 @@ fn an_order_that_is_not_answered_is_in_the_log() {
 
 #[test]
 fn a_gripper_that_does_not_open_again_is_in_the_log() {
-    let servo = PositionBased::new(ServoSettings::paper());
+    let servo = servo();
     let mut agent = Agent::with_controller(config(), servo).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
     let mut log = EventLog::default();

@@ -1,9 +1,6 @@
 //! Settings that are read by themselves are checked as those of an agent or a saved run are.
 
-use grasp_agent::{
-    AgentConfig, BehaviourPair, CameraModel, EggLimits, HybridSettings, JointLimits, Prior,
-    ServoSettings, StepLimits,
-};
+use grasp_agent::{BehaviourPair, CameraModel, HybridSettings, JointLimits, Prior, ServoSettings};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -60,12 +57,6 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         "focal length is -1",
     );
     refused(
-        &StepLimits::paper(),
-        "/0",
-        json!(-0.1),
-        "longest step of JT1 is -0.1",
-    );
-    refused(
         &JointLimits::paper(),
         "/2/0",
         json!(9.0),
@@ -79,10 +70,10 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         "goal of Y is from 90 to 82",
     );
     refused(
-        &config().approach,
-        "/growth",
+        &config(),
+        "/approach_growth",
         json!(0.0),
-        "approach.growth is 0",
+        "approach_growth is 0",
     );
     let BehaviourPair { centering, .. } = BehaviourPair::paper_mended();
     refused(&centering, "/inputs", json!(["X"]), "1 inputs");
@@ -103,21 +94,5 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         "/floor",
         json!(-1.0),
         "floor of its reward is -1",
-    );
-    let egg = EggLimits {
-        min_minor: 20.0,
-        max_minor: 272.0,
-        elongation: 2.2,
-    };
-    refused(&egg, "/elongation", json!(0.9), "up to 0.9 times");
-}
-
-#[test]
-fn settings_that_were_saved_without_a_bound_on_the_search_have_the_usual_one() {
-    let mut text = serde_json::to_value(config()).unwrap();
-    text.as_object_mut().unwrap().remove("max_views").unwrap();
-    assert_eq!(
-        serde_json::from_value::<AgentConfig>(text).unwrap(),
-        config()
     );
 }

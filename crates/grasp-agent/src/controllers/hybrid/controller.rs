@@ -4,8 +4,11 @@ use hough_heuristic::Features;
 use nalgebra::{Point3, SMatrix, Vector3};
 use puma_val2::{Joint, JointDelta, Joints};
 
+use crate::behaviour::spec::GoalInterval;
 use crate::checked::checked;
-use crate::controller::{Consequence, Controller, GaveUp, Situation};
+#[cfg(feature = "serde")]
+use crate::controller::SavedController;
+use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::controllers::hybrid::belief::{Belief, Prior};
 use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
@@ -15,7 +18,10 @@ use crate::controllers::hybrid::parameters::{
 #[cfg(feature = "serde")]
 use crate::controllers::servo::settings::check_goal;
 use crate::controllers::taught_goal::TaughtGoal;
-use crate::limits::{JointLimits, StepLimits};
+use crate::limits::JointLimits;
+#[cfg(feature = "serde")]
+use crate::limits::check_steps;
+use crate::percept::Sighting;
 use crate::sight::camera_model::CameraModel;
 
 /// Settings of a [`Hybrid`].
@@ -30,42 +36,38 @@ pub struct HybridSettings {
     pub nominal: CameraModel,
     /// Expected errors of the nominal model.
     pub prior: Prior,
-    /// Fraction of the prior uncertainty added back when a saved belief is loaded, 0..=1 \[0.2\].
+    /// Fraction of the prior uncertainty added back when a saved belief is loaded, 0..=1 (default 0.2).
     /// Larger values re-learn a knocked camera sooner; see [`Hybrid::with_belief`].
     pub drift: f64,
-    /// Features of the ball at the goal \[(103.5, 78, 33)\].
+    /// Features of the ball at the goal (default (103.5, 78, 33)).
     pub goal: Features,
-    /// Largest turn of each joint in one move [[`StepLimits::paper`]].
-    pub steps: StepLimits,
-    /// Margin to the frame's border, in standard deviations of the predicted image place \[2\].
+    /// Largest turns of `JT1` to `JT3` in one move, radians (default
+    /// [`JointLimits::PAPER_STEPS`]).
+    pub steps: [f64; 3],
+    /// Margin to the frame's border, in standard deviations of the predicted image place (default 2).
     pub caution: f64,
-    /// Number of latest runs kept as evidence \[400\].
+    /// Number of latest runs kept as evidence (default 400).
     pub memory: usize,
-    /// Turn of `JT5` for the grip, radians \[-18.01 degrees\].
+    /// Turn of `JT5` for the grip, radians (default -18.01 degrees).
     pub grip_turn: f64,
-    /// Turn of `JT4` for the grip, radians \[0\].
-    #[cfg_attr(feature = "serde", serde(default))]
+    /// Turn of `JT4` for the grip, radians (default 0).
     pub grip_aside: f64,
     /// Largest standard deviation of the ball's place, metres, at which the controller aims the
-    /// grip itself \[0.008\]. Above it the agent's configured grip is used.
+    /// grip itself (default 0.008). Above it the agent's configured grip is used.
     pub grip_certainty: f64,
 }
 
 checked!(HybridSettings);
 
 impl HybridSettings {
-    /// Returns the defaults in the brackets of the fields.
+    /// Returns the default settings.
     pub fn paper() -> Self {
         Self {
             nominal: CameraModel::paper(),
             prior: Prior::by_eye(),
             drift: 0.2,
-            goal: Features {
-                x: 103.5,
-                y: 78.0,
-                r: 33.0,
-            },
-            steps: StepLimits::paper(),
+            goal: GoalInterval::paper_features(),
+            steps: JointLimits::PAPER_STEPS,
             caution: 2.0,
             memory: 400,
             grip_turn: -18.01_f64.to_radians(),
@@ -80,7 +82,7 @@ impl HybridSettings {
         self.nominal.check()?;
         self.prior.check()?;
         check_goal(&self.goal)?;
-        self.steps.check()?;
+        check_steps(&self.steps)?;
         for (name, value) in [
             ("drift", self.drift),
             ("caution", self.caution),
@@ -284,8 +286,7 @@ impl Hybrid {
     fn plan(
         &self,
         estimate: &Estimate,
-        now: &Situation,
-        limits: &JointLimits,
+        Request { joints, limits, .. }: &Request,
     ) -> Option<JointDelta> {
         let model = &estimate.model;
         let links = self.current.links(&estimate.numbers);
@@ -303,10 +304,10 @@ impl Hybrid {
         for (target, share) in ways.into_iter().flatten() {
             let wanted = here + (target - here) * (share * self.boldness);
             let (stand, _) = model.pose_placing(&estimate.ball, &wanted, links.stand());
-            let motors = links.motors_for(&stand, &now.joints);
-            let delta = self.cut(&motors, &now.joints, limits);
+            let motors = links.motors_for(&stand, joints);
+            let delta = self.cut(&motors, joints, limits);
             last = Some(delta);
-            if self.stays_in_view(estimate, &(now.joints + delta), least) {
+            if self.stays_in_view(estimate, &(*joints + delta), least) {
                 break;
             }
         }
@@ -317,7 +318,7 @@ impl Hybrid {
     fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
         let target = limits.nearest(motors);
         JointDelta(std::array::from_fn(|i| {
-            match self.settings.steps.0.get(i) {
+            match self.settings.steps.get(i) {
                 // `min` and `max` turn NaN into a whole step; `clamp` panics on a NaN bound.
                 Some(most) => match target.0[i] - from.0[i] {
                     turn if turn.abs() <= *most => turn,
@@ -349,11 +350,7 @@ impl Hybrid {
     }
 }
 
-impl Controller for Hybrid {
-    fn name(&self) -> &str {
-        "hybrid"
-    }
-
+impl Hybrid {
     fn begin(&mut self) {
         self.current = Evidence::default();
         self.estimate = None;
@@ -364,21 +361,13 @@ impl Controller for Hybrid {
         self.grips = 0;
     }
 
-    fn arm_at(&mut self, joints: &Joints) {
-        self.current.arm_at(joints);
-    }
-
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        if !now.is_finite() {
-            // As evidence, NaN would spread to the whole belief.
-            return Err(GaveUp::NoMoveLeft);
-        }
-        let off = self.surprise(&now.features);
+    fn reach(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
+        let off = self.surprise(&ball.features);
         let odd = off.is_some();
         if off.is_some_and(|off| off > FAR_OFF) && !self.doubt && self.moving == 0 {
             // Possibly a false circle: stay and look again.
             self.doubt = true;
-            return Ok(JointDelta::default());
+            return Some(JointDelta::default());
         }
         self.doubt = false;
         self.moving = if odd {
@@ -395,39 +384,19 @@ impl Controller for Hybrid {
             self.current.forget_sightings();
             self.estimate = None;
         }
-        self.current.saw(now.features);
+        self.current.saw(ball.features);
         self.estimate = self.estimate();
         if self.estimate.is_none() {
             // The sightings contradict one another: start again from the latest.
             self.current.forget_sightings();
-            self.current.saw(now.features);
+            self.current.saw(ball.features);
             self.estimate = self.estimate();
         }
-        let estimate = self.estimate.as_ref().ok_or(GaveUp::NoMoveLeft)?;
-        self.plan(estimate, now, limits).ok_or(GaveUp::NoMoveLeft)
+        self.plan(self.estimate.as_ref()?, request)
     }
 
-    fn judge(&mut self, consequence: &Consequence) {
-        if *consequence == Consequence::Missed {
-            // The miss may have moved the ball.
-            self.remember();
-            self.current.forget_sightings();
-            self.estimate = None;
-            return;
-        }
-        (self.boldness, self.losses) = match consequence {
-            Consequence::Seen(_) => ((1.5 * self.boldness).min(1.0), 0),
-            Consequence::Lost => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses + 1),
-            Consequence::TakenBack => ((0.5 * self.boldness).max(LEAST_BOLDNESS), self.losses),
-            Consequence::Missed => (self.boldness, self.losses),
-        };
-    }
-
-    fn grip(&mut self, now: &Situation, limits: &JointLimits) -> Option<JointDelta> {
-        if !now.is_finite() {
-            return None;
-        }
-        self.current.saw(now.features);
+    fn aim(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
+        self.current.saw(ball.features);
         self.estimate = self.estimate();
         let estimate = self.estimate.as_ref()?;
         let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
@@ -444,11 +413,13 @@ impl Controller for Hybrid {
         from.0[Joint::J5.index()] += self.settings.grip_turn;
         from.0[Joint::J4.index()] += self.settings.grip_aside;
         let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
-        let motors = links.motors_for(&stand, &now.joints);
-        limits.admit(&motors).then(|| motors - now.joints)
+        let motors = links.motors_for(&stand, &request.joints);
+        let within = request.limits.admit(&motors);
+        within.then(|| motors - request.joints)
     }
 
-    fn end(&mut self) {
+    /// Learns from the run that is over.
+    fn learn(&mut self) {
         self.remember();
         if !self.learning || !std::mem::take(&mut self.news) {
             return;
@@ -463,6 +434,51 @@ impl Controller for Hybrid {
         ) {
             self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
         }
+    }
+}
+
+impl Controller for Hybrid {
+    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
+        // As evidence, NaN would spread to the whole belief.
+        let decision = if !ball.is_finite() || request.joints.non_finite().is_some() {
+            None
+        } else if request.grip {
+            self.aim(ball, request).map(Decision::Grip)
+        } else {
+            self.reach(ball, request).map(Decision::Move)
+        };
+        decision.ok_or(GaveUp::NoMoveLeft)
+    }
+
+    fn notice(&mut self, feedback: &Feedback) {
+        match feedback {
+            Feedback::Begin => self.begin(),
+            Feedback::Arm(joints) => self.current.arm_at(joints),
+            Feedback::Seen { .. } => {
+                (self.boldness, self.losses) = ((1.5 * self.boldness).min(1.0), 0);
+            }
+            Feedback::Lost | Feedback::TakenBack => {
+                self.boldness = (0.5 * self.boldness).max(LEAST_BOLDNESS);
+                self.losses += usize::from(*feedback == Feedback::Lost);
+            }
+            Feedback::Missed => {
+                // The miss may have moved the ball.
+                self.remember();
+                self.current.forget_sightings();
+                self.estimate = None;
+            }
+            Feedback::End => self.learn(),
+        }
+    }
+
+    fn describe(&self) -> &str {
+        "hybrid"
+    }
+
+    #[cfg(feature = "serde")]
+    fn save(&self) -> Option<SavedController> {
+        let data = (self.settings, self.belief.clone());
+        Some(SavedController::new("hybrid", data))
     }
 }
 
@@ -485,38 +501,47 @@ mod tests {
         }
         assert!(!cut(f64::NAN, &hybrid).1);
         let mut endless = HybridSettings::paper();
-        endless.steps.0[0] = f64::NAN;
+        endless.steps[0] = f64::NAN;
         assert!(!cut(0.01, &Hybrid::new(endless)).1);
     }
 
     #[test]
     fn nan_is_never_evidence() {
-        let limits = JointLimits::paper();
-        let seen = Situation {
-            long_axis: None,
-            features: Features {
-                x: 80.0,
-                y: 60.0,
-                r: 15.0,
-            },
-            joints: Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]),
+        let (limits, grip) = (JointLimits::paper(), false);
+        let features = Features {
+            x: 80.0,
+            y: 60.0,
+            r: 15.0,
         };
+        let ball = Sighting::new(features);
         let mut hybrid = Hybrid::new(HybridSettings::paper());
         let learned = |hybrid: &mut Hybrid, unseen: bool| {
-            hybrid.begin();
-            let mut now = seen;
+            hybrid.notice(&Feedback::Begin);
+            let mut joints = Joints::from_degrees([0.0, -80.0, 190.0, 0.0, 45.0, 0.0]);
             for _ in 0..3 {
-                hybrid.arm_at(&now.joints);
-                now.joints = now.joints + hybrid.decide(&now, &limits).unwrap();
-            }
-            if unseen {
-                for features in [f64::NAN, f64::INFINITY].map(|x| Features { x, ..now.features }) {
-                    let nothing = Situation { features, ..now };
-                    assert_eq!(hybrid.decide(&nothing, &limits), Err(GaveUp::NoMoveLeft));
-                    assert_eq!(hybrid.grip(&nothing, &limits), None);
+                hybrid.notice(&Feedback::Arm(joints));
+                let request = Request {
+                    joints,
+                    limits,
+                    grip,
+                };
+                match hybrid.decide(&ball, &request).unwrap() {
+                    Decision::Move(delta) | Decision::Grip(delta) => joints = joints + delta,
                 }
             }
-            hybrid.end();
+            for x in [f64::NAN, f64::INFINITY] {
+                let nothing = Sighting::new(Features { x, ..features });
+                for grip in [false, true] {
+                    let request = Request {
+                        joints,
+                        limits,
+                        grip,
+                    };
+                    let decide = |hybrid: &mut Hybrid| hybrid.decide(&nothing, &request);
+                    assert!(!unseen || decide(hybrid) == Err(GaveUp::NoMoveLeft));
+                }
+            }
+            hybrid.notice(&Feedback::End);
             hybrid.belief().clone()
         };
         let as_well = learned(&mut hybrid.clone(), false);

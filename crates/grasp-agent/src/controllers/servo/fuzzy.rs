@@ -1,24 +1,15 @@
-//! A fuzzy controller.
+//! The rules of the fuzzy controller.
 
+use hough_heuristic::Features;
 use nalgebra::{Matrix3, Vector3};
-use puma_val2::{JointDelta, Joints};
+use puma_val2::Joints;
 
-use crate::controller::{Consequence, Controller, GaveUp, Situation};
-use crate::controllers::servo::settings::{Boldness, ServoSettings, turns};
-use crate::limits::JointLimits;
+use crate::controllers::servo::controller::turns;
+use crate::controllers::servo::settings::ServoSettings;
 
-/// A fuzzy controller of the Takagi–Sugeno kind, the paper's "alternative AI method" (section 1).
-///
-/// The radius is *tiny*, *small*, *right* or *large*, in triangles that overlap; each of them has
-/// its own linear rule from the errors in x, y and 1/r to joint turns, and the rules act in
-/// proportion to how far their condition holds. A second set of rules gates the approach: the
-/// farther the ball is from its line in the image, the less it is approached.
+/// One linear rule for each fuzzy set of the radius.
 #[derive(Clone, Debug)]
-pub struct Fuzzy {
-    settings: ServoSettings,
-    boldness: Boldness,
-    rules: Vec<Rule>,
-}
+pub(crate) struct Rules(Vec<Rule>);
 
 /// If the radius is about `radius`, then the turns are `turns` times the errors.
 #[derive(Clone, Debug)]
@@ -28,7 +19,7 @@ struct Rule {
     turns: Matrix3<f64>,
 }
 
-/// The peaks of the four triangles, feature units, and a pose (degrees of JT2 and JT3) in which
+/// Peaks of the four triangles, feature units, each with a pose (degrees of JT2 and JT3) in which
 /// balls of that radius are typically seen.
 const SETS: [(f64, f64, f64); 4] = [
     (9.0, -105.0, 205.0),
@@ -37,12 +28,15 @@ const SETS: [(f64, f64, f64); 4] = [
     (55.0, -57.0, 186.0),
 ];
 
-impl Fuzzy {
-    /// With rules derived for the given model.
-    pub fn new(settings: ServoSettings) -> Self {
+/// Weight of the row of 33 / r beside those of x and y, units.
+const NEARNESS: f64 = 60.0;
+
+impl Rules {
+    /// Derives the rules from the camera model of `settings`.
+    pub(crate) fn new(settings: &ServoSettings) -> Self {
         let rules = SETS.iter().filter_map(|&(radius, jt2, jt3)| {
             let pose = Joints::from_degrees([0.0, jt2, jt3, 0.0, 45.0, 0.0]);
-            let typical = hough_heuristic::Features {
+            let typical = Features {
                 r: radius,
                 ..settings.goal
             };
@@ -62,50 +56,13 @@ impl Fuzzy {
                 turns: Matrix3::from_columns(&[x, y, nearness]),
             })
         });
-        Self {
-            rules: rules.collect(),
-            settings,
-            boldness: Boldness::FULL,
-        }
+        Self(rules.collect())
     }
 
-    /// How far each rule's condition holds at radius `r`; the degrees sum to 1.
-    fn degrees(&self, r: f64) -> Vec<f64> {
-        let n = self.rules.len();
-        let mut degrees = vec![0.0; n];
-        let above = self.rules.partition_point(|rule| rule.radius <= r);
-        if n == 0 || above == 0 || above == n {
-            if let Some(edge) = degrees.get_mut(above.min(n.saturating_sub(1))) {
-                *edge = 1.0;
-            }
-            return degrees;
-        }
-        let (low, high) = (self.rules[above - 1].radius, self.rules[above].radius);
-        let t = (r - low) / (high - low);
-        (degrees[above - 1], degrees[above]) = (1.0 - t, t);
-        degrees
-    }
-}
-
-/// Weight of the row of 33 / r beside those of x and y, units.
-const NEARNESS: f64 = 60.0;
-
-/// How far an error of `error` units counts as *aligned*: wholly within `full`, not at all beyond
-/// `none`.
-fn aligned(error: f64, full: f64, none: f64) -> f64 {
-    ((none - error.abs()) / (none - full)).clamp(0.0, 1.0)
-}
-
-impl Controller for Fuzzy {
-    fn name(&self) -> &str {
-        "fuzzy"
-    }
-
-    fn decide(&mut self, now: &Situation, limits: &JointLimits) -> Result<JointDelta, GaveUp> {
-        let ServoSettings {
-            goal, gain, steps, ..
-        } = &self.settings;
-        let seen = now.features;
+    /// Returns the turns of `JT1` to `JT3` for a ball with the features `seen`; `None` without
+    /// rules.
+    pub(crate) fn turns(&self, settings: &ServoSettings, seen: &Features) -> Option<[f64; 3]> {
+        let goal = &settings.goal;
         let (x, y) = (goal.x - seen.x, goal.y - seen.y);
         let gate = aligned(x, 25.0, 80.0).min(aligned(y, 25.0, 70.0));
         // Backing off needs no alignment.
@@ -113,24 +70,35 @@ impl Controller for Fuzzy {
         let nearness = if nearer < 0.0 { gate * nearer } else { nearer };
         let error = Vector3::new(x, y, nearness);
         let wanted: Vector3<f64> = self
-            .rules
+            .0
             .iter()
             .zip(self.degrees(seen.r))
             .map(|(rule, degree)| rule.turns * error * degree)
             .sum();
-        if self.rules.is_empty() {
-            return Err(GaveUp::NoMoveLeft);
+        (!self.0.is_empty()).then(|| (wanted * settings.gain).into())
+    }
+
+    /// Returns the degree to which each rule's condition holds at radius `r`; the sum is 1.
+    fn degrees(&self, r: f64) -> Vec<f64> {
+        let rules = &self.0;
+        let n = rules.len();
+        let mut degrees = vec![0.0; n];
+        let above = rules.partition_point(|rule| rule.radius <= r);
+        if n == 0 || above == 0 || above == n {
+            if let Some(edge) = degrees.get_mut(above.min(n.saturating_sub(1))) {
+                *edge = 1.0;
+            }
+            return degrees;
         }
-        Ok(self
-            .boldness
-            .cut((wanted * *gain).into(), steps, &now.joints, limits))
+        let (low, high) = (rules[above - 1].radius, rules[above].radius);
+        let t = (r - low) / (high - low);
+        (degrees[above - 1], degrees[above]) = (1.0 - t, t);
+        degrees
     }
+}
 
-    fn begin(&mut self) {
-        self.boldness = Boldness::FULL;
-    }
-
-    fn judge(&mut self, consequence: &Consequence) {
-        self.boldness.judge(consequence);
-    }
+/// Returns the degree to which an error of `error` units counts as *aligned*: 1 within `full`, 0
+/// beyond `none`.
+fn aligned(error: f64, full: f64, none: f64) -> f64 {
+    ((none - error.abs()) / (none - full)).clamp(0.0, 1.0)
 }

@@ -1,43 +1,50 @@
-//! How a run acts: orders to the arm, judged by supervision, and looks, judged by the watch over
-//! the camera.
+//! Acting of a run: orders to the arm, judged by supervision, and looks, checked for a frozen camera.
 
-use puma_val2::{ArmError, Gripper, JointDelta, Joints};
+use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::Run;
+use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints};
+
+use crate::controller::{Decision, Feedback};
 use crate::error::AgentError;
 use crate::percept::Sighting;
-use crate::run::event::{EventKind, Order};
+use crate::run::event::{EventKind, Order, RunEvent};
 use crate::run::gripper::{Hand, Went};
-use crate::run::supervision::{Arrival, Verdict};
-use crate::sight::eye::Look;
+use crate::run::state_machine::Run;
+use crate::run::supervision::Verdict;
 
 impl Hand for Run<'_> {
     fn joints(&self) -> Joints {
         self.joints
     }
 
-    /// Looks, a few times if need be, for the ball from where the arm stands.
+    /// Looks for the ball from where the arm stands, a few times if need be.
     fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
         for _ in 0..self.config.looks {
-            let Look { frame, ball } = self.devices.eye.look()?;
-            let ball = ball.filter(is_finite);
-            let kind = ball.map_or(EventKind::NotSeen, EventKind::Seen);
-            self.tell(kind, frame.as_ref());
-            if self.watch.looked(&self.joints, frame, ball.as_ref()) {
-                self.tell(EventKind::SameFrame, None);
+            let ball = self.devices.eye.look()?;
+            // A user-supplied detector might find anything.
+            let ball = ball.filter(|ball| ball.is_finite() && ball.features.r > 0.0);
+            let frame = self.devices.eye.frame();
+            (self.observe)(&RunEvent {
+                cycle: self.cycles,
+                kind: ball.map_or(EventKind::NotSeen, EventKind::Seen),
+                joints: self.joints,
+                frame,
+            });
+            if self.camera.looked(&self.joints, frame, ball.as_ref()) {
+                self.tell(EventKind::SameFrame);
             }
-            // By a picture that is as it was from another pose no grip is verified.
+            // No grip is verified by an image that has not changed.
             let most = if self.closed {
                 1
             } else {
                 self.config.same_frames
             };
-            if self.watch.same() >= most {
+            if self.camera.same() >= most {
                 return Err(self.frozen());
             }
-            if let Some(sighting) = ball {
-                self.saw(sighting);
-                return Ok(Some(sighting));
+            if let Some(ball) = ball {
+                self.saw(ball);
+                return Ok(Some(ball));
             }
         }
         Ok(None)
@@ -67,34 +74,56 @@ impl Hand for Run<'_> {
         )?;
         self.closed = jaws == Gripper::Closed;
         if self.closed {
-            self.tell(EventKind::Gripped, None);
+            self.tell(EventKind::Gripped);
         }
         Ok(())
     }
 
     fn aim(&mut self, seen: &Sighting) -> Option<JointDelta> {
-        let now = self.situation(seen);
-        let limits = self.modules.supervision.limits();
-        let delta = self.controller.grip(&now, limits)?;
-        limits.admit(&(self.joints + delta)).then_some(delta)
+        let request = self.request(true);
+        let own = match self.controller.decide(seen, &request) {
+            Ok(Decision::Grip(delta)) => Some(delta),
+            _ => None,
+        };
+        let across = seen
+            .long_axis
+            .filter(|axis| self.config.grip_across && axis.is_finite());
+        let delta = match across {
+            Some(long_axis) => across_axis(own.unwrap_or(self.config.grip), long_axis),
+            None => own?,
+        };
+        let admitted = request.limits.admit(&(self.joints + delta));
+        admitted.then_some(delta)
     }
 }
 
+/// Turns the hand of a grip so that the jaws close across `long_axis`, by the shorter turn.
+fn across_axis(mut grip: JointDelta, long_axis: f64) -> JointDelta {
+    let turn = match (long_axis + FRAC_PI_2).rem_euclid(PI) {
+        turn if turn > FRAC_PI_2 => turn - PI,
+        turn => turn,
+    };
+    grip.0[Joint::J6.index()] += turn;
+    grip
+}
+
 impl Run<'_> {
-    /// Takes down where the arm says it stands. An arm may be anyone's: from where no number says
-    /// it is, nothing can be decided.
+    /// Records the joint angles that the arm reports.
+    ///
+    /// # Errors
+    /// [`AgentError::Pose`] for an angle that is not finite: nothing can be decided from there.
     pub(super) fn stand_at(&mut self, joints: Joints) -> Result<(), AgentError> {
         self.joints = joints;
         match joints.non_finite() {
             Some(joint) => Err(AgentError::Pose { joint }),
             None => {
-                self.controller.arm_at(&joints);
+                self.controller.notice(&Feedback::Arm(joints));
                 Ok(())
             }
         }
     }
 
-    /// Goes back the way the arm came. Where that is barred too, the arm stands where it is.
+    /// Goes back the way the arm came. If that is barred too, the arm stays where it is.
     pub(super) fn take_back(&mut self, from: Joints) -> Result<(), AgentError> {
         let answer = self.devices.arm.move_to(from);
         self.arrive(Order::MoveTo(from), answer, from, EventKind::TakenBack)
@@ -108,8 +137,8 @@ impl Run<'_> {
         Ok(went)
     }
 
-    /// Tells `done`, or that the order was not answered, and has supervision judge where the arm
-    /// stands. If something is too near it is stopped.
+    /// Reports `done`, or that the order was not answered, and has supervision judge the move. Stops
+    /// the arm if something is too near.
     fn arrive(
         &mut self,
         order: Order,
@@ -120,8 +149,8 @@ impl Run<'_> {
         let answer = match answer {
             Ok(reached) => Ok((reached, false, None)),
             Err(ArmError::ProximityStop { joints, .. }) => Ok((joints, true, None)),
-            // An arm that something else has stopped stands somewhere on the way; its sensors may
-            // say what.
+            // An arm that something else has stopped stands somewhere on its way; sensors may know
+            // the reason.
             Err(error @ ArmError::NotReached { .. }) => {
                 let stands = self.devices.arm.joints();
                 stands.map(|reached| (reached, false, Some(error)))
@@ -130,21 +159,17 @@ impl Run<'_> {
         };
         let (reached, halted, fault) = self.answered(order, answer)?;
         let stands = self.stand_at(reached);
-        self.tell(done, None);
+        self.tell(done);
         stands?;
         let near = halted || self.devices.proximity.object_near()?;
-        let arrival = Arrival {
-            target,
-            reached,
-            near,
-        };
-        match (self.modules.supervision.judge_move(&arrival), fault) {
+        let supervision = &mut self.modules.supervision;
+        match (supervision.judge_move(&target, &reached, near), fault) {
             (Verdict::TooNear, _) => {
                 if !halted {
                     let stopped = self.devices.arm.stop();
                     self.answered(Order::Stop, stopped)?;
                 }
-                self.tell(EventKind::TooNear, None);
+                self.tell(EventKind::TooNear);
                 Ok(Went::Back)
             }
             (_, Some(error)) => Err(error.into()),
@@ -159,23 +184,32 @@ impl Run<'_> {
         }
     }
 
-    /// Passes on what came of `order`, and tells of it if that is nothing but an error.
+    /// Passes the answer to `order` on, and reports [`EventKind::Unanswered`] for an error.
     fn answered<T>(&mut self, order: Order, answer: Result<T, ArmError>) -> Result<T, AgentError> {
         if answer.is_err() {
-            self.tell(EventKind::Unanswered(order), None);
+            self.tell(EventKind::Unanswered(order));
         }
         Ok(answer?)
     }
 }
 
-/// Returns whether every number of a sighting is usable. User-supplied detectors may report NaN.
-fn is_finite(sighting: &Sighting) -> bool {
-    let Sighting {
-        detection,
-        features: f,
-        long_axis,
-    } = sighting;
-    let c = detection.circle;
-    let numbers = [f.x, f.y, f.r, c.x, c.y, c.radius, detection.score];
-    numbers.into_iter().chain(*long_axis).all(f64::is_finite) && f.r > 0.0
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_jaws_close_across_the_longer_axis_by_the_shorter_turn() {
+        let grip = JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.01, 0.0]);
+        for (axis, expected) in [
+            (0.0, 90.0),
+            (10.0, -80.0),
+            (-30.0, 60.0),
+            (80.0, -10.0),
+            (-90.0, 0.0),
+        ] {
+            let [.., j5, j6] = across_axis(grip, f64::to_radians(axis)).degrees();
+            let close = (j6 - expected).abs() < 1e-9 && (j5 + 18.01).abs() < 1e-9;
+            assert!(close, "{axis}: {j6}");
+        }
+    }
 }

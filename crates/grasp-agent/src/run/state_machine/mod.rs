@@ -1,63 +1,61 @@
-//! A run under way: the state machine, which links the modules and tells every transition.
+//! A run under way: the state machine, which links the modules and reports every transition.
 
 use hough_heuristic::image::GrayImage;
 use puma_val2::{Gripper, Joints, Manipulator, ProximitySensor};
 
-use crate::controller::{Consequence, Controller, GaveUp, Situation};
+use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::error::AgentError;
-use crate::percept::Percept;
-use crate::percept::Sighting;
+use crate::percept::{Percept, Sighting};
 use crate::run::config::AgentConfig;
-use crate::run::event::{Event, EventKind, Outcome, Phase};
-use crate::run::gripper::is_same_place;
-use crate::run::gripper::{GripEnd, GripperActivation, Hand, Went};
-use crate::run::recovery::Recovery;
-use crate::run::search::{LastLook, Search, Viewpoint};
+use crate::run::event::{EventKind, Phase, RunEvent, RunOutcome};
+use crate::run::gripper::{GripEnd, GripperActivation, Hand, Went, is_same_place};
+use crate::run::search::{Search, Viewpoint};
 use crate::run::supervision::Supervision;
 use crate::sight::eye::Eye;
-use crate::sight::watch::Watch;
+use crate::sight::frozen::FrozenCheck;
 
 mod acting;
 
-/// So many moves that were taken back are too many.
+/// Number of moves taken back that is too many.
 const OFTEN: usize = 3;
 
-/// The modules that a user can put others in the place of, beside the controller.
+/// Modules that a user can replace, beside the controller.
 #[derive(Clone, Debug)]
 pub(crate) struct Modules {
     pub(crate) search: Box<dyn Search>,
-    pub(crate) recovery: Box<dyn Recovery>,
+    pub(crate) recovery: Box<dyn Search>,
     pub(crate) supervision: Box<dyn Supervision>,
 }
 
-/// What a run acts on.
+/// Devices of a run.
 pub(crate) struct Devices<'a> {
     pub(crate) eye: &'a mut dyn Eye,
     pub(crate) arm: &'a mut dyn Manipulator,
     pub(crate) proximity: &'a mut dyn ProximitySensor,
 }
 
-/// Where the state machine stands: a [`Phase`] and what it begins with.
+/// State of the state machine: a [`Phase`] and the data that it begins with.
 #[derive(Clone, Copy, Debug)]
 enum State {
     Search,
     /// The ball is in view.
     Reach(Sighting),
-    /// The ball was in view like this and is not any more.
+    /// The ball was in view from the pose `from`, and is not any more.
     Recover {
-        seen: Situation,
+        ball: Sighting,
+        from: Joints,
         why: Gone,
     },
-    /// The ball is where it should be, or as near to that as can be.
+    /// The ball is at the goal, or as near to it as can be.
     Grip {
-        seen: Sighting,
+        ball: Sighting,
         at_goal: bool,
     },
-    /// Over, without a grip where there is a reason.
+    /// The run is over, without a grip if there is a reason.
     End(Option<GaveUp>),
 }
 
-/// Why a ball has to be recovered.
+/// Reason why a ball has to be recovered.
 #[derive(Clone, Copy, Debug)]
 enum Gone {
     Lost,
@@ -75,7 +73,8 @@ impl State {
         }
     }
 
-    /// The event of entering this state from another phase; [`EventKind::enters`] is its inverse.
+    /// Returns the event of entering this state from another phase: the inverse of
+    /// [`EventKind::enters`].
     fn entry(&self) -> EventKind {
         match *self {
             Self::Search => EventKind::Searching,
@@ -99,22 +98,22 @@ pub(crate) struct Run<'a> {
     controller: &'a mut dyn Controller,
     modules: &'a mut Modules,
     gripper: GripperActivation,
-    watch: &'a mut Watch,
+    camera: &'a mut FrozenCheck,
     devices: Devices<'a>,
-    observe: &'a mut dyn FnMut(&Event<'_>),
+    observe: &'a mut dyn FnMut(&RunEvent<'_>),
     joints: Joints,
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
-    /// Whether the jaws have closed: what is seen says whether they hold the ball.
+    /// `true` once the jaws have closed: looks then verify the grip.
     closed: bool,
     /// Moves in a row that were taken back.
     taken_back: usize,
-    /// All of them since the search.
+    /// Moves that were taken back since the search.
     barred: usize,
-    /// What was seen first since the search began.
+    /// First sighting since the search began.
     first_seen: Option<Sighting>,
-    /// Whether what is seen has shown in more than one place of the image since then.
+    /// `true` if the ball has shown in more than one place of the image since then.
     wandered: bool,
 }
 
@@ -123,16 +122,16 @@ impl<'a> Run<'a> {
         config: &'a AgentConfig,
         controller: &'a mut dyn Controller,
         modules: &'a mut Modules,
-        watch: &'a mut Watch,
+        camera: &'a mut FrozenCheck,
         devices: Devices<'a>,
-        observe: &'a mut dyn FnMut(&Event<'_>),
+        observe: &'a mut dyn FnMut(&RunEvent<'_>),
     ) -> Self {
         Self {
             config,
             controller,
             gripper: GripperActivation::new(config, *modules.supervision.limits()),
             modules,
-            watch,
+            camera,
             devices,
             observe,
             joints: Joints::default(),
@@ -147,33 +146,41 @@ impl<'a> Run<'a> {
         }
     }
 
-    pub(crate) fn until_done(mut self) -> Result<Outcome, AgentError> {
+    pub(crate) fn until_done(mut self) -> Result<RunOutcome, AgentError> {
         let result = self.phases();
         if let Err(error) = &result {
             // The first error is the one to report; stopping is all that can still be done.
             let _ = self.devices.arm.stop();
-            self.tell(EventKind::Failed(error.to_string()), None);
+            self.tell(EventKind::Failed(error.to_string()));
         }
         result
     }
 
-    fn phases(&mut self) -> Result<Outcome, AgentError> {
+    fn phases(&mut self) -> Result<RunOutcome, AgentError> {
         let joints = self.devices.arm.joints()?;
         self.stand_at(joints)?;
         self.set_jaws(Gripper::Open)?;
-        self.tell(EventKind::Started, None);
+        self.tell(EventKind::Started);
         let mut state = State::Search;
-        self.tell(state.entry(), None);
+        self.tell(state.entry());
         loop {
             let next = match state {
                 State::Search => self.search()?,
-                State::Reach(sighting) => self.reach(&sighting)?,
-                State::Recover { seen, .. } => self.recover(&seen)?,
-                State::Grip { seen, at_goal } => self.grip(&seen, at_goal)?,
-                State::End(gave_up) => return Ok(self.outcome(gave_up)),
+                State::Reach(ball) => self.reach(&ball)?,
+                State::Recover { ball, from, .. } => self.recover(&ball, &from)?,
+                State::Grip { ball, at_goal } => self.grip(&ball, at_goal)?,
+                State::End(gave_up) => {
+                    return Ok(RunOutcome {
+                        gave_up,
+                        cycles: self.cycles,
+                        losses: self.losses,
+                        last_seen: self.last_seen,
+                        joints: self.joints,
+                    });
+                }
             };
             if next.phase() != state.phase() {
-                self.tell(next.entry(), None);
+                self.tell(next.entry());
             }
             if let State::Recover { why, .. } = next {
                 match why {
@@ -185,35 +192,25 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn outcome(&self, gave_up: Option<GaveUp>) -> Outcome {
-        Outcome {
-            gave_up,
-            cycles: self.cycles,
-            losses: self.losses,
-            last_seen: self.last_seen,
-            joints: self.joints,
-        }
-    }
-
-    /// Looks around until the ball is in view, there is nowhere left to look from, or it has been
-    /// looked from often enough.
+    /// Looks around until the ball is in view, the search names no more viewpoints, or it has named
+    /// the allowed number.
     fn search(&mut self) -> Result<State, AgentError> {
         (self.first_seen, self.wandered, self.barred) = (None, false, 0);
-        let (mut barred, mut looked) = (false, false);
-        let mut last = LastLook::None;
-        // A module may be anyone's, and a search of its own never end.
+        let (mut barred, mut any_barred, mut looked) = (false, false, false);
+        self.modules.search.begin(&self.joints, None);
+        // A user-supplied search might never return `None`.
         for _ in 0..self.config.max_views {
-            let Some(view) = self.modules.search.next_view(&self.joints, last) else {
+            let Some(view) = self.modules.search.next_view(&self.joints, barred) else {
                 break;
             };
             match self.look_from(&view, EventKind::AtSearchPose(view.number))? {
-                Ok(ball) => return Ok(State::Reach(ball)),
-                Err(came) => last = came,
+                View::Ball(ball) => return Ok(State::Reach(ball)),
+                came => barred = matches!(came, View::Barred),
             }
-            barred |= last == LastLook::Barred;
-            looked |= last == LastLook::Nothing;
+            any_barred |= barred;
+            looked |= !barred;
         }
-        let reason = if barred && !looked {
+        let reason = if any_barred && !looked {
             GaveUp::Obstructed
         } else {
             GaveUp::NotFound
@@ -221,122 +218,122 @@ impl<'a> Run<'a> {
         Ok(State::End(Some(reason)))
     }
 
-    /// The ball from the pose nearest to that of `view`, or what came of the look.
-    fn look_from(
-        &mut self,
-        view: &Viewpoint,
-        there: EventKind,
-    ) -> Result<Result<Sighting, LastLook>, AgentError> {
-        // A module may be anyone's.
+    /// Looks from the pose nearest to that of `view` within the limits.
+    fn look_from(&mut self, view: &Viewpoint, there: EventKind) -> Result<View, AgentError> {
+        // A user-supplied search might name anything.
         if let Some(joint) = view.pose.non_finite() {
             let number = view.number;
             return Err(AgentError::Viewpoint { number, joint });
         }
         let target = self.modules.supervision.limits().nearest(&view.pose);
         Ok(match self.go_to(target, there)? {
-            Went::Back => Err(LastLook::Barred),
-            Went::There => self.look()?.ok_or(LastLook::Nothing),
+            Went::Back => View::Barred,
+            Went::There => self.look()?.map_or(View::Nothing, View::Ball),
         })
     }
 
-    /// One control cycle: sighting, decision, one joint move, next sighting.
-    fn reach(&mut self, sighting: &Sighting) -> Result<State, AgentError> {
-        let now = self.situation(sighting);
-        let percept = Percept::new(sighting.features, &self.joints);
-        if self
-            .config
-            .goal
-            .iter()
-            .all(|interval| interval.holds(&percept))
-        {
-            // What is shown from two poses alike is not what is there: no reason to grip.
-            if self.watch.same() > 0 {
-                return Err(self.frozen());
-            }
-            return Ok(State::Grip {
-                seen: *sighting,
-                at_goal: true,
-            });
+    /// Makes one control cycle: decision, one joint move, next sighting.
+    fn reach(&mut self, ball: &Sighting) -> Result<State, AgentError> {
+        let from = self.joints;
+        let percept = Percept::new(ball.features, &from);
+        let mut goal = self.config.goal.iter();
+        if goal.all(|interval| interval.holds(&percept)) {
+            return self.begin_grip(*ball, true);
         }
         if self.cycles >= self.config.max_cycles {
             return Ok(State::End(Some(GaveUp::OutOfCycles)));
         }
-        let limits = self.modules.supervision.limits();
-        let delta = match self.controller.decide(&now, limits) {
-            // A controller may be anyone's: what leads out of the limits is not done.
-            Ok(delta) if limits.admit(&(self.joints + delta)) => delta,
-            Ok(_) => return Ok(State::End(Some(GaveUp::NoMoveLeft))),
+        let request = self.request(false);
+        let delta = match self.controller.decide(ball, &request) {
+            Ok(Decision::Move(delta)) => delta,
+            Ok(Decision::Grip(_)) => {
+                // Costs a cycle: a controller could ask for a grip again and again.
+                self.cycles += 1;
+                return self.begin_grip(*ball, false);
+            }
             Err(reason) => return Ok(State::End(Some(reason))),
         };
-
+        // A user-supplied controller might decide on anything.
+        if !request.limits.admit(&(from + delta)) {
+            return Ok(State::End(Some(GaveUp::NoMoveLeft)));
+        }
         self.cycles += 1;
         if self.go_by(delta, EventKind::Moved(delta))? == Went::Back {
-            return self.after_taking_back(now);
+            return self.after_taking_back(*ball, from);
         }
         let Some(after) = self.look()? else {
-            self.controller.judge(&Consequence::Lost);
-            return Ok(lost(now));
+            self.controller.notice(&Feedback::Lost);
+            return Ok(lost(*ball, from));
         };
-        if self
-            .modules
-            .supervision
-            .is_too_fast(&sighting.features, &after.features)
-        {
-            self.tell(EventKind::TooFast, None);
-            self.take_back(now.joints)?;
-            return self.after_taking_back(now);
+        let supervision = &mut self.modules.supervision;
+        if supervision.is_too_fast(&ball.features, &after.features) {
+            self.tell(EventKind::TooFast);
+            self.take_back(from)?;
+            return self.after_taking_back(*ball, from);
         }
         self.taken_back = 0;
-        let then = self.situation(&after);
-        self.controller.judge(&Consequence::Seen(then));
+        self.controller.notice(&Feedback::Seen {
+            ball: after,
+            joints: self.joints,
+        });
         Ok(State::Reach(after))
     }
 
-    /// Looks again from where the last move began. Where moves come to nothing again and again,
-    /// what is too near may be the ball itself, and a controller that can aim at it from here does;
-    /// where they do so in a row and it cannot, whatever is seen is not to be had, and the search
-    /// begins anew.
-    fn after_taking_back(&mut self, before: Situation) -> Result<State, AgentError> {
-        self.controller.judge(&Consequence::TakenBack);
-        self.taken_back += 1;
-        self.barred += 1;
-        let Some(seen) = self.look()? else {
-            return Ok(lost(before));
-        };
-        Ok(
-            if self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN {
-                State::Grip {
-                    seen,
-                    at_goal: false,
-                }
-            } else {
-                State::Reach(seen)
-            },
-        )
+    /// Begins a grip, unless the image has not changed since another pose: it may be an old one.
+    fn begin_grip(&self, ball: Sighting, at_goal: bool) -> Result<State, AgentError> {
+        if self.camera.same() > 0 {
+            return Err(self.frozen());
+        }
+        Ok(State::Grip { ball, at_goal })
     }
 
-    /// Looks around where the ball was `seen` last, then leaves it to a new search.
-    fn recover(&mut self, seen: &Situation) -> Result<State, AgentError> {
-        // A recovery that offers nothing costs no cycle, and what led to it may not have been a
-        // move.
+    /// Looks again from where the last move began.
+    ///
+    /// After every third move that was taken back, the thing too near may be the ball itself: a
+    /// controller that can aim at it from here does. After three in a row without an aim, the
+    /// search begins anew.
+    fn after_taking_back(&mut self, before: Sighting, from: Joints) -> Result<State, AgentError> {
+        self.controller.notice(&Feedback::TakenBack);
+        self.taken_back += 1;
+        self.barred += 1;
+        let Some(ball) = self.look()? else {
+            return Ok(lost(before, from));
+        };
+        let often = self.barred.is_multiple_of(OFTEN) || self.taken_back >= OFTEN;
+        Ok(if often {
+            State::Grip {
+                ball,
+                at_goal: false,
+            }
+        } else {
+            State::Reach(ball)
+        })
+    }
+
+    /// Looks around near where the `ball` was last seen `from`, then leaves it to a new search.
+    fn recover(&mut self, ball: &Sighting, from: &Joints) -> Result<State, AgentError> {
+        // A recovery without viewpoints costs no cycle, and nor may what led to it.
         if self.cycles >= self.config.max_cycles {
             return Ok(State::End(Some(GaveUp::OutOfCycles)));
         }
-        let mut last = LastLook::None;
-        while let Some(view) = self.modules.recovery.next_view(seen, &self.joints, last) {
+        let mut barred = false;
+        self.modules
+            .recovery
+            .begin(&self.joints, Some((ball, from)));
+        while let Some(view) = self.modules.recovery.next_view(&self.joints, barred) {
             if self.cycles >= self.config.max_cycles {
                 return Ok(State::End(Some(GaveUp::OutOfCycles)));
             }
             self.cycles += 1;
             match self.look_from(&view, EventKind::Recovering(view.number))? {
-                Ok(ball) => return Ok(State::Reach(ball)),
-                Err(came) => last = came,
+                View::Ball(ball) => return Ok(State::Reach(ball)),
+                came => barred = matches!(came, View::Barred),
             }
         }
         Ok(State::Search)
     }
 
-    /// Lets the gripper go for the ball, and goes on from what that came to.
+    /// Activates the gripper and decides how to go on from its result.
     fn grip(&mut self, seen: &Sighting, at_goal: bool) -> Result<State, AgentError> {
         let from = self.joints;
         let (mut gripper, wandered) = (self.gripper.clone(), self.wandered);
@@ -353,26 +350,21 @@ impl<'a> Run<'a> {
             GripEnd::Held(ball) => self.end_with(ball, None),
             GripEnd::Unknown(ball, reason) => self.end_with(ball, Some(reason)),
             GripEnd::Missed(ball) => {
-                // What was seen meanwhile was not the ball in its place.
+                // Sightings in the meantime were not of the ball in its place.
                 self.last_seen = Some(ball);
-                self.controller.judge(&Consequence::Missed);
+                self.controller.notice(&Feedback::Missed);
                 State::Recover {
-                    seen: Situation {
-                        features: ball.features,
-                        joints: from,
-                        long_axis: ball.long_axis,
-                    },
+                    ball,
+                    from,
                     why: Gone::Missed,
                 }
             }
             GripEnd::Unseen => {
-                // As for two looks that differ.
                 self.cycles += 1;
-                lost(self.situation(seen))
+                lost(*seen, self.joints)
             }
             GripEnd::Elsewhere(ball) => {
-                // Two looks that differ cost a cycle: both can be at the goal, and no move is made
-                // between them.
+                // Costs a cycle: both looks can be at the goal, and no move is made between them.
                 self.cycles += 1;
                 if self.cycles >= self.config.max_cycles {
                     State::End(Some(GaveUp::OutOfCycles))
@@ -382,69 +374,77 @@ impl<'a> Run<'a> {
             }
             GripEnd::NoMove(_) if at_goal => State::End(Some(GaveUp::NoMoveLeft)),
             GripEnd::NoMove(ball) => {
-                let often = std::mem::take(&mut self.taken_back) >= OFTEN;
-                if often {
+                if std::mem::take(&mut self.taken_back) >= OFTEN {
                     State::Search
                 } else {
                     State::Reach(ball)
                 }
             }
             GripEnd::Barred | GripEnd::BarredAgain => {
-                self.controller.judge(&Consequence::Missed);
+                self.controller.notice(&Feedback::Missed);
                 self.cycles += 1;
                 if end == GripEnd::BarredAgain {
                     return Ok(State::End(Some(GaveUp::Obstructed)));
                 }
                 match self.look()? {
                     Some(ball) => State::Reach(ball),
-                    None => lost(self.situation(seen)),
+                    None => lost(*seen, self.joints),
                 }
             }
         })
     }
 
-    /// The end, with the ball as it was before the jaws closed: what was seen meanwhile was not the
-    /// ball in its place.
+    /// Ends the run with the ball as it was before the jaws closed: sightings in the meantime were
+    /// not of the ball in its place.
     fn end_with(&mut self, ball: Sighting, gave_up: Option<GaveUp>) -> State {
         self.last_seen = Some(ball);
         State::End(gave_up)
     }
 
-    fn situation(&self, sighting: &Sighting) -> Situation {
-        Situation {
-            features: sighting.features,
+    fn request(&self, grip: bool) -> Request {
+        Request {
             joints: self.joints,
-            long_axis: sighting.long_axis,
+            limits: *self.modules.supervision.limits(),
+            grip,
         }
     }
 
     fn frozen(&self) -> AgentError {
         AgentError::FrozenCamera {
-            looks: self.watch.same().saturating_add(1),
+            looks: self.camera.same().saturating_add(1),
         }
     }
 
-    fn tell(&mut self, kind: EventKind, frame: Option<&GrayImage>) {
-        (self.observe)(&Event {
+    fn tell(&mut self, kind: EventKind) {
+        (self.observe)(&RunEvent {
             cycle: self.cycles,
             kind,
             joints: self.joints,
-            frame,
+            frame: None::<&GrayImage>,
         });
     }
 
     /// Takes note of a sighting.
-    fn saw(&mut self, sighting: Sighting) {
-        let first = self.first_seen.get_or_insert(sighting);
-        self.wandered |= !is_same_place(first, &sighting);
-        self.last_seen = Some(sighting);
+    fn saw(&mut self, ball: Sighting) {
+        let first = self.first_seen.get_or_insert(ball);
+        self.wandered |= !is_same_place(first, &ball);
+        self.last_seen = Some(ball);
     }
 }
 
-/// The ball was in view like this and is not any more.
-fn lost(seen: Situation) -> State {
+/// Result of a look from a viewpoint.
+enum View {
+    Ball(Sighting),
+    Nothing,
+    /// Something too near kept the hand from getting there; nothing was looked at.
+    Barred,
+}
+
+/// The ball was in view `from` this pose, and is not any more.
+fn lost(ball: Sighting, from: Joints) -> State {
     State::Recover {
-        seen,
+        ball,
+        from,
         why: Gone::Lost,
     }
 }
