@@ -35,6 +35,7 @@ pub use cell::grasp::{Contact, Grasp};
 pub use cell::hand::{Capsule, Hand};
 pub use cell::motion::{BallPath, Motion};
 pub use cell::mount::Mount;
+pub use cell::moves::MoveLists;
 pub use cell::optimum::GoalBox;
 pub use cell::workspace::{Coverage, Workspace};
 pub use datasets::benchmark_kind::BenchmarkKind;
@@ -48,8 +49,8 @@ pub use regression::open_loop::OpenLoopError;
 pub use regression::reach_form::ReachForm;
 pub use regression::reach_model::ReachModel;
 pub use regression::samples::{
-    CentreSample, MOST_SAMPLES, MoveLists, ReachSample, exploring_start, sample_moves,
-    try_sample_moves, with_noise,
+    CentreSample, MOST_SAMPLES, ReachSample, exploring_start, sample_moves, try_sample_moves,
+    with_noise,
 };
 pub use regression::stored::StoredModelError;
 pub use render::renderer::Renderer;

@@ -10,6 +10,7 @@ pub(crate) mod grasp;
 pub(crate) mod hand;
 pub(crate) mod motion;
 pub(crate) mod mount;
+pub(crate) mod moves;
 pub(crate) mod optimum;
 pub(crate) mod overview;
 pub(crate) mod workspace;

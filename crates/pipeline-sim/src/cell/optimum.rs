@@ -4,9 +4,9 @@ use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta, Joints};
 
 use crate::cell::geometry::Cell;
+use crate::cell::moves::MoveLists;
 use crate::error::QuantityError;
 use crate::error::{ascending, finite};
-use crate::regression::samples::MoveLists;
 
 /// Intervals of the image features in which the goal is reached, both ends included, feature units.
 #[derive(Clone, Copy, Debug, PartialEq)]

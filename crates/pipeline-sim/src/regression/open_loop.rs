@@ -4,10 +4,11 @@ use puma_val2::{Joint, JointDelta};
 use rand::{Rng, RngExt};
 
 use crate::cell::geometry::Cell;
+use crate::cell::moves::MoveLists;
 use crate::error::QuantityError;
 use crate::error::at_most;
 use crate::regression::reach_model::ReachModel;
-use crate::regression::samples::{MoveLists, exploring_start};
+use crate::regression::samples::exploring_start;
 
 /// Errors of a model after some moves in a row without a look at the plant, feature units.
 #[derive(Clone, Copy, Debug, PartialEq)]

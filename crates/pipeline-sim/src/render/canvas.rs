@@ -9,11 +9,6 @@ pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) light: Vec<f32>,
-    /// Share of each pixel that is covered, for a canvas that is laid over another; empty for one
-    /// that is not.
-    pub(super) cover: Vec<f32>,
-    /// What has been drawn on since [`Canvas::wipe`].
-    touched: Area,
     coverage: Vec<f32>,
     shade: Vec<f32>,
     /// Edges of the present polygon that begin below the present row, the next one last; level ones
@@ -34,49 +29,6 @@ struct Edge {
     slope: f64,
 }
 
-/// A rectangle of pixels: columns left..right of rows top..bottom.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Area {
-    pub(super) left: usize,
-    pub(super) right: usize,
-    pub(super) top: usize,
-    pub(super) bottom: usize,
-}
-
-impl Area {
-    pub(super) fn is_empty(&self) -> bool {
-        self.left >= self.right || self.top >= self.bottom
-    }
-
-    /// The smallest area that holds this one and the columns start..end of row y.
-    fn with(self, y: usize, start: usize, end: usize) -> Self {
-        if self.is_empty() {
-            return Self {
-                left: start,
-                right: end,
-                top: y,
-                bottom: y + 1,
-            };
-        }
-        Self {
-            left: self.left.min(start),
-            right: self.right.max(end),
-            top: self.top.min(y),
-            bottom: self.bottom.max(y + 1),
-        }
-    }
-
-    /// The area with `by` more pixels on every side, as far as a canvas of this size goes.
-    pub(super) fn grown(self, by: usize, (width, height): (usize, usize)) -> Self {
-        Self {
-            left: self.left.saturating_sub(by),
-            right: (self.right + by).min(width),
-            top: self.top.saturating_sub(by),
-            bottom: (self.bottom + by).min(height),
-        }
-    }
-}
-
 /// Scan lines per row of pixels; coverage is exact along x and sampled this finely along y.
 const SUBROWS: usize = 4;
 
@@ -86,8 +38,6 @@ impl Canvas {
             width,
             height,
             light: vec![0.0; width * height],
-            cover: Vec::new(),
-            touched: Area::default(),
             coverage: vec![0.0; width + 2],
             shade: vec![0.0; width + 2],
             edges: Vec::with_capacity(8),
@@ -95,78 +45,12 @@ impl Canvas {
         }
     }
 
-    /// Gives the canvas another size, if it is another. A canvas that is laid over another is empty
-    /// then; of any other all is to be drawn.
+    /// Resizes the canvas; the light on it is undefined afterwards.
     pub(super) fn resize(&mut self, width: usize, height: usize) {
-        if (self.width, self.height) == (width, height) {
-            return;
-        }
-        let over = !self.cover.is_empty();
-        if over {
-            // All of it is zero from here on, whatever its size.
-            self.wipe();
-            self.cover.resize(width * height, 0.0);
-        }
         self.light.resize(width * height, 0.0);
         self.coverage.resize(width + 2, 0.0);
         self.shade.resize(width + 2, 0.0);
         (self.width, self.height) = (width, height);
-    }
-
-    /// Makes this a canvas of the given size that is laid over another, with nothing on it.
-    pub(super) fn clear_layer(&mut self, width: usize, height: usize) {
-        self.resize(width, height);
-        if self.cover.len() == self.light.len() {
-            self.wipe();
-        } else {
-            self.light.fill(0.0);
-            self.cover.resize(width * height, 0.0);
-            self.touched = Area::default();
-        }
-    }
-
-    /// All of it.
-    pub(super) fn whole(&self) -> Area {
-        Area {
-            left: 0,
-            right: self.width,
-            top: 0,
-            bottom: self.height,
-        }
-    }
-
-    /// What has been drawn on.
-    pub(super) fn touched(&self) -> Area {
-        self.touched
-    }
-
-    /// Takes off what has been drawn, and two pixels around it, which a blur may have reached.
-    fn wipe(&mut self) {
-        let area = self.touched.grown(2, (self.width, self.height));
-        for y in area.top..area.bottom {
-            let row = y * self.width + area.left..y * self.width + area.right.max(area.left);
-            self.light[row.clone()].fill(0.0);
-            self.cover[row].fill(0.0);
-        }
-        self.touched = Area::default();
-    }
-
-    /// Notes that the columns start.. of row y are covered by these shares.
-    pub(super) fn note(
-        &mut self,
-        y: usize,
-        start: usize,
-        shares: impl ExactSizeIterator<Item = f32>,
-    ) {
-        if self.cover.is_empty() {
-            return;
-        }
-        let end = start + shares.len();
-        self.touched = self.touched.with(y, start, end);
-        let row = &mut self.cover[y * self.width + start..y * self.width + end];
-        for (cover, share) in row.iter_mut().zip(shares) {
-            *cover += (1.0 - *cover) * share;
-        }
     }
 
     /// Fills a convex polygon. `shade(y, x0, row)` writes the light of the pixels x0.. of row y
@@ -199,7 +83,6 @@ impl Canvas {
             let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
             if solid {
                 shade(y, start, row);
-                self.note(y, start, (start..end).map(|_| 1.0));
                 continue;
             }
             let shades = &mut self.shade[..end - start];
@@ -209,9 +92,6 @@ impl Canvas {
             {
                 *light += (shade - *light) * share;
             }
-            let shares = std::mem::take(&mut self.coverage);
-            self.note(y, start, shares[start..end].iter().copied());
-            self.coverage = shares;
         }
     }
 
@@ -229,10 +109,6 @@ impl Canvas {
                 let coverage = if solid { 1.0 } else { *coverage };
                 *value += (light - *value) * coverage * share;
             }
-            let shares = std::mem::take(&mut self.coverage);
-            let whole = |k: &f32| share * if solid { 1.0 } else { *k };
-            self.note(y, start, shares[start..end].iter().map(whole));
-            self.coverage = shares;
         }
     }
 

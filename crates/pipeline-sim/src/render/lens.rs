@@ -4,7 +4,7 @@ use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Point2, Vector2};
 
 use crate::cell::camera::Camera;
-use crate::render::canvas::{Area, Canvas};
+use crate::render::canvas::Canvas;
 
 /// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts
 /// of the focal length.
@@ -260,36 +260,28 @@ impl Nodes {
     }
 }
 
-/// Blurs an area of a canvas as the sensor's own pass does ([`crate::Sensor::blur`]): three taps
-/// along each axis. For fields, which must be blurred before they are woven.
-pub(super) fn soften(canvas: &mut Canvas, area: Area, sigma: f64, spare: &mut Vec<f32>) {
-    let (side, middle) = three_taps(sigma);
-    if area.is_empty() || side <= 0.0 {
+/// Blurs `values`, rows of `width` pixels, with the sensor's three taps along each axis
+/// ([`Sensor::blur`](crate::render::scene::Sensor::blur)). The fields of an interlaced frame are
+/// blurred before they are woven.
+pub(super) fn soften(values: &mut [f32], width: usize, sigma: f64, spare: &mut Vec<f32>) {
+    let taps = three_taps(sigma);
+    if values.is_empty() || taps.0 <= 0.0 {
         return;
     }
     // Two rows as they were, and a row with a pixel more at either end.
-    let needed = 3 * (area.right - area.left) + 2;
-    if spare.len() < needed {
-        spare.resize(needed, 0.0);
-    }
-    for values in [&mut canvas.light, &mut canvas.cover] {
-        if !values.is_empty() {
-            widest(Softening {
-                values,
-                width: canvas.width,
-                area,
-                taps: (side, middle),
-                spare,
-            });
-        }
-    }
+    spare.resize(spare.len().max(3 * width + 2), 0.0);
+    widest(Softening {
+        values,
+        width,
+        taps,
+        spare,
+    });
 }
 
 /// The work of [`soften`].
 struct Softening<'a> {
     values: &'a mut [f32],
     width: usize,
-    area: Area,
     taps: (f32, f32),
     spare: &'a mut [f32],
 }
@@ -299,26 +291,26 @@ impl Vectorized for Softening<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { values, area, .. } = self;
+        let Self { values, width, .. } = self;
         let (side, middle) = self.taps;
-        let w = area.right - area.left;
-        let (mut above, rest) = self.spare.split_at_mut(w);
-        let (mut here, mixed) = rest.split_at_mut(w);
-        let mixed = &mut mixed[..w + 2];
-        let start = |y: usize| y * self.width + area.left;
-        here.copy_from_slice(&values[start(area.top)..][..w]);
+        let height = values.len() / width;
+        let (mut above, rest) = self.spare.split_at_mut(width);
+        let (mut here, mixed) = rest.split_at_mut(width);
+        let mixed = &mut mixed[..width + 2];
+        here.copy_from_slice(&values[..width]);
         above.copy_from_slice(here);
-        for y in area.top..area.bottom {
-            let below = &values[start((y + 1).min(area.bottom - 1))..][..w];
-            for (((m, a), c), b) in mixed[1..=w].iter_mut().zip(&*above).zip(&*here).zip(below) {
+        for y in 0..height {
+            let below = &values[(y + 1).min(height - 1) * width..][..width];
+            let rows = above.iter().zip(&*here).zip(below);
+            for (m, ((a, c), b)) in mixed[1..=width].iter_mut().zip(rows) {
                 *m = middle * c + side * (a + b);
             }
             std::mem::swap(&mut above, &mut here);
             here.copy_from_slice(below);
             mixed[0] = mixed[1];
-            mixed[w + 1] = mixed[w];
+            mixed[width + 1] = mixed[width];
             let sides = mixed.iter().zip(&mixed[2..]);
-            let out = &mut values[start(y)..][..w];
+            let out = &mut values[y * width..][..width];
             for ((o, c), (l, r)) in out.iter_mut().zip(&mixed[1..]).zip(sides) {
                 *o = middle * c + side * (l + r);
             }

@@ -13,7 +13,7 @@ const ALIKE: f32 = 0.01;
 
 /// Something that tells the light on a plane.
 pub(super) trait Lighting {
-    /// Writes the light at places of the plane; `spare` holds three times as many numbers. To be
+    /// Writes the light at places of the plane; `spare` holds twice as many numbers. To be
     /// inlined always.
     fn shed(&self, x: &[f32], y: &[f32], light: &mut [f32], spare: &mut [f32]);
 }
@@ -62,7 +62,7 @@ impl Row {
             *met = if before { 1.0 } else { 0.0 };
         }
         let light = &mut self.light[..n];
-        lighting.shed(&self.x[..n], &self.y[..n], light, &mut self.spare[..3 * n]);
+        lighting.shed(&self.x[..n], &self.y[..n], light, &mut self.spare[..2 * n]);
         for ((light, met), i) in light.iter().zip(&self.met).zip(&self.wanted) {
             values[*i as usize] = light * met;
         }
@@ -96,7 +96,7 @@ impl LightGrid {
         for list in [&mut row.x, &mut row.y, &mut row.met, &mut row.light] {
             list.resize(columns, 0.0);
         }
-        row.spare.resize(3 * columns, 0.0);
+        row.spare.resize(2 * columns, 0.0);
         let step = plane.column(0) * STEP as f64;
         let line = |j: usize| (plane.column(2) + plane.column(1) * (j * STEP) as f64, step);
         for j in (0..rows).step_by(2) {

@@ -22,7 +22,7 @@ const WALLS: f64 = 3.2;
 impl Renderer {
     /// Draws all of it.
     pub(super) fn draw(&mut self, canvas: &mut Canvas, cell: &Cell, view: &View) {
-        self.lay_light(view, cell.table, &[cell]);
+        self.lay_light(view, cell);
         let studio = self.studio(cell, view);
         if !fills_frame(view, cell) {
             self.draw_backdrop(canvas, &studio);
@@ -33,31 +33,27 @@ impl Renderer {
         }
     }
 
-    /// Works out the light on the table, with the mean of the shadows that balls and holders of
-    /// `cells` throw.
-    pub(super) fn lay_light(&mut self, view: &View, table: f64, cells: &[&Cell]) {
+    /// Works out the light on the table, with the shadows of ball and holder.
+    fn lay_light(&mut self, view: &View, cell: &Cell) {
         let things = self.scene.things.iter().enumerate();
-        let gone = things.filter(|(_, t)| cells.iter().any(|cell| in_the_way(t, cell)));
+        let gone = things.filter(|(_, t)| in_the_way(t, cell));
         self.table.leave_out(gone.map(|(i, _)| i).collect());
-        if view.eye().z <= table {
+        if view.eye().z <= cell.table {
             return;
         }
         let (total, _) = table_light(&self.scene);
         let light = (self.scene.table.albedo * total) as f32;
-        let balls: Vec<BallShadow> = cells
-            .iter()
-            .map(|cell| BallShadow::new(&self.scene, &cell.ball, cell.holder, table))
-            .collect();
         let lighting = TableLight {
             light,
             things: &self.table,
-            balls: &balls,
+            ball: BallShadow::new(&self.scene, &cell.ball, cell.holder, cell.table),
         };
-        self.light.lay(view, &table_plane(view, table), &lighting);
+        self.light
+            .lay(view, &table_plane(view, cell.table), &lighting);
     }
 
     /// What shading depends on.
-    pub(super) fn studio<'a>(&'a self, cell: &Cell, view: &'a View) -> Studio<'a> {
+    fn studio<'a>(&'a self, cell: &Cell, view: &'a View) -> Studio<'a> {
         let (total, _) = table_light(&self.scene);
         Studio {
             view,
@@ -70,7 +66,7 @@ impl Renderer {
     }
 
     /// Draws the table, seen from above, in the light last laid on it.
-    pub(super) fn draw_table(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
+    fn draw_table(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
         let view = studio.view;
         if view.eye().z <= studio.table {
             return;
@@ -181,7 +177,7 @@ impl Renderer {
     }
 
     /// Draws floor and walls of the room.
-    pub(super) fn draw_backdrop(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
+    fn draw_backdrop(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
         canvas.light.fill(0.30);
         let mut polygon = Vec::with_capacity(8);
         let n = self.walls.len() / 2;
@@ -220,27 +216,17 @@ struct TableLight<'a> {
     /// Where nothing hides the lamps.
     light: f32,
     things: &'a ThingShadows,
-    /// Shadows of which the mean counts; there is at least one.
-    balls: &'a [BallShadow],
+    ball: BallShadow,
 }
 
 impl Lighting for TableLight<'_> {
     #[inline(always)]
     fn shed(&self, x: &[f32], y: &[f32], light: &mut [f32], spare: &mut [f32]) {
-        let n = x.len();
-        let (open, spare) = spare.split_at_mut(n);
-        let (factors, spare) = spare.split_at_mut(n);
-        open.fill(0.0);
-        for ball in self.balls {
-            ball.at(x, y, factors, spare);
-            open.iter_mut()
-                .zip(&*factors)
-                .for_each(|(open, factor)| *open += factor);
-        }
+        let (factors, spare) = spare.split_at_mut(x.len());
+        self.ball.at(x, y, factors, spare);
         self.things.at(x, y, light);
-        let share = self.light / self.balls.len().max(1) as f32;
-        for (light, open) in light.iter_mut().zip(open) {
-            *light *= *open * share;
+        for (light, factor) in light.iter_mut().zip(factors) {
+            *light *= *factor * self.light;
         }
     }
 }
@@ -280,12 +266,12 @@ pub(super) enum Item {
 }
 
 /// The map from pixels to homogeneous coordinates on the table, metres along x and y.
-pub(super) fn table_plane(view: &View, table: f64) -> Matrix3<f64> {
+fn table_plane(view: &View, table: f64) -> Matrix3<f64> {
     view.plane(&Point3::new(0.0, 0.0, table), &Vector3::x(), &Vector3::y())
 }
 
 /// Whether every ray of the frame meets the table.
-pub(super) fn fills_frame(view: &View, cell: &Cell) -> bool {
+fn fills_frame(view: &View, cell: &Cell) -> bool {
     let (near, far, half) = TABLE;
     if view.eye().z <= cell.table {
         return false;

@@ -5,7 +5,6 @@ use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::cell::camera::Camera;
 use crate::cell::geometry::Cell;
 use crate::render::canvas::Canvas;
 use crate::render::lens::{Warp, defocus};
@@ -13,7 +12,6 @@ use crate::render::light_grid::LightGrid;
 use crate::render::scene::Scene;
 use crate::render::sensor::Exposure;
 use crate::render::shadow::ThingShadows;
-use crate::render::smear::Smear;
 use crate::render::texture::{CoarseMap, Texture};
 use crate::render::view::View;
 
@@ -49,13 +47,9 @@ pub struct Renderer {
     pub(super) ideal: Canvas,
     pub(super) warp: Option<Warp>,
     pub(super) spare: Vec<f32>,
-    /// Parts of a frame in motion, drawn larger than the frame.
-    pub(super) sharp: Canvas,
-    pub(super) layer: Canvas,
-    pub(super) smear: Smear,
-    /// Light of one field, and of both.
+    /// Mean light of an exposure, and of the first field of an interlaced frame.
     pub(super) exposed: Vec<f32>,
-    pub(super) woven: Vec<f32>,
+    pub(super) first_field: Vec<f32>,
     pub(super) image: GrayImage,
 }
 
@@ -82,11 +76,8 @@ impl Renderer {
             ideal: Canvas::default(),
             warp: None,
             spare: Vec::new(),
-            sharp: Canvas::default(),
-            layer: Canvas::default(),
-            smear: Smear::default(),
             exposed: Vec::new(),
-            woven: Vec::new(),
+            first_field: Vec::new(),
             image: GrayImage::new(0, 0),
         }
     }
@@ -121,49 +112,26 @@ impl Renderer {
         let finite = numbers
             .chain(cell.ball.centre.iter())
             .all(|v| v.is_finite());
-        self.through_lens(&cell.camera, |this, canvas, camera| {
-            if finite {
-                this.draw(canvas, cell, &View::new(camera, pose));
-            } else {
-                canvas.light.fill(0.0);
-            }
-            true
-        });
-    }
-
-    /// Has `draw` draw what a camera without distortion sees, and distorts and blurs it as the lens
-    /// of `camera` does. Passes on what `draw` returns; after `false` there is no picture.
-    pub(super) fn through_lens(
-        &mut self,
-        camera: &Camera,
-        draw: impl FnOnce(&mut Self, &mut Canvas, &Camera) -> bool,
-    ) -> bool {
-        if self.warp.as_ref().is_none_or(|warp| !warp.is_for(camera)) {
-            self.warp = Warp::new(camera);
-        }
-        let (width, height) = camera.size();
+        let (width, height) = cell.camera.size();
         let mut canvas = std::mem::take(&mut self.canvas);
         canvas.resize(width as usize, height as usize);
-        let drawn = match self.warp.take() {
-            None => draw(self, &mut canvas, camera),
-            Some(warp) => {
-                let mut ideal = std::mem::take(&mut self.ideal);
-                let (width, height) = warp.ideal.size();
-                ideal.resize(width as usize, height as usize);
-                let drawn = draw(self, &mut ideal, &warp.ideal);
-                if drawn {
-                    warp.apply(&ideal, &mut canvas);
-                }
-                self.ideal = ideal;
-                self.warp = Some(warp);
-                drawn
-            }
-        };
-        if drawn {
-            defocus(&mut canvas, self.scene.sensor.defocus, &mut self.spare);
+        if self.warp.as_ref().is_none_or(|w| !w.is_for(&cell.camera)) {
+            self.warp = Warp::new(&cell.camera);
         }
+        if !finite {
+            canvas.light.fill(0.0);
+        } else if let Some(warp) = self.warp.take() {
+            let mut ideal = std::mem::take(&mut self.ideal);
+            let (width, height) = warp.ideal.size();
+            ideal.resize(width as usize, height as usize);
+            self.draw(&mut ideal, cell, &View::new(&warp.ideal, pose));
+            warp.apply(&ideal, &mut canvas);
+            (self.ideal, self.warp) = (ideal, Some(warp));
+        } else {
+            self.draw(&mut canvas, cell, &View::new(&cell.camera, pose));
+        }
+        defocus(&mut canvas, self.scene.sensor.defocus, &mut self.spare);
         self.canvas = canvas;
-        drawn
     }
 
     /// Turns the light into the next frame.

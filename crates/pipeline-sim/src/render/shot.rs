@@ -5,7 +5,6 @@ use puma_val2::Joints;
 
 use crate::cell::geometry::Cell;
 use crate::render::lens::soften;
-use crate::render::moving::Exposed;
 use crate::render::renderer::Renderer;
 
 /// How a frame is taken while things move.
@@ -14,12 +13,9 @@ use crate::render::renderer::Renderer;
 pub struct Shot {
     /// Time the shutter is open, seconds, up to [`Shot::LONGEST`]. 0 freezes all motion.
     pub exposure: f64,
-    /// 1 freezes all motion. With more, the frame is drawn once, in the middle of its exposure, and
-    /// each part of it is averaged along the way it takes, as long as arm, ball and holder move
-    /// evenly and not far (48 pixels either way). Otherwise, and for two frozen fields, this many
-    /// moments, spread evenly over the exposure of each field, are drawn and averaged at the cost
-    /// of a frame each: one for every two pixels of motion is enough. 1 to [`Shot::MOST_MOMENTS`];
-    /// [`Renderer::take`] takes what is beyond for the nearer of both.
+    /// Sharp frames that are drawn, spread evenly over the exposure of each field, and averaged; 1
+    /// freezes all motion. One for every two pixels of motion is enough, and each costs a frame's
+    /// time. 1 to [`Shot::MOST_MOMENTS`]; [`Renderer::take`] clamps it to that range.
     pub moments: usize,
     /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones, at most
     /// [`Shot::LONGEST`].
@@ -60,10 +56,10 @@ impl Default for Shot {
 }
 
 impl Renderer {
-    /// Takes a frame while cell and joints change: `moment(t)` tells what they are t seconds after
-    /// the shutter opened.
+    /// Draws a frame while cell and joints change: `moment(t)` returns both, t seconds after the
+    /// shutter opened.
     ///
-    /// The truth of such a frame is that of the middle of its exposure.
+    /// [`Renderer::truth`] of such a frame is that of the middle of its exposure.
     pub fn take(
         &mut self,
         shot: &Shot,
@@ -74,99 +70,49 @@ impl Renderer {
             let (cell, joints) = moment(0.5 * shot.exposure);
             return self.render(&cell, &joints);
         }
-        let opened: &[f64] = match shot.interlace {
-            Some(later) => &[0.0, later],
-            None => &[0.0],
-        };
-        let last = opened[opened.len() - 1];
-        // Frozen fields would only lose by being drawn from the middle between them.
-        let drawn = count > 1 && {
-            let exposed = Exposed {
-                middle: moment(0.5 * (last + shot.exposure)),
-                fields: opened
-                    .iter()
-                    .map(|t| [0.0, 0.5, 1.0].map(|part| moment(t + part * shot.exposure)))
-                    .collect(),
-            };
-            self.illuminate_moving(&exposed)
-        };
-        if !drawn {
-            self.illuminate_moments(opened, (shot.exposure, count), &mut moment);
+        self.expose(0.0, (shot.exposure, count), &mut moment);
+        if let Some(later) = shot.interlace {
+            // Lens and sensor blur each field on its own; only then are the rows woven.
+            let sigma = self.scene.sensor.blur;
+            soften(&mut self.exposed, self.canvas.width, sigma, &mut self.spare);
+            std::mem::swap(&mut self.first_field, &mut self.exposed);
+            self.expose(later, (shot.exposure, count), &mut moment);
+            let width = self.canvas.width;
+            soften(&mut self.exposed, width, sigma, &mut self.spare);
+            let rows = self.exposed.chunks_exact_mut(width.max(1));
+            let first = self.first_field.chunks_exact(width.max(1));
+            for (row, first) in rows.zip(first).step_by(2) {
+                row.copy_from_slice(first);
+            }
         }
-        let (cell, _) = moment(last);
+        std::mem::swap(&mut self.canvas.light, &mut self.exposed);
         self.exposure.blurred = shot.interlace.is_some();
+        let (cell, _) = moment(shot.interlace.unwrap_or(0.0));
         self.develop(&cell)
     }
 
-    /// As [`Renderer::take`], every moment drawn on its own.
-    #[cfg(test)]
-    pub(super) fn take_exactly(
+    /// Averages `count` sharp frames over `exposure` seconds from `opened` on, into `exposed`.
+    fn expose(
         &mut self,
-        shot: &Shot,
-        mut moment: impl FnMut(f64) -> (Cell, Joints),
-    ) -> &GrayImage {
-        let opened: &[f64] = match shot.interlace {
-            Some(later) => &[0.0, later],
-            None => &[0.0],
-        };
-        self.illuminate_moments(opened, (shot.exposure, shot.moments), &mut moment);
-        let (cell, _) = moment(opened[opened.len() - 1]);
-        self.exposure.blurred = shot.interlace.is_some();
-        self.develop(&cell)
-    }
-
-    /// Draws every moment of every field on its own.
-    fn illuminate_moments(
-        &mut self,
-        opened: &[f64],
+        opened: f64,
         (exposure, count): (f64, usize),
         moment: &mut impl FnMut(f64) -> (Cell, Joints),
     ) {
-        let mut total = std::mem::take(&mut self.exposed);
-        let mut woven = std::mem::take(&mut self.woven);
-        let interlaced = opened.len() > 1;
-        for (field, opened) in opened.iter().enumerate() {
-            for k in 0..count {
-                let t = opened + exposure * (k as f64 + 0.5) / count as f64;
-                let (cell, joints) = moment(t);
-                self.illuminate(&cell, &joints);
-                if k == 0 {
-                    total.clear();
-                    total.extend_from_slice(&self.canvas.light);
-                } else if total.len() == self.canvas.light.len() {
-                    total
-                        .iter_mut()
-                        .zip(&self.canvas.light)
-                        .for_each(|(sum, light)| *sum += light);
-                }
-            }
-            let share = 1.0 / count as f32;
-            total.iter_mut().for_each(|sum| *sum *= share);
-            if interlaced && total.len() == self.canvas.light.len() {
-                // Lens and sensor blur what they see of each field; only then are the rows woven.
-                std::mem::swap(&mut self.canvas.light, &mut total);
-                let whole = self.canvas.whole();
-                soften(
-                    &mut self.canvas,
-                    whole,
-                    self.scene.sensor.blur,
-                    &mut self.spare,
-                );
-                std::mem::swap(&mut self.canvas.light, &mut total);
-            }
-            if field == 0 {
-                std::mem::swap(&mut woven, &mut total);
+        self.exposed.clear();
+        for k in 0..count {
+            let (cell, joints) = moment(opened + exposure * (k as f64 + 0.5) / count as f64);
+            self.illuminate(&cell, &joints);
+            let light = &self.canvas.light;
+            if self.exposed.len() == light.len() {
+                let sums = self.exposed.iter_mut().zip(light);
+                sums.for_each(|(sum, light)| *sum += light);
             } else {
-                let width = self.canvas.width.max(1);
-                let rows = woven.chunks_exact_mut(width).zip(total.chunks_exact(width));
-                rows.skip(1)
-                    .step_by(2)
-                    .for_each(|(row, later)| row.copy_from_slice(later));
+                // The first frame, or one of another size.
+                self.exposed.clear();
+                self.exposed.extend_from_slice(light);
             }
         }
-        if woven.len() == self.canvas.light.len() {
-            self.canvas.light.copy_from_slice(&woven);
-        }
-        (self.exposed, self.woven) = (total, woven);
+        let share = 1.0 / count as f32;
+        self.exposed.iter_mut().for_each(|sum| *sum *= share);
     }
 }

@@ -44,7 +44,6 @@ impl Studio<'_> {
             })
             .collect();
         let origin = columns.start;
-        let mut shares = vec![0.0_f32; columns.len()];
         for y in rows {
             let yn = ((y as f64 - self.view.principal.y) / self.view.focal) as f32;
             let first = ((origin as f64 - self.view.principal.x) / self.view.focal) as f32;
@@ -61,10 +60,8 @@ impl Studio<'_> {
                 lamps: &lamps,
                 albedo,
                 gloss,
-                light: &mut canvas.light[place..place + shares.len()],
-                shares: &mut shares,
+                light: &mut canvas.light[place..place + columns.len()],
             });
-            canvas.note(y, origin, shares.iter().copied());
         }
     }
 
@@ -113,8 +110,6 @@ struct SphereRow<'a> {
     albedo: f32,
     gloss: f32,
     light: &'a mut [f32],
-    /// How much of each pixel is covered; to be written.
-    shares: &'a mut [f32],
 }
 
 impl Vectorized for SphereRow<'_> {
@@ -128,11 +123,7 @@ impl Vectorized for SphereRow<'_> {
         let (yn, k, up) = (self.yn, self.k, self.up);
         // Added on top of the reflectance, hence divided by it here.
         let shine = self.gloss / self.albedo.max(0.05);
-        let lights = self
-            .light
-            .chunks_mut(LANES)
-            .zip(self.shares.chunks_mut(LANES));
-        for (chunk, (light, shares)) in lights.enumerate() {
+        for (chunk, light) in self.light.chunks_mut(LANES).enumerate() {
             let ahead = chunk * LANES;
             let mut share = [0.0_f32; LANES];
             let mut normal = [[0.0_f32; LANES]; 3];
@@ -156,7 +147,6 @@ impl Vectorized for SphereRow<'_> {
                 share[i] = (0.5 + disc / (gx * gx + gy * gy).max(1e-20).sqrt()).clamp(0.0, 1.0);
             }
             if share.iter().all(|share| *share <= 0.0) {
-                shares.fill(0.0);
                 continue;
             }
             for (axis, half, intensity) in self.lamps {
@@ -174,8 +164,6 @@ impl Vectorized for SphereRow<'_> {
             for ((light, value), share) in light.iter_mut().zip(&value).zip(&share) {
                 *light += (self.albedo * value - *light) * share;
             }
-            let n = shares.len();
-            shares.copy_from_slice(&share[..n]);
         }
     }
 }

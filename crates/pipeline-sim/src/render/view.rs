@@ -23,9 +23,6 @@ pub(super) struct View {
 /// Nothing nearer than this to the camera's plane is drawn, metres.
 const NEAR: f64 = 0.004;
 
-/// Nothing nearer than this can be said to move evenly while the camera moves, metres.
-const CLEAR: f64 = 0.03;
-
 impl View {
     pub(super) fn new(camera: &Camera, pose: Isometry3<f64>) -> Self {
         let (width, height) = camera.size();
@@ -53,27 +50,6 @@ impl View {
             unit: self.unit * scale,
             corner: there(self.corner),
         }
-    }
-
-    /// The view with `margin` more pixels on every side.
-    pub(super) fn wider(&self, margin: usize) -> Self {
-        let corner = Vector2::repeat(-0.5 - margin as f64);
-        self.part(
-            corner,
-            1.0,
-            (self.width + 2 * margin, self.height + 2 * margin),
-        )
-    }
-
-    /// Where this view has points of the world, as long as all are well before the camera.
-    pub(super) fn all(&self, points: &[Point3<f64>]) -> Option<Vec<Point2<f64>>> {
-        points
-            .iter()
-            .map(|p| {
-                let seen = self.seen(p);
-                (seen.z >= CLEAR).then(|| self.pixel(&seen))
-            })
-            .collect()
     }
 
     /// Where this view has what lies in the direction (p, 1) of the camera frame.
