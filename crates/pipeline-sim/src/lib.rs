@@ -19,6 +19,7 @@
 //! ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
 
 mod cell;
+#[cfg(feature = "datasets")]
 mod datasets;
 mod devices;
 mod error;
@@ -28,36 +29,31 @@ mod render;
 pub use cell::ball::{Ball, Holder};
 pub use cell::camera::Camera;
 pub use cell::distortion::Distortion;
-pub use cell::ellipse::Ellipse;
-pub use cell::errors::{ErrorLevel, Errors, UnknownName};
-pub use cell::geometry::{Cell, SightRule, WorkingLimits};
-pub use cell::grasp::{Contact, Grasp};
-pub use cell::hand::{Capsule, Hand};
-pub use cell::motion::{BallPath, Motion};
-pub use cell::mount::Mount;
-pub use cell::moves::MoveLists;
-pub use cell::optimum::GoalBox;
-pub use cell::workspace::{Coverage, Workspace};
-pub use datasets::benchmark_kind::BenchmarkKind;
-pub use datasets::scene_kind::{SceneKind, Snapshot};
-pub use devices::source::{CellCamera, FeatureCamera, SharedCell, SimulatedArm};
-pub use devices::y4m::Y4mWriter;
-pub use error::{CameraError, ProjectionError, QuantityError, ReachError, SightError};
+pub use cell::ellipse::ProjectedEllipse;
+pub use cell::errors::{ErrorLevel, Errors};
+pub use cell::geometry::Cell;
+pub use cell::grasp::Grasp;
+pub use cell::hand::HandShape;
+pub use cell::sight::SightRule;
+pub use cell::workspace::Workspace;
+#[cfg(feature = "datasets")]
+pub use datasets::{recipe::Recipe, snapshot::Snapshot};
+pub use devices::arm::SimulatedArm;
+pub use devices::camera::{CellCamera, FeatureCamera};
+pub use devices::shared_cell::{Contacts, SharedCell};
+pub use error::{FitError, QuantityError, ReachError, SightError};
 pub use regression::centre_model::CentreModel;
-pub use regression::least_squares::{FitError, Quality};
-pub use regression::open_loop::OpenLoopError;
+pub use regression::quality::Quality;
 pub use regression::reach_form::ReachForm;
 pub use regression::reach_model::ReachModel;
-pub use regression::samples::{
-    CentreSample, MOST_SAMPLES, ReachSample, exploring_start, sample_moves, try_sample_moves,
-    with_noise,
-};
-pub use regression::stored::StoredModelError;
+pub use regression::samples::{CentreSample, ReachSample};
 pub use render::renderer::Renderer;
-pub use render::scene::{Light, Look, Occluder, Scene, Sensor, Shape, Thing};
+pub use render::scene::{Appearance, Light, Occluder, Scene, Sensor, Shape, Thing};
 pub use render::shot::Shot;
-pub use render::truth::{Round, Sighting};
+pub use render::truth::{Round, RoundOutline};
 
+pub use hough_heuristic;
 pub use hough_heuristic::image;
 pub use nalgebra;
+pub use puma_val2;
 pub use rand;

@@ -1,4 +1,4 @@
-//! The ball, and what it stands on.
+//! The ball and its holder.
 
 use nalgebra::{Point2, Point3};
 
@@ -16,7 +16,7 @@ impl Ball {
     /// Radius of the ball used throughout, metres: 20 mm.
     pub const RADIUS: f64 = 0.020;
 
-    /// A ball of [`Ball::RADIUS`] with its centre at (x, y, z) metres.
+    /// Returns a ball of [`Ball::RADIUS`] with its centre at (x, y, z) metres.
     pub fn at(x: f64, y: f64, z: f64) -> Self {
         Self {
             centre: Point3::new(x, y, z),
@@ -25,12 +25,12 @@ impl Ball {
     }
 }
 
-/// An upright rod on the table that carries the ball, so that the fingers find room below the
-/// ball's centre.
+/// An upright rod on the table that carries the ball, so that the fingers fit below the ball's
+/// centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Holder {
-    /// Where it stands: x and y of its axis, metres.
+    /// Position of its axis on the table, metres.
     pub foot: Point2<f64>,
     /// Height of its upper end, metres.
     pub top: f64,
@@ -39,7 +39,7 @@ pub struct Holder {
 }
 
 impl Holder {
-    /// The holder that carries `ball`: a rod of 8 mm radius that ends where the ball rests.
+    /// Returns the holder that carries `ball`: a rod of 8 mm radius that ends where the ball rests.
     pub fn under(ball: &Ball) -> Self {
         let radius = 0.008_f64.min(0.8 * ball.radius);
         // The ball sinks a little into the open end of the rod.
@@ -54,7 +54,7 @@ impl Holder {
         }
     }
 
-    /// Whether `ball` rests on this holder, to a millimetre.
+    /// Returns `true` if `ball` rests on this holder, to a millimetre.
     pub fn carries(&self, ball: &Ball) -> bool {
         let sunk = (ball.radius * ball.radius - self.radius * self.radius)
             .max(0.0)

@@ -1,11 +1,11 @@
-//! The camera: optics, and the exact outline of a sphere.
+//! The camera: its optics and the exact outline of a sphere.
 
 use hough_heuristic::Circle;
 use nalgebra::{Point2, Point3, Vector3};
 
 use crate::cell::distortion::Distortion;
-use crate::cell::ellipse::Ellipse;
-use crate::error::{CameraError, ProjectionError};
+use crate::cell::ellipse::ProjectedEllipse;
+use crate::error::{QuantityError, SightError, at_most, finite, positive};
 
 /// A monochrome camera: a pinhole with square pixels, and the distortion of its lens.
 ///
@@ -21,10 +21,10 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The greatest width and height of a frame, pixels.
+    /// Greatest width and height of a frame, pixels.
     pub const LARGEST_SIDE: u32 = 16_384;
 
-    /// The paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3"
+    /// Returns the paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3"
     /// CCD, whose image is 8.8 mm wide; principal point in the middle of the frame, no distortion.
     ///
     /// ```
@@ -42,18 +42,18 @@ impl Camera {
         }
     }
 
-    /// A pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width` metres wide
+    /// Creates a pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width` metres wide
     /// and a frame of `width` x `height` pixels, principal point in the middle of the frame.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] names the quantity that is not above zero;
-    /// [`CameraError::TooLarge`] for more than [`Camera::LARGEST_SIDE`].
+    /// [`QuantityError::NotPositive`] names the quantity that is not above zero;
+    /// [`QuantityError::TooLarge`] for more than [`Camera::LARGEST_SIDE`].
     pub fn pinhole(
         focal_length: f64,
         sensor_width: f64,
         width: u32,
         height: u32,
-    ) -> Result<Self, CameraError> {
+    ) -> Result<Self, QuantityError> {
         positive("focal length (m)", focal_length)?;
         positive("sensor width (m)", sensor_width)?;
         frame_size(width, height)?;
@@ -71,7 +71,7 @@ impl Camera {
         })
     }
 
-    /// A pinhole given in pixels, for frames that are drawn and then warped or reduced.
+    /// Creates a pinhole given in pixels, for frames that are drawn and then warped or reduced.
     pub(crate) fn ideal(focal_px: f64, principal: Point2<f64>, width: u32, height: u32) -> Self {
         Self {
             focal_px,
@@ -82,36 +82,35 @@ impl Camera {
         }
     }
 
-    /// The same camera with its focal length multiplied by `factor`.
+    /// Multiplies the focal length by `factor`.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] if the factor is not above zero; [`CameraError::Folds`] if a
+    /// [`QuantityError::NotPositive`] if the factor is not above zero; [`QuantityError::Folds`] if a
     /// distorted image would fold.
-    pub fn with_focal_factor(self, factor: f64) -> Result<Self, CameraError> {
+    pub fn with_focal_factor(self, factor: f64) -> Result<Self, QuantityError> {
         positive("focal factor", factor)?;
         let focal_px = self.focal_px * factor;
         positive("focal length (px)", focal_px)?;
         Self { focal_px, ..self }.unfolded()
     }
 
-    /// The same camera with its principal point at `principal`, pixels.
+    /// Moves the principal point to `principal`, pixels.
     ///
     /// # Errors
-    /// [`CameraError::NotFinite`]; [`CameraError::Folds`] if a distorted image would fold.
-    pub fn with_principal_point(self, principal: Point2<f64>) -> Result<Self, CameraError> {
+    /// [`QuantityError::NotFinite`]; [`QuantityError::Folds`] if a distorted image would fold.
+    pub fn with_principal_point(self, principal: Point2<f64>) -> Result<Self, QuantityError> {
         finite("principal point x (px)", principal.x)?;
         finite("principal point y (px)", principal.y)?;
         Self { principal, ..self }.unfolded()
     }
 
-    /// The same lens before a sensor of `width` x `height` pixels: what the frame showed, the new
-    /// one shows as large as it can hold all of it; a frame of another shape shows more on two
-    /// sides.
+    /// Changes the frame to `width` x `height` pixels and scales the image so that it just fits. A
+    /// frame of another shape shows more on two sides.
     ///
     /// # Errors
-    /// [`CameraError::NotPositive`] for a frame without pixels; [`CameraError::TooLarge`] for more
-    /// than [`Camera::LARGEST_SIDE`]; [`CameraError::Folds`] if a distorted image would fold.
-    pub fn resized(self, width: u32, height: u32) -> Result<Self, CameraError> {
+    /// [`QuantityError::NotPositive`] for a frame without pixels; [`QuantityError::TooLarge`] for more
+    /// than [`Camera::LARGEST_SIDE`]; [`QuantityError::Folds`] if a distorted image would fold.
+    pub fn resized(self, width: u32, height: u32) -> Result<Self, QuantityError> {
         frame_size(width, height)?;
         let scale = (f64::from(width) / f64::from(self.width))
             .min(f64::from(height) / f64::from(self.height));
@@ -128,11 +127,11 @@ impl Camera {
         .unfolded()
     }
 
-    /// The same camera with this lens distortion.
+    /// Replaces the lens distortion.
     ///
     /// # Errors
-    /// [`CameraError::NotFinite`]; [`CameraError::Folds`] if the image folds over within the frame.
-    pub fn with_distortion(self, distortion: Distortion) -> Result<Self, CameraError> {
+    /// [`QuantityError::NotFinite`]; [`QuantityError::Folds`] if the image folds over within the frame.
+    pub fn with_distortion(self, distortion: Distortion) -> Result<Self, QuantityError> {
         let Distortion { k1, k2, k3, p1, p2 } = distortion;
         for (name, value) in [("k1", k1), ("k2", k2), ("k3", k3), ("p1", p1), ("p2", p2)] {
             finite(name, value)?;
@@ -140,112 +139,88 @@ impl Camera {
         Self { distortion, ..self }.unfolded()
     }
 
-    /// Width and height of the frame, pixels.
+    /// Returns the width and height of the frame, pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
-    /// Focal length in pixels.
+    /// Returns the focal length in pixels.
     pub fn focal_px(&self) -> f64 {
         self.focal_px
     }
 
-    /// Where the optical axis meets the image, pixels.
+    /// Returns the pixel at which the optical axis meets the image.
     pub fn principal_point(&self) -> Point2<f64> {
         self.principal
     }
 
-    /// The lens distortion.
+    /// Returns the lens distortion.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
     }
 
-    /// The pixel that shows a point given in the camera frame; `None` for a point that is not in
-    /// front of the camera, or so far off the axis that the lens would have folded the image over
-    /// before.
+    /// Returns the pixel that shows a point of the camera frame; `None` for a point that is not in
+    /// front of the camera, or lies beyond the fold of the lens.
     pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
         (point.z > 0.0)
             .then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
             .flatten()
     }
 
-    /// The direction, in the camera frame and with z = 1, that is seen at a pixel. Within the frame
-    /// there always is one; for a pixel outside it where the lens shows nothing, the direction is
-    /// not a number ([`Camera::try_ray`] says so).
-    pub fn ray(&self, pixel: Point2<f64>) -> Vector3<f64> {
-        self.try_ray(pixel)
-            .unwrap_or_else(|_| Vector3::repeat(f64::NAN))
-    }
-
-    /// As [`Camera::ray`].
+    /// Returns the direction, in the camera frame and with z = 1, that is seen at a pixel. Within
+    /// the frame there always is one.
     ///
     /// # Errors
-    /// [`CameraError::NoRay`] for a pixel where the lens shows nothing, which can only be one
-    /// outside the frame, or one that is not finite.
-    pub fn try_ray(&self, pixel: Point2<f64>) -> Result<Vector3<f64>, CameraError> {
+    /// [`QuantityError::NoRay`] for a pixel outside the frame where the lens shows nothing, or one
+    /// that is not finite.
+    pub fn ray(&self, pixel: Point2<f64>) -> Result<Vector3<f64>, QuantityError> {
         let image = (pixel - self.principal.coords) / self.focal_px;
         let ideal = self.distortion.undistort(image);
         ideal
             .filter(|p| p.x.is_finite() && p.y.is_finite())
             .map(|p| Vector3::new(p.x, p.y, 1.0))
-            .ok_or(CameraError::NoRay {
+            .ok_or(QuantityError::NoRay {
                 x: pixel.x,
                 y: pixel.y,
             })
     }
 
-    /// The outline of a sphere whose centre is given in the camera frame.
+    /// Returns the outline of a sphere whose centre is given in the camera frame.
     ///
-    /// Without distortion the outline *is* an ellipse, and this one is exact: the section of the
-    /// image plane with the cone of half-angle asin(radius / distance) about the direction of the
-    /// centre. With distortion it is the ellipse with the area and the second moments of the
-    /// distorted outline.
+    /// Without distortion the ellipse is exact: the section of the image plane with the cone of
+    /// half-angle asin(radius / distance) about the direction of the centre. With distortion it is
+    /// the ellipse with the area and the second moments of the distorted outline.
     ///
     /// # Errors
-    /// [`ProjectionError`]: a radius that is not above zero, a camera inside the sphere, a sphere
-    /// not wholly in front of the camera, or one that reaches beyond the directions that the lens
-    /// shows.
+    /// [`SightError`]: a radius that is not above zero, a camera inside the sphere, a sphere not
+    /// wholly in front of the camera, or one that reaches beyond the fold of the lens.
     pub fn project_sphere(
         &self,
         centre: &Point3<f64>,
         radius: f64,
-    ) -> Result<Ellipse, ProjectionError> {
+    ) -> Result<ProjectedEllipse, SightError> {
         let outline = unit_outline(centre, radius)?;
         if self.distortion.is_none() {
-            return Ok(Ellipse {
+            return Ok(ProjectedEllipse {
                 centre: self.principal + outline.centre.coords * self.focal_px,
                 major: outline.major * self.focal_px,
                 minor: outline.minor * self.focal_px,
                 angle: outline.angle,
             });
         }
-        Ellipse::of_outline(|t| self.to_pixel(outline.point(t))).ok_or_else(|| {
-            ProjectionError::BeyondLens {
+        ProjectedEllipse::of_outline(|t| self.to_pixel(outline.point(t))).ok_or_else(|| {
+            SightError::BeyondLens {
                 angle: centre.xy().coords.norm().atan2(centre.z),
             }
         })
     }
 
-    /// The circle of equal mean radius for a sphere: the centre of [`Camera::project_sphere`]'s
-    /// ellipse and the mean of its semi-axes, in pixels of this camera's frame.
+    /// Returns the centre, in the camera frame, of the sphere of `radius` metres whose
+    /// [`Camera::project_sphere`] has the mean circle `circle`. Exact without distortion; otherwise
+    /// the distortion at the circle's centre is undone.
     ///
-    /// # Errors
-    /// As for [`Camera::project_sphere`].
-    pub fn project_sphere_to_circle(
-        &self,
-        centre: &Point3<f64>,
-        radius: f64,
-    ) -> Result<Circle, ProjectionError> {
-        Ok(self.project_sphere(centre, radius)?.circle())
-    }
-
-    /// The centre of the sphere of `radius` metres whose outline has the circle `circle`, in the
-    /// camera frame: the inverse of [`Camera::project_sphere_to_circle`] for a camera without
-    /// distortion, and close to it (the distortion at the circle's centre is undone) for others.
-    ///
-    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at
-    /// the circle's centre, or numbers do not suffice (a circle that fills all but the whole
-    /// half-space).
+    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at the
+    /// circle's centre, or the circle is too large for double precision.
     pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
         let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
             && [circle.radius, radius]
@@ -254,10 +229,11 @@ impl Camera {
         if !usable {
             return None;
         }
-        let ray = self.try_ray(Point2::new(circle.x, circle.y)).ok()?;
+        let ray = self.ray(Point2::new(circle.x, circle.y)).ok()?;
         let (m, r) = (ray.xy().norm(), circle.radius / self.focal_px);
-        // Unknown: tan(eta) of the centre's direction, sin²(alpha), and the minor semi-axis b. The formulas of `unit_outline` come to
-        // m = tan(eta) (1 + b²), sin²(alpha) = b² cos²(eta) / (1 + b²) and r = b (1 + sqrt(1 + m² / (1 + b²))) / 2.
+        // Unknown: tan(eta) of the centre's direction, sin²(alpha), and the minor semi-axis b. The
+        // formulas of `unit_outline` come to m = tan(eta) (1 + b²), sin²(alpha) = b² cos²(eta) /
+        // (1 + b²) and r = b (1 + sqrt(1 + m² / (1 + b²))) / 2.
         let b = minor_axis(m, r);
         let outer = 1.0 + b * b;
         let tan = m / outer;
@@ -270,7 +246,7 @@ impl Camera {
         (off <= 1e-6 * (m + r)).then_some(centre)
     }
 
-    /// The pixel that shows the direction (p, 1); `None` beyond the fold of the lens.
+    /// Returns the pixel that shows the direction (p, 1); `None` beyond the fold of the lens.
     fn to_pixel(self, p: Point2<f64>) -> Option<Point2<f64>> {
         let image = if self.distortion.is_none() {
             p
@@ -283,7 +259,7 @@ impl Camera {
     }
 
     /// Refuses a distortion that turns back before the farthest corner of the frame.
-    fn unfolded(self) -> Result<Self, CameraError> {
+    fn unfolded(self) -> Result<Self, QuantityError> {
         if self.distortion.is_none() {
             return Ok(self);
         }
@@ -323,7 +299,7 @@ impl Camera {
                         beyond = middle;
                     }
                 }
-                return Err(CameraError::Folds {
+                return Err(QuantityError::Folds {
                     radius_px: out(shown),
                 });
             }
@@ -332,9 +308,11 @@ impl Camera {
     }
 }
 
-/// The minor semi-axis b of a sphere's outline on the plane at unit depth, from the distance `m` of its centre from the axis and the mean
-/// `r` of both semi-axes: the root of b (1 + sqrt(1 + m² / (1 + b²))) = 2 r, whose left side rises with b. By Newton's method, and by
-/// bisection where that leads out of where the root must be.
+/// Returns the minor semi-axis b of a sphere's outline on the plane at unit depth, from the distance
+/// `m` of its centre from the axis and the mean `r` of both semi-axes.
+///
+/// It is the root of b (1 + sqrt(1 + m² / (1 + b²))) = 2 r, whose left side rises with b, by Newton's
+/// method, with bisection where a step leaves the bracket.
 fn minor_axis(m: f64, r: f64) -> f64 {
     let (mut low, mut high) = (2.0 * r / (1.0 + 1.0_f64.hypot(m)), r);
     let mut b = low;
@@ -360,23 +338,26 @@ fn minor_axis(m: f64, r: f64) -> f64 {
     b
 }
 
-/// The outline of a sphere on the plane at unit depth.
-pub(crate) fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse, ProjectionError> {
+/// Returns the outline of a sphere on the plane at unit depth.
+pub(crate) fn unit_outline(
+    centre: &Point3<f64>,
+    radius: f64,
+) -> Result<ProjectedEllipse, SightError> {
     if !(radius.is_finite() && radius > 0.0) {
-        return Err(ProjectionError::Radius { radius });
+        return Err(SightError::BallRadius { radius });
     }
     let distance2 = centre.coords.norm_squared();
     if !distance2.is_finite() {
-        return Err(ProjectionError::CentreNotFinite);
+        return Err(SightError::CentreNotFinite);
     }
     if distance2 <= radius * radius {
-        return Err(ProjectionError::Inside {
+        return Err(SightError::Inside {
             distance: distance2.sqrt(),
             radius,
         });
     }
     if centre.z <= radius {
-        return Err(ProjectionError::Behind {
+        return Err(SightError::Behind {
             depth: centre.z,
             radius,
         });
@@ -387,7 +368,7 @@ pub(crate) fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse,
     // cos²(alpha) - sin²(eta), above zero because the whole sphere is in front of the camera.
     let k = cos2_eta - sin2_alpha;
     let scale = centre.z / distance2 / k;
-    Ok(Ellipse {
+    Ok(ProjectedEllipse {
         centre: Point2::new(centre.x * scale, centre.y * scale),
         major: (sin2_alpha * (1.0 - sin2_alpha)).sqrt() / k,
         minor: (sin2_alpha / k).sqrt(),
@@ -399,28 +380,10 @@ pub(crate) fn unit_outline(centre: &Point3<f64>, radius: f64) -> Result<Ellipse,
     })
 }
 
-/// Refuses a frame without pixels, or with more than a renderer can hold.
-fn frame_size(width: u32, height: u32) -> Result<(), CameraError> {
+/// Refuses a frame without pixels, or one larger than a renderer can hold.
+fn frame_size(width: u32, height: u32) -> Result<(), QuantityError> {
     positive("frame width (px)", f64::from(width))?;
     positive("frame height (px)", f64::from(height))?;
-    if width.max(height) > Camera::LARGEST_SIDE {
-        return Err(CameraError::TooLarge { width, height });
-    }
-    Ok(())
-}
-
-fn positive(quantity: &'static str, value: f64) -> Result<(), CameraError> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(CameraError::NotPositive { quantity, value })
-    }
-}
-
-fn finite(quantity: &'static str, value: f64) -> Result<(), CameraError> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(CameraError::NotFinite { quantity, value })
-    }
+    let (side, most) = (width.max(height), Camera::LARGEST_SIDE);
+    at_most("frame side (px)", f64::from(side), f64::from(most))
 }

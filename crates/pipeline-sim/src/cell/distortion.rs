@@ -1,4 +1,4 @@
-//! Lens distortion, and how it is undone.
+//! Lens distortion and its inverse.
 
 use nalgebra::{Matrix2, Point2};
 
@@ -23,12 +23,12 @@ pub struct Distortion {
 }
 
 impl Distortion {
-    /// Whether this is the ideal pinhole.
+    /// Returns `true` for the ideal pinhole.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Where the lens shows what a pinhole would show at `p`.
+    /// Returns the place at which the lens shows the point that a pinhole shows at `p`.
     pub fn distort(&self, p: Point2<f64>) -> Point2<f64> {
         let (x, y) = (p.x, p.y);
         let s = x * x + y * y;
@@ -39,11 +39,11 @@ impl Distortion {
         )
     }
 
-    /// The inverse of [`Distortion::distort`]: what a pinhole would show where the lens shows `p`,
-    /// to about 1e-13 of its size.
+    /// Inverts [`Distortion::distort`], to about 1e-13 of the result.
     ///
-    /// By Newton's method; where that hesitates, followed outward from the axis, so that of several
-    /// answers it is the one before the lens folds. `None` if there is none, or `p` is not finite.
+    /// Newton's method; where it does not converge, it is continued outward from the axis in
+    /// stages, which finds the answer before the fold of the lens. `None` if there is none, or `p`
+    /// is not finite.
     pub fn undistort(&self, p: Point2<f64>) -> Option<Point2<f64>> {
         if self.is_none() {
             return Some(p);
@@ -56,7 +56,7 @@ impl Distortion {
         })
     }
 
-    /// As [`Distortion::undistort`], with the answer for a place nearby as a start.
+    /// Inverts [`Distortion::distort`] from the answer for a place nearby.
     pub(crate) fn undistort_near(
         &self,
         p: Point2<f64>,
@@ -66,8 +66,8 @@ impl Distortion {
             .or_else(|| self.undistort(p))
     }
 
-    /// Newton's method from `start`. It must come nearer with every step; where it does not, the
-    /// step is halved if `patient`, else that is the end of it.
+    /// Runs Newton's method from `start`. A step that does not reduce the error is halved if
+    /// `patient`, else the search ends.
     fn newton(&self, p: Point2<f64>, start: Point2<f64>, patient: bool) -> Option<Point2<f64>> {
         let (mut q, mut error) = (start, self.distort(start) - p);
         let enough = 1e-14 * (1.0 + p.coords.norm());
@@ -88,7 +88,7 @@ impl Distortion {
             });
             match nearer {
                 Some(nearer) => (q, error) = nearer,
-                // As near as numbers go.
+                // The limit of double precision.
                 None if error.norm() <= 10.0 * enough => break,
                 None => return None,
             }
@@ -97,12 +97,12 @@ impl Distortion {
         sound.then_some(q)
     }
 
-    /// Whether the lens has not folded the image over on the way from the axis to `p`: only such
+    /// Returns `true` if the lens does not fold the image over between the axis and `p`. Only such
     /// directions are shown.
     pub(crate) fn shows(&self, p: Point2<f64>) -> bool {
         let s = p.coords.norm_squared();
-        // How fast the radial part grows with the distance from the axis: never slower than at
-        // either end or where this itself turns.
+        // Growth of the radial part with the distance from the axis. Its least value is at an end
+        // or at a turning point.
         let growth = |s: f64| 1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3));
         let last = growth(s);
         if last.is_nan() || last <= 0.0 {
@@ -113,7 +113,7 @@ impl Distortion {
         let turns = [(-b + root) / (2.0 * a), (-b - root) / (2.0 * a), -c / b];
         let turns = turns.into_iter().filter(|turn| (0.0..s).contains(turn));
         let slowest = turns.map(growth).fold(last, f64::min);
-        // The tangential part changes that by no more than this.
+        // Greatest change of the growth by the tangential part.
         let tangential = 6.0 * self.p1.hypot(self.p2) * s.sqrt();
         if slowest.abs() >= tangential {
             return slowest > 0.0;
@@ -126,12 +126,12 @@ impl Distortion {
         })
     }
 
-    /// Derivatives of [`Distortion::distort`].
+    /// Returns the derivatives of [`Distortion::distort`].
     pub(crate) fn jacobian(&self, q: Point2<f64>) -> Matrix2<f64> {
         let (x, y) = (q.x, q.y);
         let s = x * x + y * y;
         let radial = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
-        // Of the radial factor by s, twice.
+        // Twice the derivative of the radial factor by s.
         let growth = 2.0 * (self.k1 + s * (2.0 * self.k2 + s * 3.0 * self.k3));
         let across = x * y * growth + 2.0 * (self.p1 * x + self.p2 * y);
         Matrix2::new(

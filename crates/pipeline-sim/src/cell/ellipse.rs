@@ -9,7 +9,7 @@ use nalgebra::Point2;
 /// downward).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Ellipse {
+pub struct ProjectedEllipse {
     /// Centre.
     pub centre: Point2<f64>,
     /// The longer semi-axis.
@@ -20,11 +20,11 @@ pub struct Ellipse {
     pub angle: f64,
 }
 
-/// Points on an outline at which moments are taken.
+/// Number of points on an outline at which moments are taken.
 const OUTLINE: usize = 256;
 
-impl Ellipse {
-    /// The circle of equal mean radius: same centre, radius the mean of the semi-axes.
+impl ProjectedEllipse {
+    /// Returns the circle with this centre and the mean of the semi-axes as radius.
     pub fn circle(&self) -> Circle {
         Circle {
             x: self.centre.x,
@@ -33,7 +33,7 @@ impl Ellipse {
         }
     }
 
-    /// The point of the outline at the eccentric angle `t`, radians from the longer axis.
+    /// Returns the point of the outline at the eccentric angle `t`, radians from the longer axis.
     pub fn point(&self, t: f64) -> Point2<f64> {
         let ((sin_t, cos_t), (sin, cos)) = (t.sin_cos(), self.angle.sin_cos());
         let (u, v) = (self.major * cos_t, self.minor * sin_t);
@@ -43,7 +43,7 @@ impl Ellipse {
         )
     }
 
-    /// Half the width and half the height of the upright box around the ellipse.
+    /// Returns half the width and half the height of the upright box around the ellipse.
     pub fn half_extent(&self) -> (f64, f64) {
         let (sin, cos) = self.angle.sin_cos();
         (
@@ -52,9 +52,9 @@ impl Ellipse {
         )
     }
 
-    /// The share of the outline, 0..=1, that lies inside a frame of `width` x `height` pixels,
-    /// whose border runs half a pixel outside the outer pixel centres; measured in the eccentric
-    /// angle, which for the nearly round outlines of balls is as good as the length.
+    /// Returns the fraction of the outline, 0..=1, that lies inside a frame of `width` x `height`
+    /// pixels, whose border runs half a pixel outside the outer pixel centres. It is measured in
+    /// the eccentric angle, which is close to the length for a nearly round outline.
     pub fn share_inside(&self, width: u32, height: u32) -> f64 {
         let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
         let (w, h) = self.half_extent();
@@ -87,8 +87,7 @@ impl Ellipse {
             (u + PI, beyond(y + 0.5, h)),
         ];
         let mut outside: f64 = arcs.iter().map(|arc| 2.0 * arc.1).sum();
-        // Only neighbouring borders have points of the outline in common: those beyond a corner of
-        // the frame.
+        // Points beyond a corner of the frame are counted for both of its borders.
         for i in 0..4 {
             let (a, b) = (arcs[i], arcs[(i + 1) % 4]);
             if a.1 > 0.0 && b.1 > 0.0 {
@@ -102,8 +101,8 @@ impl Ellipse {
         (1.0 - outside / TAU).clamp(0.0, 1.0)
     }
 
-    /// The ellipse with the area and second moments of a closed outline, given as a function of an
-    /// angle 0..2 pi. `None` if a point of it has no place in the image.
+    /// Returns the ellipse with the area and second moments of a closed outline, given as a function
+    /// of an angle 0..2 pi; `None` if a point of it has no pixel.
     pub(crate) fn of_outline(point: impl Fn(f64) -> Option<Point2<f64>>) -> Option<Self> {
         let mut points = [Point2::origin(); OUTLINE];
         for (i, place) in points.iter_mut().enumerate() {
@@ -130,8 +129,7 @@ impl Ellipse {
             myy / area - cy * cy,
         );
         let (mean, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
-        // A regular polygon has a little less spread than its circle; this makes an ellipse come
-        // out exactly.
+        // Corrects for the smaller spread of a polygon, so that an ellipse comes out exactly.
         let polygon = 3.0 / (2.0 + (TAU / OUTLINE as f64).cos());
         Some(Self {
             centre: Point2::new(origin.x + cx, origin.y + cy),
@@ -146,8 +144,8 @@ impl Ellipse {
 mod tests {
     use super::*;
 
-    /// The share inside, by counting.
-    fn counted(e: &Ellipse, width: u32, height: u32) -> f64 {
+    /// Counts the fraction inside.
+    fn counted(e: &ProjectedEllipse, width: u32, height: u32) -> f64 {
         let n = 20_000;
         let inside = |p: Point2<f64>| {
             (-0.5..=f64::from(width) - 0.5).contains(&p.x)
@@ -160,11 +158,11 @@ mod tests {
     }
 
     #[test]
-    fn the_share_inside_is_the_counted_one() {
+    fn share_inside_is_the_counted_one() {
         for i in 0..4000 {
             let f = |k: i32| f64::from(i * 7919 % (k * 97)) / f64::from(k * 97);
             let major = 3.0 + 140.0 * f(3);
-            let e = Ellipse {
+            let e = ProjectedEllipse {
                 centre: Point2::new(-30.0 + 160.0 * f(5), -30.0 + 130.0 * f(7)),
                 major,
                 minor: major * (0.4 + 0.6 * f(11)),

@@ -1,15 +1,15 @@
-//! How wrong a cell can be: the arm and the camera that one believes to have, and those one has.
+//! The differences between a believed cell and the real one.
 
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use puma_val2::{ArmError, Joints};
 use rand::{Rng, RngExt};
 
 use crate::cell::ball::Holder;
 use crate::cell::geometry::Cell;
-use crate::cell::mount::Mount;
-use crate::error::CameraError;
+use crate::error::{QuantityError, finite, positive};
 
 /// The ways in which a real cell differs from the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +38,11 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// Angles of one count of the PUMA 560's encoders, degrees.
+    /// Angle of one count of each of the PUMA 560's encoders, degrees.
     pub const PUMA_ENCODER_DEGREES: [f64; 6] =
         [0.00575, 0.00417, 0.00670, 0.00474, 0.00501, 0.00939];
 
-    /// A cell as it is believed to be.
+    /// Returns the errors of a cell that is as believed.
     pub fn none() -> Self {
         Self {
             focal_factor: 1.0,
@@ -58,14 +58,14 @@ impl Errors {
         }
     }
 
-    /// The true cell where `nominal` is the believed one. Backlash, encoder steps and noise belong
-    /// to the arm and the observation ([`crate::SimulatedArm::with_errors`],
-    /// [`crate::FeatureCamera`]).
+    /// Returns the true cell for the believed cell `nominal`. Backlash, encoder steps and noise
+    /// belong to the arm ([`SimulatedArm::with_errors`](crate::SimulatedArm::with_errors)) and the
+    /// observation ([`FeatureCamera`](crate::FeatureCamera)).
     ///
     /// # Errors
-    /// [`CameraError`] names the factor that is not above zero, or the angle or shift that is not
+    /// [`QuantityError`] names the factor that is not above zero, or the angle or shift that is not
     /// finite.
-    pub fn apply(&self, nominal: &Cell) -> Result<Cell, CameraError> {
+    pub fn apply(&self, nominal: &Cell) -> Result<Cell, QuantityError> {
         let [x, y, z] = self.camera_shift;
         for (quantity, value) in [
             ("roll of the camera (rad)", self.roll),
@@ -75,31 +75,25 @@ impl Errors {
             ("shift of the camera along its y axis (m)", y),
             ("shift of the camera along its z axis (m)", z),
         ] {
-            if !value.is_finite() {
-                return Err(CameraError::NotFinite { quantity, value });
-            }
+            finite(quantity, value)?;
         }
         let radius = nominal.ball.radius * self.radius_factor;
-        if !(radius.is_finite() && radius > 0.0) {
-            return Err(CameraError::NotPositive {
-                quantity: "radius of the ball (m)",
-                value: radius,
-            });
-        }
+        positive("radius of the ball (m)", radius)?;
         let unit = f64::from(nominal.camera.size().0) / hough_heuristic::Features::WIDTH;
         let principal = nominal.camera.principal_point()
-            + nalgebra::Vector2::new(self.centre_shift[0] * unit, self.centre_shift[1] * unit);
+            + Vector2::new(self.centre_shift[0] * unit, self.centre_shift[1] * unit);
         let mut cell = *nominal;
         cell.camera = nominal
             .camera
             .with_focal_factor(self.focal_factor)?
             .with_principal_point(principal)?;
-        cell.mount = Mount::displaced(
-            &nominal.mount,
-            self.camera_shift,
-            self.roll,
-            self.pitch,
-            self.yaw,
+        // Shifted along the camera's own axes, then turned in place.
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), self.yaw)
+            * Rotation3::from_axis_angle(&Vector3::x_axis(), self.pitch)
+            * Rotation3::from_axis_angle(&Vector3::z_axis(), self.roll);
+        cell.mount *= Isometry3::from_parts(
+            Translation3::from(self.camera_shift),
+            UnitQuaternion::from_rotation_matrix(&turn),
         );
         cell.ball.radius = radius;
         if nominal
@@ -113,7 +107,7 @@ impl Errors {
 }
 
 impl Errors {
-    /// Whether an arm can have this play and these encoders.
+    /// Checks that an arm can have this play and these encoders.
     ///
     /// # Errors
     /// [`ArmError::Setting`] names the quantity that is not finite, or below zero.
@@ -128,7 +122,6 @@ impl Errors {
         ];
         let steps = STEPS.into_iter().zip(self.encoder_step);
         for (what, value) in steps.chain([("the backlash", self.backlash)]) {
-            // A turn and more could not be told from none.
             if !(0.0..=std::f64::consts::PI).contains(&value) {
                 return Err(ArmError::Setting {
                     what,
@@ -147,7 +140,7 @@ impl Default for Errors {
     }
 }
 
-/// How wrong a cell is, in four measures.
+/// Size of the errors of a cell.
 ///
 /// | level | focal length | roll, pitch, yaw | backlash | noise | ball | camera | principal point |
 /// |---|---|---|---|---|---|---|---|
@@ -156,12 +149,12 @@ impl Default for Errors {
 /// | heavy | 25 % | 8 deg | 0.6 deg | 1 unit | 10 % | 20 mm each axis | 5 units |
 /// | extreme | 40 % | 15 deg | 1 deg | 1.5 units | 20 % | 20 mm each axis | 5 units |
 ///
-/// Each quantity is off by the full amount, with a sign drawn at random. All levels but `none` have
-/// the encoder steps of a PUMA 560.
+/// Each quantity is off by the full amount, with a random sign. All levels but `none` have the
+/// encoder steps of a PUMA 560.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ErrorLevel {
-    /// As believed.
+    /// No errors.
     None,
     /// A cell set up with care, without calibration.
     Moderate,
@@ -212,30 +205,20 @@ impl fmt::Display for ErrorLevel {
 }
 
 impl FromStr for ErrorLevel {
-    type Err = UnknownName;
+    type Err = QuantityError;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         Self::ALL
             .into_iter()
             .find(|level| level.to_string() == name)
-            .ok_or_else(|| UnknownName {
+            .ok_or_else(|| QuantityError::Name {
                 name: name.to_owned(),
-                known: "none, moderate, heavy, extreme",
+                known: "none, moderate, heavy, extreme".to_owned(),
             })
     }
 }
 
-/// A name that stands for nothing.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown name {name:?}; known are {known}")]
-pub struct UnknownName {
-    /// What was given.
-    pub name: String,
-    /// What would have been known.
-    pub known: &'static str,
-}
-
-/// Motors and gears: where the arm reports to be, and where its links are.
+/// Motors and gears: the reported joint angles, and those of the links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Drive {
     backlash: f64,
@@ -258,18 +241,18 @@ impl Drive {
         drive
     }
 
-    /// What the encoders say.
+    /// Returns the angles that the encoders report.
     pub(crate) fn reported(&self) -> Joints {
         self.reported
     }
 
-    /// Where the links are, within the play of the gears.
+    /// Returns the angles of the links, within the play of the gears.
     pub(crate) fn links(&self) -> Joints {
         self.links
     }
 
-    /// Turns the motors to the counts nearest to `target`; the links follow as soon as the play is
-    /// used up.
+    /// Turns the motors to the counts nearest to `target`; the links follow once the play is used
+    /// up.
     pub(crate) fn send(&mut self, target: Joints) {
         let half = 0.5 * self.backlash;
         for i in 0..6 {

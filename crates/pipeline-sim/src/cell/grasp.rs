@@ -1,51 +1,35 @@
-//! Touching the ball: gripping it, carrying it, pushing it.
+//! Contact of hand and ball: gripping, carrying, pushing.
 
-use hough_heuristic::Features;
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joints, PumaParams};
 
 use crate::cell::ball::Holder;
 use crate::cell::geometry::Cell;
 
-/// What closing the jaws came to.
+/// The result of closing the jaws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Grasp {
-    /// The ball is between the pads and goes where the hand goes.
+    /// The ball is between the pads and moves with the hand.
     Held,
-    /// The pads caught the ball beside its middle and squeezed it out; it moved by this much.
+    /// The pads caught the ball beside its middle and squeezed it out.
     Pushed {
-        /// Metres.
+        /// Distance the ball moved, metres.
         by: f64,
     },
     /// There was no ball between the jaws.
     Missed,
 }
 
-/// What a move of the hand did to the ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Contact {
-    /// Nothing.
-    Free,
-    /// The ball is in the jaws and came along.
-    Carried,
-    /// Finger, palm or camera pushed the ball aside.
-    Pushed {
-        /// Metres.
-        by: f64,
-    },
-}
-
 impl Cell {
     /// Closes the jaws with the arm at `joints`.
     ///
-    /// The jaws open along the hand's y axis. Held: the ball's middle lies between the jaws and
-    /// within [`crate::Hand::pad_tolerance`] of the pads' middle across them; the jaws then pull it
-    /// to the middle. Pushed: it lies between the jaws but farther out than that, so that the pads
-    /// slide off and press it away along the table until they miss it. Missed: otherwise, and
-    /// always for a ball that is wider than the jaws open and for jaws that were closed before; the
-    /// ball stays.
+    /// The jaws open along the hand's y axis. [`Grasp::Held`]: the ball's middle lies between the
+    /// jaws and within [`HandShape::pad_tolerance`](crate::HandShape::pad_tolerance) of the pads'
+    /// middle across them; the jaws pull it to the middle. [`Grasp::Pushed`]: it lies between the
+    /// jaws but farther out, and the pads press it away along the table until they miss it.
+    /// [`Grasp::Missed`]: otherwise, and always for a ball wider than the open jaws and for jaws
+    /// that were closed already; the ball stays.
     pub fn close_gripper(&mut self, joints: &Joints) -> Grasp {
         if self.held.is_some() {
             self.jaws = Gripper::Closed;
@@ -77,8 +61,8 @@ impl Cell {
         Grasp::Pushed { by }
     }
 
-    /// Opens the jaws. A ball that they held falls straight down, onto its holder if that is below,
-    /// else onto the table, beside the holder if need be.
+    /// Opens the jaws. A held ball falls straight down, onto its holder if that is below, else onto
+    /// the table; it slides off the side of a holder.
     pub fn open_gripper(&mut self) {
         self.jaws = Gripper::Open;
         if self.held.take().is_none() {
@@ -94,7 +78,6 @@ impl Cell {
             }
             holder => {
                 ball.centre.z = self.table + ball.radius;
-                // It cannot lie where the holder stands: it slides off.
                 let Some(h) = holder else { return };
                 let aside = ball.centre.xy() - h.foot;
                 let missing = h.radius + ball.radius - aside.norm();
@@ -105,19 +88,17 @@ impl Cell {
         }
     }
 
-    /// Lets the ball follow the hand, now at `joints`: a held ball comes along; one that finger,
-    /// palm or camera overlap is pushed aside, holder and all, until they only touch.
-    ///
-    /// Call it after every move (and along the way for long moves, which [`Cell::sweep`] does);
-    /// [`crate::SimulatedArm`] does.
-    pub fn follow(&mut self, joints: &Joints) -> Contact {
+    /// Moves the ball with the hand, now at `joints`, and returns the distance it was pushed: a held
+    /// ball moves along; one that finger, palm or camera overlap is pushed aside with its holder
+    /// until they only touch.
+    fn follow(&mut self, joints: &Joints) -> f64 {
         if let Some(place) = self.held {
             self.ball.centre = self.params.wrist(joints) * place;
-            return Contact::Carried;
+            return 0.0;
         }
         let start = self.ball.centre;
         let bodies = self.hand_bodies(joints);
-        // Pushing it off one body may push it into another; a few rounds settle that.
+        // Pushing it off one body may push it into another.
         for _ in 0..8 {
             let centre = self.ball.centre;
             let deepest = bodies
@@ -142,25 +123,22 @@ impl Cell {
                 .max(0.25);
             self.slide_ball(aside * (-gap / slant));
         }
-        let by = (self.ball.centre - start).norm();
-        if by > 0.0 {
-            Contact::Pushed { by }
-        } else {
-            Contact::Free
-        }
+        (self.ball.centre - start).norm()
     }
 
-    /// As [`Cell::follow`], for a hand that goes from one pose to another with all joints in step:
-    /// the ball follows along the way, at most 0.02 rad of a joint at a time.
-    pub fn sweep(&mut self, from: &Joints, to: &Joints) -> Contact {
-        /// Greatest joint step between two looks for contact on the way, radians.
+    /// Moves the hand from one pose to another, all joints in step, and the ball with it; returns
+    /// how far the ball was pushed, metres.
+    ///
+    /// A held ball moves with the hand. One that finger, palm or camera run into is pushed aside
+    /// along the table, with its holder if it stands on it.
+    pub fn sweep(&mut self, from: &Joints, to: &Joints) -> f64 {
+        /// Greatest joint step between two checks for contact on the way, radians.
         const STEP: f64 = 0.02;
         if self.held.is_some() {
             return self.follow(to);
         }
-        // Too far away to meet: no point of the wrist's way is farther from the nearer of its ends
-        // than half the way is long, and no part of the hand farther from the wrist than it
-        // reaches.
+        // Too far away to meet: the wrist's path stays within half its length of the nearer end,
+        // and the hand within its reach of the wrist.
         let wrist_at = |joints: &Joints| self.params.wrist(joints).translation.vector;
         let (start, end) = (wrist_at(from), wrist_at(to));
         let bodies = self.hand_bodies(from);
@@ -183,7 +161,7 @@ impl Cell {
         if (ball - start).norm().min((ball - end).norm())
             > hand + self.ball.radius + 0.5 * arm * way
         {
-            return Contact::Free;
+            return 0.0;
         }
         let steps = (turned / STEP).ceil().clamp(1.0, 1000.0) as usize;
         let (before, mut pushed) = (self.ball.centre, false);
@@ -192,14 +170,12 @@ impl Cell {
             let pose = Joints(std::array::from_fn(|j| {
                 from.0[j] + t * (to.0[j] - from.0[j])
             }));
-            pushed |= matches!(self.follow(&pose), Contact::Pushed { .. });
+            pushed |= self.follow(&pose) > 0.0;
         }
         if pushed {
-            Contact::Pushed {
-                by: (self.ball.centre - before).norm(),
-            }
+            (self.ball.centre - before).norm()
         } else {
-            Contact::Free
+            0.0
         }
     }
 
@@ -211,35 +187,18 @@ impl Cell {
             *foot += by.xy();
         }
     }
-
-    /// Pushes the ball along the camera's line of sight until it shows with radius `r` units:
-    /// nearer for a greater r. The holder comes along. Returns whether such a place exists above
-    /// the table.
-    pub fn push_to_radius(&mut self, joints: &Joints, r: f64) -> bool {
-        let Some(outline) = self.outline(joints) else {
-            return false;
-        };
-        let now = Features::from_circle(&outline.circle(), self.camera.size().0);
-        match self.ball_showing(joints, &Features { r, ..now }) {
-            Some(place) if place.z > self.table + self.ball.radius => {
-                self.place_ball(place);
-                true
-            }
-            _ => false,
-        }
-    }
 }
 
-/// The horizontal direction, and how far along it, a ball must go to be `reach` away from the pads'
-/// middle; `across` is how it lies to it now in the hand's frame, without the part along the jaws.
+/// Returns the horizontal direction in which a ball leaves the pads, and the distance to go until it
+/// is `reach` away from their middle; `across` is its offset from there in the hand frame, without
+/// the part along the jaws.
 fn way_out(
     wrist: &Isometry3<f64>,
     across: &Vector3<f64>,
     reach: f64,
 ) -> Option<(Vector3<f64>, f64)> {
     let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0);
-    // Straight away if that is not straight down or up; else along whichever axis of the hand is
-    // the more level.
+    // Straight away unless that is nearly vertical; else along the more level axis of the hand.
     let axes = [Vector3::x(), Vector3::z()].map(|axis| level(wrist * axis));
     let away = level(wrist * across);
     let aside = if away.norm() > 0.1 * across.norm() {

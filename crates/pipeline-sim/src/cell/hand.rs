@@ -1,22 +1,21 @@
-//! The gripper and the camera as bodies: how near they come to things.
+//! The gripper and the camera as bodies, and their distances from things.
 
 use nalgebra::{Isometry3, Point3};
 
-/// A segment with a thickness: how fingers, palm, camera and rods are modelled.
+/// A segment with a radius: the model of fingers, palm, camera and rods.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Capsule {
+pub(crate) struct Capsule {
     /// One end of the axis, metres.
-    pub from: Point3<f64>,
+    pub(crate) from: Point3<f64>,
     /// The other end, metres.
-    pub to: Point3<f64>,
+    pub(crate) to: Point3<f64>,
     /// Radius, metres.
-    pub radius: f64,
+    pub(crate) radius: f64,
 }
 
 impl Capsule {
-    /// The capsule moved by `pose`.
-    pub fn moved(&self, pose: &Isometry3<f64>) -> Self {
+    /// Returns the capsule moved by `pose`.
+    pub(crate) fn moved(&self, pose: &Isometry3<f64>) -> Self {
         Self {
             from: pose * self.from,
             to: pose * self.to,
@@ -24,8 +23,8 @@ impl Capsule {
         }
     }
 
-    /// The point of the axis that is nearest to `point`.
-    pub fn nearest_axis_point(&self, point: &Point3<f64>) -> Point3<f64> {
+    /// Returns the point of the axis that is nearest to `point`.
+    pub(crate) fn nearest_axis_point(&self, point: &Point3<f64>) -> Point3<f64> {
         let along = self.to - self.from;
         let length2 = along.norm_squared();
         let t = if length2 > 0.0 {
@@ -36,13 +35,13 @@ impl Capsule {
         self.from + along * t
     }
 
-    /// Gap between the surface and a sphere, metres; below zero if they overlap.
-    pub fn gap_to_sphere(&self, centre: &Point3<f64>, radius: f64) -> f64 {
+    /// Returns the gap to a sphere, metres; below zero if they overlap.
+    pub(crate) fn gap_to_sphere(&self, centre: &Point3<f64>, radius: f64) -> f64 {
         (self.nearest_axis_point(centre) - centre).norm() - self.radius - radius
     }
 
-    /// Gap between the surfaces of two capsules, metres; below zero if they overlap.
-    pub fn gap_to(&self, other: &Self) -> f64 {
+    /// Returns the gap to another capsule, metres; below zero if they overlap.
+    pub(crate) fn gap_to(&self, other: &Self) -> f64 {
         // Axes as p(s) = from + s u and q(t) = from' + t v with s, t in 0..1. The squared distance
         // is a convex quadratic: its minimum is where both lines are nearest to each other, if that
         // is on both segments, else on one of the four ends.
@@ -73,8 +72,8 @@ impl Capsule {
         ends.into_iter().fold(between, f64::min) - self.radius - other.radius
     }
 
-    /// Gap above the horizontal plane at `height`, metres.
-    pub fn gap_to_plane(&self, height: f64) -> f64 {
+    /// Returns the gap above the horizontal plane at `height`, metres.
+    pub(crate) fn gap_to_plane(&self, height: f64) -> f64 {
         self.from.z.min(self.to.z) - self.radius - height
     }
 }
@@ -85,14 +84,14 @@ impl Capsule {
 /// Lengths in metres, in the hand frame (origin at the wrist centre, z along the tool axis).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Hand {
-    /// From the flange to the tool point between the finger pads, along z.
+pub struct HandShape {
+    /// Distance from the flange to the tool point between the finger pads, along z.
     pub tool: f64,
-    /// How far the finger tips reach past the tool point.
+    /// Distance of the finger tips past the tool point.
     pub beyond_tool: f64,
     /// Radius of a finger.
     pub finger_radius: f64,
-    /// From the tool axis to the axis of each open finger.
+    /// Distance from the tool axis to the axis of each open finger.
     pub half_opening: f64,
     /// Radius of the palm that carries the fingers.
     pub palm_radius: f64,
@@ -100,16 +99,16 @@ pub struct Hand {
     pub finger_length: f64,
     /// Radius of the camera's body.
     pub camera_radius: f64,
-    /// How far the lens reaches past the centre of projection.
+    /// Distance of the lens past the centre of projection.
     pub lens: f64,
     /// Reach of the proximity sensors.
     pub sensor_range: f64,
-    /// How far from the middle of the pads, across the jaws, a ball may be and still be held.
+    /// Greatest distance from the middle of the pads, across the jaws, at which a ball is held.
     pub pad_tolerance: f64,
 }
 
-impl Hand {
-    /// The gripper used throughout: tool point 126 mm beyond the flange (`TOOL` z = 126).
+impl HandShape {
+    /// Returns the gripper used throughout: tool point 126 mm beyond the flange (`TOOL` z = 126).
     pub fn paper() -> Self {
         Self {
             tool: 0.126,
@@ -125,9 +124,9 @@ impl Hand {
         }
     }
 
-    /// The two fingers in the hand frame, jaws `half_opening` metres off the tool axis; `flange` is
-    /// the distance from the wrist centre to the flange.
-    pub fn fingers(&self, flange: f64, half_opening: f64) -> [Capsule; 2] {
+    /// Returns the two fingers in the hand frame, `half_opening` metres off the tool axis; `flange`
+    /// is the distance from the wrist centre to the flange.
+    pub(crate) fn fingers(&self, flange: f64, half_opening: f64) -> [Capsule; 2] {
         let tip = flange + self.tool + self.beyond_tool;
         [half_opening, -half_opening].map(|y| Capsule {
             from: Point3::new(0.0, y, tip - self.finger_length),
@@ -136,8 +135,8 @@ impl Hand {
         })
     }
 
-    /// The palm in the hand frame.
-    pub fn palm(&self, flange: f64) -> Capsule {
+    /// Returns the palm in the hand frame.
+    pub(crate) fn palm(&self, flange: f64) -> Capsule {
         let front = flange + self.tool + self.beyond_tool - self.finger_length;
         Capsule {
             from: Point3::new(0.0, 0.0, 0.0),
@@ -146,8 +145,8 @@ impl Hand {
         }
     }
 
-    /// The camera's body in the *camera* frame.
-    pub fn camera_body(&self) -> Capsule {
+    /// Returns the camera's body in the *camera* frame.
+    pub(crate) fn camera_body(&self) -> Capsule {
         Capsule {
             from: Point3::new(0.0, 0.0, -0.060),
             to: Point3::new(0.0, 0.0, self.lens - self.camera_radius),
@@ -156,7 +155,7 @@ impl Hand {
     }
 }
 
-impl Default for Hand {
+impl Default for HandShape {
     fn default() -> Self {
         Self::paper()
     }
@@ -168,8 +167,7 @@ mod tests {
     use rand::rngs::Xoshiro256PlusPlus;
     use rand::{RngExt, SeedableRng};
 
-    /// The gap by trying places on both axes, finer and finer about the best: the distance is
-    /// convex.
+    /// Searches places on both axes, finer and finer about the best: the distance is convex.
     fn tried(a: &Capsule, b: &Capsule) -> f64 {
         let at = |c: &Capsule, t: f64| c.from + (c.to - c.from) * t;
         let ((mut s, mut t), mut width) = ((0.5, 0.5), 0.5);
@@ -194,14 +192,14 @@ mod tests {
     }
 
     #[test]
-    fn the_gap_between_capsules_is_the_least_there_is() {
+    fn gap_between_capsules_is_the_least_distance() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let mut point = |reach: f64| {
             let mut draw = || rng.random_range(-reach..reach);
             Point3::new(draw(), draw(), draw())
         };
         for k in 0..600 {
-            // Among them nearly parallel ones and rods that are points.
+            // Some are nearly parallel, some are points.
             let spread = [0.05, 1e-4, 0.0][k % 3];
             let (from, along) = (point(0.1), point(0.1).coords);
             let a = Capsule {

@@ -1,56 +1,16 @@
-//! The fewest moves that lead to the goal: the yardstick for every controller.
+//! The fewest moves that lead to a goal: a lower bound for every controller.
 
 use hough_heuristic::Features;
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{JointDelta, Joints};
 
 use crate::cell::geometry::Cell;
-use crate::cell::moves::MoveLists;
 use crate::error::QuantityError;
 use crate::error::{ascending, finite};
 
-/// Intervals of the image features in which the goal is reached, both ends included, feature units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct GoalBox {
-    /// Least and greatest x.
-    pub x: (f64, f64),
-    /// Least and greatest y.
-    pub y: (f64, f64),
-    /// Least and greatest r.
-    pub r: (f64, f64),
-}
-
-impl GoalBox {
-    /// The goal of the paper's rewards (equations 5 and 6): x 99..108, y 74..82, r 32..34.
-    pub fn paper() -> Self {
-        Self {
-            x: (99.0, 108.0),
-            y: (74.0, 82.0),
-            r: (32.0, 34.0),
-        }
-    }
-
-    /// Whether x is in its interval: the goal of centring.
-    pub fn centred(&self, features: &Features) -> bool {
-        (self.x.0..=self.x.1).contains(&features.x)
-    }
-
-    /// Whether y and r are in their intervals: the goal of approaching.
-    pub fn approached(&self, features: &Features) -> bool {
-        (self.y.0..=self.y.1).contains(&features.y) && (self.r.0..=self.r.1).contains(&features.r)
-    }
-}
-
-impl Default for GoalBox {
-    fn default() -> Self {
-        Self::paper()
-    }
-}
-
-/// Joint angles reached by listed moves lie on a grid of this many degrees around the start.
+/// Spacing of the grid of joint angles around the start, degrees.
 const GRID_DEGREES: f64 = 0.1;
 
-/// What stands at a joint pose; looked up once.
+/// The state of a joint pose; evaluated once.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
     Unknown,
@@ -60,87 +20,19 @@ enum Place {
 }
 
 impl Cell {
-    /// The fewest moves of `JT2` and `JT3` together, from the lists of `moves`, that lead from
-    /// `start` to the goal in y and r, by breadth-first search ([`Cell::fewest_moves`]); 0 if
-    /// `start` is there already. `JT1` is first turned so that the ball lies between the jaws:
-    /// turning the arm about its waist changes neither y nor r of the task, so this is the optimum
-    /// of the approach alone.
+    /// Returns the fewest of the given moves that lead from `start` to a pose for which `reached`
+    /// returns `true`, by breadth-first search; 0 if `start` is one. The ball stays in sight and the
+    /// arm within its working limits after every move. Moves are rounded to a tenth of a degree and
+    /// may turn one or two joints.
     ///
-    /// `None` as for [`Cell::fewest_moves`].
-    ///
-    /// # Errors
-    /// As for [`Cell::fewest_moves`].
-    pub fn fewest_reaching_moves(
-        &self,
-        start: &Joints,
-        moves: &MoveLists,
-        goal: &GoalBox,
-        most: u32,
-    ) -> Result<Option<u32>, QuantityError> {
-        let mut turned = *start;
-        if let Some(pose) = self.goal_pose(start[Joint::J5].to_degrees()) {
-            turned.0[0] = pose.0[0];
-        }
-        let pairs = moves
-            .jt2
-            .iter()
-            .flat_map(|d2| moves.jt3.map(|d3| (*d2, d3)));
-        let deltas: Vec<JointDelta> = pairs
-            .map(|(d2, d3)| JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]))
-            .collect();
-        // The ball must be in sight before the waist is turned, too.
-        if start.non_finite().is_none() && self.features(start).is_none() {
-            return Grid::new(self, start, &deltas).map(|_| None);
-        }
-        self.breadth_first(&turned, &deltas, |f, _| goal.approached(f), most)
-    }
-
-    /// The fewest moves of `JT1` from the list of `moves` that bring the ball into the goal's
-    /// interval of x, as [`Cell::fewest_reaching_moves`] does for y and r.
-    ///
-    /// # Errors
-    /// As for [`Cell::fewest_moves`].
-    pub fn fewest_centring_moves(
-        &self,
-        start: &Joints,
-        moves: &MoveLists,
-        goal: &GoalBox,
-        most: u32,
-    ) -> Result<Option<u32>, QuantityError> {
-        let deltas = moves
-            .jt1
-            .map(|d1| JointDelta::from_degrees([d1, 0.0, 0.0, 0.0, 0.0, 0.0]));
-        self.fewest_moves(start, &deltas, |f, _| goal.centred(f), most)
-    }
-
-    /// The fewest of the given moves that lead from `start` to a pose that `reached` calls the
-    /// goal, by breadth-first search; 0 if `start` is one. The ball is kept in sight and the arm
-    /// within its working limits after every move. Moves are taken to the nearest tenth of a
-    /// degree, and may turn one or two joints.
-    ///
-    /// `None` if the ball is out of sight at `start` or the arm out of its limits, no way leads to
-    /// the goal, or it takes more than `most` moves.
+    /// `None` if the ball is out of sight at `start` or the arm out of its limits, if there is no
+    /// way to the goal, or if it takes more than `most` moves.
     ///
     /// # Errors
     /// [`QuantityError`]: a ball's place, angles of `start`, of a move, or of the working limits
     /// that are not finite; limits the wrong way round or more than three turns apart; moves that
     /// turn more than two joints.
     pub fn fewest_moves(
-        &self,
-        start: &Joints,
-        moves: &[JointDelta],
-        reached: impl Fn(&Features, &Joints) -> bool,
-        most: u32,
-    ) -> Result<Option<u32>, QuantityError> {
-        if start.non_finite().is_none() && self.features(start).is_none() {
-            // Nothing to look for, but what cannot be searched is still to be named.
-            return Grid::new(self, start, moves).map(|_| None);
-        }
-        self.breadth_first(start, moves, reached, most)
-    }
-
-    /// As [`Cell::fewest_moves`], whether or not the ball is in sight at the start.
-    fn breadth_first(
         &self,
         start: &Joints,
         moves: &[JointDelta],
@@ -154,13 +46,15 @@ impl Cell {
         let look = |at: (i64, i64)| {
             let pose = grid.pose(at);
             match self.features(&pose) {
-                Some(f) if reached(&f, &pose) => Place::Goal,
-                Some(_) => Place::Open,
-                None => Place::Barred,
+                Ok(f) if reached(&f, &pose) => Place::Goal,
+                Ok(_) => Place::Open,
+                Err(_) => Place::Barred,
             }
         };
-        if look((0, 0)) == Place::Goal {
-            return Ok(Some(0));
+        match look((0, 0)) {
+            Place::Goal => return Ok(Some(0)),
+            Place::Barred => return Ok(None),
+            _ => {}
         }
         let mut places = vec![Place::Unknown; grid.len()];
         if let Some(place) = grid.index((0, 0)) {
@@ -183,7 +77,7 @@ impl Cell {
                         Place::Open => next.push(to),
                         _ => {}
                     }
-                    // Visited or of no use: either way never again.
+                    // Visited, or of no use.
                     *place = Place::Barred;
                 }
             }
@@ -197,14 +91,14 @@ impl Cell {
     }
 }
 
-/// The poses around a start that moves of one or two joints can lead to, within the working limits.
+/// The poses that moves of one or two joints can lead to, within the working limits.
 struct Grid {
     start: Joints,
-    /// The joints that move; the second may stand still.
+    /// Joints that move; the second may stand still.
     joints: [usize; 2],
     /// Least and greatest number of steps of each.
     spans: [(i64, i64); 2],
-    /// The moves, in steps.
+    /// Moves, in steps.
     moves: Vec<(i64, i64)>,
 }
 
@@ -238,7 +132,7 @@ impl Grid {
         let step = GRID_DEGREES.to_radians();
         let mut spans = [(0, 0); 2];
         for (span, joint) in spans.iter_mut().zip(&moving) {
-            let (low, high) = (cell.limits.min[*joint], cell.limits.max[*joint]);
+            let (low, high) = cell.limits[*joint];
             ascending("the working limits of a joint (rad)", (low, high))?;
             if high - low > 3.0 * std::f64::consts::TAU {
                 return Err(QuantityError::Range {
@@ -248,7 +142,7 @@ impl Grid {
                 });
             }
             let here = start.0[*joint];
-            // A start outside the limits has no grid; it is refused before one is looked at.
+            // A start outside the limits is refused before the grid is used.
             *span = (
                 -(((here - low) / step + 1e-6).floor().max(0.0) as i64),
                 ((high - here) / step + 1e-6).floor().max(0.0) as i64,
@@ -261,7 +155,7 @@ impl Grid {
         let joints = [at(0).unwrap_or(0), at(1).or(at(0)).unwrap_or(0)];
         let in_steps = |m: &JointDelta, k: usize| {
             at(k).map_or(0, |joint| {
-                // No move is longer than the widest span; what is, leads nowhere either way.
+                // A move longer than the widest span leads nowhere.
                 (m.0[joint] / step).round().clamp(-1e6, 1e6) as i64
             })
         };
@@ -291,7 +185,7 @@ impl Grid {
         size(self.spans[0]) * size(self.spans[1])
     }
 
-    /// Position in a list of all places; `None` outside the working limits.
+    /// Returns the position in a list of all places; `None` outside the working limits.
     fn index(&self, (i, j): (i64, i64)) -> Option<usize> {
         let [(low_i, high_i), (low_j, high_j)] = self.spans;
         let inside = (low_i..=high_i).contains(&i) && (low_j..=high_j).contains(&j);

@@ -1,4 +1,4 @@
-//! Where balls lie, and the poses from which the arm looks for them.
+//! The region in which balls lie, and the poses from which the arm searches for them.
 
 use puma_val2::Joints;
 use rand::{Rng, RngExt};
@@ -25,7 +25,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// The workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70 degrees, 200
+    /// Returns the workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70 degrees, 200
     /// mm below to 50 mm above the shoulder; search poses (p, -110, 210, 0, 45, 0) with p from -75
     /// to 50 in steps of 25 degrees.
     pub fn paper() -> Self {
@@ -38,14 +38,14 @@ impl Workspace {
         }
     }
 
-    /// The six starting poses of the target search (section 2.2 of the paper).
+    /// Returns the six starting poses of the target search (section 2.2 of the paper).
     pub fn search_poses(&self) -> [Joints; 6] {
         let jt5 = Cell::REACHING_JT5_DEGREES.to_radians();
         self.search_pans
             .map(|pan| Joints([pan, self.search_elbow.0, self.search_elbow.1, 0.0, jt5, 0.0]))
     }
 
-    /// Whether balls can lie in this workspace.
+    /// Checks that balls can lie in this workspace.
     ///
     /// # Errors
     /// [`QuantityError`] names the range that is not finite and ascending (a distance from the
@@ -73,9 +73,8 @@ impl Workspace {
         }
     }
 
-    /// A ball somewhere in the workspace, uniform in volume. In a workspace that
-    /// [`Workspace::check`] refuses, a ball nowhere: its coordinates are not numbers, and no camera
-    /// sees it.
+    /// Draws a ball in the workspace, uniform in volume. Its coordinates are NaN in a workspace that
+    /// [`Workspace::check`] refuses.
     pub fn sample_ball<R: Rng + ?Sized>(&self, rng: &mut R) -> Ball {
         if self.check().is_err() {
             return Ball::at(f64::NAN, f64::NAN, f64::NAN);
@@ -88,8 +87,8 @@ impl Workspace {
         Ball::at(rho * azimuth.cos(), rho * azimuth.sin(), z)
     }
 
-    /// A ball that at least one of the search poses sees in `cell` (93 % of all balls are), and the
-    /// first such pose.
+    /// Draws a ball that at least one of the search poses sees in `cell` (93 % of all balls), and
+    /// returns it with the first such pose.
     ///
     /// `None` if 10 000 balls in a row cannot be seen (a camera that does not see the workspace),
     /// and in a workspace that [`Workspace::check`] refuses.
@@ -103,69 +102,14 @@ impl Workspace {
         (0..10_000).find_map(|_| {
             let ball = self.sample_ball(rng);
             let cell = Cell { ball, ..*cell };
-            let pose = poses.iter().find(|pose| cell.circle(pose).is_some())?;
+            let pose = poses.iter().find(|pose| cell.circle(pose).is_ok())?;
             Some((ball, *pose))
         })
-    }
-
-    /// Which share of the workspace the search poses see, and which share of that can be reached,
-    /// from `samples` random balls.
-    pub fn coverage<R: Rng + ?Sized>(&self, cell: &Cell, samples: usize, rng: &mut R) -> Coverage {
-        let poses = self.search_poses();
-        let mut coverage = Coverage {
-            samples,
-            seen: 0,
-            seen_and_reachable: 0,
-            reachable: 0,
-            by_pose: [0; 6],
-        };
-        for _ in 0..samples {
-            let cell = Cell {
-                ball: self.sample_ball(rng),
-                ..*cell
-            };
-            let sights = poses.map(|pose| cell.circle(&pose).is_some());
-            let (seen, reachable) = (sights.contains(&true), cell.reachable());
-            coverage.seen += usize::from(seen);
-            coverage.reachable += usize::from(reachable);
-            coverage.seen_and_reachable += usize::from(seen && reachable);
-            for (count, sight) in coverage.by_pose.iter_mut().zip(sights) {
-                *count += usize::from(sight);
-            }
-        }
-        coverage
     }
 }
 
 impl Default for Workspace {
     fn default() -> Self {
         Self::paper()
-    }
-}
-
-/// Counts of balls, from [`Workspace::coverage`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Coverage {
-    /// Balls tried.
-    pub samples: usize,
-    /// Seen from at least one search pose.
-    pub seen: usize,
-    /// Within reach of the goal pose.
-    pub reachable: usize,
-    /// Both.
-    pub seen_and_reachable: usize,
-    /// Seen from each pose.
-    pub by_pose: [usize; 6],
-}
-
-impl Coverage {
-    /// Share of the workspace that the search poses see; NaN without samples.
-    pub fn seen_share(&self) -> f64 {
-        self.seen as f64 / self.samples as f64
-    }
-
-    /// Share of the seen balls that can be reached; NaN if none is seen.
-    pub fn reachable_share(&self) -> f64 {
-        self.seen_and_reachable as f64 / self.seen as f64
     }
 }

@@ -1,4 +1,6 @@
-//! Recipes of scenes and snapshots by kind of difficulty, drawn from a seed.
+//! Recipes of labelled frames by kind of difficulty, drawn from a seed.
 
-pub(crate) mod benchmark_kind;
-pub(crate) mod scene_kind;
+pub(crate) mod recipe;
+pub(crate) mod snapshot;
+mod stage;
+mod things;

@@ -1,4 +1,5 @@
-//! Simulated devices: a camera that delivers frames, an arm that moves, sensors, a video file.
+//! Simulated devices: a camera that delivers frames, an arm that moves, sensors.
 
-pub(crate) mod source;
-pub(crate) mod y4m;
+pub(crate) mod arm;
+pub(crate) mod camera;
+pub(crate) mod shared_cell;

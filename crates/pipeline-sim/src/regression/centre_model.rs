@@ -1,36 +1,56 @@
-//! The regression simulator of the centring behaviour: what a move of `JT1` does to x.
+//! The regression simulator of the centering behaviour: the change of x by a move of `JT1`.
 
 use hough_heuristic::Features;
 
-use crate::cell::geometry::SightRule;
-use crate::error::QuantityError;
-use crate::regression::least_squares::{Entry, Fit, Hold, Rows, ridge_strength};
-use crate::regression::least_squares::{FitError, Quality};
-use crate::regression::reach_noise::{Misfit, Noise, Shares, widening};
+use crate::cell::sight::SightRule;
+use crate::error::{FitError, QuantityError, check_ridge};
+use crate::regression::least_squares::{Entry, Fit, Rows};
+use crate::regression::quality::{Quality, VERSION, check_version};
 use crate::regression::samples::CentreSample;
-use crate::regression::stored::StoredModelError;
-use crate::regression::stored::{Reader, Writer};
 
-/// Terms 1, d1, r d1 of the longest move of the list at the goal's radius: what one unit of a ridge
-/// is measured in.
+/// Terms 1, d1, r d1 of the longest move of the list at the goal's radius: the units of a ridge.
 const SCALES: [f64; 3] = [1.0, 5.0, 5.0 * 33.0];
 
-/// The change of x on 1, d1 and r d1, with d1 the move of `JT1` in degrees.
+/// A regression of the change of x on 1, d1 and r d1, with d1 the move of `JT1` in degrees.
 ///
 /// The paper's linear regression has no product with r; without it a fifth of the variance stays
 /// unexplained, because a near ball moves farther in the image.
+///
+/// With the feature `serde` a model can be stored; it is checked when it is read.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
     feature = "serde",
-    serde(into = "stored::CentreModelData", try_from = "stored::CentreModelData")
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Parts")
 )]
-pub struct CentreModel {
+pub struct CentreModel(Parts);
+
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Parts {
+    #[cfg_attr(feature = "serde", serde(default))]
+    version: u32,
     with_radius: bool,
     fit: Fit,
-    /// How far observations of x lie from predictions.
-    noise: Noise,
     quality: Vec<Quality>,
+}
+
+impl TryFrom<Parts> for CentreModel {
+    type Error = String;
+
+    fn try_from(parts: Parts) -> Result<Self, String> {
+        check_version(parts.version)?;
+        if parts.fit.is_sound(1, 2 + usize::from(parts.with_radius))
+            && Quality::are_sound(&parts.quality, &["dx"])
+        {
+            return Ok(Self(parts));
+        }
+        Err(
+            "the stored model is damaged: it has the wrong number of coefficients, or a number is \
+             out of range"
+                .to_owned(),
+        )
+    }
 }
 
 impl CentreModel {
@@ -46,7 +66,7 @@ impl CentreModel {
     /// Fits dx on 1, d1: the paper's reading of linear regression.
     ///
     /// # Errors
-    /// As for [`CentreModel::fit`], with two coefficients.
+    /// [`CentreModel::fit`] lists them; two samples are enough.
     pub fn fit_without_radius(samples: &[CentreSample]) -> Result<Self, FitError> {
         Self::fit_terms(samples, false)
     }
@@ -56,101 +76,48 @@ impl CentreModel {
         let rows = rows(samples, needed)?;
         enough(samples, needed)?;
         let fit = rows.solve(PLACE, samples.len())?;
-        Ok(Self::with(with_radius, fit, samples, None))
+        Ok(Self::with(with_radius, fit, samples))
     }
 
-    /// The model fitted anew to samples of another plant, held toward this one, as
-    /// [`ReachModel::refit`](crate::ReachModel::refit) does it for the approach: the coefficients c
-    /// minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with c0 this model's
-    /// coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest move of the
-    /// list at the goal). Without samples the model stays as it is. [`CentreModel::uncertainty`] is
-    /// found as there.
+    /// Fits the model to samples of another plant by ridge regression toward this model.
+    ///
+    /// The coefficients c minimise the mean of (change - terms · c)² plus `ridge` · |c - c0|², with
+    /// c0 this model's coefficients and the terms 1, d1 / 5, r d1 / 165 (all near 1 for the longest
+    /// move of the list at the goal). Without samples the model is returned unchanged.
     ///
     /// # Errors
-    /// [`FitError::Prior`] for a `ridge` that is not a finite number of zero or above, or above
-    /// 1e100; otherwise as for [`CentreModel::fit`] (with a ridge of 1e-12 or above neither too few
-    /// samples nor a lack of rank is an error).
+    /// [`FitError::Prior`] for a `ridge` out of 0..=1e100; otherwise those of
+    /// [`CentreModel::fit`]. With a ridge of 1e-12 or above any number of samples is enough.
     pub fn refit(&self, samples: &[CentreSample], ridge: f64) -> Result<Self, FitError> {
-        let strength = ridge_strength(ridge, samples.len())?;
-        let needed = self.fit.terms();
+        check_ridge(ridge)?;
+        let needed = self.0.fit.terms();
         let mut rows = rows(samples, needed)?;
         if samples.is_empty() {
             return Ok(self.clone());
         }
         if ridge > 0.0 {
-            rows.pull(&self.fit, &SCALES[..needed], strength)?;
+            rows.pull(&self.0.fit, &SCALES[..needed], ridge, samples.len())?;
         } else {
             enough(samples, needed)?;
         }
         let fit = rows.solve(PLACE, samples.len())?;
-        let hold = Hold::new(strength, &SCALES, samples.len());
-        Ok(Self::with(
-            self.with_radius,
-            fit,
-            samples,
-            Some((self, hold)),
-        ))
+        Ok(Self::with(self.0.with_radius, fit, samples))
     }
 
-    /// The model with these coefficients, judged on the samples they were fitted to; of a refit,
-    /// with the prior.
-    fn with(
-        with_radius: bool,
-        fit: Fit,
-        samples: &[CentreSample],
-        prior: Option<(&Self, Hold)>,
-    ) -> Self {
-        let mut model = Self {
+    /// Builds the model with these coefficients, judged on the samples they were fitted to.
+    fn with(with_radius: bool, fit: Fit, samples: &[CentreSample]) -> Self {
+        let mut model = Self(Parts {
+            version: VERSION,
             with_radius,
             fit,
-            noise: Noise::default(),
             quality: Vec::new(),
-        };
-        let n = model.fit.terms();
-        let taken: f64 = samples
-            .iter()
-            .map(|s| model.fit.leverage(&terms(&s.before, s.d1)[..n]))
-            .sum();
-        let residuals: Vec<(Shares, f64)> = samples
-            .iter()
-            .map(|s| {
-                let missed = s.after.x - s.before.x - model.change(&s.before, s.d1);
-                (shares(&s.before, s.d1, with_radius), missed * missed)
-            })
-            .collect();
-        let count = samples.len() as f64;
-        let freedom = count - taken;
-        model.noise = Noise::of(&residuals, freedom.max(1.0) / count);
-        if let Some((prior, hold)) = prior {
-            let misfit = prior.misfit(samples, &model.fit, &hold);
-            model.fit.pool(&prior.fit, freedom, [&misfit]);
-            model.fit.hold(&hold);
-            model.noise = model.noise.pooled(&prior.noise, freedom, &misfit);
-        }
-        model.quality = vec![model.judge(samples)];
+        });
+        model.0.quality = vec![model.judge(samples)];
         model
     }
 
-    /// By how much more, or less, than this model expects its refit errs: each sample is predicted
-    /// by what the others and the prior say of it, `fit` without it.
-    fn misfit(&self, samples: &[CentreSample], fit: &Fit, hold: &Hold) -> Misfit {
-        let mut misfit = Misfit::default();
-        for s in samples {
-            let terms = &terms(&s.before, s.d1)[..fit.terms()];
-            let Some((left, leverage)) = fit.without(terms, 1.0, hold) else {
-                continue;
-            };
-            let missed = (s.after.x - s.before.x - fit.value(0, terms)) / left;
-            let noise = self
-                .noise
-                .variance(shares(&s.before, s.d1, self.with_radius));
-            misfit.add(missed * missed / (noise + self.fit.residual[0].powi(2) * leverage));
-        }
-        misfit
-    }
-
-    /// What the image shows after `JT1` turned by `d1` degrees; y and r stay. `None` if the ball is
-    /// lost ([`SightRule::sees_features`]) or an argument is not finite.
+    /// Predicts the features after `JT1` turned by `d1` degrees; y and r stay. `None` if the ball
+    /// is lost ([`SightRule::sees_features`]) or an argument is not finite.
     pub fn predict(&self, before: &Features, d1: f64) -> Option<Features> {
         let after = Features {
             x: before.x + self.change(before, d1),
@@ -159,41 +126,19 @@ impl CentreModel {
         SightRule::default().sees_features(&after).then_some(after)
     }
 
-    /// The standard deviation of x, feature units, that the fit expects around what a new
-    /// observation would show: noise, what the terms leave out (which grows with the move), and the
-    /// uncertainty of the coefficients. `None` if an argument is not finite, or `before` shows a
-    /// radius that is not above zero.
-    pub fn uncertainty(&self, before: &Features, d1: f64) -> Option<f64> {
-        let finite = before.x.is_finite() && before.y.is_finite();
-        if !finite || before.r.is_nan() || before.r <= 0.0 {
-            return None;
-        }
-        let terms = terms(before, d1);
-        let of_fit = self.fit.residual[0].powi(2) * self.fit.leverage(&terms[..self.fit.terms()]);
-        let sd = (self.noise.variance(shares(before, d1, self.with_radius)) + of_fit).sqrt();
-        let sd = sd * widening(self.fit.samples);
-        sd.is_finite().then_some(sd)
+    /// Accuracy of dx on the samples the model was fitted to.
+    pub fn quality(&self) -> &[Quality] {
+        &self.0.quality
     }
 
-    /// What the fit leaves of the changes of x on its samples: standard deviation in feature units,
-    /// with the degrees of freedom that are left; of a refit, together with those of its prior.
-    pub fn residual_noise(&self) -> f64 {
-        self.fit.residual[0]
-    }
-
-    /// How well dx is reproduced on the samples the model was fitted to.
-    pub fn quality(&self) -> Vec<Quality> {
-        self.quality.clone()
-    }
-
-    /// How well dx is reproduced on other samples.
+    /// Judges the model on other samples.
     ///
     /// # Errors
     /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not
     /// above zero.
     pub fn quality_on(&self, samples: &[CentreSample]) -> Result<Vec<Quality>, QuantityError> {
         Quality::some(samples.len())?;
-        rows(samples, self.fit.terms()).map_err(FitError::into_quantity)?;
+        rows(samples, self.0.fit.terms()).map_err(FitError::into_quantity)?;
         Ok(vec![self.judge(samples)])
     }
 
@@ -207,11 +152,12 @@ impl CentreModel {
 
     /// Condition number of the design matrix, columns scaled to unit length.
     pub fn condition_number(&self) -> f64 {
-        self.fit.condition
+        self.0.fit.condition
     }
 
     fn change(&self, before: &Features, d1: f64) -> f64 {
-        self.fit.value(0, &terms(before, d1)[..self.fit.terms()])
+        let fit = &self.0.fit;
+        fit.value(0, &terms(before, d1)[..fit.terms()])
     }
 }
 
@@ -219,25 +165,10 @@ fn terms(before: &Features, d1: f64) -> [f64; 3] {
     [1.0, d1, before.r * d1]
 }
 
-/// By how much noise, and what the terms leave out, show in x. Without r d1 they leave out how near
-/// the ball is; with it, how far it is from the waist's axis, which says how far a turn carries it.
-fn shares(before: &Features, d1: f64, with_radius: bool) -> Shares {
-    let [_, turned, near] = terms(before, d1);
-    let left_out = if with_radius {
-        near / SCALES[2]
-    } else {
-        turned / SCALES[1]
-    };
-    Shares {
-        observed: 1.0,
-        fitted: left_out * left_out,
-    }
-}
+/// Name of the whole of the samples in errors.
+const PLACE: &str = "centering";
 
-/// What errors call the whole of the samples.
-const PLACE: &str = "centring";
-
-/// The rows of the first `needed` terms; refuses samples that cannot be fitted to.
+/// Collects the rows of the first `needed` terms; refuses samples that cannot be fitted to.
 fn rows(samples: &[CentreSample], needed: usize) -> Result<Rows, FitError> {
     let mut rows = Rows::default();
     for (index, s) in samples.iter().enumerate() {
@@ -257,18 +188,15 @@ fn rows(samples: &[CentreSample], needed: usize) -> Result<Rows, FitError> {
                 return Err(not_finite(quantity, value));
             }
         }
-        rows.push(
-            &terms(&s.before, s.d1)[..needed],
-            &[s.after.x - s.before.x],
-            1.0,
-        )
-        .map_err(|(entry, value)| {
-            let quantity = match entry {
-                Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
-                Entry::Target(_) => "the change of x",
-            };
-            not_finite(quantity, value)
-        })?;
+        let change = s.after.x - s.before.x;
+        rows.push(&terms(&s.before, s.d1)[..needed], &[change], 1.0)
+            .map_err(|(entry, value)| {
+                let quantity = match entry {
+                    Entry::Term(i) => ["the constant term", "the term d1", "the term r d1"][i],
+                    Entry::Target(_) => "the change of x",
+                };
+                not_finite(quantity, value)
+            })?;
     }
     Ok(rows)
 }
@@ -282,93 +210,4 @@ fn enough(samples: &[CentreSample], needed: usize) -> Result<(), FitError> {
         });
     }
     Ok(())
-}
-
-impl CentreModel {
-    const KIND: &str = "centre-model";
-
-    /// The model as text, which [`CentreModel::from_text`] turns into the same model again.
-    pub fn to_text(&self) -> String {
-        let mut out = Writer::new(Self::KIND);
-        out.line("with-radius", &[self.with_radius]);
-        out.quality(&self.quality);
-        out.fit(&self.fit);
-        out.noise(&self.noise);
-        out.finish()
-    }
-
-    /// The model that was stored as text.
-    ///
-    /// # Errors
-    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged
-    /// one.
-    pub fn from_text(text: &str) -> Result<Self, StoredModelError> {
-        let mut stored = Reader::new(Self::KIND, text)?;
-        let with_radius: bool = stored.one("with-radius")?;
-        let model = Self {
-            with_radius,
-            quality: stored.quality(&["dx"])?,
-            fit: stored.fit(1, 2 + usize::from(with_radius))?,
-            noise: stored.noise()?,
-        };
-        stored.end()?;
-        model.sound()
-    }
-
-    /// Passes the model on if it could have come out of a fit.
-    fn sound(self) -> Result<Self, StoredModelError> {
-        let fitted = self.fit.fits(1, 2 + usize::from(self.with_radius)) && self.noise.is_sound();
-        if fitted && Quality::are_sound(&self.quality, &["dx"]) {
-            return Ok(self);
-        }
-        Err(StoredModelError::Contents {
-            what: "it has the wrong number of coefficients, or a number is out of range",
-        })
-    }
-}
-
-#[cfg(feature = "serde")]
-mod stored {
-    //! The model in serde's terms. What comes back is believed only after it has been checked.
-
-    use super::{CentreModel, Fit, Noise, Quality, StoredModelError};
-    use crate::regression::stored::{VERSION, known};
-
-    #[derive(serde::Serialize, serde::Deserialize)]
-    pub(super) struct CentreModelData {
-        #[serde(default)]
-        version: u32,
-        with_radius: bool,
-        fit: Fit,
-        #[serde(default)]
-        noise: Noise,
-        quality: Vec<Quality>,
-    }
-
-    impl From<CentreModel> for CentreModelData {
-        fn from(model: CentreModel) -> Self {
-            Self {
-                version: VERSION,
-                with_radius: model.with_radius,
-                fit: model.fit,
-                noise: model.noise,
-                quality: model.quality,
-            }
-        }
-    }
-
-    impl TryFrom<CentreModelData> for CentreModel {
-        type Error = StoredModelError;
-
-        fn try_from(data: CentreModelData) -> Result<Self, Self::Error> {
-            known(data.version)?;
-            let model = Self {
-                with_radius: data.with_radius,
-                fit: data.fit,
-                noise: data.noise,
-                quality: data.quality,
-            };
-            model.sound()
-        }
-    }
 }

@@ -2,10 +2,7 @@
 
 pub(crate) mod centre_model;
 pub(crate) mod least_squares;
-pub(crate) mod open_loop;
+pub(crate) mod quality;
 pub(crate) mod reach_form;
 pub(crate) mod reach_model;
-pub(crate) mod reach_noise;
-pub(crate) mod reach_refit;
 pub(crate) mod samples;
-pub(crate) mod stored;

@@ -1,46 +1,71 @@
-//! The regression simulator of the approaching behaviour: what a move of `JT2` and `JT3` does to y
-//! and r.
+//! The regression simulator of the approaching behaviour: the changes of y and r by a move of
+//! `JT2` and `JT3`.
 
 use hough_heuristic::Features;
 
-use crate::cell::geometry::SightRule;
-use crate::error::QuantityError;
+use crate::cell::sight::SightRule;
+use crate::error::{FitError, QuantityError, check_ridge};
 use crate::regression::least_squares::{Entry, Fit, Rows};
-use crate::regression::least_squares::{FitError, Quality};
+use crate::regression::quality::{Quality, VERSION, check_version};
 use crate::regression::reach_form::ReachForm;
-use crate::regression::reach_noise::{Noise, widening};
-use crate::regression::samples;
-use crate::regression::samples::ReachSample;
-use crate::regression::stored::StoredModelError;
-use crate::regression::stored::{Reader, Writer};
+use crate::regression::samples::{ReachSample, check};
 
 /// A regression simulator of the approaching behaviour, fitted to samples of real or simulated
 /// moves.
 ///
+/// With the feature `serde` a model can be stored; it is checked when it is read.
+///
 /// ```
 /// use pipeline_sim::{Ball, Cell, ReachForm, ReachModel, sample_moves};
-/// use rand::SeedableRng;
+/// use pipeline_sim::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 ///
-/// let mut rng = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1);
-/// let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-/// let (_, samples) = sample_moves(&cell, 500, 0.125, &mut rng);
-/// let model = ReachModel::fit(&samples, ReachForm::Rigid22, &[])?;
-/// assert!(model.quality().iter().all(|q| q.r2 > 0.99));
-/// # Ok::<(), pipeline_sim::FitError>(())
+/// fn main() -> Result<(), Box<dyn std::error::Error>> {
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+///     let (_, samples) = sample_moves(&cell, 500, 0.125, &mut rng)?;
+///     let model = ReachModel::fit(&samples, ReachForm::Rigid22, &[])?;
+///     assert!(model.quality().iter().all(|q| q.r2 > 0.99));
+///     Ok(())
+/// }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
     feature = "serde",
-    serde(into = "stored::ReachModelData", try_from = "stored::ReachModelData")
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Parts")
 )]
-pub struct ReachModel {
-    pub(crate) form: ReachForm,
+pub struct ReachModel(Parts);
+
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Parts {
+    #[cfg_attr(feature = "serde", serde(default))]
+    version: u32,
+    form: ReachForm,
     edges: Vec<f64>,
-    pub(crate) pieces: Vec<Fit>,
-    /// Of each piece: how far observations of y and of r lie from predictions.
-    pub(crate) noise: Vec<[Noise; 2]>,
-    pub(crate) quality: Vec<Quality>,
+    pieces: Vec<Fit>,
+    quality: Vec<Quality>,
+}
+
+impl TryFrom<Parts> for ReachModel {
+    type Error = String;
+
+    fn try_from(parts: Parts) -> Result<Self, String> {
+        check_version(parts.version)?;
+        let (pieces, terms) = (&parts.pieces, parts.form.terms());
+        let wrong = if !ascend(&parts.edges) {
+            "the elbow edges do not ascend"
+        } else if pieces.len() != parts.edges.len() + 1
+            || !pieces.iter().all(|fit| fit.is_sound(2, terms))
+        {
+            "it has the wrong number of coefficients, or a number of its fit is out of range"
+        } else if !Quality::are_sound(&parts.quality, &["dy", "dr"]) {
+            "its accuracy is out of range"
+        } else {
+            return Ok(Self(parts));
+        };
+        Err(format!("the stored model is damaged: {wrong}"))
+    }
 }
 
 impl ReachModel {
@@ -59,88 +84,116 @@ impl ReachModel {
         elbow_edges_degrees: &[f64],
     ) -> Result<Self, FitError> {
         let edges = elbow_edges_degrees.to_vec();
-        if !edges.iter().all(|e| e.is_finite()) || !edges.windows(2).all(|w| w[0] < w[1]) {
+        if !ascend(&edges) {
             return Err(FitError::Edges { edges });
         }
-        let mut model = Self {
+        let mut model = Self(Parts {
+            version: VERSION,
             form,
             edges,
             pieces: Vec::new(),
-            noise: Vec::new(),
             quality: Vec::new(),
-        };
+        });
         for (i, group) in model.groups(samples)?.iter().enumerate() {
-            let place = model.place(i);
-            if group.len() < form.terms() {
-                return Err(FitError::TooFewSamples {
-                    place,
-                    got: group.len(),
-                    needed: form.terms(),
-                });
-            }
+            model.enough(i, group.len())?;
             let mut rows = Rows::default();
             for (index, sample) in group {
                 push(form, &mut rows, *index, sample, 1.0)?;
             }
-            model.pieces.push(rows.solve(&place, group.len())?);
-            model.noise.push(Default::default());
-            model.noise[i] = model.noise_of(i, group, |_| 1.0).0;
+            let fit = rows.solve(&model.place(i), group.len())?;
+            model.0.pieces.push(fit);
         }
-        model.quality = model.judge(samples);
+        model.0.quality = model.judge(samples);
         Ok(model)
     }
 
-    /// The samples by elbow interval, each with its position.
-    pub(crate) fn groups<'a>(
+    /// Fits the model to samples of another plant by ridge regression toward this model.
+    ///
+    /// For each elbow interval and output the coefficients c minimise the mean of w (change - terms
+    /// · c)² plus `ridge` · |c - c0|², with c0 this model's coefficients and w = r before to the
+    /// power `radius_power`, normalised to mean 1. The fitted quantities of the `Rigid` forms are
+    /// noisier for a smaller ball: 2 to 4 is right for them, 0 for `Linear`. Intervals without
+    /// samples stay unchanged.
+    ///
+    /// # Errors
+    /// [`FitError::Prior`] for a `ridge` out of 0..=1e100 and for a power that is not finite;
+    /// otherwise those of [`ReachModel::fit`]. With a ridge of 1e-12 or above any number of samples
+    /// is enough.
+    pub fn refit(
+        &self,
+        samples: &[ReachSample],
+        ridge: f64,
+        radius_power: f64,
+    ) -> Result<Self, FitError> {
+        check_ridge(ridge)?;
+        if !radius_power.is_finite() {
+            let what = format!("the power of the radius must be finite, but is {radius_power}");
+            return Err(FitError::Prior { what });
+        }
+        let (mut model, form) = (self.clone(), self.0.form);
+        for (i, group) in self.groups(samples)?.iter().enumerate() {
+            let count = group.len();
+            if count == 0 {
+                continue;
+            }
+            if ridge == 0.0 {
+                self.enough(i, count)?;
+            }
+            // Logarithms relative to the greatest keep any power in range.
+            let log_weight = |sample: &ReachSample| radius_power * sample.before.r.ln();
+            let greatest = group
+                .iter()
+                .map(|(_, s)| log_weight(s))
+                .fold(f64::NEG_INFINITY, f64::max);
+            let relative = |sample: &ReachSample| (log_weight(sample) - greatest).exp();
+            let mean = group.iter().map(|(_, s)| relative(s)).sum::<f64>() / count as f64;
+            let mut rows = Rows::default();
+            for (index, sample) in group {
+                let weight = (relative(sample) / mean).sqrt();
+                push(form, &mut rows, *index, sample, weight)?;
+            }
+            if ridge > 0.0 {
+                rows.pull(&self.0.pieces[i], &[], ridge, count)?;
+            }
+            model.0.pieces[i] = rows.solve(&self.place(i), count)?;
+        }
+        if !samples.is_empty() {
+            model.0.quality = model.judge(samples);
+        }
+        Ok(model)
+    }
+
+    /// Sorts the samples by elbow interval, each with its position.
+    fn groups<'a>(
         &self,
         samples: &'a [ReachSample],
     ) -> Result<Vec<Vec<(usize, &'a ReachSample)>>, FitError> {
-        let mut groups = vec![Vec::new(); self.edges.len() + 1];
+        let mut groups = vec![Vec::new(); self.0.edges.len() + 1];
         for (index, sample) in samples.iter().enumerate() {
-            samples::check(index, sample)?;
+            check(index, sample)?;
             groups[self.piece(sample.jt3_degrees)].push((index, sample));
         }
         Ok(groups)
     }
 
-    /// How far the samples of piece `i` lie from what it predicts for them, and the degrees of
-    /// freedom that are left.
-    pub(crate) fn noise_of(
-        &self,
-        i: usize,
-        group: &[(usize, &ReachSample)],
-        weight: impl Fn(&ReachSample) -> f64,
-    ) -> ([Noise; 2], f64) {
-        let mut buffer = [0.0; 22];
-        let (mut y, mut r, mut fitted) = (Vec::new(), Vec::new(), 0.0);
-        for (_, s) in group {
-            let terms = self
-                .form
-                .fill(&s.before, s.jt3_degrees, s.d2, s.d3, &mut buffer);
-            fitted += weight(s) * self.pieces[i].leverage(terms);
-            if let Some(after) = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3) {
-                let [of_y, of_r] = self.form.shares(&s.before, &after, s.d2, s.d3);
-                y.push((of_y, (s.after.y - after.y).powi(2)));
-                r.push((of_r, (s.after.r - after.r).powi(2)));
-            }
+    fn enough(&self, piece: usize, got: usize) -> Result<(), FitError> {
+        let needed = self.0.form.terms();
+        if got < needed {
+            return Err(FitError::TooFewSamples {
+                place: self.place(piece),
+                got,
+                needed,
+            });
         }
-        // What the coefficients have taken from the samples is missing in the residuals.
-        let freedom = group.len() as f64 - fitted;
-        let left = freedom.max(1.0) / group.len() as f64;
-        ([Noise::of(&y, left), Noise::of(&r, left)], freedom)
+        Ok(())
     }
 
-    /// The form the model was fitted in.
+    /// Form of the model.
     pub fn form(&self) -> ReachForm {
-        self.form
+        self.0.form
     }
 
-    /// Edges of the elbow intervals, degrees of `JT3`.
-    pub fn elbow_edges(&self) -> &[f64] {
-        &self.edges
-    }
-
-    /// What the image shows after `JT2` and `JT3` turned by `d2` and `d3` degrees; x stays. `None`
+    /// Predicts the features after `JT2` and `JT3` turned by `d2` and `d3` degrees; x stays. `None`
     /// if the ball is lost ([`SightRule::sees_features`]) or an argument is not finite.
     pub fn predict(
         &self,
@@ -153,9 +206,9 @@ impl ReachModel {
             .filter(|features| SightRule::default().sees_features(features))
     }
 
-    /// As [`ReachModel::predict`], but also where the ball would count as lost. `None` only where
-    /// the model places the ball behind the camera, an argument is not finite, or `before` shows a
-    /// radius that is not above zero.
+    /// Predicts like [`ReachModel::predict`], also where the ball would count as lost. `None` only
+    /// where the model places the ball behind the camera, an argument is not finite, or `before`
+    /// has a radius that is not above zero.
     pub fn predict_unbounded(
         &self,
         before: &Features,
@@ -168,9 +221,9 @@ impl ReachModel {
             .flatten()
     }
 
-    /// As [`ReachModel::predict_unbounded`], also from a prediction of `Linear` whose radius is not
-    /// above zero.
-    pub(crate) fn predict_onward(
+    /// Predicts like [`ReachModel::predict_unbounded`], also from a prediction of `Linear` whose
+    /// radius is not above zero.
+    pub(super) fn predict_onward(
         &self,
         before: &Features,
         jt3_degrees: f64,
@@ -181,91 +234,21 @@ impl ReachModel {
         if !arguments.iter().all(|v| v.is_finite()) {
             return None;
         }
-        let mut buffer = [0.0; 22];
-        let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
-        let fit = &self.pieces[self.piece(jt3_degrees)];
-        let from = self.form.outputs(before);
-        let (y, r) = self
-            .form
-            .image([from[0] + fit.value(0, terms), from[1] + fit.value(1, terms)])?;
+        let (mut buffer, form) = ([0.0; 22], self.0.form);
+        let terms = form.fill(before, jt3_degrees, d2, d3, &mut buffer);
+        let fit = &self.0.pieces[self.piece(jt3_degrees)];
+        let from = form.outputs(before);
+        let (y, r) = form.image([from[0] + fit.value(0, terms), from[1] + fit.value(1, terms)])?;
         (y.is_finite() && r.is_finite()).then_some(Features { x: before.x, y, r })
     }
 
-    /// The standard deviations of y and r, feature units, that the fit expects of
-    /// [`ReachModel::predict_unbounded`] around what a new observation would show: noise of both
-    /// observations, what the form cannot express, and the uncertainty of the coefficients
-    /// together, widened for models of few samples so that 95 % lie within 1.96 of them. `None` as
-    /// there, and where they are no finite numbers.
-    ///
-    /// Noise of `before` is carried along: what comes four times as near shows it four times (in y)
-    /// and sixteen times (in r) as large.
-    pub fn uncertainty(
-        &self,
-        before: &Features,
-        jt3_degrees: f64,
-        d2: f64,
-        d3: f64,
-    ) -> Option<(f64, f64)> {
-        let after = self.predict_unbounded(before, jt3_degrees, d2, d3)?;
-        let mut buffer = [0.0; 22];
-        let terms = self.form.fill(before, jt3_degrees, d2, d3, &mut buffer);
-        let piece = self.piece(jt3_degrees);
-        let fit = &self.pieces[piece];
-        let wider = widening(fit.samples);
-        let [y, r] = self
-            .variances(piece, before, &after, (d2, d3), fit.leverage(terms))
-            .map(|variance| wider * variance.sqrt());
-        (y.is_finite() && r.is_finite()).then_some((y, r))
+    /// Accuracy of the changes of y and r on the samples the model was fitted to.
+    pub fn quality(&self) -> &[Quality] {
+        &self.0.quality
     }
 
-    /// Variances of y and r around a prediction `after` of piece `i`.
-    pub(crate) fn variances(
-        &self,
-        i: usize,
-        before: &Features,
-        after: &Features,
-        (d2, d3): (f64, f64),
-        leverage: f64,
-    ) -> [f64; 2] {
-        let [of_y, of_r] = self.form.shares(before, after, d2, d3);
-        let [noise_y, noise_r] = &self.noise[i];
-        let [first, second] = [0, 1].map(|k| leverage * self.pieces[i].residual[k].powi(2));
-        let (from_y, from_r) = match self.form {
-            ReachForm::Linear => (first, second),
-            // r = 33 / Z and y = 72 + r V: first order in the errors of Z and V.
-            _ => {
-                let r_of_z = after.r * after.r / 33.0;
-                let v = (after.y - 72.0) / after.r;
-                (
-                    after.r.powi(2) * second + (v * r_of_z).powi(2) * first,
-                    r_of_z.powi(2) * first,
-                )
-            }
-        };
-        [
-            noise_y.variance(of_y) + from_y,
-            noise_r.variance(of_r) + from_r,
-        ]
-    }
-
-    /// What the fit leaves of the changes of y and r on its samples, a pair for each elbow
-    /// interval: standard deviations in feature units, with the degrees of freedom that are left;
-    /// of a refit, together with those of its prior.
-    pub fn residual_noise(&self) -> Vec<(f64, f64)> {
-        self.noise
-            .iter()
-            .map(|[y, r]| (y.residual, r.residual))
-            .collect()
-    }
-
-    /// How well the changes of y and r are reproduced on the samples the model was fitted to.
-    pub fn quality(&self) -> Vec<Quality> {
-        self.quality.clone()
-    }
-
-    /// How well the changes of y and r are reproduced on other samples. A sample for which the
-    /// model has no prediction counts as one for which it predicts no change, and in
-    /// [`Quality::unpredicted`].
+    /// Judges the model on other samples. A sample for which the model has no prediction counts as
+    /// one for which it predicts no change, and in [`Quality::unpredicted`].
     ///
     /// # Errors
     /// [`QuantityError`]: no samples, or one that holds a NaN, an infinity, or a radius that is not
@@ -273,18 +256,16 @@ impl ReachModel {
     pub fn quality_on(&self, samples: &[ReachSample]) -> Result<Vec<Quality>, QuantityError> {
         Quality::some(samples.len())?;
         for (index, sample) in samples.iter().enumerate() {
-            samples::check(index, sample).map_err(FitError::into_quantity)?;
+            check(index, sample).map_err(FitError::into_quantity)?;
         }
         Ok(self.judge(samples))
     }
 
-    pub(crate) fn judge(&self, samples: &[ReachSample]) -> Vec<Quality> {
-        let predicted = samples.iter().map(|s| {
-            let after = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3);
-            (s, after)
-        });
-        let (y, r): (Vec<_>, Vec<_>) = predicted
-            .map(|(s, after)| {
+    fn judge(&self, samples: &[ReachSample]) -> Vec<Quality> {
+        let (y, r): (Vec<_>, Vec<_>) = samples
+            .iter()
+            .map(|s| {
+                let after = self.predict_unbounded(&s.before, s.jt3_degrees, s.d2, s.d3);
                 (
                     (s.after.y - s.before.y, after.map(|a| a.y - s.before.y)),
                     (s.after.r - s.before.r, after.map(|a| a.r - s.before.r)),
@@ -296,33 +277,31 @@ impl ReachModel {
 
     /// Condition number of each elbow interval's design matrix, columns scaled to unit length.
     pub fn condition_numbers(&self) -> Vec<f64> {
-        self.pieces.iter().map(|fit| fit.condition).collect()
+        self.0.pieces.iter().map(|fit| fit.condition).collect()
     }
 
     fn piece(&self, jt3_degrees: f64) -> usize {
-        self.edges
-            .iter()
-            .filter(|edge| jt3_degrees >= **edge)
-            .count()
+        let edges = self.0.edges.iter();
+        edges.filter(|edge| jt3_degrees >= **edge).count()
     }
 
-    pub(crate) fn place(&self, piece: usize) -> String {
-        let edge = |i: usize| {
-            self.edges
-                .get(i)
-                .map_or_else(|| "open".to_owned(), ToString::to_string)
-        };
-        match (piece, self.edges.len()) {
-            (_, 0) => "all elbow angles".to_owned(),
-            (0, _) => format!("JT3 below {}", edge(0)),
-            (i, n) if i == n => format!("JT3 from {}", edge(n - 1)),
-            (i, _) => format!("JT3 {}..{}", edge(i - 1), edge(i)),
+    fn place(&self, piece: usize) -> String {
+        match (piece, &self.0.edges[..]) {
+            (_, []) => "all elbow angles".to_owned(),
+            (0, [first, ..]) => format!("JT3 below {first}"),
+            (i, edges) if i == edges.len() => format!("JT3 from {}", edges[i - 1]),
+            (i, edges) => format!("JT3 {}..{}", edges[i - 1], edges[i]),
         }
     }
 }
 
-/// One more sample in the rows of its piece.
-pub(crate) fn push(
+/// Returns `true` if all edges are finite and each is above the one before.
+fn ascend(edges: &[f64]) -> bool {
+    edges.iter().all(|e| e.is_finite()) && edges.windows(2).all(|w| w[0] < w[1])
+}
+
+/// Adds a sample to the rows of its piece.
+fn push(
     form: ReachForm,
     rows: &mut Rows,
     index: usize,
@@ -331,13 +310,8 @@ pub(crate) fn push(
 ) -> Result<(), FitError> {
     let mut buffer = [0.0; 22];
     let (from, to) = (form.outputs(&sample.before), form.outputs(&sample.after));
-    let terms = form.fill(
-        &sample.before,
-        sample.jt3_degrees,
-        sample.d2,
-        sample.d3,
-        &mut buffer,
-    );
+    let (jt3, d2, d3) = (sample.jt3_degrees, sample.d2, sample.d3);
+    let terms = form.fill(&sample.before, jt3, d2, d3, &mut buffer);
     rows.push(terms, &[to[0] - from[0], to[1] - from[1]], weight)
         .map_err(|(entry, value)| FitError::NotFinite {
             index,
@@ -347,132 +321,4 @@ pub(crate) fn push(
             },
             value,
         })
-}
-
-impl ReachModel {
-    const KIND: &str = "reach-model";
-
-    /// The model as text, which [`ReachModel::from_text`] turns into the same model again.
-    ///
-    /// ```
-    /// # use pipeline_sim::{Ball, Cell, ReachForm, ReachModel, sample_moves};
-    /// # use rand::SeedableRng;
-    /// # let mut rng = rand::rngs::Xoshiro256PlusPlus::seed_from_u64(1);
-    /// # let (_, samples) = sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 100, 0.125, &mut rng);
-    /// # let path = std::env::temp_dir().join(format!("pipeline-sim-{}.txt", std::process::id()));
-    /// let model = ReachModel::fit(&samples, ReachForm::Rigid8, &[])?;
-    /// std::fs::write(&path, model.to_text())?;
-    /// assert_eq!(ReachModel::from_text(&std::fs::read_to_string(&path)?)?, model);
-    /// # std::fs::remove_file(&path)?;
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn to_text(&self) -> String {
-        let mut out = Writer::new(Self::KIND);
-        out.line("form", &[self.form]);
-        out.line("elbow-edges", &self.edges);
-        out.quality(&self.quality);
-        for (fit, noise) in self.pieces.iter().zip(&self.noise) {
-            out.fit(fit);
-            noise.iter().for_each(|noise| out.noise(noise));
-        }
-        out.finish()
-    }
-
-    /// The model that was stored as text.
-    ///
-    /// # Errors
-    /// [`StoredModelError`]: no stored model of this kind, one of another version, or a damaged
-    /// one.
-    pub fn from_text(text: &str) -> Result<Self, StoredModelError> {
-        let mut stored = Reader::new(Self::KIND, text)?;
-        let form = stored.form()?;
-        let edges: Vec<f64> = stored.line("elbow-edges", None)?;
-        let quality = stored.quality(&["dy", "dr"])?;
-        let (mut pieces, mut noise) = (Vec::new(), Vec::new());
-        for _ in 0..=edges.len() {
-            pieces.push(stored.fit(2, form.terms())?);
-            noise.push([stored.noise()?, stored.noise()?]);
-        }
-        stored.end()?;
-        let model = Self {
-            form,
-            edges,
-            pieces,
-            noise,
-            quality,
-        };
-        model.sound()
-    }
-
-    /// Passes the model on if it could have come out of a fit.
-    fn sound(self) -> Result<Self, StoredModelError> {
-        let damaged = |what| Err(StoredModelError::Contents { what });
-        let edges = &self.edges;
-        if !(edges.iter().all(|e| e.is_finite()) && edges.windows(2).all(|w| w[0] < w[1])) {
-            return damaged("the elbow edges do not ascend");
-        }
-        let terms = self.form.terms();
-        if self.pieces.len() != edges.len() + 1 || !self.pieces.iter().all(|p| p.fits(2, terms)) {
-            return damaged(
-                "it has the wrong number of coefficients, or a number of its fit is out of range",
-            );
-        }
-        if self.noise.len() != self.pieces.len()
-            || !self.noise.iter().flatten().all(Noise::is_sound)
-        {
-            return damaged("its noise is not a finite number of zero or above for each piece");
-        }
-        if !Quality::are_sound(&self.quality, &["dy", "dr"]) {
-            return damaged("its accuracy is out of range");
-        }
-        Ok(self)
-    }
-}
-
-#[cfg(feature = "serde")]
-mod stored {
-    //! The model in serde's terms. What comes back is believed only after it has been checked.
-
-    use super::{Fit, Noise, Quality, ReachForm, ReachModel, StoredModelError};
-    use crate::regression::stored::{VERSION, known};
-
-    #[derive(serde::Serialize, serde::Deserialize)]
-    pub(super) struct ReachModelData {
-        #[serde(default)]
-        version: u32,
-        form: ReachForm,
-        edges: Vec<f64>,
-        pieces: Vec<Fit>,
-        noise: Vec<[Noise; 2]>,
-        quality: Vec<Quality>,
-    }
-
-    impl From<ReachModel> for ReachModelData {
-        fn from(model: ReachModel) -> Self {
-            Self {
-                version: VERSION,
-                form: model.form,
-                edges: model.edges,
-                pieces: model.pieces,
-                noise: model.noise,
-                quality: model.quality,
-            }
-        }
-    }
-
-    impl TryFrom<ReachModelData> for ReachModel {
-        type Error = StoredModelError;
-
-        fn try_from(data: ReachModelData) -> Result<Self, Self::Error> {
-            known(data.version)?;
-            let model = Self {
-                form: data.form,
-                edges: data.edges,
-                pieces: data.pieces,
-                noise: data.noise,
-                quality: data.quality,
-            };
-            model.sound()
-        }
-    }
 }

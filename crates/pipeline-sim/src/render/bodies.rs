@@ -4,7 +4,7 @@ use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::render::canvas::Canvas;
-use crate::render::scene::{Look, Occluder, Scene, Shape, Thing};
+use crate::render::scene::{Appearance, Occluder, Scene, Shape, Thing};
 use crate::render::texture::Texture;
 use crate::render::view::View;
 
@@ -98,7 +98,7 @@ impl Studio<'_> {
         radius: f64,
         low: f64,
         high: f64,
-        look: &Look,
+        appearance: &Appearance,
     ) {
         const SIDES: usize = 40;
         let ring = |z: f64| -> [Point3<f64>; SIDES] {
@@ -132,16 +132,18 @@ impl Studio<'_> {
             let n = Vector3::new(t * d.x - axis.x, t * d.y - axis.y, 0.0).try_normalize(1e-12);
             let n = n.unwrap_or_else(Vector3::x);
             let mut light = self.irradiance(&n);
-            if look.gloss > 0.0 {
+            if appearance.gloss > 0.0 {
                 let back = -d.normalize();
                 for (toward, intensity) in &self.lamps {
                     let half = (toward + back).try_normalize(1e-9).unwrap_or(n);
-                    light += intensity * look.gloss * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
+                    light += intensity
+                        * appearance.gloss
+                        * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
                 }
             }
             // Darker toward the table.
             let depth = ((eye.z + t * d.z - self.table) / 0.03).clamp(0.0, 1.0);
-            (look.albedo * light * (0.75 + 0.25 * depth)) as f32
+            (appearance.albedo * light * (0.75 + 0.25 * depth)) as f32
         };
         canvas.fill(&hull, |y, x0, row| {
             // Exact at every fourth pixel and straight between.
@@ -160,8 +162,8 @@ impl Studio<'_> {
                 &top,
                 &Vector3::x(),
                 &Vector3::y(),
-                look,
-                look.albedo,
+                appearance,
+                appearance.albedo,
             );
         }
     }
@@ -173,18 +175,18 @@ impl Studio<'_> {
         corners: &[Point3<f64>],
         u: &Vector3<f64>,
         v: &Vector3<f64>,
-        look: &Look,
+        appearance: &Appearance,
         albedo: f64,
     ) {
         let mut polygon = Vec::with_capacity(corners.len() + 1);
         self.view.polygon(corners, &mut polygon);
         let light = (albedo * self.irradiance(&u.cross(v))) as f32;
-        if look.texture <= 0.0 {
+        if appearance.texture <= 0.0 {
             canvas.fill(&polygon, |_, _, row| row.fill(light));
             return;
         }
         let plane = self.view.plane(&corners[0], u, v);
-        let strength = look.texture as f32;
+        let strength = appearance.texture as f32;
         canvas.fill(&polygon, |y, x0, row| {
             plane_row(&plane, self.texture, strength, (y, x0), row);
             row.iter_mut().for_each(|value| *value *= light);
@@ -204,7 +206,7 @@ impl Studio<'_> {
         ) {
             return;
         }
-        let (look, albedo) = (&thing.look, thing.look.albedo);
+        let (appearance, albedo) = (&thing.appearance, thing.appearance.albedo);
         let quad = |at: Point3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
             [at - u - v, at + u - v, at + u + v, at - u + v]
         };
@@ -229,7 +231,7 @@ impl Studio<'_> {
                             &corners,
                             &u.normalize(),
                             &v.normalize(),
-                            look,
+                            appearance,
                             albedo,
                         );
                     }
@@ -242,11 +244,16 @@ impl Studio<'_> {
                     radius,
                     self.table,
                     self.table + height,
-                    look,
+                    appearance,
                 );
             }
             Shape::Ball { radius } => {
-                self.sphere(canvas, &(middle + Vector3::z() * radius), radius, look);
+                self.sphere(
+                    canvas,
+                    &(middle + Vector3::z() * radius),
+                    radius,
+                    appearance,
+                );
             }
             Shape::Disc { radius, inner } => {
                 for (r, a) in [
@@ -265,13 +272,13 @@ impl Studio<'_> {
                             let (s, c) = (i as f64 * std::f64::consts::TAU / 64.0).sin_cos();
                             middle + along * (r * c) + across * (r * s)
                         });
-                        self.face(canvas, &ring, &along, &across, look, a);
+                        self.face(canvas, &ring, &along, &across, appearance, a);
                     }
                 }
             }
             Shape::Tape { length, width } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                self.face(canvas, &corners, &along, &across, look, albedo);
+                self.face(canvas, &corners, &along, &across, appearance, albedo);
             }
             Shape::Print {
                 length,
@@ -279,7 +286,7 @@ impl Studio<'_> {
                 lines,
             } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                self.face(canvas, &corners, &along, &across, look, albedo);
+                self.face(canvas, &corners, &along, &across, appearance, albedo);
                 self.print(canvas, thing, (length, width), lines);
             }
         }
@@ -315,7 +322,7 @@ impl Studio<'_> {
         let (sin, cos) = thing.turn.sin_cos();
         let (along, across) = (Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0));
         let middle = Point3::new(thing.x, thing.y, self.table);
-        let ink = Look {
+        let ink = Appearance {
             albedo: 0.1,
             texture: 0.0,
             gloss: 0.0,

@@ -8,7 +8,7 @@ use crate::render::bodies::{Studio, plane_row};
 use crate::render::canvas::Canvas;
 use crate::render::light_grid::Lighting;
 use crate::render::renderer::Renderer;
-use crate::render::scene::{Look, Thing};
+use crate::render::scene::{Appearance, Thing};
 use crate::render::shadow::{ThingShadows, lamps, table_light};
 use crate::render::view::View;
 
@@ -246,7 +246,7 @@ fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
 }
 
 /// How the holder looks.
-const ROD: Look = Look {
+const ROD: Appearance = Appearance {
     albedo: 0.35,
     texture: 0.0,
     gloss: 0.3,

@@ -82,14 +82,14 @@ impl Renderer {
         }
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Frames drawn so far: the number of the next frame.
-    pub fn frames(&self) -> u64 {
-        self.frames
+    /// Returns the last frame.
+    pub(crate) fn frame(&self) -> &GrayImage {
+        &self.image
     }
 
     /// Draws what the camera of `cell` sees with the arm at `joints`.

@@ -1,4 +1,4 @@
-//! What stands on the table, how it is lit, and what the sensor makes of it.
+//! A scene: lamps, surfaces, things on the table, and the sensor.
 
 use nalgebra::{Point2, Vector3};
 
@@ -8,17 +8,16 @@ use nalgebra::{Point2, Vector3};
 pub struct Light {
     /// Direction *toward* the lamp, world frame; its length does not matter. Must point upward.
     pub toward: Vector3<f64>,
-    /// Irradiance on a surface that faces the lamp; a white surface under 1 is just white in the
-    /// image.
+    /// Irradiance on a surface that faces the lamp; 1 makes a white surface just white in the image.
     pub intensity: f64,
-    /// Half the angle under which the lamp is seen, radians: the softness of its shadows.
+    /// Half the angle that the lamp subtends, radians: the softness of its shadows.
     pub half_angle: f64,
 }
 
-/// How a surface looks.
+/// The appearance of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Look {
+pub struct Appearance {
     /// Mean reflectance, 0 (black) to 1 (white).
     pub albedo: f64,
     /// Strength of the surface's texture relative to the reflectance, 0 (even) to about 1. Flat
@@ -80,17 +79,16 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Whether the shape lies flat on the table, so that nothing can stand in front of it by
-    /// accident.
-    pub fn is_flat(&self) -> bool {
+    /// Returns `true` if the shape lies flat on the table.
+    pub(super) fn is_flat(&self) -> bool {
         matches!(
             self,
             Self::Disc { .. } | Self::Print { .. } | Self::Tape { .. }
         )
     }
 
-    /// Height above the table, metres; 0 for what lies flat.
-    pub fn height(&self) -> f64 {
+    /// Returns the height above the table, metres; 0 for flat shapes.
+    pub(super) fn height(&self) -> f64 {
         match *self {
             Self::Box { height, .. } | Self::Cylinder { height, .. } => height,
             Self::Ball { radius } => 2.0 * radius,
@@ -98,8 +96,8 @@ impl Shape {
         }
     }
 
-    /// Radius of the smallest circle on the table, about the thing's middle, that holds the shape.
-    pub fn footprint(&self) -> f64 {
+    /// Returns the radius of the smallest circle about the thing's middle that holds the shape.
+    pub(crate) fn footprint(&self) -> f64 {
         match *self {
             Self::Box { length, width, .. }
             | Self::Print { length, width, .. }
@@ -111,24 +109,23 @@ impl Shape {
     }
 }
 
-/// Something on the table that is not the ball.
+/// A thing on the table other than the ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Thing {
     /// Its shape.
     pub shape: Shape,
-    /// Where its middle stands, world frame, metres.
+    /// Position of its middle along the world's x, metres.
     pub x: f64,
-    /// Where its middle stands, world frame, metres.
+    /// Position of its middle along the world's y, metres.
     pub y: f64,
-    /// By how much it is turned about the vertical, radians.
+    /// Turn about the vertical, radians.
     pub turn: f64,
-    /// How it looks.
-    pub look: Look,
+    /// Appearance of its surface.
+    pub appearance: Appearance,
 }
 
-/// A strip right before the lens, a cable or the edge of a finger: it hides whatever is behind it.
-/// Lengths in feature units.
+/// A strip right before the lens, such as a cable or the edge of a finger. Lengths in feature units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Occluder {
@@ -144,13 +141,13 @@ pub struct Occluder {
     pub albedo: f64,
 }
 
-/// What turns light into grey levels.
+/// The sensor, which turns light into gray levels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensor {
-    /// Standard deviation of the noise in the dark, grey levels of 255 before gamma.
+    /// Standard deviation of the noise in the dark, gray levels of 255 before gamma.
     pub read_noise: f64,
-    /// Standard deviation of the photon noise at full white, grey levels of 255 before gamma; it
+    /// Standard deviation of the photon noise at full white, gray levels of 255 before gamma; it
     /// falls with the root of the light.
     pub shot_noise: f64,
     /// Standard deviation of the blur of lens and video electronics, pixels, 0 to about 1.2.
@@ -159,14 +156,14 @@ pub struct Sensor {
     pub defocus: f64,
     /// Strength of the fall of light toward the corners, 0 (none) to 1 (the natural cos⁴).
     pub vignetting: f64,
-    /// Exponent of the grey levels: value^(1 / gamma). 1 is linear.
+    /// Exponent of the gray levels: value^(1 / gamma). 1 is linear.
     pub gamma: f64,
     /// Factor on the light.
     pub exposure: f64,
 }
 
 impl Default for Sensor {
-    /// A decent interline CCD of the 1990s behind an analogue grabber.
+    /// Returns a decent interline CCD of the 1990s behind an analogue grabber.
     fn default() -> Self {
         Self {
             read_noise: 1.6,
@@ -180,29 +177,29 @@ impl Default for Sensor {
     }
 }
 
-/// A scene: all that a frame shows besides the ball, its holder and the table's place.
+/// Everything that a frame shows besides the ball, its holder and the table's place.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scene {
-    /// The lamps.
+    /// Lamps.
     pub lights: Vec<Light>,
-    /// Light from everywhere, as the irradiance on a horizontal surface.
+    /// Light from all directions, as the irradiance on a horizontal surface.
     pub ambient: f64,
-    /// The table's surface.
-    pub table: Look,
-    /// The ball's surface.
-    pub ball: Look,
-    /// What else is on the table. No two standing things may overlap; one that stands where the
-    /// holder or a low ball is, is left out.
+    /// Surface of the table.
+    pub table: Appearance,
+    /// Surface of the ball.
+    pub ball: Appearance,
+    /// Things on the table. Standing things must not overlap; one in the place of the holder or of a
+    /// low ball is left out.
     pub things: Vec<Thing>,
-    /// What hangs before the lens.
+    /// Strips before the lens.
     pub occluders: Vec<Occluder>,
-    /// The sensor.
+    /// Sensor of the camera.
     pub sensor: Sensor,
 }
 
 impl Scene {
-    /// A light ball over a bare, slightly textured table under one lamp.
+    /// Returns a light ball over a bare, slightly textured table under one lamp.
     pub fn plain() -> Self {
         Self {
             lights: vec![Light {
@@ -211,12 +208,12 @@ impl Scene {
                 half_angle: 0.06,
             }],
             ambient: 0.25,
-            table: Look {
+            table: Appearance {
                 albedo: 0.30,
                 texture: 0.15,
                 gloss: 0.0,
             },
-            ball: Look {
+            ball: Appearance {
                 albedo: 0.80,
                 texture: 0.0,
                 gloss: 0.25,
@@ -227,24 +224,35 @@ impl Scene {
         }
     }
 
-    /// The scene used throughout: a wooden table under two lamps, with boxes, cylinders, discs,
+    /// Returns the scene used throughout: a wooden table under two lamps, with boxes, cylinders, discs,
     /// another ball, print and tape.
     pub fn laboratory() -> Self {
-        let thing = |shape, x, y, degrees: f64, albedo, texture| Thing {
-            shape,
-            x,
-            y,
-            turn: degrees.to_radians(),
-            look: Look {
-                albedo,
-                texture,
-                gloss: 0.15,
-            },
-        };
+        /// Shape, x and y (m), turn (degrees), reflectance, texture.
+        type Row = (Shape, f64, f64, f64, f64, f64);
         let solid = |length, width, height| Shape::Box {
             length,
             width,
             height,
+        };
+        let post = |radius, height| Shape::Cylinder { radius, height };
+        let disc = |radius, inner| Shape::Disc { radius, inner };
+        let ball = |radius| Shape::Ball { radius };
+        let print = |length, width, lines| Shape::Print {
+            length,
+            width,
+            lines,
+        };
+        let tape = |length, width| Shape::Tape { length, width };
+        let thing = |(shape, x, y, degrees, albedo, texture): Row| Thing {
+            shape,
+            x,
+            y,
+            turn: degrees.to_radians(),
+            appearance: Appearance {
+                albedo,
+                texture,
+                gloss: 0.15,
+            },
         };
         Self {
             lights: vec![
@@ -260,160 +268,40 @@ impl Scene {
                 },
             ],
             ambient: 0.22,
-            table: Look {
+            table: Appearance {
                 albedo: 0.40,
                 texture: 0.55,
                 gloss: 0.0,
             },
-            ball: Look {
+            ball: Appearance {
                 albedo: 0.86,
                 texture: 0.03,
                 gloss: 0.30,
             },
-            things: vec![
-                thing(solid(0.090, 0.050, 0.045), 0.780, 0.210, 28.0, 0.62, 0.25),
-                thing(solid(0.060, 0.060, 0.060), 0.480, -0.300, -15.0, 0.22, 0.30),
-                thing(solid(0.130, 0.032, 0.025), 0.640, 0.420, 70.0, 0.70, 0.15),
-                thing(solid(0.050, 0.030, 0.020), 0.860, -0.120, 5.0, 0.16, 0.20),
-                thing(solid(0.075, 0.075, 0.030), 0.350, 0.560, 40.0, 0.50, 0.40),
-                thing(solid(0.040, 0.040, 0.050), 0.600, -0.620, 20.0, 0.66, 0.20),
-                thing(
-                    Shape::Cylinder {
-                        radius: 0.022,
-                        height: 0.070,
-                    },
-                    0.560,
-                    0.170,
-                    0.0,
-                    0.72,
-                    0.10,
-                ),
-                thing(
-                    Shape::Cylinder {
-                        radius: 0.033,
-                        height: 0.040,
-                    },
-                    0.800,
-                    -0.330,
-                    0.0,
-                    0.30,
-                    0.20,
-                ),
-                thing(
-                    Shape::Cylinder {
-                        radius: 0.012,
-                        height: 0.110,
-                    },
-                    0.420,
-                    0.330,
-                    0.0,
-                    0.55,
-                    0.10,
-                ),
-                thing(
-                    Shape::Cylinder {
-                        radius: 0.040,
-                        height: 0.018,
-                    },
-                    0.330,
-                    -0.520,
-                    0.0,
-                    0.75,
-                    0.10,
-                ),
-                thing(
-                    Shape::Disc {
-                        radius: 0.030,
-                        inner: 0.012,
-                    },
-                    0.680,
-                    -0.030,
-                    0.0,
-                    0.70,
-                    0.10,
-                ),
-                thing(
-                    Shape::Disc {
-                        radius: 0.045,
-                        inner: 0.036,
-                    },
-                    0.560,
-                    -0.430,
-                    0.0,
-                    0.16,
-                    0.10,
-                ),
-                thing(
-                    Shape::Disc {
-                        radius: 0.018,
-                        inner: 0.0,
-                    },
-                    0.880,
-                    0.080,
-                    0.0,
-                    0.82,
-                    0.05,
-                ),
-                thing(
-                    Shape::Disc {
-                        radius: 0.025,
-                        inner: 0.010,
-                    },
-                    0.470,
-                    0.500,
-                    0.0,
-                    0.60,
-                    0.10,
-                ),
-                thing(Shape::Ball { radius: 0.012 }, 0.730, 0.110, 0.0, 0.25, 0.05),
-                thing(Shape::Ball { radius: 0.030 }, 0.900, 0.330, 0.0, 0.35, 0.05),
-                thing(
-                    Shape::Print {
-                        length: 0.150,
-                        width: 0.100,
-                        lines: 9,
-                    },
-                    0.480,
-                    -0.080,
-                    12.0,
-                    0.88,
-                    0.02,
-                ),
-                thing(
-                    Shape::Print {
-                        length: 0.100,
-                        width: 0.140,
-                        lines: 12,
-                    },
-                    0.720,
-                    -0.520,
-                    -35.0,
-                    0.85,
-                    0.02,
-                ),
-                thing(
-                    Shape::Tape {
-                        length: 0.500,
-                        width: 0.024,
-                    },
-                    0.960,
-                    0.050,
-                    84.0,
-                    0.12,
-                    0.10,
-                ),
-                thing(
-                    Shape::Tape {
-                        length: 0.350,
-                        width: 0.018,
-                    },
-                    0.540,
-                    0.720,
-                    15.0,
-                    0.70,
-                    0.10,
-                ),
-            ],
+            things: [
+                (solid(0.090, 0.050, 0.045), 0.780, 0.210, 28.0, 0.62, 0.25),
+                (solid(0.060, 0.060, 0.060), 0.480, -0.300, -15.0, 0.22, 0.30),
+                (solid(0.130, 0.032, 0.025), 0.640, 0.420, 70.0, 0.70, 0.15),
+                (solid(0.050, 0.030, 0.020), 0.860, -0.120, 5.0, 0.16, 0.20),
+                (solid(0.075, 0.075, 0.030), 0.350, 0.560, 40.0, 0.50, 0.40),
+                (solid(0.040, 0.040, 0.050), 0.600, -0.620, 20.0, 0.66, 0.20),
+                (post(0.022, 0.070), 0.560, 0.170, 0.0, 0.72, 0.10),
+                (post(0.033, 0.040), 0.800, -0.330, 0.0, 0.30, 0.20),
+                (post(0.012, 0.110), 0.420, 0.330, 0.0, 0.55, 0.10),
+                (post(0.040, 0.018), 0.330, -0.520, 0.0, 0.75, 0.10),
+                (disc(0.030, 0.012), 0.680, -0.030, 0.0, 0.70, 0.10),
+                (disc(0.045, 0.036), 0.560, -0.430, 0.0, 0.16, 0.10),
+                (disc(0.018, 0.0), 0.880, 0.080, 0.0, 0.82, 0.05),
+                (disc(0.025, 0.010), 0.470, 0.500, 0.0, 0.60, 0.10),
+                (ball(0.012), 0.730, 0.110, 0.0, 0.25, 0.05),
+                (ball(0.030), 0.900, 0.330, 0.0, 0.35, 0.05),
+                (print(0.150, 0.100, 9), 0.480, -0.080, 12.0, 0.88, 0.02),
+                (print(0.100, 0.140, 12), 0.720, -0.520, -35.0, 0.85, 0.02),
+                (tape(0.500, 0.024), 0.960, 0.050, 84.0, 0.12, 0.10),
+                (tape(0.350, 0.018), 0.540, 0.720, 15.0, 0.70, 0.10),
+            ]
+            .map(thing)
+            .to_vec(),
             occluders: Vec::new(),
             sensor: Sensor::default(),
         }

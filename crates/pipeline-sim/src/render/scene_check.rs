@@ -1,13 +1,12 @@
-//! Which quantity of a scene or a shot makes no sense.
+//! Checks of scenes and shots.
 
-use crate::error::QuantityError;
-use crate::error::{amount, at_most, finite};
-use crate::render::scene::{Look, Scene, Sensor, Shape};
+use crate::error::{QuantityError, amount, at_most, finite, positive};
+use crate::render::scene::{Appearance, Scene, Sensor, Shape};
 use crate::render::shot::Shot;
 
 impl Scene {
-    /// Whether every quantity is one that a scene can have. [`crate::Renderer`] does not ask: it
-    /// draws of a senseless scene what makes sense, and takes a gamma that is not above zero for 1.
+    /// Checks every quantity. [`Renderer`](crate::Renderer) does not: it draws the usable parts of a
+    /// scene and replaces a gamma that is not above zero by 1.
     ///
     /// # Errors
     /// [`QuantityError`] names the first quantity that is not finite, below zero, or, for gamma and
@@ -18,7 +17,7 @@ impl Scene {
             for (axis, value) in ["x", "y", "z"].into_iter().zip(light.toward.iter()) {
                 finite(format!("{axis} of the direction to lamp {i}"), *value)?;
             }
-            above_zero(format!("z of the direction to lamp {i}"), light.toward.z)?;
+            positive(format!("z of the direction to lamp {i}"), light.toward.z)?;
             amount(format!("intensity of lamp {i}"), light.intensity)?;
             amount(format!("half angle of lamp {i} (rad)"), light.half_angle)?;
         }
@@ -28,7 +27,7 @@ impl Scene {
             finite(format!("x of thing {i} (m)"), thing.x)?;
             finite(format!("y of thing {i} (m)"), thing.y)?;
             finite(format!("turn of thing {i} (rad)"), thing.turn)?;
-            thing.look.check(&format!("thing {i}"))?;
+            thing.appearance.check(&format!("thing {i}"))?;
             for (name, value) in thing.shape.lengths() {
                 amount(format!("{name} of thing {i} (m)"), value)?;
             }
@@ -49,25 +48,24 @@ impl Scene {
 }
 
 impl Sensor {
-    /// Whether a sensor can be like this.
+    /// Checks every quantity.
     ///
     /// # Errors
     /// [`QuantityError`] names the first quantity that is not finite or below zero; gamma must be
     /// above zero.
-    pub fn check(&self) -> Result<(), QuantityError> {
-        amount("read noise (grey levels)", self.read_noise)?;
-        amount("shot noise (grey levels)", self.shot_noise)?;
+    pub(crate) fn check(&self) -> Result<(), QuantityError> {
+        amount("read noise (gray levels)", self.read_noise)?;
+        amount("shot noise (gray levels)", self.shot_noise)?;
         amount("blur (px)", self.blur)?;
         amount("defocus (px)", self.defocus)?;
         amount("vignetting", self.vignetting)?;
         amount("exposure", self.exposure)?;
-        finite("gamma", self.gamma)?;
-        above_zero("gamma".to_owned(), self.gamma)
+        positive("gamma", self.gamma)
     }
 }
 
 impl Shot {
-    /// Whether a frame can be taken like this. [`crate::Renderer::take`] does not ask.
+    /// Checks every quantity. [`Renderer::take`](crate::Renderer::take) does not.
     ///
     /// # Errors
     /// [`QuantityError`] names the time that is not finite, below zero or above [`Shot::LONGEST`],
@@ -81,18 +79,12 @@ impl Shot {
             at_most(quantity, time, Self::LONGEST)?;
         }
         let (quantity, moments) = ("number of moments", self.moments as f64);
-        if self.moments == 0 {
-            let quantity = quantity.to_owned();
-            return Err(QuantityError::NotPositive {
-                quantity,
-                value: moments,
-            });
-        }
+        positive(quantity, moments)?;
         at_most(quantity, moments, Self::MOST_MOMENTS as f64)
     }
 }
 
-impl Look {
+impl Appearance {
     fn check(&self, of: &str) -> Result<(), QuantityError> {
         amount(format!("albedo of {of}"), self.albedo)?;
         amount(format!("texture of {of}"), self.texture)?;
@@ -101,7 +93,7 @@ impl Look {
 }
 
 impl Shape {
-    /// Its measures, by name.
+    /// Returns its measures by name.
     fn lengths(&self) -> Vec<(&'static str, f64)> {
         match *self {
             Self::Box {
@@ -119,49 +111,17 @@ impl Shape {
     }
 }
 
-fn above_zero(quantity: String, value: f64) -> Result<(), QuantityError> {
-    if value > 0.0 {
-        Ok(())
-    } else {
-        Err(QuantityError::NotPositive { quantity, value })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::{Point2, Vector3};
-    use rand::SeedableRng;
-    use rand::rngs::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::datasets::benchmark_kind::BenchmarkKind;
-    use crate::datasets::scene_kind::{SceneKind, Snapshot};
     use crate::render::scene::{Light, Occluder};
 
     type Spoil = fn(&mut Scene);
 
     #[test]
-    fn what_is_drawn_from_a_seed_makes_sense() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-        for kind in SceneKind::ALL {
-            assert_eq!(Scene::generate(kind, &mut rng).check(), Ok(()), "{kind}");
-            assert_eq!(
-                Snapshot::draw(kind, &mut rng).shot.check(),
-                Ok(()),
-                "{kind}"
-            );
-        }
-        for kind in BenchmarkKind::ALL {
-            let (scene, snapshot) = kind.draw((768, 576), &mut rng).expect("a frame of pixels");
-            assert_eq!(scene.check(), Ok(()), "{kind}");
-            assert_eq!(snapshot.shot.check(), Ok(()), "{kind}");
-        }
-        assert_eq!(Scene::laboratory().check(), Ok(()));
-        assert_eq!(Scene::plain().check(), Ok(()));
-    }
-
-    #[test]
-    fn what_makes_no_sense_is_named() {
+    fn out_of_range_quantities_are_named() {
         let spoil: [(&str, Spoil); 12] = [
             ("ambient light", |s| s.ambient = -1.0),
             ("gamma", |s| s.sensor.gamma = -2.0),

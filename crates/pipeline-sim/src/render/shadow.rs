@@ -274,11 +274,11 @@ fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::scene::Look;
+    use crate::render::scene::Appearance;
 
     #[test]
     fn the_gloom_at_the_foot_of_a_box_has_the_shape_of_the_box() {
-        let look = Look {
+        let look = Appearance {
             albedo: 0.5,
             texture: 0.0,
             gloss: 0.0,

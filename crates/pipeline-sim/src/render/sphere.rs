@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
-use crate::render::scene::Look;
+use crate::render::scene::Appearance;
 
 impl Studio<'_> {
     /// Draws a sphere.
@@ -14,7 +14,7 @@ impl Studio<'_> {
         canvas: &mut Canvas,
         centre: &Point3<f64>,
         radius: f64,
-        look: &Look,
+        appearance: &Appearance,
     ) {
         // In units of the radius, camera frame.
         let c = self.view.seen(centre).coords / radius;
@@ -32,8 +32,8 @@ impl Studio<'_> {
             (0.5 * self.scene.ambient.max(0.0)) as f32,
             (0.5 * self.bounce) as f32,
         );
-        let albedo = look.albedo as f32;
-        let gloss = look.gloss as f32;
+        let albedo = appearance.albedo as f32;
+        let gloss = appearance.gloss as f32;
         let lamps: Vec<(Vector3<f32>, Vector3<f32>, f32)> = self
             .lamps
             .iter()

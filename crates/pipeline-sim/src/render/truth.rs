@@ -4,7 +4,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use puma_val2::Joints;
 
 use crate::cell::camera::unit_outline;
-use crate::cell::ellipse::Ellipse;
+use crate::cell::ellipse::ProjectedEllipse;
 use crate::cell::geometry::Cell;
 use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
@@ -31,11 +31,11 @@ pub enum Round {
 /// A round outline in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Sighting {
+pub struct RoundOutline {
     /// What it belongs to.
     pub what: Round,
-    /// The exact outline ([`Ellipse::circle`] is the circle of equal mean radius), pixels.
-    pub ellipse: Ellipse,
+    /// The exact outline ([`ProjectedEllipse::circle`] is the circle of equal mean radius), pixels.
+    pub ellipse: ProjectedEllipse,
     /// Share of the outlined area that the frame shows, 0..=1: the rest is hidden behind nearer
     /// things or cut off by the frame.
     pub visible: f64,
@@ -52,15 +52,15 @@ const OUTLINE: i32 = 96;
 /// y, 1) of the camera frame.
 struct Outline {
     what: Round,
-    ellipse: Ellipse,
+    ellipse: ProjectedEllipse,
     points: Vec<Point2<f64>>,
 }
 
 impl Renderer {
     /// Every round outline that the frame of `cell` with the arm at `joints` shows, the ball's
     /// first; outlines of which nothing is visible, or that reach beyond what the lens shows, are
-    /// left out. Exact but for [`Sighting::visible`], which is good to about a hundredth.
-    pub fn truth(&self, cell: &Cell, joints: &Joints) -> Vec<Sighting> {
+    /// left out. Exact but for [`RoundOutline::visible`], which is good to about a hundredth.
+    pub fn truth(&self, cell: &Cell, joints: &Joints) -> Vec<RoundOutline> {
         let pose = cell.camera_pose(joints);
         if pose.translation.vector.iter().any(|v| !v.is_finite()) {
             return Vec::new();
@@ -78,7 +78,7 @@ impl Renderer {
             for outline in self.rounds(cell, &view, item) {
                 let visible = self.visible(cell, &view, &dark, &outline.points, &items[rank + 1..]);
                 if visible > 0.0 {
-                    found.push(Sighting {
+                    found.push(RoundOutline {
                         what: outline.what,
                         ellipse: outline.ellipse,
                         visible,
@@ -188,7 +188,7 @@ impl Renderer {
             }
             Some(Outline {
                 what,
-                ellipse: Ellipse::of_outline(|t| cell.camera.project(&at(t)))?,
+                ellipse: ProjectedEllipse::of_outline(|t| cell.camera.project(&at(t)))?,
                 points: around(&|t| Point2::from(at(t).xy() / at(t).z)),
             })
         };

@@ -1,0 +1,175 @@
+//! The camera on the hand, with and without frames.
+
+use hough_heuristic::image::GrayImage;
+use hough_heuristic::{Features, FrameError, FrameSource};
+use puma_val2::Joints;
+use rand::SeedableRng;
+use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::cell::geometry::Cell;
+use crate::cell::noise::{NOISE, with_noise};
+use crate::devices::shared_cell::SharedCell;
+use crate::error::{QuantityError, amount};
+use crate::render::renderer::Renderer;
+use crate::render::shot::Shot;
+
+/// The camera on the hand as a [`FrameSource`]: every grab renders the cell as it is, with the
+/// joints where they are.
+///
+/// A closure supplies the joints, so that any arm will do: [`SimulatedArm::pose`] or the pose of an
+/// emulated controller. Frames are taken in an instant unless [`CellCamera::exposed`] sets an
+/// exposure.
+///
+/// [`SimulatedArm::pose`]: crate::SimulatedArm::pose
+pub struct CellCamera<P> {
+    cell: SharedCell,
+    renderer: Renderer,
+    pose: P,
+    exposure: Option<(Shot, Box<Moved>)>,
+}
+
+/// Returns cell and joints some seconds later, or before.
+type Moved = dyn FnMut(&Cell, &Joints, f64) -> (Cell, Joints) + Send;
+
+impl<P: FnMut() -> Joints> CellCamera<P> {
+    /// Creates a camera in `cell` at the pose that `pose` returns.
+    pub fn new(cell: SharedCell, renderer: Renderer, pose: P) -> Self {
+        Self {
+            cell,
+            renderer,
+            pose,
+            exposure: None,
+        }
+    }
+
+    /// Gives the frames an exposure time, of one field or two: `moved` receives cell and joints in
+    /// the middle of the exposure and a time in seconds after (or, below zero, before) it, and
+    /// returns both at that time.
+    ///
+    /// The truth of the frame, and [`Cell::features`], hold for the middle of the exposure.
+    ///
+    /// ```
+    /// use pipeline_sim::image::GrayImage;
+    /// use pipeline_sim::{Ball, Cell, CellCamera, FrameSource, Renderer, Scene, SharedCell, Shot};
+    /// use pipeline_sim::Workspace;
+    ///
+    /// fn main() -> Result<(), Box<dyn std::error::Error>> {
+    ///     let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.15, -0.1)));
+    ///     let pose = Workspace::paper().search_poses()[3];
+    ///     let renderer = Renderer::new(&Scene::laboratory(), 1);
+    ///     // PAL, each field exposed for 10 ms, while the waist turns by 20 degrees a second.
+    ///     let mut camera = CellCamera::new(cell, renderer, move || pose).exposed(
+    ///         Shot::pal(0.010, 4),
+    ///         |cell, joints, seconds| {
+    ///             let mut then = *joints;
+    ///             then.0[0] += 20.0_f64.to_radians() * seconds;
+    ///             (*cell, then)
+    ///         },
+    ///     )?;
+    ///     let mut frame = GrayImage::new(0, 0);
+    ///     camera.grab(&mut frame)?;
+    ///     assert_eq!(frame.dimensions(), (768, 576));
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the quantity of `shot` that is out of range.
+    pub fn exposed(
+        mut self,
+        shot: Shot,
+        moved: impl FnMut(&Cell, &Joints, f64) -> (Cell, Joints) + Send + 'static,
+    ) -> Result<Self, QuantityError> {
+        shot.check()?;
+        self.exposure = Some((shot, Box::new(moved)));
+        Ok(self)
+    }
+
+    /// Renders the next frame into the renderer's own buffer, without a copy.
+    ///
+    /// # Errors
+    /// [`FrameError::Failed`] if the joints, or those of a moment of the exposure, are not finite.
+    pub fn look(&mut self) -> Result<&GrayImage, FrameError> {
+        let joints = (self.pose)();
+        let mut wrong = joints.non_finite();
+        let cell = self.cell.get();
+        if wrong.is_none() {
+            match &mut self.exposure {
+                None => drop(self.renderer.render(&cell, &joints)),
+                Some((shot, moved)) => {
+                    let middle = 0.5 * (shot.exposure + shot.interlace.unwrap_or(0.0));
+                    self.renderer.take(shot, |t| {
+                        let (cell, joints) = moved(&cell, &joints, t - middle);
+                        wrong = wrong.or(joints.non_finite());
+                        (cell, joints)
+                    });
+                }
+            }
+        }
+        match wrong {
+            None => Ok(self.renderer.frame()),
+            Some(joint) => Err(FrameError::Failed {
+                origin: "simulated camera".to_owned(),
+                reason: format!("the angle of {joint} is not a finite number"),
+            }),
+        }
+    }
+}
+
+impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
+    fn grab(&mut self) -> Result<GrayImage, FrameError> {
+        self.look().cloned()
+    }
+}
+
+impl<P> std::fmt::Debug for CellCamera<P> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let shot = self.exposure.as_ref().map(|(shot, _)| shot);
+        f.debug_struct("CellCamera")
+            .field("cell", &self.cell)
+            .field("shot", &shot)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Camera and detector in one: the ball's features from the geometry, with noise, without a frame.
+pub struct FeatureCamera<P> {
+    cell: SharedCell,
+    pose: P,
+    noise: f64,
+    rng: Xoshiro256PlusPlus,
+}
+
+impl<P: FnMut() -> Joints> FeatureCamera<P> {
+    /// Creates a camera in `cell` at the pose that `pose` returns. Its features carry normal noise
+    /// of standard deviation `noise` units, drawn from `seed`.
+    ///
+    /// # Errors
+    /// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is not a finite
+    /// number of zero or above.
+    pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Result<Self, QuantityError> {
+        amount(NOISE, noise)?;
+        Ok(Self {
+            cell,
+            pose,
+            noise,
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+        })
+    }
+
+    /// Returns the features that a detector would find; `None` if the ball counts as lost.
+    pub fn look(&mut self) -> Option<Features> {
+        let joints = (self.pose)();
+        let features = self.cell.with(|cell| cell.features(&joints)).ok()?;
+        Some(with_noise(features, self.noise, &mut self.rng))
+    }
+}
+
+impl<P> std::fmt::Debug for FeatureCamera<P> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FeatureCamera")
+            .field("cell", &self.cell)
+            .field("noise", &self.noise)
+            .finish_non_exhaustive()
+    }
+}

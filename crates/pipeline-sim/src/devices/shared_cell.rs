@@ -1,0 +1,115 @@
+//! A cell shared between camera, arm and sensors, with a record of contacts.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use puma_val2::{Gripper, Joints};
+
+use crate::cell::geometry::Cell;
+use crate::cell::grasp::Grasp;
+
+/// Contacts of the hand with the cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contacts {
+    /// Number of times that fingers, palm or camera ran into ball, holder or table; with a
+    /// [`SimulatedArm`](crate::SimulatedArm), number of moves that pushed the ball.
+    pub collisions: usize,
+    /// Distance that the ball was pushed, metres.
+    pub pushed: f64,
+    /// Result of the last closing of the jaws; `None` before the first.
+    pub grasp: Option<Grasp>,
+}
+
+/// A handle to a cell that camera, arm, sensors and the user share.
+///
+/// ```
+/// use pipeline_sim::nalgebra::Point3;
+/// use pipeline_sim::{Ball, Cell, SharedCell};
+///
+/// let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.1, -0.1)));
+/// let same = cell.clone();
+/// same.with(|cell| cell.place_ball(Point3::new(0.65, 0.1, -0.1)));
+/// assert_eq!(cell.get().ball.centre.x, 0.65);
+/// ```
+#[derive(Clone, Debug)]
+pub struct SharedCell(Arc<Mutex<State>>);
+
+#[derive(Debug)]
+struct State {
+    cell: Cell,
+    /// Last pose of the hand.
+    stood: Option<Joints>,
+    /// Set while the hand overlaps something.
+    touching: bool,
+    contacts: Contacts,
+}
+
+impl SharedCell {
+    /// Shares a cell.
+    pub fn new(cell: Cell) -> Self {
+        Self(Arc::new(Mutex::new(State {
+            cell,
+            stood: None,
+            touching: false,
+            contacts: Contacts::default(),
+        })))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Plain data stays valid when a thread panics.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns a copy of the cell.
+    pub fn get(&self) -> Cell {
+        self.lock().cell
+    }
+
+    /// Calls `act` with the cell.
+    pub fn with<T>(&self, act: impl FnOnce(&mut Cell) -> T) -> T {
+        act(&mut self.lock().cell)
+    }
+
+    /// Moves the hand to `joints` from where it was last, pushing the ball on its way, and counts
+    /// contacts. Returns `true` if something is within the proximity sensors' range there.
+    ///
+    /// For an arm that does not know the cell, on its way or standing. An uninterrupted contact
+    /// counts as one collision.
+    pub fn move_hand(&self, joints: &Joints) -> bool {
+        let mut state = self.lock();
+        let from = state.stood.replace(*joints).unwrap_or(*joints);
+        let pushed = state.cell.sweep(&from, joints);
+        let touching = pushed > 0.0 || state.cell.collides(joints);
+        state.contacts.pushed += pushed;
+        state.contacts.collisions += usize::from(touching && !state.touching);
+        state.touching = touching;
+        state.cell.proximity(joints)
+    }
+
+    /// Moves the hand along the way of an arm that is the only one in the cell, without looking for
+    /// other contacts than with the ball.
+    pub(super) fn sweep(&self, from: &Joints, to: &Joints) {
+        let mut state = self.lock();
+        let pushed = state.cell.sweep(from, to);
+        state.contacts.pushed += pushed;
+        state.contacts.collisions += usize::from(pushed > 0.0);
+    }
+
+    /// Opens or closes the jaws with the arm at `joints`.
+    pub fn set_gripper(&self, gripper: Gripper, joints: &Joints) {
+        let mut state = self.lock();
+        match gripper {
+            Gripper::Open => state.cell.open_gripper(),
+            Gripper::Closed => state.contacts.grasp = Some(state.cell.close_gripper(joints)),
+        }
+    }
+
+    /// Returns the contacts since the last [`SharedCell::reset_contacts`].
+    pub fn contacts(&self) -> Contacts {
+        self.lock().contacts
+    }
+
+    /// Clears the contacts.
+    pub fn reset_contacts(&self) {
+        self.lock().contacts = Contacts::default();
+    }
+}
