@@ -158,7 +158,7 @@ pub fn bright_ball_scene() -> Scene {
         .things
         .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
     for thing in &mut scene.things {
-        thing.look.albedo *= 0.5;
+        thing.appearance.albedo *= 0.5;
     }
     scene
 }

@@ -18,13 +18,13 @@
 //! ```
 //! use puma_grasp::Simulator;
 //! use puma_grasp::grasp_agent::BehaviourSpec;
-//! use puma_grasp::pipeline_sim::{Ball, Cell, ReachForm, sample_moves};
+//! use puma_grasp::pipeline_sim::{Ball, Cell, ReachForm};
 //! use puma_grasp::qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
 //!     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-//!     let (centering, reaching) = sample_moves(&cell, 500, 0.5, &mut rng);
+//!     let (centering, reaching) = cell.sample_moves(500, 0.5, &mut rng)?;
 //!     let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
 //!     let spec = BehaviourSpec::centering();
 //!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, &mut |_| {})?;
@@ -40,7 +40,6 @@
 mod detector;
 mod rig;
 mod simulator;
-mod surroundings;
 
 pub use grasp_agent;
 pub use hough_heuristic;
@@ -51,7 +50,6 @@ pub use qtable;
 pub use detector::{BallDetector, UnknownDetector, bright_ball_scene};
 pub use rig::{PlaceError, Rig, RigError, RigParts};
 pub use simulator::Simulator;
-pub use surroundings::Contacts;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,22 +1,18 @@
 //! The rig: an arm behind a VAL II controller, with the simulated cell around it.
 
 use std::io;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use grasp_agent::{Agent, AgentError, CameraEye, Controller, RunEvent, RunOutcome};
 use hough_heuristic::{CircleDetector, FrameSource};
-use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell};
+use pipeline_sim::{Ball, Cell, CellCamera, Contacts, Renderer, Scene, SharedCell};
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
-use puma_val2::nalgebra::Point3;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, GuardedArm, JointDelta, Joints, Manipulator,
-    Profile, ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, Gripper, GuardedArm, Joints, Manipulator, Profile,
+    ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
-
-use crate::Contacts;
-use crate::surroundings::Surroundings;
 
 /// An arm behind a VAL II controller, calibrated, in a simulated cell: a ball to place, a camera on
 /// the hand whose frames are rendered from the arm's pose, proximity sensors, and a gripper that
@@ -31,7 +27,6 @@ pub struct Rig {
     arm: Box<dyn Manipulator>,
     pose: Pose,
     cell: SharedCell,
-    surroundings: Surroundings,
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
 }
 
@@ -56,12 +51,11 @@ impl Rig {
     /// The system has no free line, or the emulator does not answer on it.
     pub fn emulated(realtime: bool, scene: &Scene, seed: u64) -> Result<Self, RigError> {
         let (cell, client_config) = (paper_cell(), ClientConfig::for_emulator());
-        let surroundings = Surroundings::new(cell.clone());
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-        let around = surroundings.clone();
+        let around = cell.clone();
         emulator
             .attach_sensor(client_config.proximity_signal, move |joints| {
-                around.hand_at(joints)
+                around.move_hand(joints)
             })
             .map_err(|fault| RigError::Serve(io::Error::other(fault.to_string())))?;
         let config = ServeConfig {
@@ -83,20 +77,12 @@ impl Rig {
         };
         let name = line.name().to_owned();
         let pose: Pose = Arc::new(move || server.joints());
-        let arm = ArmInCell {
-            arm: connect(line, client_config)?,
-            surroundings: surroundings.clone(),
-            pose: Arc::clone(&pose),
-            reported: None,
+        let arm = {
+            let pose = Arc::clone(&pose);
+            cell.with_jaws_of(connect(line, client_config)?, move || pose())
         };
-        Ok(Self::assemble(
-            name,
-            Box::new(arm),
-            pose,
-            surroundings,
-            cell,
-            (scene, seed),
-        ))
+        let arm = Box::new(arm);
+        Ok(Self::assemble(name, arm, pose, cell, (scene, seed)))
     }
 
     /// Connects to the controller on the serial device `path`.
@@ -123,35 +109,16 @@ impl Rig {
     ) -> Result<Self, RigError> {
         let name = line.name().to_owned();
         let mut arm = connect(line, ClientConfig::default())?;
-        let reported = Arc::new(Mutex::new(arm.joints()?));
-        let pose: Pose = {
-            let reported = Arc::clone(&reported);
-            Arc::new(move || *reported.lock().unwrap_or_else(PoisonError::into_inner))
-        };
-        let cell = paper_cell();
-        let surroundings = Surroundings::new(cell.clone());
-        surroundings.hand_at(&pose());
-        let arm = ArmInCell {
-            arm,
-            surroundings: surroundings.clone(),
-            pose: Arc::clone(&pose),
-            reported: Some(reported),
-        };
-        Ok(Self::assemble(
-            name,
-            Box::new(arm),
-            pose,
-            surroundings,
-            cell,
-            (scene, seed),
-        ))
+        let (cell, start) = (paper_cell(), arm.joints()?);
+        let (arm, pose) = cell.follow(arm, start);
+        let (arm, pose): (_, Pose) = (Box::new(arm), Arc::new(pose));
+        Ok(Self::assemble(name, arm, pose, cell, (scene, seed)))
     }
 
     fn assemble(
         name: String,
         arm: Box<dyn Manipulator>,
         pose: Pose,
-        surroundings: Surroundings,
         cell: SharedCell,
         (scene, seed): (&Scene, u64),
     ) -> Self {
@@ -165,7 +132,6 @@ impl Rig {
             arm,
             pose,
             cell,
-            surroundings,
             camera,
         }
     }
@@ -195,24 +161,12 @@ impl Rig {
                 });
             }
         }
-        self.surroundings.begin();
         Ok(())
     }
 
     /// Puts the ball at its place unless it would stand in the hand. Returns whether it did.
     fn put(&self, ball: &Ball) -> bool {
-        let joints = (self.pose)();
-        self.cell.with(|cell| {
-            let (mut there, mut nowhere) = (*cell, *cell);
-            there.place_ball(ball.centre);
-            take_away(&mut nowhere);
-            // A hand that overlaps the table does so wherever the ball is.
-            let free = !there.collides(&joints) || nowhere.collides(&joints);
-            if free {
-                *cell = there;
-            }
-            free
-        })
+        self.cell.place_ball(ball.centre, &(self.pose)())
     }
 
     /// Removes the ball and its holder from the cell, opens the jaws, and moves the arm to `pose`.
@@ -220,7 +174,7 @@ impl Rig {
     /// # Errors
     /// What kept the arm from getting there.
     pub fn clear_for(&mut self, pose: Joints) -> Result<(), ArmError> {
-        self.cell.with(take_away);
+        self.cell.remove_ball();
         self.arm.set_gripper(Gripper::Open)?;
         match self.arm.move_to(pose) {
             // The arm stood close to what has just been removed.
@@ -231,7 +185,7 @@ impl Rig {
 
     /// Returns the contacts of the hand with the cell since the ball was placed.
     pub fn contacts(&self) -> Contacts {
-        self.surroundings.contacts()
+        self.cell.contacts()
     }
 
     /// Returns whether the ball is in the jaws.
@@ -260,13 +214,11 @@ impl Rig {
 
     /// Returns camera, arm and sensor, for a caller that puts something of its own in between.
     pub fn parts(&mut self) -> RigParts<'_> {
+        let sensor = Box::new(self.cell.sensor(self.pose()));
         RigParts {
             camera: &mut self.camera,
             arm: &mut *self.arm,
-            sensor: Box::new(CellSensor {
-                cell: self.cell.clone(),
-                pose: Arc::clone(&self.pose),
-            }),
+            sensor,
         }
     }
 
@@ -302,12 +254,6 @@ impl std::fmt::Debug for Rig {
     }
 }
 
-/// Removes the ball and its holder from the cell.
-fn take_away(cell: &mut Cell) {
-    cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
-    cell.holder = None;
-}
-
 /// Returns the cell that a rig begins with.
 fn paper_cell() -> SharedCell {
     SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)))
@@ -323,69 +269,6 @@ fn connect<T: Transport>(line: T, config: ClientConfig) -> Result<GuardedArm<T>,
     let mut client = Val2Client::connect(line, config)?;
     client.calibrate()?;
     GuardedArm::new(client)
-}
-
-/// The proximity sensors of a simulated cell.
-struct CellSensor {
-    cell: SharedCell,
-    pose: Pose,
-}
-
-impl ProximitySensor for CellSensor {
-    fn object_near(&mut self) -> Result<bool, ArmError> {
-        let joints = (self.pose)();
-        Ok(self.cell.with(|cell| cell.proximity(&joints)))
-    }
-}
-
-/// An arm that the cell follows.
-struct ArmInCell<M> {
-    arm: M,
-    surroundings: Surroundings,
-    pose: Pose,
-    /// The last pose that the arm reported, for the cell; `None` where the cell sees it move.
-    reported: Option<Arc<Mutex<Joints>>>,
-}
-
-impl<M: Manipulator> ArmInCell<M> {
-    fn note(&self, outcome: Result<Joints, ArmError>) -> Result<Joints, ArmError> {
-        let stands = match &outcome {
-            Ok(joints) | Err(ArmError::ProximityStop { joints, .. }) => Some(joints),
-            Err(_) => None,
-        };
-        if let (Some(reported), Some(joints)) = (&self.reported, stands) {
-            *reported.lock().unwrap_or_else(PoisonError::into_inner) = *joints;
-            self.surroundings.hand_at(joints);
-        }
-        outcome
-    }
-}
-
-impl<M: Manipulator> Manipulator for ArmInCell<M> {
-    fn joints(&mut self) -> Result<Joints, ArmError> {
-        let joints = self.arm.joints();
-        self.note(joints)
-    }
-
-    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
-        let joints = self.arm.move_by(delta);
-        self.note(joints)
-    }
-
-    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let joints = self.arm.move_to(target);
-        self.note(joints)
-    }
-
-    fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        self.arm.set_gripper(gripper)?;
-        self.surroundings.jaws(gripper, &(self.pose)());
-        Ok(())
-    }
-
-    fn stop(&mut self) -> Result<(), ArmError> {
-        self.arm.stop()
-    }
 }
 
 /// Error of placing a ball.

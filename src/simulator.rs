@@ -49,8 +49,8 @@ impl Simulator {
     /// Returns the quality of fit of each output: `dx` of centering, `dy` and `dr` of approaching,
     /// in feature units.
     pub fn quality(&self) -> Vec<Quality> {
-        let mut all = self.centre.quality();
-        all.extend(self.reach.quality());
+        let mut all = self.centre.quality().to_vec();
+        all.extend_from_slice(self.reach.quality());
         all
     }
 

@@ -23,9 +23,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use example_support::files::{animated, writable_folder, write_whole};
 use example_support::program::ended;
+use hough_heuristic::Y4mWriter;
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageFormat};
-use pipeline_sim::{Cell, Renderer, Scene, Sensor, Workspace, Y4mWriter};
+use pipeline_sim::{Cell, Renderer, Scene, Sensor, Workspace};
 use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -64,9 +65,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
         .sample_seen_ball(&nominal, &mut rng)
         .ok_or("no search pose sees the workspace")?;
     let cell = Cell::paper(ball);
-    let goal = cell
-        .goal_pose(Cell::REACHING_JT5_DEGREES)
-        .ok_or("the ball is out of reach")?;
+    let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
     let path = reach(&cell, &start, &goal, options.frames.max(4));
 
     let overview = overview::overview(&cell, &workspace, &path[..=path.len() * 3 / 4])?;

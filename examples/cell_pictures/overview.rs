@@ -218,7 +218,10 @@ fn sight_lines(cell: &Cell, joints: &Joints) -> [Point3<f64>; 7] {
     let (w, h) = cell.camera.size();
     let (w, h) = (f64::from(w) - 0.5, f64::from(h) - 0.5);
     let end = |x: f64, y: f64| {
-        let ray = pose * cell.camera.ray(Point2::new(x, y)).normalize();
+        let Ok(ray) = cell.camera.ray(Point2::new(x, y)) else {
+            return eye;
+        };
+        let ray = pose * ray.normalize();
         let down = if ray.z < 0.0 {
             (cell.table - eye.z) / ray.z
         } else {

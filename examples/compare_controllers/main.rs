@@ -20,7 +20,7 @@ use grasp_agent::{
     Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, Retargeted,
     SavedRun, Servo, ServoLaw, ServoSettings, TaughtGoal,
 };
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
+use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
 use puma_grasp::{BallDetector, Simulator};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -355,7 +355,7 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
+    let (centring, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
     let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
     let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
     let plane = ExactPlane::new(20_000, &mut rng);

@@ -23,7 +23,7 @@ use grasp_agent::{
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use pipeline_sim::{Ball, Cell, ReachForm, Workspace, sample_moves};
+use pipeline_sim::{Ball, Cell, ReachForm, Workspace};
 use puma_grasp::{Rig, RigError, RigParts, Simulator, bright_ball_scene};
 use qtable::TrainReport;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -222,7 +222,7 @@ impl Taught {
         rng: &mut dyn Rng,
     ) -> Result<Self, Box<dyn Error>> {
         say(options, &format!("sampling {SAMPLES} moves in the cell"));
-        let (centring, reaching) = sample_moves(cell, SAMPLES, FEATURE_NOISE, rng);
+        let (centring, reaching) = cell.sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
         let form = match options.simulator.unwrap_or(FormName::Rigid22) {
             FormName::Linear => ReachForm::Linear,
             FormName::Rigid8 => ReachForm::Rigid8,

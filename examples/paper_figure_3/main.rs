@@ -106,7 +106,7 @@ fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
     let poses = Workspace::paper().search_poses();
     let pose = poses
         .iter()
-        .find(|pose| cell.circle(pose).as_ref().is_some_and(inside));
+        .find(|pose| cell.circle(pose).as_ref().is_ok_and(inside));
     let pose = pose.ok_or("the ball is in view from none of the search poses")?;
     Ok(Renderer::new(&Scene::laboratory(), seed)
         .render(&cell, pose)

@@ -21,7 +21,7 @@ use grasp_agent::{
     Agent, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, LearnError, Learned, Lesson,
     Percept,
 };
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
+use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
 use puma_grasp::Simulator;
 use qtable::Record;
 use rand::SeedableRng;
@@ -117,7 +117,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let plane = ExactPlane::new(20_000, &mut rng);
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-        let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
+        let (centring, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
         let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
         let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
         let (literal, mended) = (
@@ -258,7 +258,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
             // The last sighting before each move.
             let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
             let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
-                let there = cell.features(joints).is_some_and(|f| {
+                let there = cell.features(joints).is_ok_and(|f| {
                     (99.0..=108.0).contains(&f.x)
                         && (74.0..=82.0).contains(&f.y)
                         && (32.0..=34.0).contains(&f.r)

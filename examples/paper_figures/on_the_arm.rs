@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt::Write as _;
 
 use grasp_agent::{Agent, AgentConfig, BehaviourPair, GoalInterval, Learned, OnlineLearning};
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, sample_moves};
+use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
 use puma_grasp::Simulator;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -106,7 +106,7 @@ fn one_arm(
 ) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (centring, reaching) =
-        sample_moves(&Cell::paper(Ball::at(0.6, 0.0, -0.1)), 2_500, 0.5, &mut rng);
+        Cell::paper(Ball::at(0.6, 0.0, -0.1)).sample_moves(2_500, 0.5, &mut rng)?;
     let simulator = Simulator::fit(&centring, &reaching, form)?;
     let pair = BehaviourPair::paper_mended();
     let only_x = pair.centering.goal.clone();

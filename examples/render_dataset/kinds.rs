@@ -2,15 +2,16 @@
 
 use std::str::FromStr;
 
-use pipeline_sim::{BenchmarkKind, SceneKind};
+use pipeline_sim::Recipe;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 /// A kind of frame.
 #[derive(Clone, Copy)]
-pub(crate) enum Kind {
-    Cell(SceneKind),
-    Benchmark(BenchmarkKind),
+pub(crate) struct Kind {
+    pub(crate) recipe: &'static Recipe,
+    /// Smallest radius in the truth, pixels of a frame 768 wide.
+    pub(crate) least_radius: f64,
 }
 
 /// One or several kinds, as given on the command line.
@@ -21,51 +22,47 @@ impl FromStr for Kinds {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        let all_of_cell = SceneKind::ALL.map(Kind::Cell);
-        let all_of_benchmark = BenchmarkKind::ALL.map(Kind::Benchmark);
-        Ok(Self(match (name, name.parse(), name.parse()) {
-            ("cell", ..) => all_of_cell.to_vec(),
-            ("benchmark", ..) => all_of_benchmark.to_vec(),
-            (_, Ok(kind), _) => vec![Kind::Cell(kind)],
-            (_, _, Ok(kind)) => vec![Kind::Benchmark(kind)],
-            (_, Err(of_cell), Err(of_benchmark)) => {
-                return Err(format!(
-                    "unknown kind; known are cell: {}; benchmark: {}",
-                    of_cell.known, of_benchmark.known
-                ));
+        let list = |recipes: &'static [Recipe], least_radius| -> Vec<Kind> {
+            let kind = |recipe| Kind {
+                recipe,
+                least_radius,
+            };
+            recipes.iter().map(kind).collect()
+        };
+        let (mut kinds, benchmark) = (list(Recipe::cell(), 5.0), list(Recipe::benchmark(), 0.0));
+        match name {
+            "cell" => {}
+            "benchmark" => kinds = benchmark,
+            _ => {
+                Recipe::named(name)
+                    .map_err(|error| format!("{error} (and all of `cell` or `benchmark`)"))?;
+                kinds.extend(benchmark);
+                kinds.retain(|kind| kind.recipe.name() == name);
             }
-        }))
+        }
+        Ok(Self(kinds))
     }
 }
 
 impl Kind {
-    pub(crate) fn name(self) -> String {
-        match self {
-            Self::Cell(kind) => kind.to_string(),
-            Self::Benchmark(kind) => kind.to_string(),
-        }
-    }
-
     /// Returns a generator that no other kind and no other seed shares.
     pub(crate) fn generator(self, seed: u64) -> Xoshiro256PlusPlus {
         // FNV-1a over the name and the seed.
-        let bytes = self
-            .name()
-            .into_bytes()
-            .into_iter()
-            .chain(seed.to_le_bytes());
-        let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
+        let name = self.recipe.name().bytes();
+        let hash = name
+            .chain(seed.to_le_bytes())
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+            });
         Xoshiro256PlusPlus::seed_from_u64(hash)
     }
 }
 
 /// Returns the first kind that is named twice: its files would be overwritten.
 pub(crate) fn repeated(kinds: &[Kind]) -> Option<String> {
-    let names: Vec<String> = kinds.iter().map(|kind| kind.name()).collect();
+    let names: Vec<&str> = kinds.iter().map(|kind| kind.recipe.name()).collect();
     let again = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
-    again.map(|i| names[i].clone())
+    again.map(|i| names[i].to_owned())
 }
 
 /// Parses a share from 0 to 1.

@@ -13,9 +13,9 @@
 //! other round outlines, such as the rim of a disc seen from above. A frame with a less visible
 //! ball has no row for it; use `--visible 0` and the column `visible` where that matters.
 //!
-//! Kinds are those of `SceneKind` (the arm at work) and of `BenchmarkKind` (one difficulty at a
-//! time); `cell` and `benchmark` stand for all of either. The frames of a kind depend on the seed
-//! only, not on the other kinds drawn.
+//! Kinds are the recipes of `Recipe::cell` (the arm at work) and of `Recipe::benchmark` (one
+//! difficulty at a time); `cell` and `benchmark` stand for all of either. The frames of a kind
+//! depend on the seed only, not on the other kinds drawn.
 
 #![allow(
     clippy::print_stdout,
@@ -39,8 +39,7 @@ use example_support::program::ended;
 use image::ImageFormat;
 use indicatif::{ProgressBar, ProgressStyle};
 use kinds::{Kind, Kinds, repeated, share, size};
-use pipeline_sim::{Camera, Renderer, Round, Scene, Sighting, Snapshot};
-use rand::RngExt;
+use pipeline_sim::{Camera, Renderer, Round, RoundOutline};
 
 /// Renders labelled frames of the simulated cell.
 #[derive(Parser)]
@@ -88,28 +87,23 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut frames = String::from("file,scene\n");
     let bar = ProgressBar::new(kinds.len() as u64 * options.frames)
         .with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}")?);
-    let (width, height) = options.size;
     for kind in kinds {
-        let name = kind.name();
+        let name = kind.recipe.name();
         let mut rng = kind.generator(options.seed);
         let mut shared: Option<Renderer> = None;
         let mut milliseconds = Vec::new();
         for i in 0..options.frames {
-            let (mut renderer, snapshot) = match kind {
-                Kind::Cell(kind) => {
-                    let shared = shared.take().filter(|_| i % options.per_scene.max(1) != 0);
-                    let renderer = shared.unwrap_or_else(|| {
-                        Renderer::new(&Scene::generate(kind, &mut rng), rng.random())
-                    });
-                    (
-                        renderer,
-                        Snapshot::draw(kind, &mut rng).resized(width, height)?,
-                    )
+            let again = shared.take().filter(|_| i % options.per_scene.max(1) != 0);
+            let again = match again {
+                Some(renderer) => {
+                    let snapshot = kind.recipe.draw_again(options.size, &mut rng)?;
+                    snapshot.map(|snapshot| (renderer, snapshot))
                 }
-                Kind::Benchmark(kind) => {
-                    let (scene, snapshot) = kind.draw(options.size, &mut rng)?;
-                    (Renderer::new(&scene, rng.random()), snapshot)
-                }
+                None => None,
+            };
+            let (mut renderer, snapshot) = match again {
+                Some(drawn) => drawn,
+                None => kind.recipe.draw(options.size, &mut rng)?,
             };
             let file = format!("{name}_{i:03}.png");
             let before = cpu_time();
@@ -121,10 +115,7 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             writeln!(frames, "{file},{name}")?;
             let sightings = snapshot.truth(&renderer);
             let scale = snapshot.cell.camera.focal_px() / Camera::paper().focal_px();
-            let least = match kind {
-                Kind::Cell(_) => 5.0 * scale,
-                Kind::Benchmark(_) => 0.0,
-            };
+            let least = kind.least_radius * scale;
             for sighting in sightings
                 .iter()
                 .filter(|s| counts(s, options.visible, least))
@@ -159,7 +150,7 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
 }
 
 /// Returns whether a detector should find the outline.
-fn counts(sighting: &Sighting, visible: f64, least_radius: f64) -> bool {
+fn counts(sighting: &RoundOutline, visible: f64, least_radius: f64) -> bool {
     let ellipse = &sighting.ellipse;
     let round = matches!(sighting.what, Round::Target | Round::Ball)
         || ellipse.minor >= 0.95 * ellipse.major;

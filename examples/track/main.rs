@@ -328,7 +328,7 @@ fn on_shortcut(
         if seen && moved && cell.held.is_none() {
             world.go_on(cell, joints);
         }
-        seen |= cell.features(joints).is_some();
+        seen |= cell.features(joints).is_ok();
     };
     cell.run(agent, seed, &mut go_on, &mut |event| saved.note(event))
 }

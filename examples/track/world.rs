@@ -53,7 +53,7 @@ impl World {
     /// Lets happen what is due after the arm has moved to `joints`.
     pub(crate) fn go_on(&mut self, cell: &mut Cell, joints: &Joints) {
         let workspace = Workspace::paper();
-        let reached = cell.features(joints).is_some_and(|f| at_goal(&f));
+        let reached = cell.features(joints).is_ok_and(|f| at_goal(&f));
         match self.fate {
             Fate::Push if reached && self.events < 3 => {
                 self.events += usize::from(cell.push_to_radius(joints, 60.0));
@@ -71,7 +71,7 @@ impl World {
                     if workspace
                         .search_poses()
                         .iter()
-                        .any(|pose| there.features(pose).is_some())
+                        .any(|pose| there.features(pose).is_ok())
                     {
                         *cell = there;
                         self.events = 1;

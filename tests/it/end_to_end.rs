@@ -7,7 +7,7 @@ use grasp_agent::{
     Agent, AgentConfig, Behaviour, BehaviourSpec, EventKind, GaveUp, Learned, Percept,
 };
 use hough_heuristic::CircleDetector;
-use pipeline_sim::{Ball, ReachForm, Workspace, sample_moves};
+use pipeline_sim::{Ball, ReachForm, Workspace};
 use puma_grasp::{BallDetector, Rig, Simulator, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -20,7 +20,11 @@ fn detector() -> Box<dyn CircleDetector + Send> {
 /// way.
 fn agent(rig: &Rig, seed: u64) -> Agent {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (centring, reaching) = sample_moves(&rig.cell().get(), 2_500, 0.5, &mut rng);
+    let (centring, reaching) = rig
+        .cell()
+        .get()
+        .sample_moves(2_500, 0.5, &mut rng)
+        .expect("samples");
     let simulator =
         Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
     assert!(

@@ -7,7 +7,7 @@ use std::process::Command;
 use example_support::learning::learn_both;
 use example_support::trial::TrialCell;
 use grasp_agent::{Agent, AgentConfig, BehaviourPair, JointLimits, Learned};
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, Workspace, sample_moves};
+use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, Workspace};
 use puma_grasp::Simulator;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -16,7 +16,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 fn learned() -> Learned {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let (centring, reaching) = sample_moves(&cell, 2_500, 0.5, &mut rng);
+    let (centring, reaching) = cell.sample_moves(2_500, 0.5, &mut rng).expect("samples");
     let simulator =
         Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
     let pair = BehaviourPair::paper_mended();

@@ -3,10 +3,12 @@
 #[cfg(feature = "files")]
 mod files;
 mod stream;
+mod y4m;
 
 #[cfg(feature = "files")]
 pub use files::ImageFiles;
 pub use stream::FrameStream;
+pub use y4m::Y4mWriter;
 
 use image::GrayImage;
 

@@ -96,7 +96,7 @@ pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
 #[cfg(feature = "files")]
 pub use frame::ImageFiles;
-pub use frame::{FrameError, FrameSource, FrameStream};
+pub use frame::{FrameError, FrameSource, FrameStream, Y4mWriter};
 pub use image;
 pub use region::Region;
 pub use sampling::Sampling;

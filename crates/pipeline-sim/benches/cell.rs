@@ -1,4 +1,4 @@
-//! What a rendered frame costs, and what the shortcut past it.
+//! Time of a rendered frame, and of features without one.
 //!
 //! Wall time: on a busy machine compare within one run. Frames: the laboratory from a search pose
 //! and from a goal pose. Steps: a move of `JT2` and `JT3` with a check of the limits and the
@@ -9,8 +9,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pipeline_sim::{
-    Ball, Cell, FeatureCamera, Renderer, Scene, SceneKind, SharedCell, SimulatedArm, Snapshot,
-    Workspace, exploring_start,
+    Ball, Cell, FeatureCamera, Recipe, Renderer, Scene, SharedCell, SimulatedArm, Workspace,
 };
 use puma_val2::{JointDelta, Manipulator};
 use rand::SeedableRng;
@@ -30,16 +29,12 @@ fn frames(c: &mut Criterion) {
     group.bench_function("laboratory, goal pose", |b| {
         b.iter(|| renderer.render(&cell, black_box(&goal)).len());
     });
-    for kind in [
-        SceneKind::Clutter,
-        SceneKind::Defocus,
-        SceneKind::Interlaced,
-        SceneKind::Distorted,
-    ] {
+    for name in ["clutter", "defocus", "interlaced", "distorted"] {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-        let mut renderer = Renderer::new(&Scene::generate(kind, &mut rng), 1);
-        let snapshot = Snapshot::draw(kind, &mut rng);
-        group.bench_function(kind.to_string(), |b| {
+        let recipe = Recipe::named(name).expect("a recipe");
+        let drawn = recipe.draw((768, 576), &mut rng);
+        let (mut renderer, snapshot) = drawn.expect("a frame of pixels");
+        group.bench_function(name, |b| {
             b.iter(|| black_box(&snapshot).take(&mut renderer).len());
         });
     }
@@ -50,7 +45,7 @@ fn steps(c: &mut Criterion) {
     let nominal = Cell::paper(Ball::at(0.60, 0.15, -0.10));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
     let starts: Vec<_> = (0..256)
-        .filter_map(|_| exploring_start(&nominal, &mut rng))
+        .filter_map(|_| nominal.exploring_start(&mut rng))
         .collect();
     let moves: Vec<_> = (0..9)
         .map(|i| {
@@ -77,7 +72,7 @@ fn steps(c: &mut Criterion) {
     let (cell, joints) = starts[0];
     let shared = SharedCell::new(cell);
     let mut arm = SimulatedArm::new(shared.clone(), joints).expect("within limits");
-    let mut camera = FeatureCamera::new(shared, arm.pose(), 0.5, 3);
+    let mut camera = FeatureCamera::new(shared, arm.pose(), 0.5, 3).expect("sound noise");
     let mut sign = 1.0;
     group.bench_function("arm and feature camera", |b| {
         b.iter(|| {

@@ -9,7 +9,7 @@ use grasp_agent::{
     Percept, schedule,
 };
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, SightRule, Workspace, exploring_start};
+use pipeline_sim::{Ball, Cell, SightRule, Workspace};
 use puma_val2::{JointDelta, Joints};
 use qtable::{Action, Progress};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -57,8 +57,8 @@ impl ExactPlane {
     pub fn new(starts: usize, rng: &mut dyn Rng) -> Self {
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let drawn = (0..starts).filter_map(|_| {
-            let (cell, joints) = exploring_start(&cell, rng)?;
-            let mut features = cell.features(&joints)?;
+            let (cell, joints) = cell.exploring_start(rng)?;
+            let mut features = cell.features(&joints).ok()?;
             // Into the arm's plane: the camera sits this many ball radii beside it.
             features.x = 0.5 * Features::WIDTH + CAMERA_BESIDE * features.r;
             Some(Percept::new(features, &joints))
@@ -137,7 +137,7 @@ pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
 /// plane: trials to choose a table by.
 pub fn search_percepts(count: usize, seed: u64) -> Vec<Percept> {
     let seen = found_by_search(seed).filter_map(|(cell, joints)| {
-        let features = cell.features(&joints)?;
+        let features = cell.features(&joints).ok()?;
         Some(Percept::new(features, &joints))
     });
     seen.take(count).collect()
@@ -150,10 +150,10 @@ fn found_by_search(seed: u64) -> impl Iterator<Item = (Cell, Joints)> {
     let elbow = workspace.search_poses()[0];
     std::iter::repeat_with(move || {
         let cell = Cell::paper(workspace.sample_ball(&mut rng));
-        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
+        let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES).ok()?;
         let mut joints = elbow;
         joints.0[0] = goal.0[0];
-        cell.features(&joints).map(|_| (cell, joints))
+        cell.features(&joints).ok().map(|_| (cell, joints))
     })
     .flatten()
 }
@@ -181,7 +181,7 @@ fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Optio
     let mut episode = Episode::new(behaviour);
     let mut joints = start.joints;
     for step in 0..=MOST_STEPS {
-        let percept = Percept::new(start.cell.features(&joints)?, &joints);
+        let percept = Percept::new(start.cell.features(&joints).ok()?, &joints);
         if spec.at_goal(&percept) {
             return Some(step);
         }

@@ -8,8 +8,8 @@ use grasp_agent::{
 };
 use hough_heuristic::{Features, FrameError};
 use pipeline_sim::{
-    Ball, CameraError, Cell, ErrorLevel, Errors, FeatureCamera, Hand, SharedCell, SimulatedArm,
-    Workspace,
+    Ball, Cell, ErrorLevel, Errors, FeatureCamera, HandShape, QuantityError, SharedCell,
+    SimulatedArm, Workspace,
 };
 use puma_val2::{ArmError, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -100,7 +100,7 @@ impl TrialCell {
     ///
     /// # Errors
     /// A camera that cannot be; none of the levels makes one.
-    pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, CameraError> {
+    pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, QuantityError> {
         let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
         let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         Ok(Self {
@@ -117,7 +117,7 @@ impl TrialCell {
     pub fn without_bodies(mut self) -> Self {
         // Everything of the hand at the wrist centre, where no ball can be.
         let at_the_wrist = -self.cell.params.d6;
-        self.cell.hand = Hand {
+        self.cell.hand = HandShape {
             tool: at_the_wrist,
             beyond_tool: 0.0,
             finger_radius: 0.0,
@@ -149,7 +149,7 @@ impl TrialCell {
             };
             let cell = Cell { ball, ..self.cell };
             // Something to spare, for joints whose play is taken up from the other side.
-            let seen = |joints: &Joints| cell.features(joints).is_some_and(|f| well_inside(&f));
+            let seen = |joints: &Joints| cell.features(joints).is_ok_and(|f| well_inside(&f));
             stands.iter().any(seen).then_some(ball)
         }))
     }
@@ -206,7 +206,7 @@ impl TrialCell {
         const LOOKS: usize = 20;
         // The ball is shown between real jaws even where the hand has no bodies otherwise.
         let shared = SharedCell::new(Cell {
-            hand: Hand::paper(),
+            hand: HandShape::paper(),
             ..self.cell
         });
         let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
@@ -214,7 +214,7 @@ impl TrialCell {
         let gripping = arm.pose()();
         shared.with(|cell| cell.place_ball(cell.tool_point(&gripping)));
         arm.move_to(from)?;
-        let mut camera = FeatureCamera::new(shared, arm.pose(), self.errors.feature_noise, seed);
+        let mut camera = self.camera(shared, arm.pose(), seed)?;
         let seen: Option<Vec<Features>> = (0..LOOKS).map(|_| camera.look()).collect();
         let mean = |seen: Vec<Features>| {
             let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / LOOKS as f64;
@@ -225,6 +225,21 @@ impl TrialCell {
             }
         };
         Ok(seen.map(mean).filter(well_inside))
+    }
+
+    /// Returns a camera with the noise of the drawn errors.
+    fn camera<P: FnMut() -> Joints>(
+        &self,
+        cell: SharedCell,
+        pose: P,
+        seed: u64,
+    ) -> Result<FeatureCamera<P>, ArmError> {
+        let noise = self.errors.feature_noise;
+        FeatureCamera::new(cell, pose, noise, seed).map_err(|_| ArmError::Setting {
+            what: "the noise of the image features",
+            value: noise.to_string(),
+            allowed: "a finite number of zero or above",
+        })
     }
 
     /// Lets `agent` go for the ball that `seed` places among those in view from the search poses;
@@ -248,8 +263,7 @@ impl TrialCell {
         cell.place_ball(ball.centre);
         let shared = SharedCell::new(cell);
         let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
-        let noise = self.errors.feature_noise;
-        let camera = FeatureCamera::new(shared.clone(), arm.pose(), noise, rng.random());
+        let camera = self.camera(shared.clone(), arm.pose(), rng.random())?;
         let devices = Devices {
             eye: &mut ChangingWorld {
                 eye: FeatureEye(camera),

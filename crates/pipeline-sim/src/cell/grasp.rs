@@ -1,5 +1,6 @@
 //! Contact of hand and ball: gripping, carrying, pushing.
 
+use hough_heuristic::Features;
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Gripper, Joints, PumaParams};
 
@@ -185,6 +186,22 @@ impl Cell {
         self.ball.centre += by;
         if let Some(Holder { foot, .. }) = self.holder.as_mut().filter(|_| carried) {
             *foot += by.xy();
+        }
+    }
+
+    /// Moves the ball, with its holder, along the camera's line of sight until it shows with radius
+    /// `r` units: nearer for a greater r. Returns `true` if there is such a place above the table.
+    pub fn push_to_radius(&mut self, joints: &Joints, r: f64) -> bool {
+        let Some(outline) = self.outline(joints) else {
+            return false;
+        };
+        let now = Features::from_circle(&outline.circle(), self.camera.size().0);
+        match self.ball_showing(joints, &Features { r, ..now }) {
+            Some(place) if place.z > self.table + self.ball.radius => {
+                self.place_ball(place);
+                true
+            }
+            _ => false,
         }
     }
 }

@@ -1,7 +1,9 @@
 //! The region in which balls lie, and the poses from which the arm searches for them.
 
+use nalgebra::{Point3, Vector3};
 use puma_val2::Joints;
 use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
 
 use crate::cell::ball::Ball;
 use crate::cell::geometry::Cell;
@@ -104,6 +106,30 @@ impl Workspace {
             let cell = Cell { ball, ..*cell };
             let pose = poses.iter().find(|pose| cell.circle(pose).is_ok())?;
             Some((ball, *pose))
+        })
+    }
+
+    /// Returns `true` if a place is inside the workspace.
+    pub fn contains(&self, place: &Point3<f64>) -> bool {
+        let within = |range: (f64, f64), value: f64| (range.0..=range.1).contains(&value);
+        within(self.rho, place.x.hypot(place.y))
+            && within(self.azimuth, place.y.atan2(place.x))
+            && within(self.height, place.z)
+    }
+
+    /// Draws a place `distance` metres from `from` in a random direction, inside the workspace;
+    /// `None` if 1000 directions lead out of it.
+    pub fn sample_jump<R: Rng + ?Sized>(
+        &self,
+        from: &Point3<f64>,
+        distance: f64,
+        rng: &mut R,
+    ) -> Option<Point3<f64>> {
+        (0..1000).find_map(|_| {
+            let mut draw = || -> f64 { StandardNormal.sample(rng) };
+            let direction = Vector3::new(draw(), draw(), draw()).try_normalize(1e-9)?;
+            let to = from + direction * distance;
+            self.contains(&to).then_some(to)
         })
     }
 }

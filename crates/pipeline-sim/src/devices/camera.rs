@@ -49,9 +49,9 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
     /// The truth of the frame, and [`Cell::features`], hold for the middle of the exposure.
     ///
     /// ```
+    /// use pipeline_sim::hough_heuristic::FrameSource;
     /// use pipeline_sim::image::GrayImage;
-    /// use pipeline_sim::{Ball, Cell, CellCamera, FrameSource, Renderer, Scene, SharedCell, Shot};
-    /// use pipeline_sim::Workspace;
+    /// use pipeline_sim::{Ball, Cell, CellCamera, Renderer, Scene, SharedCell, Shot, Workspace};
     ///
     /// fn main() -> Result<(), Box<dyn std::error::Error>> {
     ///     let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.15, -0.1)));
@@ -66,7 +66,7 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
     ///             (*cell, then)
     ///         },
     ///     )?;
-    ///     let mut frame = GrayImage::new(0, 0);
+    ///     let mut frame = GrayImage::default();
     ///     camera.grab(&mut frame)?;
     ///     assert_eq!(frame.dimensions(), (768, 576));
     ///     Ok(())
@@ -84,12 +84,14 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
         self.exposure = Some((shot, Box::new(moved)));
         Ok(self)
     }
+}
 
-    /// Renders the next frame into the renderer's own buffer, without a copy.
+impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
+    /// Renders the next frame.
     ///
     /// # Errors
     /// [`FrameError::Failed`] if the joints, or those of a moment of the exposure, are not finite.
-    pub fn look(&mut self) -> Result<&GrayImage, FrameError> {
+    fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         let joints = (self.pose)();
         let mut wrong = joints.non_finite();
         let cell = self.cell.get();
@@ -107,18 +109,15 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
             }
         }
         match wrong {
-            None => Ok(self.renderer.frame()),
+            None => {
+                frame.clone_from(self.renderer.frame());
+                Ok(())
+            }
             Some(joint) => Err(FrameError::Failed {
                 origin: "simulated camera".to_owned(),
                 reason: format!("the angle of {joint} is not a finite number"),
             }),
         }
-    }
-}
-
-impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
-    fn grab(&mut self) -> Result<GrayImage, FrameError> {
-        self.look().cloned()
     }
 }
 

@@ -2,4 +2,5 @@
 
 pub(crate) mod arm;
 pub(crate) mod camera;
+mod followed_arm;
 pub(crate) mod shared_cell;

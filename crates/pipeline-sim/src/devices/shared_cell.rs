@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use nalgebra::Point3;
 use puma_val2::{Gripper, Joints};
 
 use crate::cell::geometry::Cell;
@@ -69,6 +70,28 @@ impl SharedCell {
         act(&mut self.lock().cell)
     }
 
+    /// Places the ball, on a holder, at `centre`, out of the jaws if they held it, and clears the
+    /// contacts. Returns `false`, and changes nothing, if ball or holder would overlap the hand at
+    /// `joints`.
+    pub fn place_ball(&self, centre: Point3<f64>, joints: &Joints) -> bool {
+        let mut state = self.lock();
+        let (mut there, mut without) = (state.cell, state.cell);
+        there.place_ball(centre);
+        remove_ball(&mut without);
+        // A hand that overlaps the table does so wherever the ball is.
+        let free = !there.collides(joints) || without.collides(joints);
+        if free {
+            state.cell = there;
+            state.contacts = Contacts::default();
+        }
+        free
+    }
+
+    /// Removes ball and holder from the hand's surroundings.
+    pub fn remove_ball(&self) {
+        self.with(remove_ball);
+    }
+
     /// Moves the hand to `joints` from where it was last, pushing the ball on its way, and counts
     /// contacts. Returns `true` if something is within the proximity sensors' range there.
     ///
@@ -103,13 +126,14 @@ impl SharedCell {
         }
     }
 
-    /// Returns the contacts since the last [`SharedCell::reset_contacts`].
+    /// Returns the contacts since the ball was last placed by [`SharedCell::place_ball`].
     pub fn contacts(&self) -> Contacts {
         self.lock().contacts
     }
+}
 
-    /// Clears the contacts.
-    pub fn reset_contacts(&self) {
-        self.lock().contacts = Contacts::default();
-    }
+/// Puts the ball out of reach, without a holder.
+fn remove_ball(cell: &mut Cell) {
+    cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
+    cell.holder = None;
 }

@@ -16,13 +16,13 @@ use crate::regression::samples::{ReachSample, check};
 /// With the feature `serde` a model can be stored; it is checked when it is read.
 ///
 /// ```
-/// use pipeline_sim::{Ball, Cell, ReachForm, ReachModel, sample_moves};
+/// use pipeline_sim::{Ball, Cell, ReachForm, ReachModel};
 /// use pipeline_sim::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 ///
 /// fn main() -> Result<(), Box<dyn std::error::Error>> {
 ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
 ///     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-///     let (_, samples) = sample_moves(&cell, 500, 0.125, &mut rng)?;
+///     let (_, samples) = cell.sample_moves(500, 0.125, &mut rng)?;
 ///     let model = ReachModel::fit(&samples, ReachForm::Rigid22, &[])?;
 ///     assert!(model.quality().iter().all(|q| q.r2 > 0.99));
 ///     Ok(())

@@ -432,7 +432,9 @@ mod tests {
             .step_by(3)
             .flat_map(|y| (0..width).step_by(5).map(move |x| (x, y)))
         {
-            let ray = camera.ray(Point2::new(f64::from(x), f64::from(y)));
+            let ray = camera
+                .ray(Point2::new(f64::from(x), f64::from(y)))
+                .expect("shown");
             let exact = warp.ideal.principal_point() + ray.xy() * camera.focal_px();
             let run = &warp.sources[y as usize * warp.columns + x as usize / warp.run..];
             let (from, to) = (run[0].map(f64::from), run[1].map(f64::from));

@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn the_gloom_at_the_foot_of_a_box_has_the_shape_of_the_box() {
-        let look = Appearance {
+        let appearance = Appearance {
             albedo: 0.5,
             texture: 0.0,
             gloss: 0.0,
@@ -294,7 +294,7 @@ mod tests {
                 x: 0.0,
                 y: 0.0,
                 turn: 0.5,
-                look,
+                appearance,
             }],
             ..Scene::plain()
         };

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 use pipeline_sim::{
-    Ball, Cell, Distortion, Ellipse, Look, Occluder, Renderer, Round, Scene, SceneKind, Shape,
-    Snapshot, Thing, Workspace,
+    Appearance, Ball, Cell, Distortion, Occluder, ProjectedEllipse, Recipe, Renderer, Round, Scene,
+    Shape, Thing, Workspace,
 };
 use puma_val2::{JointDelta, Joints};
 use rand::SeedableRng;
@@ -25,9 +25,9 @@ fn truth_knows_what_hides_the_ball() {
     };
     let free = target(&Scene::plain());
     assert!(free.visible > 0.99, "{}", free.visible);
-    assert_eq!(Some(free.ellipse.circle()), cell.circle(&goal));
+    assert_eq!(Ok(free.ellipse.circle()), cell.circle(&goal));
     // A strip of 20 units over the middle of a circle of radius 33.
-    let Ellipse { centre, .. } = free.ellipse;
+    let ProjectedEllipse { centre, .. } = free.ellipse;
     let (x, y) = ((centre.x + 0.5) / 4.0, (centre.y + 0.5) / 4.0);
     let strip = Occluder {
         from: Point2::new(x, y - 100.0),
@@ -64,7 +64,7 @@ fn nearer_things_hide_farther_ones() {
     // A tall cylinder between the camera and a low ball on the table.
     let (cell, _) = cell_at_goal();
     let pose = Workspace::paper().search_poses()[3];
-    let look = Look {
+    let appearance = Appearance {
         albedo: 0.5,
         texture: 0.0,
         gloss: 0.0,
@@ -74,7 +74,7 @@ fn nearer_things_hide_farther_ones() {
         x,
         y,
         turn: 0.0,
-        look,
+        appearance,
     };
     let ball = thing(Shape::Ball { radius: 0.03 }, 0.80, 0.0);
     let visible = |things: Vec<Thing>| {
@@ -117,7 +117,7 @@ fn nearer_things_hide_farther_ones() {
 
 /// A bare scene with one dull thing.
 fn with_thing(shape: Shape, x: f64, y: f64) -> Scene {
-    let look = Look {
+    let appearance = Appearance {
         albedo: 0.5,
         texture: 0.0,
         gloss: 0.0,
@@ -127,7 +127,7 @@ fn with_thing(shape: Shape, x: f64, y: f64) -> Scene {
         x,
         y,
         turn: 0.3,
-        look,
+        appearance,
     };
     Scene {
         things: vec![thing],
@@ -275,20 +275,23 @@ fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
 }
 
 #[test]
-fn whatever_the_truth_of_a_distorted_frame_lists_is_met_by_the_rays_of_the_frame() {
+fn truth_of_distorted_frames_agrees_with_their_rays() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let recipe = Recipe::named("distorted").expect("a recipe");
     let mut rows = 0;
     for _ in 0..16 {
-        let scene = Scene::generate(SceneKind::Distorted, &mut rng);
-        let renderer = Renderer::new(&scene, 1);
+        let drawn = recipe.draw((768, 576), &mut rng);
+        let (renderer, _) = drawn.expect("a frame of pixels");
+        let scene = renderer.scene();
         for _ in 0..5 {
-            let snapshot = Snapshot::draw(SceneKind::Distorted, &mut rng);
+            let drawn = recipe.draw_again((768, 576), &mut rng).expect("a frame");
+            let snapshot = drawn.expect("scenes are shared");
             let cell = &snapshot.cell;
             let pose = cell.camera_pose(&snapshot.joints);
             let eye = Point3::from(pose.translation.vector);
             for row in snapshot.truth(&renderer) {
                 rows += 1;
-                let ray = cell.camera.try_ray(row.ellipse.centre);
+                let ray = cell.camera.ray(row.ellipse.centre);
                 let ray = pose
                     * ray
                         .expect("the lens shows the middle of what is seen")

@@ -1,7 +1,7 @@
 //! The outline of a sphere against a brute-force ray cast.
 
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
-use pipeline_sim::{Camera, CameraError, Distortion, ProjectionError};
+use pipeline_sim::{Camera, Distortion, QuantityError, SightError};
 
 /// The lens as the literature has it, written down anew: a pinhole's image of unit focal length to
 /// the distorted one.
@@ -93,8 +93,9 @@ fn the_projected_circle_agrees_with_a_ray_cast_to_a_hundredth_of_a_pixel() {
     for (x, y, z) in PLACES {
         let centre = Point3::new(x, y, z);
         let circle = camera
-            .project_sphere_to_circle(&centre, 0.020)
-            .expect("in view");
+            .project_sphere(&centre, 0.020)
+            .expect("in view")
+            .circle();
         let (cx, cy, r) = brute_force(&camera, &centre, 0.020);
         let error = (circle.x - cx)
             .abs()
@@ -119,8 +120,9 @@ fn with_distortion_too() {
     for (x, y, z) in PLACES {
         let centre = Point3::new(x, y, z);
         let circle = camera
-            .project_sphere_to_circle(&centre, 0.020)
-            .expect("in view");
+            .project_sphere(&centre, 0.020)
+            .expect("in view")
+            .circle();
         let (cx, cy, r) = brute_force(&camera, &centre, 0.020);
         let error = (circle.x - cx).abs().max((circle.y - cy).abs());
         assert!(error < 0.01, "{centre}: {circle:?} against {cx} {cy} {r}");
@@ -129,7 +131,10 @@ fn with_distortion_too() {
             "{centre}: {} against {r}",
             circle.radius
         );
-        let back = camera.ray(camera.project(&centre).expect("in front")) * z;
+        let back = camera
+            .ray(camera.project(&centre).expect("in front"))
+            .expect("shown")
+            * z;
         assert!((back - centre.coords).norm() < 1e-9);
     }
 }
@@ -140,24 +145,24 @@ fn what_has_no_outline_is_named() {
     let at = |x, y, z, r| camera.project_sphere(&Point3::new(x, y, z), r);
     assert!(matches!(
         at(0.0, 0.0, 0.01, 0.02),
-        Err(ProjectionError::Inside { .. })
+        Err(SightError::Inside { .. })
     ));
     assert!(matches!(
         at(0.0, 0.0, -0.5, 0.02),
-        Err(ProjectionError::Behind { .. })
+        Err(SightError::Behind { .. })
     ));
     assert!(matches!(
         at(0.5, 0.0, 0.01, 0.02),
-        Err(ProjectionError::Behind { .. })
+        Err(SightError::Behind { .. })
     ));
     assert!(matches!(
         at(f64::NAN, 0.0, 0.5, 0.02),
-        Err(ProjectionError::CentreNotFinite)
+        Err(SightError::CentreNotFinite)
     ));
     for r in [0.0, -0.02, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             at(0.0, 0.0, 0.5, r),
-            Err(ProjectionError::Radius { .. })
+            Err(SightError::BallRadius { .. })
         ));
     }
     for (f, w, width, height, named) in [
@@ -171,7 +176,7 @@ fn what_has_no_outline_is_named() {
     ] {
         let refused = Camera::pinhole(f, w, width, height).expect_err("no camera");
         assert!(
-            matches!(refused, CameraError::NotPositive { quantity, .. } if quantity == named),
+            matches!(refused, QuantityError::NotPositive { ref quantity, .. } if quantity == named),
             "{refused}"
         );
         assert!(refused.to_string().contains(named), "{refused}");
@@ -225,8 +230,7 @@ fn strong_lenses_are_undone_or_refused() {
         usable += 1;
         for (x, y) in corners {
             let pixel = Point2::new(x, y);
-            let ray = camera.try_ray(pixel).expect("inside the frame");
-            assert_eq!(ray, camera.ray(pixel));
+            let ray = camera.ray(pixel).expect("inside the frame");
             let (u, v) = distorted(&strong, ray.x, ray.y);
             let back = camera.principal_point() + Vector2::new(u, v) * camera.focal_px();
             assert!(
@@ -242,10 +246,9 @@ fn strong_lenses_are_undone_or_refused() {
         .expect("does not fold inside the frame");
     for pixel in [Point2::new(3000.0, 288.0), Point2::new(f64::NAN, 0.0)] {
         assert!(matches!(
-            barrel.try_ray(pixel),
-            Err(CameraError::NoRay { .. })
+            barrel.ray(pixel),
+            Err(QuantityError::NoRay { .. })
         ));
-        assert!(barrel.ray(pixel).x.is_nan());
     }
 }
 
@@ -254,21 +257,23 @@ fn a_camera_with_another_frame_shows_the_same_and_more() {
     let camera = Camera::paper();
     let centre = Point3::new(0.03, -0.02, 0.4);
     let circle = camera
-        .project_sphere_to_circle(&centre, 0.02)
-        .expect("in view");
+        .project_sphere(&centre, 0.02)
+        .expect("in view")
+        .circle();
     for (size, scale, beside) in [((192, 144), 0.25, 0.0), ((1920, 1080), 1.875, 240.0)] {
         let other = camera.resized(size.0, size.1).expect("a usable size");
         assert_eq!(other.size(), size);
         let shown = other
-            .project_sphere_to_circle(&centre, 0.02)
-            .expect("in view");
+            .project_sphere(&centre, 0.02)
+            .expect("in view")
+            .circle();
         assert!((shown.radius - scale * circle.radius).abs() < 1e-9);
         assert!((shown.x + 0.5 - beside - scale * (circle.x + 0.5)).abs() < 1e-9);
         assert!((shown.y + 0.5 - scale * (circle.y + 0.5)).abs() < 1e-9);
     }
     assert!(matches!(
         camera.resized(0, 576),
-        Err(CameraError::NotPositive { .. })
+        Err(QuantityError::NotPositive { .. })
     ));
 }
 
@@ -303,7 +308,7 @@ fn directions_beyond_the_fold_are_not_shown() {
                 // Nor has a ball there an outline.
                 let named = camera.project_sphere(&direction, 0.02);
                 assert!(
-                    matches!(named, Err(ProjectionError::BeyondLens { angle }) if (angle - tangent.atan()).abs() < 1e-9),
+                    matches!(named, Err(SightError::BeyondLens { angle }) if (angle - tangent.atan()).abs() < 1e-9),
                     "{named:?}"
                 );
                 continue;
@@ -311,7 +316,7 @@ fn directions_beyond_the_fold_are_not_shown() {
             // Whatever is said to lie in the frame is what the frame shows there.
             if (-0.5..=767.5).contains(&pixel.x) && (-0.5..=575.5).contains(&pixel.y) {
                 shown += 1;
-                let back = camera.try_ray(pixel).expect("inside the frame");
+                let back = camera.ray(pixel).expect("inside the frame");
                 assert!(
                     (back - direction.coords).norm() < 1e-9,
                     "{lens:?}: {direction} {back}"
@@ -328,7 +333,7 @@ fn directions_beyond_the_fold_are_not_shown() {
     for (x, y) in (0..=48).flat_map(|i| (0..=36).map(move |j| (i, j))) {
         let pixel = Point2::new(16.0 * f64::from(x) - 0.5, 16.0 * f64::from(y) - 0.5);
         let back = camera
-            .project(&Point3::from(camera.ray(pixel)))
+            .project(&Point3::from(camera.ray(pixel).expect("shown")))
             .expect("shown");
         assert!((back - pixel).norm() < 1e-6, "{pixel} {back}");
     }
@@ -349,8 +354,9 @@ fn a_circle_leads_back_to_its_sphere_whatever_the_lens() {
                 .sphere_of_circle(&circle, 0.02)
                 .expect("there is one");
             let back = camera
-                .project_sphere_to_circle(&centre, 0.02)
-                .expect("before the camera");
+                .project_sphere(&centre, 0.02)
+                .expect("before the camera")
+                .circle();
             let off =
                 (back.x - circle.x).hypot(back.y - circle.y) + (back.radius - circle.radius).abs();
             assert!(
@@ -371,7 +377,10 @@ fn a_frame_too_large_to_hold_is_refused() {
             Camera::pinhole(0.01, 0.01, width, height),
         ];
         for refused in refused {
-            assert_eq!(refused, Err(CameraError::TooLarge { width, height }));
+            assert!(
+                matches!(refused, Err(QuantityError::TooLarge { .. })),
+                "{width} {height}"
+            );
         }
     }
 }
@@ -387,7 +396,7 @@ fn a_fold_narrower_than_the_frame_is_found() {
     // The radius u (1 - u²)² first turns back at u² = 1 / 5.
     let expected = wide.focal_px() * 0.2_f64.sqrt() * 0.64;
     for lens in [lens, Distortion { p1: 1e-6, ..lens }] {
-        let Err(CameraError::Folds { radius_px }) = wide.with_distortion(lens) else {
+        let Err(QuantityError::Folds { radius_px }) = wide.with_distortion(lens) else {
             panic!("folds");
         };
         assert!(

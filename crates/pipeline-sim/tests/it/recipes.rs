@@ -1,20 +1,20 @@
-//! Frames for comparing detectors show what their kind says.
+//! Frames of each recipe show what it says.
 
 use pipeline_sim::image::GrayImage;
 use pipeline_sim::{
-    BenchmarkKind, Camera, CameraError, Renderer, Round, Sensor, Sighting, Snapshot,
+    Camera, QuantityError, Recipe, Renderer, Round, RoundOutline, Sensor, Snapshot,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-fn drawn(kind: BenchmarkKind, size: (u32, u32), seed: u64) -> (Renderer, Snapshot) {
+fn drawn(name: &str, size: (u32, u32), seed: u64) -> (Renderer, Snapshot) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (scene, snapshot) = kind.draw(size, &mut rng).expect("a usable size");
-    (Renderer::new(&scene, seed), snapshot)
+    let recipe = Recipe::named(name).expect("a recipe");
+    recipe.draw(size, &mut rng).expect("a usable size")
 }
 
 /// The balls among the truth.
-fn balls(renderer: &Renderer, snapshot: &Snapshot) -> Vec<Sighting> {
+fn balls(renderer: &Renderer, snapshot: &Snapshot) -> Vec<RoundOutline> {
     let truth = snapshot.truth(renderer);
     assert!(
         truth
@@ -25,17 +25,12 @@ fn balls(renderer: &Renderer, snapshot: &Snapshot) -> Vec<Sighting> {
 }
 
 #[test]
-fn every_kind_has_a_name_and_repeats_with_its_seed() {
-    for kind in BenchmarkKind::ALL {
-        assert_eq!(kind.to_string().parse::<BenchmarkKind>(), Ok(kind));
-        let known = "nothing"
-            .parse::<BenchmarkKind>()
-            .expect_err("no such kind")
-            .known;
-        assert!(
-            known.split(", ").any(|name| name == kind.to_string()),
-            "{kind}"
-        );
+fn frames_of_each_recipe_repeat_with_their_seed() {
+    let refused = Recipe::named("nothing")
+        .expect_err("no such recipe")
+        .to_string();
+    for kind in Recipe::benchmark().iter().map(Recipe::name) {
+        assert!(refused.contains(kind), "{refused}");
         let frame = |seed| -> GrayImage {
             let (mut renderer, snapshot) = drawn(kind, (192, 144), seed);
             snapshot.take(&mut renderer).clone()
@@ -46,31 +41,29 @@ fn every_kind_has_a_name_and_repeats_with_its_seed() {
 }
 
 #[test]
-fn balls_are_as_many_as_large_and_as_visible_as_the_kind_says() {
+fn balls_have_the_number_size_and_visibility_of_the_recipe() {
     for size in [(192, 144), (768, 576), (1920, 1080)] {
         let scale = Camera::paper()
             .resized(size.0, size.1)
             .expect("a usable size")
             .focal_px()
             / Camera::paper().focal_px();
-        for kind in BenchmarkKind::ALL {
+        for kind in Recipe::benchmark().iter().map(Recipe::name) {
             for seed in 0..if size.0 == 768 { 2 } else { 1 } {
                 let (renderer, snapshot) = drawn(kind, size, seed);
                 let balls = balls(&renderer, &snapshot);
-                assert_eq!(balls.len(), kind.balls(), "{kind} {size:?} {seed}");
+                let count = match kind {
+                    "empty-table" | "noisy-empty" => 0,
+                    "many" => 20,
+                    "textured" => 4,
+                    _ => 1,
+                };
+                assert_eq!(balls.len(), count, "{kind} {size:?} {seed}");
                 for ball in &balls {
                     let radius = ball.ellipse.circle().radius / scale;
-                    let most = if kind == BenchmarkKind::Many {
-                        60.0
-                    } else {
-                        145.0
-                    };
+                    let most = if kind == "many" { 60.0 } else { 145.0 };
                     // In motion the truth is half a motion away from where the ball was put.
-                    let slack = if kind == BenchmarkKind::MotionBlur {
-                        0.5
-                    } else {
-                        1e-6
-                    };
+                    let slack = if kind == "motion-blur" { 0.5 } else { 1e-6 };
                     assert!(
                         (12.0 - slack..=most + slack).contains(&radius),
                         "{kind} {size:?} {seed}: {radius}"
@@ -79,7 +72,7 @@ fn balls_are_as_many_as_large_and_as_visible_as_the_kind_says() {
                         ball.ellipse.share_inside(size.0, size.1) >= 1.0,
                         "{kind} {size:?} {seed}"
                     );
-                    let shown = if kind == BenchmarkKind::Occluded40 {
+                    let shown = if kind == "occluded-40" {
                         // The segment that 40 % of the circumference cut off.
                         let angle = 0.4 * std::f64::consts::PI;
                         1.0 - (angle - angle.sin() * angle.cos()) / std::f64::consts::PI
@@ -101,9 +94,7 @@ fn balls_are_as_many_as_large_and_as_visible_as_the_kind_says() {
 fn radii_are_spread_over_the_whole_range() {
     let mut radii: Vec<f64> = (0..60)
         .map(|seed| {
-            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let drawn = BenchmarkKind::Clean.draw((192, 144), &mut rng);
-            let Snapshot { cell, joints, .. } = drawn.expect("a usable size").1;
+            let Snapshot { cell, joints, .. } = drawn("clean", (192, 144), seed).1;
             4.0 * cell.outline(&joints).expect("in view").circle().radius
         })
         .collect();
@@ -115,14 +106,14 @@ fn radii_are_spread_over_the_whole_range() {
 }
 
 #[test]
-fn noise_is_as_strong_as_the_name_says() {
+fn noise_has_the_strength_of_the_recipe() {
     for (kind, expected) in [
-        (BenchmarkKind::Clean, Sensor::default().read_noise),
-        (BenchmarkKind::Noise10, 10.0),
-        (BenchmarkKind::Noise25, 25.0),
-        (BenchmarkKind::Noise40, 40.0),
-        (BenchmarkKind::DistractorsNoise10, 10.0),
-        (BenchmarkKind::DistractorsNoise25, 25.0),
+        ("clean", Sensor::default().read_noise),
+        ("noise-10", 10.0),
+        ("noise-25", 25.0),
+        ("noise-40", 40.0),
+        ("distractors-noise-10", 10.0),
+        ("distractors-noise-25", 25.0),
     ] {
         let (mut renderer, snapshot) = drawn(kind, (768, 576), 5);
         let (a, b) = (
@@ -140,11 +131,7 @@ fn noise_is_as_strong_as_the_name_says() {
         let variance =
             differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64 / 2.0;
         let deviation = variance.sqrt();
-        let shot = if kind == BenchmarkKind::Clean {
-            1.3
-        } else {
-            0.0
-        };
+        let shot = if kind == "clean" { 1.3 } else { 0.0 };
         assert!(
             (deviation - expected - shot).abs() < 0.12 * expected + 0.6,
             "{kind}: {deviation}, {} pixels",
@@ -154,9 +141,9 @@ fn noise_is_as_strong_as_the_name_says() {
 }
 
 #[test]
-fn in_motion_the_ball_moves_by_four_to_twelve_pixels() {
+fn motion_blur_is_four_to_twelve_pixels() {
     for seed in 0..20 {
-        let (_, snapshot) = drawn(BenchmarkKind::MotionBlur, (768, 576), seed);
+        let (_, snapshot) = drawn("motion-blur", (768, 576), seed);
         let place = |seconds| {
             let (cell, joints) = snapshot.moment(seconds);
             cell.outline(&joints).expect("in view").centre
@@ -168,22 +155,25 @@ fn in_motion_the_ball_moves_by_four_to_twelve_pixels() {
 }
 
 #[test]
-fn a_frame_without_pixels_is_refused() {
+fn frame_without_pixels_is_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     for size in [(0, 576), (768, 0)] {
-        let refused = BenchmarkKind::Clean.draw(size, &mut rng);
+        let refused = Recipe::cell()[0]
+            .draw(size, &mut rng)
+            .expect_err("no pixels");
         assert!(
-            matches!(refused, Err(CameraError::NotPositive { .. })),
+            matches!(refused, QuantityError::NotPositive { .. }),
             "{size:?}"
         );
+        assert!(Recipe::benchmark()[0].draw(size, &mut rng).is_err());
     }
     // However small the frame, there is one.
-    assert!(BenchmarkKind::Many.draw((1, 1), &mut rng).is_ok());
+    assert_eq!(drawn("many", (1, 1), 1).1.cell.camera.size(), (1, 1));
 }
 
 #[test]
 fn frames_of_any_shape_are_drawn_and_rendered() {
-    for kind in [BenchmarkKind::Clean, BenchmarkKind::Textured] {
+    for kind in ["clean", "textured"] {
         for size in [(100, 576), (16, 2000), (2000, 16)] {
             let (mut renderer, snapshot) = drawn(kind, size, 1);
             assert_eq!(snapshot.take(&mut renderer).dimensions(), size);

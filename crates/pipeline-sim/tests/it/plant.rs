@@ -1,10 +1,8 @@
 //! The cell as a plant: errors, play, grasps, pushes and moving balls.
 
-use hough_heuristic::Features;
 use nalgebra::{Point3, Vector3};
 use pipeline_sim::{
-    Ball, BallPath, Cell, Contact, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell,
-    SimulatedArm, Workspace, sample_moves, try_sample_moves, with_noise,
+    Ball, Cell, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell, SimulatedArm, Workspace,
 };
 use puma_val2::{Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::SeedableRng;
@@ -21,22 +19,18 @@ fn swing() -> JointDelta {
 }
 
 #[test]
-fn a_ball_at_the_pads_is_held_carried_and_put_down() {
+fn ball_at_the_pads_is_held_carried_and_put_down() {
     let (cell, goal) = at_goal();
     let shared = SharedCell::new(cell);
     let mut arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
     arm.move_by(swing()).expect("within limits");
-    assert_eq!(
-        arm.contact(),
-        Contact::Free,
-        "the open jaws straddle the ball"
-    );
+    assert_eq!(shared.contacts().collisions, 0, "the open jaws straddle it");
     arm.set_gripper(Gripper::Closed).expect("always");
-    assert_eq!(arm.grasp(), Some(Grasp::Held));
+    assert_eq!(shared.contacts().grasp, Some(Grasp::Held));
     let joints = arm
         .move_by(JointDelta::from_degrees([10.0, -15.0, 0.0, 0.0, 0.0, 0.0]))
         .expect("within limits");
-    assert_eq!(arm.contact(), Contact::Carried);
+    assert_eq!(shared.contacts().collisions, 0);
     assert!(
         shared.get().ball.centre.z > cell.ball.centre.z + 0.05,
         "lifted"
@@ -55,7 +49,7 @@ fn a_ball_at_the_pads_is_held_carried_and_put_down() {
 }
 
 #[test]
-fn released_over_the_holder_it_stands_there_again() {
+fn ball_released_over_the_holder_stands_there_again() {
     let (mut cell, goal) = at_goal();
     let start = cell.ball.centre;
     let grip = goal + swing();
@@ -66,7 +60,7 @@ fn released_over_the_holder_it_stands_there_again() {
 }
 
 #[test]
-fn a_grasp_beside_the_ball_pushes_it_or_misses() {
+fn grasp_beside_the_ball_pushes_it_or_misses() {
     let (cell, goal) = at_goal();
     let grip = goal + swing();
     let mut outcomes = [0; 3];
@@ -156,7 +150,7 @@ fn jaws_hold_only_what_they_straddle_and_only_when_they_close() {
 }
 
 #[test]
-fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
+fn ball_off_its_holder_is_pushed_without_it() {
     let (cell, goal) = at_goal();
     let mut cell = cell;
     let holder = cell.holder.expect("on a holder");
@@ -167,7 +161,7 @@ fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
     for degrees in [2.0, 12.0] {
         let mut aside = cell;
         let there = grip + JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(aside.follow(&there), Contact::Carried);
+        assert!(aside.sweep(&there, &there) <= 0.0);
         aside.open_gripper();
         assert!(!holder.carries(&aside.ball));
         let apart = (aside.ball.centre.xy() - holder.foot).norm();
@@ -176,10 +170,10 @@ fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
             "{degrees}: {apart}"
         );
         // A finger meets it from the side.
-        let [finger, ..] = aside.hand_bodies(&there);
-        aside.ball.centre =
-            nalgebra::center(&finger.from, &finger.to) + Vector3::new(0.01, 0.0, 0.0);
-        assert!(matches!(aside.follow(&there), Contact::Pushed { by } if by > 0.005));
+        let reach = aside.params.d6 + aside.hand.tool - 0.02;
+        let finger = Point3::new(0.0, aside.hand.half_opening, reach);
+        aside.ball.centre = aside.params.wrist(&there) * finger + Vector3::new(0.01, 0.0, 0.0);
+        assert!(aside.sweep(&there, &there) > 0.005);
         assert_eq!(aside.holder, Some(holder), "the holder stays where it is");
     }
     // With another ball than one believes the holder still carries it.
@@ -192,7 +186,7 @@ fn a_ball_that_has_left_its_holder_is_pushed_without_it() {
 }
 
 #[test]
-fn play_and_encoders_that_cannot_be_are_refused_by_name() {
+fn impossible_play_and_encoders_are_refused_by_name() {
     let start = Workspace::paper().search_poses()[2];
     let arm =
         |errors: Errors| SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors);
@@ -211,7 +205,7 @@ fn play_and_encoders_that_cannot_be_are_refused_by_name() {
 }
 
 #[test]
-fn a_workspace_that_cannot_be_is_refused_by_name_and_has_no_balls() {
+fn impossible_workspace_is_refused_and_has_no_balls() {
     let (cell, _) = at_goal();
     let paper = Workspace::paper();
     assert_eq!(paper.check(), Ok(()));
@@ -257,12 +251,11 @@ fn a_workspace_that_cannot_be_is_refused_by_name_and_has_no_balls() {
         assert!(refused.contains(name), "{refused}");
         assert!(broken.sample_ball(&mut rng(1)).centre.x.is_nan());
         assert_eq!(broken.sample_seen_ball(&cell, &mut rng(1)), None);
-        assert_eq!(broken.coverage(&cell, 10, &mut rng(1)).seen, 0);
     }
 }
 
 #[test]
-fn running_into_the_ball_pushes_it_out_of_the_way() {
+fn arm_pushes_the_ball_out_of_its_way() {
     let (cell, goal) = at_goal();
     let shared = SharedCell::new(cell);
     let mut arm = SimulatedArm::new(
@@ -272,17 +265,14 @@ fn running_into_the_ball_pushes_it_out_of_the_way() {
     .expect("within limits");
     arm.move_by(JointDelta::from_degrees([-16.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
         .expect("within limits");
+    let contacts = shared.contacts();
     assert!(
-        matches!(arm.contact(), Contact::Pushed { by } if by > 0.02),
-        "{:?}",
-        arm.contact()
+        contacts.pushed > 0.02 && contacts.collisions == 1,
+        "{contacts:?}"
     );
     let now = shared.get();
     let joints = arm.joints().expect("always");
-    let gaps = now
-        .hand_bodies(&joints)
-        .map(|b| b.gap_to_sphere(&now.ball.centre, now.ball.radius));
-    assert!(gaps.iter().all(|g| *g > -1e-6), "{gaps:?}");
+    assert!(!now.collides(&joints));
     assert_eq!(
         now.holder.expect("still there").foot,
         now.ball.centre.xy(),
@@ -291,7 +281,7 @@ fn running_into_the_ball_pushes_it_out_of_the_way() {
 }
 
 #[test]
-fn play_and_counts_lie_between_what_is_reported_and_what_is() {
+fn reported_and_real_joints_differ_by_play_and_counts() {
     let errors = Errors {
         backlash: 0.2_f64.to_radians(),
         ..ErrorLevel::Moderate.draw(&mut rng(1))
@@ -338,7 +328,7 @@ fn error_levels_are_drawn_from_a_seed_and_make_the_cell_wrong() {
                 .draw(&mut rng(seed))
                 .apply(&cell)
                 .expect("sound errors");
-            if let Some(f) = wrong.features(&goal) {
+            if let Ok(f) = wrong.features(&goal) {
                 worst = worst
                     .max((f.x - 103.5).hypot(f.y - 78.0))
                     .max((f.r - 33.0).abs());
@@ -377,60 +367,13 @@ fn error_levels_are_drawn_from_a_seed_and_make_the_cell_wrong() {
 }
 
 #[test]
-fn balls_are_pushed_jump_and_drift() {
-    let (mut cell, goal) = at_goal();
-    assert!(cell.push_to_radius(&goal, 60.0));
-    let Features { x, y, r } = cell.features(&goal).expect("in sight");
-    assert!(
-        (r - 60.0).abs() < 1e-6 && (y - 78.0).abs() < 0.01 && (x - 103.5).abs() < 0.2,
-        "{x} {y} {r}"
-    );
-    assert!(!cell.push_to_radius(&goal, f64::NAN));
-
-    let workspace = Workspace::paper();
-    let from = cell.ball.centre;
-    let to = workspace
-        .sample_jump(&Point3::new(0.65, 0.1, -0.1), 0.15, &mut rng(5))
-        .expect("there is room");
-    assert!(
-        workspace.contains(&to) && ((to - Point3::new(0.65, 0.1, -0.1)).norm() - 0.15).abs() < 1e-9
-    );
-    let drift = workspace.sample_drift(&from, 0.02, &mut rng(6));
-    let drifted = (drift.at(3.0).expect("always") - from).norm();
-    assert!((drifted - 0.06).abs() < 1e-12, "{drifted}");
-    let jumps = BallPath::Jumps(vec![(0.0, from), (2.0, to)]);
-    assert_eq!(
-        (jumps.at(-1.0), jumps.at(1.9), jumps.at(2.0)),
-        (Some(from), Some(from), Some(to))
-    );
-    assert_eq!(BallPath::Jumps(vec![]).at(0.0), None);
-    let circle = BallPath::Circle {
-        middle: from,
-        radius: 0.05,
-        period: 4.0,
-    };
-    assert!(
-        (circle.at(1.0).expect("a period") - (from + Vector3::new(0.0, 0.05, 0.0))).norm() < 1e-12
-    );
-    assert_eq!(
-        BallPath::Circle {
-            middle: from,
-            radius: 0.05,
-            period: 0.0
-        }
-        .at(0.0),
-        None
-    );
-}
-
-#[test]
-fn the_feature_camera_sees_what_the_cell_shows_with_noise() {
+fn feature_camera_adds_noise_to_the_cells_features() {
     let (cell, goal) = at_goal();
     let shared = SharedCell::new(cell);
     let arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
-    let mut exact = FeatureCamera::new(shared.clone(), arm.pose(), 0.0, 1);
-    assert_eq!(exact.look(), cell.features(&goal));
-    let mut noisy = FeatureCamera::new(shared, arm.pose(), 0.5, 1);
+    let mut exact = FeatureCamera::new(shared.clone(), arm.pose(), 0.0, 1).expect("no noise");
+    assert_eq!(exact.look(), cell.features(&goal).ok());
+    let mut noisy = FeatureCamera::new(shared, arm.pose(), 0.5, 1).expect("noise");
     let spread = (0..2000)
         .map(|_| (noisy.look().expect("in sight").r - 33.0).powi(2))
         .sum::<f64>()
@@ -461,43 +404,7 @@ fn each_error_of_the_mount_is_named() {
 }
 
 #[test]
-fn noise_that_is_no_number_is_refused_and_leads_to_no_features() {
-    let (cell, goal) = at_goal();
-    let shared = SharedCell::new(cell);
-    let arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    for noise in [f64::NAN, f64::INFINITY, -0.5] {
-        let refused =
-            FeatureCamera::try_new(shared.clone(), arm.pose(), noise, 1).expect_err("no noise");
-        assert!(refused.to_string().contains("noise"), "{refused}");
-        assert_eq!(
-            try_sample_moves(&cell, 5, noise, &mut rng)
-                .expect_err("no noise")
-                .to_string(),
-            refused.to_string()
-        );
-    }
-    assert_eq!(
-        FeatureCamera::new(shared.clone(), arm.pose(), f64::NAN, 1).look(),
-        None
-    );
-    let (centring, reaching) = sample_moves(&cell, 5, f64::NAN, &mut rng);
-    assert!(centring.is_empty() && reaching.is_empty());
-    let spoiled = with_noise(Cell::GOAL, f64::NAN, &mut rng);
-    assert!([spoiled.x, spoiled.y, spoiled.r].iter().all(|v| v.is_nan()));
-    let mut sound = FeatureCamera::try_new(shared, arm.pose(), 0.0, 1).expect("no noise at all");
-    assert_eq!(sound.look(), cell.features(&goal));
-    assert_eq!(
-        try_sample_moves(&cell, 5, 0.5, &mut rng)
-            .expect("sound")
-            .0
-            .len(),
-        5
-    );
-}
-
-#[test]
-fn a_hand_of_any_length_meets_the_ball_on_its_way() {
+fn long_hand_meets_the_ball_on_its_way() {
     // Fingers half a metre long: they reach the ball where the wrist stays far from it.
     let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
     let goal = cell
@@ -510,10 +417,26 @@ fn a_hand_of_any_length_meets_the_ball_on_its_way() {
     cell.holder = None;
     cell.table = -1.0;
     let ball = cell.ball.centre;
-    let contact = cell.sweep(&turned(-12.0), &turned(12.0));
-    assert!(
-        matches!(contact, Contact::Pushed { .. }),
-        "{contact:?} {:?}",
-        cell.ball.centre - ball
-    );
+    assert!(cell.sweep(&turned(-12.0), &turned(12.0)) > 0.0);
+    assert!(cell.ball.centre != ball);
+}
+
+#[test]
+fn noise_that_is_not_a_finite_amount_is_refused_by_name() {
+    let (cell, goal) = at_goal();
+    let shared = SharedCell::new(cell);
+    for noise in [-1.0, f64::NAN, f64::INFINITY] {
+        let camera = FeatureCamera::new(shared.clone(), || goal, noise, 1).expect_err("no noise");
+        let samples = cell
+            .sample_moves(5, noise, &mut rng(1))
+            .expect_err("no noise");
+        assert_eq!(camera.to_string(), samples.to_string());
+        assert!(camera.to_string().contains("noise"), "{camera}");
+    }
+    let refused = cell
+        .sample_moves(usize::MAX, 0.1, &mut rng(1))
+        .expect_err("too many");
+    assert!(refused.to_string().contains("at most"), "{refused}");
+    let (centering, reaching) = cell.sample_moves(5, 0.5, &mut rng(1)).expect("sound");
+    assert_eq!((centering.len(), reaching.len()), (5, 5));
 }
