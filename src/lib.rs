@@ -28,7 +28,7 @@
 //!     let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
 //!     let spec = BehaviourSpec::centering();
 //!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, &mut |_| {})?;
-//!     let last = lesson.report.curve.last();
+//!     let last = lesson.curve.last();
 //!     assert!(last.and_then(|record| record.success_share) > Some(0.8));
 //!     Ok(())
 //! }

@@ -5,7 +5,7 @@ use pipeline_sim::{
     CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample,
 };
 use puma_val2::{Joint, JointDelta};
-use qtable::Progress;
+use qtable::Record;
 use rand::{Rng, RngExt};
 
 /// Regression simulator of section 4: predicts x, y and r after a joint move from models fitted to
@@ -93,7 +93,7 @@ impl Simulator {
         trials: &[Percept],
         actions: u64,
         rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Progress),
+        on_progress: &mut dyn FnMut(&Record),
     ) -> Result<Lesson, LearnError> {
         let simulate = |percept: &Percept, delta: &JointDelta| self.predict(percept, delta);
         let start = |rng: &mut dyn Rng| self.start(rng);

@@ -361,7 +361,7 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     let plane = ExactPlane::new(20_000, &mut rng);
     let anywhere: Vec<Percept> = (0..TRIALS).map(|_| rigid.start(&mut rng)).collect();
     let trials = search_percepts(TRIALS, seed_of(options.seed, &[4]));
-    let (spec, quiet) = (BehaviourSpec::centering(), &mut |_: &qtable::Progress| ());
+    let (spec, quiet) = (BehaviourSpec::centering(), &mut |_: &qtable::Record| ());
     let centering = rigid
         .learn(spec, &anywhere, ACTIONS.0, &mut rng, quiet)?
         .behaviour;

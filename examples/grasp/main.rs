@@ -25,7 +25,7 @@ use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pipeline_sim::{Ball, Cell, ReachForm, Workspace};
 use puma_grasp::{Rig, RigError, RigParts, Simulator, bright_ball_scene};
-use qtable::TrainReport;
+use qtable::Record;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
@@ -90,16 +90,18 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         None => Taught::train(options, &pair, &rig.cell().get(), &mut rng)?,
     };
     let training = TrainingSummary {
-        trained: taught.reports.is_some(),
+        trained: taught.curves.is_some(),
         actions: taught
-            .reports
+            .curves
             .iter()
-            .map(|(centering, approaching)| centering.actions + approaching.actions)
+            .flat_map(|(centering, approaching)| [centering.last(), approaching.last()])
+            .flatten()
+            .map(|record| record.actions)
             .sum(),
         seconds: begin.elapsed().as_secs_f64(),
         r2: taught.r2,
     };
-    if let Some((centering, approaching)) = &taught.reports {
+    if let Some((centering, approaching)) = &taught.curves {
         let svg =
             plots::learning_curves(&[("centering", centering), ("approaching", approaching)])?;
         write_whole(&options.out.join("learning.svg"), svg.as_bytes())?;
@@ -208,7 +210,7 @@ struct Taught {
     learned: Learned,
     limits: JointLimits,
     /// Learning curves, unless the behaviours were read from files.
-    reports: Option<(TrainReport, TrainReport)>,
+    curves: Option<(Vec<Record>, Vec<Record>)>,
     r2: BTreeMap<String, f64>,
 }
 
@@ -279,7 +281,7 @@ impl Taught {
             &format!("policies saved to {}", options.out.display()),
         );
         Ok(Self {
-            reports: Some((first.report, second.report)),
+            curves: Some((first.curve, second.curve)),
             r2,
             ..saved
         })
@@ -313,7 +315,7 @@ impl Taught {
         Ok(Self {
             learned,
             limits,
-            reports: None,
+            curves: None,
             r2: BTreeMap::new(),
         })
     }
@@ -374,7 +376,6 @@ fn teach(
     })?;
     bar.finish_and_clear();
     let success = lesson
-        .report
         .curve
         .last()
         .and_then(|record| record.success_share);

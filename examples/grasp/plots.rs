@@ -4,18 +4,18 @@ use std::error::Error;
 
 use example_support::plot::{Line, Panel, drawn};
 use hough_heuristic::Features;
-use qtable::{Record, TrainReport};
+use qtable::Record;
 
 use crate::record::RunRecord;
 
 type Drawn = Result<String, Box<dyn Error>>;
 
 /// Draws the share of episodes that reached the goal and the mean error of Q over the actions.
-pub(crate) fn learning_curves(curves: &[(&str, &TrainReport)]) -> Drawn {
-    let panels = curves.iter().flat_map(|(name, report)| {
+pub(crate) fn learning_curves(curves: &[(&str, &[Record])]) -> Drawn {
+    let panels = curves.iter().flat_map(|(name, curve)| {
         let panel = |title: &str, pick: fn(&Record) -> Option<f64>| {
             let known = |record: &Record| Some((record.actions as f64, pick(record)?));
-            let line = report.curve.iter().filter_map(known).collect();
+            let line = curve.iter().filter_map(known).collect();
             Panel::new(
                 &format!("{name}: {title}"),
                 "actions",

@@ -130,7 +130,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         );
         let mut floored = literal.approaching.clone();
         floored.reward.floor = 1.0;
-        let quiet = &mut |_: &qtable::Progress| ();
+        let quiet = &mut |_: &qtable::Record| ();
         let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
         let centering = rigid.learn(mended.centering, &anywhere, 60_000, &mut rng, quiet)?;
         let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
@@ -197,8 +197,8 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         }
         let [(_, (approaching, _)), ..] = lessons;
         let approaching = approaching?;
-        curves[0].1.push(centering.report.curve);
-        curves[1].1.push(approaching.report.curve);
+        curves[0].1.push(centering.curve);
+        curves[1].1.push(approaching.curve);
         taught.get_or_insert(Learned::new(centering.behaviour, approaching.behaviour));
     }
     let mut csv = String::from("behaviour,seed,actions,success_share,mean_td_error\n");

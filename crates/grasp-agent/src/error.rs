@@ -49,7 +49,7 @@ pub enum BehaviourError {
     /// A file that cannot be written or read, or is damaged.
     #[cfg(feature = "serde")]
     #[error(transparent)]
-    File(#[from] qtable::PersistError),
+    File(#[from] qtable::FileError),
 }
 
 /// Why a run was broken off. The arm stands.

@@ -65,44 +65,32 @@
 //!
 //! # Learning a behaviour
 //!
-//! Here the "simulator" is one line: a degree of the first joint moves the ball by four units.
+//! The simulator of this example is one line: a degree of the first joint moves the ball by four
+//! units.
 //!
 //! ```
-//! use grasp_agent::{Behaviour, BehaviourSpec, BehaviourTask, Percept};
+//! use grasp_agent::{BehaviourSpec, Percept, learn, schedule};
 //! use hough_heuristic::Features;
-//! use puma_val2::Joint;
+//! use puma_val2::{Joint, JointDelta};
 //! use qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
-//! use qtable::{QTable, Schedule, TrainConfig, train};
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let spec = BehaviourSpec::centering();
-//! let simulate = |percept: &Percept, delta: &puma_val2::JointDelta| {
-//!     let mut next = *percept;
-//!     next.features.x += 4.0 * delta[Joint::J1].to_degrees();
-//!     (0.0..192.0).contains(&next.features.x).then_some(next)
-//! };
-//! let gamma = 0.9;
-//! let start = |rng: &mut dyn Rng| Percept {
-//!     features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
-//!     theta3: 0.0,
-//! };
-//! let mut task = BehaviourTask::new(&spec, gamma, simulate, start);
-//! let mut table = QTable::new(spec.states(), spec.actions())?;
-//! let config = TrainConfig {
-//!     gamma,
-//!     alpha: Schedule::exponential(0.6, 0.02, 20_000)?,
-//!     temperature: Schedule::exponential(1000.0, 0.1, 20_000)?,
-//!     actions: 20_000,
-//!     episode_limit: 60,
-//!     record_every: 1_000,
-//! };
-//! let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-//! let report = train(&mut task, &mut table, &config, &mut rng, &mut |_progress| {})?;
-//! assert!(report.curve.last().is_some_and(|record| record.success_share > Some(0.9)));
-//! let centering = Behaviour::new(spec, table)?;
-//! # let _ = centering;
-//! # Ok(())
-//! # }
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let simulate = |percept: &Percept, delta: &JointDelta| {
+//!         let mut next = *percept;
+//!         next.features.x += 4.0 * delta[Joint::J1].to_degrees();
+//!         (0.0..192.0).contains(&next.features.x).then_some(next)
+//!     };
+//!     let start = |rng: &mut dyn Rng| Percept {
+//!         features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
+//!         theta3: 0.0,
+//!     };
+//!     let spec = BehaviourSpec::centering();
+//!     let settings = schedule(20_000)?;
+//!     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+//!     let lesson = learn(spec, simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
+//!     assert!(lesson.curve.last().is_some_and(|record| record.success_share > Some(0.9)));
+//!     Ok(())
+//! }
 //! ```
 
 mod behaviour;
@@ -121,7 +109,7 @@ pub use nalgebra;
 pub use puma_val2;
 pub use qtable;
 
-pub use behaviour::learning::{LearnError, Lesson, learn, schedule};
+pub use behaviour::learning::{LearnError, LearningSettings, Lesson, learn, schedule};
 pub use behaviour::policy::{Behaviour, Episode};
 pub use behaviour::preset::BehaviourPair;
 pub use behaviour::reward::{Reward, RewardTerm};

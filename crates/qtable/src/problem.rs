@@ -1,9 +1,9 @@
-//! Problems: environments, time limits, and states made from measured quantities.
+//! Problems: the environment's trait, time limits, and states made from measured quantities.
 
 mod discretise;
 mod environment;
 mod time_limit;
 
-pub use discretise::{DiscretiseError, Intervals, Product};
-pub use environment::{Environment, Status, Step};
+pub use discretise::{Intervals, Product};
+pub use environment::Environment;
 pub use time_limit::TimeLimit;

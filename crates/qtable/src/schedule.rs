@@ -1,187 +1,223 @@
-//! Quantities that change while a run goes on: the learning rate α, the exploration rate ε, the
+//! Quantities that change during a run: the learning rate α, the exploration rate ε, the
 //! temperature T.
+
+use std::sync::Arc;
 
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::elementary::{exp, ln};
-use crate::error::{Error, ScheduleError};
+use crate::error::{Error, check_setting};
 use crate::validated::validated;
 
-/// The value of a quantity after a number of steps (actions taken, or visits of one state-action
-/// pair).
-///
-/// Variants are made by the constructors, which check them; they can be matched on, not written
-/// out.
+validated! {
+    /// The value of a quantity as a run goes on.
+    ///
+    /// A schedule counts the actions of the run, or its episodes ([`by_episode`]), or the visits of
+    /// the state-action pair ([`inverse_visits`]).
+    ///
+    /// ```
+    /// use qtable::Schedule;
+    ///
+    /// fn main() -> Result<(), qtable::Error> {
+    ///     let epsilon = Schedule::linear(1.0, 0.1, 100)?;
+    ///     assert_eq!((epsilon.at(0), epsilon.at(50), epsilon.at(999)), (1.0, 0.55, 0.1));
+    ///     let by_hand = Schedule::custom((0.0, 1.0), |step| 1.0 / (1.0 + step as f64));
+    ///     assert_eq!(by_hand?.by_episode().at(3), 0.25);
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// [`by_episode`]: Schedule::by_episode
+    /// [`inverse_visits`]: Schedule::inverse_visits
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Schedule {
+        shape: Shape,
+        by_episode: bool,
+        /// The logarithm of the ratio of an exponential schedule's ends.
+        #[cfg_attr(feature = "serde", serde(skip))]
+        log_ratio: f64,
+    }
+}
+
+/// The course of a schedule.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-#[non_exhaustive]
-pub enum Schedule {
-    /// Always `value`.
-    #[non_exhaustive]
-    Constant {
-        /// The value.
-        value: f64,
-    },
-    /// From `start` to `end` by equal differences within `steps`, then `end`.
-    #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+enum Shape {
+    Constant(f64),
     Linear {
-        /// Value at step 0.
         start: f64,
-        /// Value from step `steps` on.
         end: f64,
-        /// Steps from `start` to `end`.
         steps: u64,
     },
-    /// From `start` to `end` by equal ratios within `steps`, then `end`.
-    #[non_exhaustive]
     Exponential {
-        /// Value at step 0, positive.
         start: f64,
-        /// Value from step `steps` on, positive.
         end: f64,
-        /// Steps from `start` to `end`.
         steps: u64,
     },
-    /// `start / (1 + visits / scale)`: by the visits of the state-action pair, not by the steps of
-    /// the run.
-    #[non_exhaustive]
     InverseVisits {
-        /// Value at the first visit.
         start: f64,
-        /// Visits after which half of `start` is left, positive.
         scale: f64,
     },
-    /// Straight lines between points, constant before the first and after the last.
-    #[non_exhaustive]
-    Piecewise {
-        /// Steps, strictly ascending, and the values there.
-        points: Vec<(u64, f64)>,
-    },
+    Piecewise(Vec<(u64, f64)>),
+    #[cfg_attr(feature = "serde", serde(skip))]
+    Custom(Custom),
+}
+
+/// A function of the caller and its range.
+#[derive(Clone)]
+struct Custom {
+    range: (f64, f64),
+    value: Arc<dyn Fn(u64) -> f64 + Send + Sync>,
+}
+
+impl std::fmt::Debug for Custom {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Custom").field(&self.range).finish()
+    }
+}
+
+impl PartialEq for Custom {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.value, &other.value)
+    }
 }
 
 impl Schedule {
-    /// Always `value`.
+    /// Creates a schedule that is always `value`.
     ///
     /// # Errors
-    /// [`ScheduleError::NotFinite`].
-    pub fn constant(value: f64) -> Result<Self, ScheduleError> {
-        Self::Constant { value }.restore()
+    /// A value that is not finite.
+    pub fn constant(value: f64) -> Result<Self, Error> {
+        Self::of(Shape::Constant(value))
     }
 
-    /// From `start` at step 0 to `end` at `steps` by equal differences; `end` from there on.
+    /// Creates a schedule from `start` at step 0 to `end` at `steps` by equal differences; it stays
+    /// at `end` from there on.
     ///
     /// # Errors
     /// A value that is not finite, or `steps` of 0.
-    pub fn linear(start: f64, end: f64, steps: u64) -> Result<Self, ScheduleError> {
-        Self::Linear { start, end, steps }.restore()
+    pub fn linear(start: f64, end: f64, steps: u64) -> Result<Self, Error> {
+        Self::of(Shape::Linear { start, end, steps })
     }
 
-    /// From `start` at step 0 to `end` at `steps` by equal ratios; `end` from there on.
+    /// Creates a schedule from `start` at step 0 to `end` at `steps` by equal ratios; it stays at
+    /// `end` from there on.
     ///
     /// # Errors
     /// A value that is not finite or not positive, or `steps` of 0.
-    pub fn exponential(start: f64, end: f64, steps: u64) -> Result<Self, ScheduleError> {
-        Self::Exponential { start, end, steps }.restore()
+    pub fn exponential(start: f64, end: f64, steps: u64) -> Result<Self, Error> {
+        Self::of(Shape::Exponential { start, end, steps })
     }
 
-    /// `start / (1 + visits / scale)`, by the visits of each state-action pair. With both 1 it is
-    /// `1/n` at the n-th visit, the sample average; a larger scale keeps learning longer, and both
-    /// satisfy the conditions of Robbins and Monro under which Q-learning converges.
+    /// Creates the schedule `start / (1 + visits / scale)` of the visits of each state-action pair.
     ///
-    /// A quantity that belongs to no pair, such as ε or T, has its steps in place of visits.
+    /// With both 1 it is `1/n` at the n-th visit, the sample average; a larger scale keeps learning
+    /// longer. Both satisfy the conditions of Robbins and Monro under which Q-learning converges. A
+    /// quantity that belongs to no pair, such as ε or T, counts its steps instead.
     ///
     /// # Errors
     /// A value that is not finite, or a scale that is not positive.
-    pub fn inverse_visits(start: f64, scale: f64) -> Result<Self, ScheduleError> {
-        Self::InverseVisits { start, scale }.restore()
+    pub fn inverse_visits(start: f64, scale: f64) -> Result<Self, Error> {
+        Self::of(Shape::InverseVisits { start, scale })
     }
 
-    /// Straight lines between `(step, value)` points; constant before the first and after the last.
+    /// Creates straight lines between `(step, value)` points; the schedule is constant before the
+    /// first and after the last.
     ///
     /// # Errors
     /// No point, steps that do not ascend, or a value that is not finite.
-    pub fn piecewise(points: &[(u64, f64)]) -> Result<Self, ScheduleError> {
-        Self::Piecewise {
-            points: points.to_vec(),
-        }
-        .restore()
+    pub fn piecewise(points: &[(u64, f64)]) -> Result<Self, Error> {
+        Self::of(Shape::Piecewise(points.to_vec()))
     }
 
-    /// The paper's learning rate: exponential from 0.6 (section 4). The end, which the paper does
-    /// not give, is 0.02 after `actions`, at least 1.
-    pub fn paper_alpha(actions: u64) -> Self {
-        Self::Exponential {
-            start: 0.6,
-            end: 0.02,
-            steps: actions.max(1),
-        }
+    /// Creates a schedule from a function of the step. The function must stay within `range`;
+    /// values outside are moved to its nearer end. Such a schedule cannot be saved.
+    ///
+    /// # Errors
+    /// A range that is not finite.
+    pub fn custom(
+        range: (f64, f64),
+        value: impl Fn(u64) -> f64 + Send + Sync + 'static,
+    ) -> Result<Self, Error> {
+        let value = Arc::new(value);
+        Self::of(Shape::Custom(Custom { range, value }))
     }
 
-    /// The paper's temperature: from 1000 (section 4). Course and end, which the paper does not
-    /// give, are exponential and 0.1 after `actions`, at least 1.
-    pub fn paper_temperature(actions: u64) -> Self {
-        Self::Exponential {
-            start: 1000.0,
-            end: 0.1,
-            steps: actions.max(1),
-        }
+    /// Counts episodes instead of actions: step 0 is the first episode.
+    #[must_use]
+    pub fn by_episode(self) -> Self {
+        let by_episode = true;
+        Self { by_episode, ..self }
     }
 
-    /// The value at a step, 0 being the first. [`Schedule::InverseVisits`] takes it as the number
+    /// Returns the value at a step, 0 being the first. A schedule by visits takes it as the number
     /// of visits.
+    #[inline]
     pub fn at(&self, step: u64) -> f64 {
-        match self {
-            Self::Constant { value } => *value,
-            Self::Linear { start, end, steps } => between(*start, *end, step, *steps),
-            Self::Exponential { start, end, steps } if step < *steps => {
-                let value = start * exp((ln(*end) - ln(*start)) * (step as f64 / *steps as f64));
+        match &self.shape {
+            Shape::Constant(value) => *value,
+            Shape::Linear { start, end, steps } => between(*start, *end, step, *steps),
+            Shape::Exponential { start, end, steps } if step < *steps => {
+                let value = start * exp(self.log_ratio * (step as f64 / *steps as f64));
                 held_between(*start, *end, value)
             }
-            Self::Exponential { end, .. } => *end,
-            Self::InverseVisits { start, scale } => start / (1.0 + step as f64 / scale),
-            Self::Piecewise { points } => {
-                let after = points.partition_point(|&(at, _)| at <= step);
-                match (points[..after].last(), points.get(after)) {
-                    (Some(&(from, start)), Some(&(to, end))) => {
-                        between(start, end, step - from, to - from)
-                    }
-                    (Some(&(_, value)), None) | (None, Some(&(_, value))) => value,
-                    (None, None) => f64::NAN,
+            Shape::Exponential { end, .. } => *end,
+            Shape::InverseVisits { start, scale } => start / (1.0 + step as f64 / scale),
+            Shape::Piecewise(points) => along(points, step),
+            Shape::Custom(Custom { range, value }) => {
+                let value = value(step);
+                if value.is_nan() {
+                    range.0
+                } else {
+                    held_between(range.0, range.1, value)
                 }
             }
         }
     }
 
-    /// The value at a step for a pair with a number of visits before it: whichever of the two the
-    /// schedule runs by.
-    #[inline]
-    pub fn at_visit(&self, step: u64, visits: u64) -> f64 {
-        match self {
-            Self::Constant { value } => *value,
-            Self::InverseVisits { .. } => self.at(visits),
-            _ => self.at(step),
+    /// Returns the smallest and the largest value.
+    pub fn range(&self) -> (f64, f64) {
+        let (low, high) = match &self.shape {
+            Shape::Constant(value) => (*value, *value),
+            Shape::Linear { start, end, .. } | Shape::Exponential { start, end, .. } => {
+                (*start, *end)
+            }
+            Shape::InverseVisits { start, .. } => (0.0, *start),
+            Shape::Piecewise(points) => points.iter().fold(
+                (f64::INFINITY, f64::NEG_INFINITY),
+                |(low, high), &(_, value)| (value.min(low), value.max(high)),
+            ),
+            Shape::Custom(custom) => custom.range,
+        };
+        (low.min(high), low.max(high))
+    }
+
+    /// Returns `true` for a schedule that counts the visits of each pair.
+    pub fn is_by_visits(&self) -> bool {
+        matches!(self.shape, Shape::InverseVisits { .. })
+    }
+
+    /// Returns the value now for a pair with a number of visits before.
+    #[inline(always)]
+    pub(crate) fn now(&self, clock: &Clock, visits: u32) -> f64 {
+        if let Shape::Constant(value) = self.shape {
+            value
+        } else if self.is_by_visits() {
+            self.at(u64::from(visits))
+        } else {
+            self.at_time(clock)
         }
     }
 
-    /// The smallest and the largest value it takes.
-    pub fn range(&self) -> (f64, f64) {
-        let within = |low: f64, value: f64, high: f64| (low.min(value), high.max(value));
-        match self {
-            Self::Constant { value } => (*value, *value),
-            Self::Linear { start, end, .. } | Self::Exponential { start, end, .. } => {
-                within(*start, *end, *start)
-            }
-            Self::InverseVisits { start, .. } => within(0.0, *start, 0.0),
-            Self::Piecewise { points } => points.iter().fold(
-                (f64::INFINITY, f64::NEG_INFINITY),
-                |(low, high), &(_, value)| within(low, value, high),
-            ),
-        }
+    /// Returns the value now of a quantity that belongs to no pair.
+    #[inline(always)]
+    pub(crate) fn at_time(&self, clock: &Clock) -> f64 {
+        self.at(if self.by_episode {
+            clock.episodes.saturating_sub(1)
+        } else {
+            clock.actions
+        })
     }
 
     /// Refuses a schedule that leaves `low..=high`.
@@ -194,62 +230,109 @@ impl Schedule {
     ) -> Result<(), Error> {
         let (least, most) = self.range();
         if least >= low && most <= high {
-            Ok(())
-        } else {
-            Err(Error::ScheduleRange {
-                name,
-                low: least,
-                high: most,
-                expected,
-            })
+            return Ok(());
         }
+        Err(Error::ScheduleRange {
+            name,
+            low: least,
+            high: most,
+            expected,
+        })
     }
 
-    fn restore(self) -> Result<Self, ScheduleError> {
-        let finite = |values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
-            Some(&value) => Err(ScheduleError::NotFinite { value }),
-            None => Ok(()),
+    fn of(shape: Shape) -> Result<Self, Error> {
+        Self {
+            shape,
+            by_episode: false,
+            log_ratio: 0.0,
+        }
+        .restore()
+    }
+
+    fn restore(mut self) -> Result<Self, Error> {
+        let finite = |value: f64| {
+            let valid = value.is_finite();
+            check_setting("a value of a schedule", value, valid, "finite")
         };
-        match &self {
-            Self::Constant { value } => finite(&[*value])?,
-            Self::Linear { start, end, steps } | Self::Exponential { start, end, steps } => {
-                finite(&[*start, *end])?;
-                if *steps == 0 {
-                    return Err(ScheduleError::NoSteps);
-                }
+        match &self.shape {
+            Shape::Constant(value) => finite(*value)?,
+            Shape::Linear { start, end, steps } | Shape::Exponential { start, end, steps } => {
+                finite(*start)?;
+                finite(*end)?;
+                check_setting(
+                    "the number of steps of a schedule",
+                    *steps as f64,
+                    *steps > 0,
+                    "at least 1",
+                )?;
             }
-            Self::InverseVisits { start, scale } => {
-                finite(&[*start])?;
-                if !scale.is_finite() || *scale <= 0.0 {
-                    return Err(ScheduleError::Scale { scale: *scale });
-                }
+            Shape::InverseVisits { start, scale } => {
+                finite(*start)?;
+                let valid = scale.is_finite() && *scale > 0.0;
+                check_setting("the scale of a schedule", *scale, valid, "positive")?;
             }
-            Self::Piecewise { points } => {
-                if points.is_empty() {
-                    return Err(ScheduleError::NoPoints);
-                }
-                for (_, value) in points {
-                    finite(&[*value])?;
-                }
+            Shape::Piecewise(points) => {
+                let valid = !points.is_empty();
+                check_setting("the number of points", 0.0, valid, "at least 1")?;
+                points.iter().try_for_each(|&(_, value)| finite(value))?;
                 if let Some(before) = points.windows(2).position(|pair| pair[0].0 >= pair[1].0) {
-                    let index = before + 1;
-                    return Err(ScheduleError::PointsNotAscending {
-                        index,
-                        step: points[index].0,
+                    return Err(Error::NotAscending {
+                        what: "the step of point",
+                        index: before + 1,
+                        value: points[before + 1].0 as f64,
+                        before: points[before].0 as f64,
                     });
                 }
             }
-        }
-        match self {
-            Self::Exponential { start, end, .. } if start.min(end) < f64::MIN_POSITIVE => {
-                Err(ScheduleError::NotPositive { start, end })
+            Shape::Custom(custom) => {
+                finite(custom.range.0)?;
+                finite(custom.range.1)?;
             }
-            valid => Ok(valid),
         }
+        if let Shape::Exponential { start, end, .. } = self.shape {
+            let valid = start.min(end) >= f64::MIN_POSITIVE;
+            let what = "the lower end of an exponential schedule";
+            check_setting(what, start.min(end), valid, "positive")?;
+            self.log_ratio = ln(end) - ln(start);
+        }
+        Ok(self)
     }
 }
 
-/// The value `step` of `steps` along a straight line, its end from there on.
+/// Actions taken and episodes begun so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub(crate) struct Clock {
+    pub(crate) actions: u64,
+    episodes: u64,
+}
+
+impl Clock {
+    /// Counts an action.
+    #[inline(always)]
+    pub(crate) fn tick(&mut self) {
+        self.actions = self.actions.saturating_add(1);
+    }
+
+    /// Counts an episode that begins.
+    #[inline(always)]
+    pub(crate) fn begin_episode(&mut self) {
+        self.episodes = self.episodes.saturating_add(1);
+    }
+}
+
+/// Returns the value of a piecewise schedule.
+fn along(points: &[(u64, f64)], step: u64) -> f64 {
+    let after = points.partition_point(|&(at, _)| at <= step);
+    match (points[..after].last(), points.get(after)) {
+        (Some(&(from, start)), Some(&(to, end))) => between(start, end, step - from, to - from),
+        (Some(&(_, value)), None) | (None, Some(&(_, value))) => value,
+        (None, None) => f64::NAN,
+    }
+}
+
+/// Returns the value `step` of `steps` along a straight line, its end from there on.
+#[inline]
 fn between(start: f64, end: f64, step: u64, steps: u64) -> f64 {
     if step >= steps {
         return end;
@@ -258,12 +341,11 @@ fn between(start: f64, end: f64, step: u64, steps: u64) -> f64 {
     held_between(start, end, start * (1.0 - t) + end * t)
 }
 
-/// A value between two others, where rounding may have led out of their range.
+/// Returns a value moved between two others, where rounding may have led out of their range.
+#[inline]
 fn held_between(start: f64, end: f64, value: f64) -> f64 {
     value.max(start.min(end)).min(start.max(end))
 }
-
-validated!(Schedule);
 
 #[cfg(test)]
 mod tests {

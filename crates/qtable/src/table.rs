@@ -4,7 +4,7 @@ mod csv;
 mod mask;
 mod qtable;
 
-pub use csv::CsvError;
 pub use mask::ActionMask;
 pub(crate) use mask::checked_entries;
-pub use qtable::{QTable, Value};
+pub use qtable::QTable;
+pub(crate) use qtable::check_value;

@@ -1,21 +1,31 @@
-//! Decoding that ends in a check: a type read from a file keeps the promises its constructors make.
+//! Deserialization that ends in a check.
 
-/// Implements `Serialize` and `Deserialize` for a type that derives both with
-/// `#[serde(remote = "Self")]` and has `fn restore(self) -> Result<Self, E>`, which checks what was
-/// read and rebuilds what was not stored.
+/// Declares a struct that serde reads only in a valid state.
+///
+/// The struct has `fn restore(self) -> Result<Self, Error>`, which checks what was read and
+/// rebuilds what is not stored. Its constructors end in the same check.
 macro_rules! validated {
-    ($type:ident $(<$v:ident: $bound:path>)?) => {
-        #[cfg(feature = "serde")]
-        impl $(<$v: $bound + serde::Serialize>)? serde::Serialize for $type $(<$v>)? {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                Self::serialize(self, serializer)
-            }
+    (
+        $(#[$meta:meta])*
+        $visibility:vis struct $name:ident {
+            $($(#[$field_meta:meta])* $field_visibility:vis $field:ident: $type:ty,)*
+        }
+    ) => {
+        $(#[$meta])*
+        #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+        $visibility struct $name {
+            $($(#[$field_meta])* $field_visibility $field: $type,)*
         }
 
         #[cfg(feature = "serde")]
-        impl<'de $(, $v: $bound + serde::Deserialize<'de>)?> serde::Deserialize<'de> for $type $(<$v>)? {
+        impl<'de> serde::Deserialize<'de> for $name {
             fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                Self::deserialize(deserializer)?.restore().map_err(serde::de::Error::custom)
+                #[derive(serde::Deserialize)]
+                struct Stored {
+                    $($(#[$field_meta])* $field: $type,)*
+                }
+                let Stored { $($field),* } = Stored::deserialize(deserializer)?;
+                Self { $($field),* }.restore().map_err(serde::de::Error::custom)
             }
         }
     };

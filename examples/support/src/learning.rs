@@ -24,7 +24,7 @@ pub fn learn_both(
 ) -> Result<Learned, LearnError> {
     let anywhere: Vec<Percept> = (0..TRIALS).map(|_| simulator.start(rng)).collect();
     let found = search_percepts(TRIALS, seed);
-    let quiet = &mut |_: &qtable::Progress| ();
+    let quiet = &mut |_: &qtable::Record| ();
     let centering = simulator.learn(pair.centering, &anywhere, ACTIONS.0, rng, quiet)?;
     let approaching = simulator.learn(pair.approaching, &found, ACTIONS.1, rng, quiet)?;
     Ok(Learned::new(centering.behaviour, approaching.behaviour))

@@ -11,7 +11,7 @@ use grasp_agent::{
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace};
 use puma_val2::{JointDelta, Joints};
-use qtable::{Action, Progress};
+use qtable::{Action, Record};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
@@ -105,7 +105,7 @@ impl ExactPlane {
         trials: &[Percept],
         actions: u64,
         rng: &mut dyn Rng,
-        on_progress: &mut dyn FnMut(&Progress),
+        on_progress: &mut dyn FnMut(&Record),
     ) -> Result<Lesson, LearnError> {
         let mut plane = ArmPlane::new(&self.model, JointLimits::paper());
         let simulate = |percept: &Percept, delta: &JointDelta| {
@@ -220,6 +220,6 @@ mod tests {
         let lesson = plane
             .learn(spec, &[], 2_000, &mut rng, &mut |_| ())
             .expect("learns");
-        assert!(lesson.report.episodes > 0);
+        assert!(lesson.curve.last().is_some_and(|record| record.episodes > 0));
     }
 }

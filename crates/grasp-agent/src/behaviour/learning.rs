@@ -1,8 +1,10 @@
 //! Learning a behaviour in a simulator, as the paper does in section 4.
 
+use std::ops::ControlFlow;
+
 use puma_val2::{Joint, JointDelta};
 use qtable::{
-    Action, Progress, QTable, Record, Schedule, State, TrainConfig, TrainReport, train_in_blocks,
+    Action, Boltzmann, QLearning, QTable, Record, Schedule, State, Training, Until,
 };
 use rand::Rng;
 
@@ -21,29 +23,48 @@ const ELBOW_RANGE: (f64, f64) = JointLimits::PAPER_DEGREES[2];
 pub struct Lesson {
     /// What was learned.
     pub behaviour: Behaviour,
-    /// The learning curve.
-    pub report: TrainReport,
+    /// Learning curve, oldest record first.
+    pub curve: Vec<Record>,
     /// Actions after which the table was as it is in `behaviour`: all of them, or fewer where the
     /// best table was kept.
     pub learned_by: u64,
 }
 
-/// The paper's settings (section 4) for a number of actions, with the ends of the two courses,
-/// which it does not give, at 0.1 for alpha and 5 for the temperature.
+/// Settings of Q-learning with a Boltzmann policy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearningSettings {
+    /// Discount factor γ, `0..=1`.
+    pub gamma: f64,
+    /// Learning rate α over the actions taken, within `0..=1`.
+    pub alpha: Schedule,
+    /// Temperature T over the actions taken, in units of the values, within `1e-6..=1e6`.
+    pub temperature: Schedule,
+    /// Actions to take in all, at least 1.
+    pub actions: u64,
+    /// Actions after which an episode is truncated, at least 1.
+    pub episode_limit: u64,
+    /// Actions from one record of the learning curve to the next, at least 1.
+    pub record_every: u64,
+}
+
+/// Returns the paper's settings (section 4) for a number of actions: γ = 0.9, α from 0.6, T from
+/// 1000, 60 actions to an episode, 100 records. The ends of the two schedules, which the paper does
+/// not give, are 0.1 for α and 5 for T.
 ///
-/// Both are far above those of [`TrainConfig::paper`]: on states as coarse as these, values that
-/// are still moving and actions that are still tried find the policies that reach the goal from
-/// everywhere, where a colder end settles early on some that do not.
+/// Both ends are high: on states as coarse as these, values that are still moving and actions that
+/// are still tried find the policies that reach the goal from everywhere. A colder end settles early
+/// on some that do not.
 ///
 /// # Errors
 /// No actions to learn by.
-pub fn schedule(actions: u64) -> Result<TrainConfig, LearnError> {
-    let exponential =
-        |start, end| Schedule::exponential(start, end, actions).map_err(qtable::Error::from);
-    Ok(TrainConfig {
-        alpha: exponential(0.6, 0.1)?,
-        temperature: exponential(1000.0, 5.0)?,
-        ..TrainConfig::paper(actions)
+pub fn schedule(actions: u64) -> Result<LearningSettings, LearnError> {
+    Ok(LearningSettings {
+        gamma: 0.9,
+        alpha: Schedule::exponential(0.6, 0.1, actions)?,
+        temperature: Schedule::exponential(1000.0, 5.0, actions)?,
+        actions,
+        episode_limit: 60,
+        record_every: actions.div_ceil(100),
     })
 }
 
@@ -65,46 +86,36 @@ pub fn learn(
     mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
     mut start: impl FnMut(&mut dyn Rng) -> Percept,
     trials: &[Percept],
-    config: &TrainConfig,
-    mut rng: &mut dyn Rng,
-    on_progress: &mut dyn FnMut(&Progress),
+    settings: &LearningSettings,
+    rng: &mut dyn Rng,
+    on_progress: &mut dyn FnMut(&Record),
 ) -> Result<Lesson, LearnError> {
-    /// Parts from record to record in which alpha and the temperature stand still.
+    /// Parts from record to record in which α and the temperature stand still.
     const BLOCKS: u64 = 5;
-    let mut table = QTable::new(spec.states(), spec.actions())?;
-    let mut report = TrainReport::default();
+    let (gamma, actions) = (settings.gamma, settings.actions);
+    let every = settings.record_every.clamp(1, actions.max(1));
+    let alpha = along_lines(&settings.alpha, every, actions)?;
+    let temperature = along_lines(&settings.temperature, every, actions)?;
+    let mut training = Training::new(
+        &BehaviourTask::new(&spec, gamma, &mut simulate, &mut start),
+        QTable::new(spec.states(), spec.actions())?,
+        QLearning::new(alpha, gamma)?,
+        Boltzmann::new(temperature)?,
+    )?
+    .with_episode_limit(settings.episode_limit)?;
     let mut best: Option<(usize, u64, QTable)> = None;
-    while report.actions < config.actions {
-        let from = report.actions;
-        let to = from
-            .saturating_add(config.record_every.max(1))
-            .min(config.actions);
-        let part = TrainConfig {
-            alpha: between(&config.alpha, from, to)?,
-            temperature: between(&config.temperature, from, to)?,
-            actions: to - from,
-            record_every: to - from,
-            ..config.clone()
-        };
-        let mut task = BehaviourTask::new(&spec, config.gamma, &mut simulate, &mut start);
-        let done = train_in_blocks(&mut task, &mut table, &part, BLOCKS, &mut rng, &mut |_| ())?;
-        for record in done.curve {
-            let latest = Record {
-                actions: from + record.actions,
-                episodes: report.episodes + record.episodes,
-                ..record
-            };
-            report.curve.push(latest);
-            on_progress(&Progress {
-                actions: latest.actions,
-                of: config.actions,
-                latest,
-            });
-        }
-        report.actions = to;
-        report.episodes += done.episodes;
-        if !trials.is_empty() && 2 * to > config.actions {
-            let behaviour = Behaviour::new(spec.clone(), table.clone())?;
+    while training.actions() < actions {
+        let part = every.min(actions - training.actions());
+        let to = training.actions() + part;
+        training = training.with_record_every(part)?;
+        let mut task = BehaviourTask::new(&spec, gamma, &mut simulate, &mut start);
+        training.run_in_blocks(&mut task, Until::Actions(to), BLOCKS, rng, |record, _| {
+            on_progress(record);
+            ControlFlow::Continue(())
+        })?;
+        training.end_episode();
+        if !trials.is_empty() && 2 * to > actions {
+            let behaviour = Behaviour::new(spec.clone(), training.table().clone())?;
             let fewest = best.as_ref().map_or(usize::MAX, |(fewest, ..)| *fewest);
             let (tried, without) = without_losses(trials, behaviour, fewest, &mut simulate)?;
             if tried.steps < fewest {
@@ -112,21 +123,27 @@ pub fn learn(
             }
         }
     }
-    let (learned_by, table) = best.map_or((report.actions, table), |(_, by, table)| (by, table));
+    let curve = training.take_curve();
+    let last = (actions, training.into_parts().0);
+    let (learned_by, table) = best.map_or(last, |(_, by, table)| (by, table));
     Ok(Lesson {
         behaviour: Behaviour::new(spec, table)?,
-        report,
+        curve,
         learned_by,
     })
 }
 
-/// The part of a schedule from one action to another.
-fn between(schedule: &Schedule, from: u64, to: u64) -> Result<Schedule, qtable::Error> {
-    if matches!(schedule, Schedule::InverseVisits { .. }) {
+/// Returns a schedule by straight lines from one record to the next. A schedule by visits stays.
+fn along_lines(schedule: &Schedule, every: u64, actions: u64) -> Result<Schedule, qtable::Error> {
+    if schedule.is_by_visits() {
         return Ok(schedule.clone());
     }
-    let (start, end) = (schedule.at(from), schedule.at(to));
-    Ok(Schedule::piecewise(&[(0, start), (to - from, end)])?)
+    let records = (0..actions).step_by(usize::try_from(every).unwrap_or(usize::MAX));
+    let points: Vec<_> = records
+        .chain([actions])
+        .map(|action| (action, schedule.at(action)))
+        .collect();
+    Schedule::piecewise(&points)
 }
 
 /// What the greedy policy, with the loop breaker of approaching, came to from a number of starts

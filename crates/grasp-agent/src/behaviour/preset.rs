@@ -1,6 +1,6 @@
 //! Both behaviours together, with the paper's values and with ours.
 
-use qtable::DiscretiseError;
+use qtable::Error;
 
 use crate::behaviour::reward::Reward;
 use crate::behaviour::spec::{BehaviourSpec, GoalInterval};
@@ -48,7 +48,7 @@ impl BehaviourPair {
     /// # Errors
     /// Intervals of approaching into which that goal does not fit; those of the presets take both
     /// of the paper's.
-    pub fn with_y_goal(self, goal: GoalInterval) -> Result<Self, DiscretiseError> {
+    pub fn with_y_goal(self, goal: GoalInterval) -> Result<Self, Error> {
         Ok(Self {
             approaching: self.approaching.with_y_goal(goal)?,
             ..self

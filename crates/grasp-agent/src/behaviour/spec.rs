@@ -3,7 +3,7 @@
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta};
-use qtable::{Action, DiscretiseError, Intervals, Product, State};
+use qtable::{Action, Error, Intervals, Product, State};
 
 use crate::behaviour::reward::Reward;
 use crate::checked::checked;
@@ -235,7 +235,7 @@ impl BehaviourSpec {
     ///
     /// # Errors
     /// Edges that do not increase: ends that are not finite or not in order.
-    pub fn with_y_goal(mut self, goal: GoalInterval) -> Result<Self, DiscretiseError> {
+    pub fn with_y_goal(mut self, goal: GoalInterval) -> Result<Self, Error> {
         let GoalInterval { low, high, .. } = goal;
         let mut axes = self.space.quantities().to_vec();
         for (input, axis) in self.inputs.iter().zip(&mut axes) {
@@ -275,7 +275,7 @@ impl BehaviourSpec {
 
     /// How many states it tells apart.
     pub fn states(&self) -> usize {
-        self.space.len()
+        self.space.states()
     }
 
     /// How many actions it chooses from; the largest number there is if they are more.
@@ -289,10 +289,11 @@ impl BehaviourSpec {
     ///
     /// # Errors
     /// An input that is NaN, with its position.
-    pub fn state(&self, percept: &Percept) -> Result<State, DiscretiseError> {
+    pub fn state(&self, percept: &Percept) -> Result<State, Error> {
         let axes = self.space.quantities();
         if axes.len() != self.inputs.len() {
-            return Err(DiscretiseError::WrongCount {
+            return Err(Error::WrongLength {
+                what: "the list of inputs",
                 needed: axes.len(),
                 found: self.inputs.len(),
             });
@@ -301,7 +302,7 @@ impl BehaviourSpec {
         for (quantity, (input, axis)) in self.inputs.iter().zip(axes).enumerate() {
             let bin = axis
                 .index(input.of(percept))
-                .map_err(|_| DiscretiseError::NotANumber { quantity })?;
+                .map_err(|_| Error::NotANumber { quantity })?;
             state = state * axis.bins() + bin;
         }
         Ok(State(state))

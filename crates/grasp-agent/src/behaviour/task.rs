@@ -77,7 +77,7 @@ where
         self.spec.actions()
     }
 
-    fn reset(&mut self, rng: &mut dyn Rng) -> State {
+    fn reset(&mut self, rng: &mut dyn Rng) -> Result<State, qtable::Error> {
         // A start at the goal would be an episode without a choice, so it is drawn again, but not
         // for ever.
         for _ in 0..STARTS_TRIED {
@@ -87,10 +87,10 @@ where
             }
         }
         self.state = self.spec.state(&self.now).unwrap_or(State(0));
-        self.state
+        Ok(self.state)
     }
 
-    fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
+    fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, qtable::Error> {
         let reward = &self.spec.reward;
         let known = self.deltas.get(action.0).copied();
         let delta = known.unwrap_or_else(|| self.spec.delta(action));
@@ -98,26 +98,23 @@ where
         // What is not a number cannot be seen either.
         let seen = after.and_then(|percept| Some((percept, self.spec.state(&percept).ok()?)));
         let Some((after, observation)) = seen else {
-            return Step {
+            return Ok(Step {
                 observation: self.state,
                 reward: reward.lost,
                 status: Status::Terminated,
-            };
+            });
         };
         let before = std::mem::replace(&mut self.now, after);
         self.state = observation;
-        if self.spec.at_goal(&after) {
-            Step {
-                observation,
-                reward: reward.arrival(self.gamma),
-                status: Status::Terminated,
-            }
+        let (reward, status) = if self.spec.at_goal(&after) {
+            (reward.arrival(self.gamma), Status::Terminated)
         } else {
-            Step {
-                observation,
-                reward: reward.step(&before, &after),
-                status: Status::Continuing,
-            }
-        }
+            (reward.step(&before, &after), Status::Continuing)
+        };
+        Ok(Step {
+            observation,
+            reward,
+            status,
+        })
     }
 }

@@ -1,100 +1,97 @@
 //! Double Q-learning.
 
 use rand::{Rng, RngExt};
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::learner::rule::{Experience, Learner, Rates, check};
 use crate::policy::Policy;
 use crate::schedule::Schedule;
-use crate::table::{QTable, Value};
+use crate::step::{Action, State};
+use crate::table::QTable;
 use crate::validated::validated;
 
-/// Double Q-learning (van Hasselt 2010). Two tables A and B; a coin decides which one learns:
-/// `A(s,a) <- A(s,a) + α (r + γ B(s', argmax over b of A(s',b)) - A(s,a))`, or the same with A and
-/// B exchanged.
-///
-/// One table chooses the next action and the other one values it, so that a value overestimated by
-/// chance is not chosen for being overestimated. The caller's table shows the mean of both, and the
-/// policy acts on it; A and B begin as copies of it and are kept here. An α by visits goes by those
-/// of the table that learns. There are no defaults.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(
-        remote = "Self",
-        bound(serialize = "V: Serialize", deserialize = "V: Deserialize<'de>")
-    )
-)]
-pub struct DoubleQLearning<V: Value = f64> {
-    rates: Rates,
-    tables: Option<[QTable<V>; 2]>,
+validated! {
+    /// Double Q-learning (van Hasselt 2010). Of two tables A and B a coin decides which one learns:
+    /// `A(s,a) <- A(s,a) + α (r + γ B(s', argmax over b of A(s',b)) - A(s,a))`, or the same with A
+    /// and B exchanged.
+    ///
+    /// One table chooses the next action and the other one values it, so that a value overestimated
+    /// by chance is not chosen for being overestimated. The caller's table shows the mean of both,
+    /// and the policy acts on it; A and B are kept here. An α by visits goes by the visits of the
+    /// table that learns.
+    ///
+    /// A learner belongs to the table it was made for; another table, or one changed by hand, is
+    /// refused with [`Error::OtherTable`].
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct DoubleQLearning {
+        rates: Rates,
+        tables: [QTable; 2],
+    }
 }
 
-impl<V: Value> DoubleQLearning<V> {
-    /// With α following a schedule over the updates made, or the visits.
+impl DoubleQLearning {
+    /// Creates the learner for a table, with a schedule of α over its updates, episodes or visits,
+    /// and the discount factor γ.
     ///
     /// # Errors
     /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
+    pub fn new(table: &QTable, alpha: Schedule, gamma: f64) -> Result<Self, Error> {
         Ok(Self {
             rates: Rates::new(alpha, gamma)?,
-            tables: None,
+            tables: [table.clone(), table.clone()],
         })
+    }
+
+    /// Returns the mean of A and B.
+    fn mean(&self, state: State, action: Action) -> f64 {
+        let [a, b] = self.tables.each_ref();
+        0.5 * a.value(state, action) + 0.5 * b.value(state, action)
+    }
+
+    /// Refuses a table that does not show the mean.
+    fn check_mean(&self, table: &QTable, state: State, action: Action) -> Result<(), Error> {
+        if table.value(state, action).to_bits() == self.mean(state, action).to_bits() {
+            return Ok(());
+        }
+        Err(Error::OtherTable { state, action })
     }
 
     #[cfg(feature = "serde")]
     fn restore(self) -> Result<Self, Error> {
-        if let Some([a, b]) = &self.tables {
-            a.check_shape("the second table", b.states(), b.actions())?;
-        }
+        let [a, b] = &self.tables;
+        a.check_shape("the second table", b.states(), b.actions())?;
         Ok(self)
     }
 }
 
-validated!(DoubleQLearning<V: Value>);
+impl Learner for DoubleQLearning {
+    fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
+    }
 
-impl<V: Value> Learner<V> for DoubleQLearning<V> {
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        let Experience {
-            state,
-            action,
-            step,
-            ..
-        } = *experience;
-        check(table, state, action, &step)?;
-        let tables = self
-            .tables
-            .get_or_insert_with(|| [table.clone(), table.clone()]);
-        table.check_shape(
-            "the table of Double Q-learning",
-            tables[0].states(),
-            tables[0].actions(),
-        )?;
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        check(table, state, action, step)?;
+        let (states, actions) = (self.tables[0].states(), self.tables[0].actions());
+        table.check_shape("the learner's own table", states, actions)?;
         let (learning, valuing) = if rng.random() { (0, 1) } else { (1, 0) };
-        let choice = tables[learning].best(step.observation);
-        let target = self.rates.target(&step, || {
-            tables[valuing].value(step.observation, choice).to_f64()
+        let choice = self.tables[learning].best(step.observation);
+        self.check_mean(table, state, action)?;
+        self.check_mean(table, step.observation, choice)?;
+        let target = self.rates.target(step, || {
+            self.tables[valuing].value(step.observation, choice)
         });
-        let alpha = self.rates.alpha(&tables[learning], state, action);
-        let old = tables[learning].value(state, action).to_f64();
-        let error = target - old;
-        tables[learning].store(state, action, old + alpha * error)?;
-        let mean = tables
-            .each_ref()
-            .map(|one| 0.5 * one.value(state, action).to_f64());
-        table.store(state, action, mean[0] + mean[1])?;
-        tables[learning].visit(state, action)?;
+        let error = self
+            .rates
+            .learn(&mut self.tables[learning], state, action, target)?;
+        table.store(state, action, self.mean(state, action))?;
         table.visit(state, action)?;
-        self.rates.tick();
         Ok(error)
     }
 }

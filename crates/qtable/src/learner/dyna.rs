@@ -10,37 +10,41 @@ use crate::learner::rule::{Experience, Learner};
 use crate::model::ModelEstimate;
 use crate::policy::Policy;
 use crate::schedule::Schedule;
-use crate::table::{QTable, Value};
+use crate::table::QTable;
 
 /// Dyna-Q (Sutton 1990): one-step Q-learning on each real step, then on k steps drawn from a model:
 /// a pair tried before, each as likely as the other, and one of its outcomes, as often as it was
 /// seen.
 ///
-/// In Sutton's deterministic worlds an outcome is the last one seen; drawing from all of them is
-/// the same there and right in a stochastic world too. Imagined steps use the α of the present, and
-/// count neither as visits nor for the schedule. Default: k = 5.
+/// Imagined steps use the α of the present, and count neither as visits nor for the schedule.
+/// Default: k = 5.
+///
+/// A learner belongs to the table it was made for; another table is refused with
+/// [`Error::OtherTable`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct DynaQ {
     real: QLearning,
     planning_steps: u32,
-    model: Option<ModelEstimate>,
+    model: ModelEstimate,
 }
 
 impl DynaQ {
-    /// With α following a schedule over the updates made, or the visits.
+    /// Creates the learner for a table, with a schedule of α over its updates, episodes or visits,
+    /// and the discount factor γ.
     ///
     /// # Errors
     /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
+    pub fn new(table: &QTable, alpha: Schedule, gamma: f64) -> Result<Self, Error> {
         Ok(Self {
             real: QLearning::new(alpha, gamma)?,
             planning_steps: 5,
-            model: None,
+            model: ModelEstimate::new(table.states(), table.actions())?,
         })
     }
 
-    /// Another number of imagined steps after each real one; 0 is plain Q-learning.
+    /// Sets the number of imagined steps after each real one; 0 is plain Q-learning.
+    #[must_use]
     pub fn with_planning_steps(self, planning_steps: u32) -> Self {
         Self {
             planning_steps,
@@ -48,42 +52,32 @@ impl DynaQ {
         }
     }
 
-    /// What was learned of the environment, once there is something.
-    pub fn model(&self) -> Option<&ModelEstimate> {
-        self.model.as_ref()
-    }
-
-    fn imagine<V: Value>(&mut self, table: &mut QTable<V>, rng: &mut dyn Rng) -> Result<(), Error> {
-        match self.model.as_ref().and_then(|model| model.draw(rng)) {
-            Some((state, action, step)) => self.real.update_imagined(table, state, action, &step),
-            None => Ok(()),
-        }
+    /// Returns the model learned so far.
+    pub fn model(&self) -> &ModelEstimate {
+        &self.model
     }
 }
 
-impl<V: Value> Learner<V> for DynaQ {
+impl Learner for DynaQ {
+    fn begin_episode(&mut self) {
+        self.real.begin_episode();
+    }
+
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        let Experience {
-            state,
-            action,
-            step,
-            ..
-        } = experience;
-        let error = self.real.update(table, *state, *action, step)?;
-        if self.model.is_none() {
-            self.model = Some(ModelEstimate::new(table.states(), table.actions())?);
-        }
-        if let Some(model) = &mut self.model {
-            model.observe(*state, *action, step)?;
-        }
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        self.model.check_table(table)?;
+        let error = self.real.update(table, state, action, step)?;
+        self.model.observe(state, action, step)?;
         for _ in 0..self.planning_steps {
-            self.imagine(table, rng)?;
+            if let Some((state, action, step)) = self.model.draw(rng) {
+                self.real.update_imagined(table, state, action, &step)?;
+            }
         }
         Ok(error)
     }

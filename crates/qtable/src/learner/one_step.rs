@@ -4,21 +4,33 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::Error;
-use crate::index::{Action, State};
-use crate::learner::rule::{Experience, Learner, Rates, check, next_value};
+use crate::error::{Error, check_reward};
+use crate::learner::rule::{Experience, Learner, Rates, check, constructor, next_value};
 use crate::policy::Policy;
-use crate::problem::{Status, Step};
 use crate::schedule::Schedule;
 use crate::scratch::Scratch;
-use crate::table::{QTable, Value};
+use crate::step::{Action, State, Status, Step};
+use crate::table::QTable;
 
-/// One-step Q-learning (Watkins and Dayan 1992; the paper's Eq. 3):
+/// One-step Q-learning (Watkins and Dayan 1992):
 /// `Q(s,a) <- (1 - α) Q(s,a) + α (r + γ max over b of Q(s',b))`.
 ///
-/// Learns the optimal policy whatever policy acts, as long as that one keeps trying everything. The
-/// term in γ is left out when the step *terminated* the episode and kept when it was only
-/// *truncated*. There are no defaults; the paper has γ = 0.9 and [`Schedule::paper_alpha`].
+/// It learns the optimal policy whatever policy acts, as long as that one keeps trying everything.
+/// The term in γ is left out when the step *terminated* the episode and kept when it was only
+/// *truncated*.
+///
+/// ```
+/// use qtable::{Action, QLearning, QTable, Schedule, State, Status, Step};
+///
+/// fn main() -> Result<(), qtable::Error> {
+///     let mut table = QTable::new(2, 1)?;
+///     let mut learner = QLearning::new(Schedule::constant(0.5)?, 0.9)?;
+///     let step = Step { observation: State(1), reward: 4.0, status: Status::Continuing };
+///     let error = learner.update(&mut table, State(0), Action(0), &step)?;
+///     assert_eq!((error, table.max(State(0))), (4.0, 2.0));
+///     Ok(())
+/// }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct QLearning {
@@ -26,87 +38,80 @@ pub struct QLearning {
 }
 
 impl QLearning {
-    /// With α following a schedule over the updates made, or the visits.
-    ///
-    /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
-        Ok(Self {
-            rates: Rates::new(alpha, gamma)?,
-        })
-    }
+    constructor!();
 
     /// Learns from one step: `action` taken in `state` led to `step`. Counts the visit and returns
-    /// the error `r + γ max Q(s',·) - Q(s,a)` as it was before the update.
+    /// the error `r + γ max Q(s',·) - Q(s,a)` before the update.
     ///
     /// # Errors
     /// A state or action out of range or forbidden, a reward that is not finite, or a value that
     /// would not be. The table is unchanged then.
     #[inline(always)]
-    pub fn update<V: Value>(
+    pub fn update(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         state: State,
         action: Action,
         step: &Step,
     ) -> Result<f64, Error> {
         table.check_state(step.observation)?;
-        let target = self
-            .rates
-            .target(step, || table.max(step.observation).to_f64());
-        // A reward that is not finite makes a value that is not, which is refused; only its name is
-        // to be found.
-        match self.rates.learn(table, state, action, target) {
-            Err(Error::ValueNotFinite { .. }) if !step.reward.is_finite() => {
-                Err(Error::RewardNotFinite {
-                    state,
-                    action,
-                    reward: step.reward,
-                })
-            }
-            learned => learned,
+        let target = self.rates.greedy_target(table, step);
+        let learned = self.rates.learn(table, state, action, target);
+        if let Err(Error::ValueNotFinite { .. }) = learned {
+            // The value is refused; the reward may be the cause.
+            check_reward(state, action, step.reward)?;
         }
+        learned
     }
 
-    /// Learns from a step that did not really happen: no visit is counted, and the clock stands
-    /// still.
-    pub(super) fn update_imagined<V: Value>(
+    /// Learns from a step that a model made up: no visit is counted, and the clock stands still.
+    pub(super) fn update_imagined(
         &self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         state: State,
         action: Action,
         step: &Step,
     ) -> Result<(), Error> {
         check(table, state, action, step)?;
-        let target = self
-            .rates
-            .target(step, || table.max(step.observation).to_f64());
-        let old = table.value(state, action).to_f64();
-        table.store(
-            state,
-            action,
-            old + self.rates.alpha(table, state, action) * (target - old),
-        )
+        let target = self.rates.greedy_target(table, step);
+        let old = table.value(state, action);
+        let alpha = self.rates.alpha(table, state, action);
+        table.store(state, action, old + alpha * (target - old))
     }
 
-    /// α of the next update of a pair never visited.
-    pub fn alpha(&self) -> f64 {
-        self.rates.alpha.at_visit(self.rates.updates, 0)
+    /// Returns α of the next update of a pair with a number of visits.
+    #[inline(always)]
+    pub(crate) fn alpha(&self, visits: u32) -> f64 {
+        self.rates.alpha.now(&self.rates.clock, visits)
     }
 
-    /// The discount factor.
-    pub fn gamma(&self) -> f64 {
+    /// Returns `true` if α goes by visits.
+    pub(crate) fn is_by_visits(&self) -> bool {
+        self.rates.alpha.is_by_visits()
+    }
+
+    pub(crate) fn gamma(&self) -> f64 {
         self.rates.gamma
+    }
+
+    /// Counts an update that was made in cached weights.
+    #[inline(always)]
+    pub(crate) fn tick(&mut self) {
+        self.rates.clock.tick();
     }
 }
 
-impl<V: Value> Learner<V> for QLearning {
+impl Learner for QLearning {
+    fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
+    }
+
     #[inline]
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         self.update(table, experience.state, experience.action, &experience.step)
@@ -114,10 +119,9 @@ impl<V: Value> Learner<V> for QLearning {
 }
 
 /// SARSA (Rummery and Niranjan 1994): `Q(s,a) <- Q(s,a) + α (r + γ Q(s',a') - Q(s,a))` with the
-/// action `a'` that the policy really takes next.
+/// action `a'` that the policy takes next.
 ///
-/// Learns the value of the policy that acts, exploration included, and so keeps away from cliffs.
-/// There are no defaults.
+/// It learns the value of the policy that acts, exploration included, and so keeps away from cliffs.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Sarsa {
@@ -125,47 +129,38 @@ pub struct Sarsa {
 }
 
 impl Sarsa {
-    /// With α following a schedule over the updates made, or the visits.
-    ///
-    /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
-        Ok(Self {
-            rates: Rates::new(alpha, gamma)?,
-        })
-    }
+    constructor!();
 }
 
-impl<V: Value> Learner<V> for Sarsa {
-    fn on_policy(&self) -> bool {
+impl Learner for Sarsa {
+    fn needs_next_action(&self) -> bool {
         true
+    }
+
+    fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
     }
 
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        let Experience {
-            state,
-            action,
-            step,
-            ..
-        } = experience;
-        check(table, *state, *action, step)?;
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        check(table, state, action, step)?;
         let next = next_value(table, experience)?;
         let target = self.rates.target(step, || next);
-        self.rates.learn(table, *state, *action, target)
+        self.rates.learn(table, state, action, target)
     }
 }
 
 /// Expected SARSA (van Seijen and others 2009):
 /// `Q(s,a) <- Q(s,a) + α (r + γ Σ p(b|s') Q(s',b) - Q(s,a))`, with p from the policy that acts.
 ///
-/// As SARSA, without the chance in the next action. There are no defaults. It needs a policy that
-/// tells its probabilities, as all of this crate do.
+/// It is SARSA without the chance in the next action. It needs a policy that tells its
+/// probabilities, as all of this crate do.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ExpectedSarsa {
@@ -175,52 +170,38 @@ pub struct ExpectedSarsa {
 }
 
 impl ExpectedSarsa {
-    /// With α following a schedule over the updates made, or the visits.
-    ///
-    /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
-        Ok(Self {
-            rates: Rates::new(alpha, gamma)?,
-            probabilities: Scratch::default(),
-        })
-    }
+    constructor!(probabilities: Scratch::default());
 
-    fn expected<V: Value>(
+    fn expected(
         &mut self,
-        table: &QTable<V>,
+        table: &QTable,
         state: State,
-        policy: &dyn Policy<V>,
+        policy: &dyn Policy,
     ) -> Result<f64, Error> {
         let probabilities = self.probabilities.of_length(table.actions());
         if !policy.probabilities(table, state, probabilities) {
             return Err(Error::NoProbabilities);
         }
-        let row = table.row(state);
         // Forbidden actions have probability 0 and, being finite, no part in the sum.
-        Ok(probabilities
-            .iter()
-            .zip(row)
-            .map(|(p, value)| p * value.to_f64())
-            .sum())
+        let row = table.row(state);
+        Ok(probabilities.iter().zip(row).map(|(p, q)| p * q).sum())
     }
 }
 
-impl<V: Value> Learner<V> for ExpectedSarsa {
+impl Learner for ExpectedSarsa {
+    fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
+    }
+
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        policy: &dyn Policy<V>,
+        policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        let Experience {
-            state,
-            action,
-            step,
-            ..
-        } = experience;
-        check(table, *state, *action, step)?;
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        check(table, state, action, step)?;
         let next = match step.status {
             Status::Terminated => 0.0,
             Status::Continuing | Status::Truncated => {
@@ -228,6 +209,6 @@ impl<V: Value> Learner<V> for ExpectedSarsa {
             }
         };
         let target = self.rates.target(step, || next);
-        self.rates.learn(table, *state, *action, target)
+        self.rates.learn(table, state, action, target)
     }
 }

@@ -1,68 +1,65 @@
-//! How a table improves from experience.
+//! The trait of a learner, and what learners share.
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_gamma};
-use crate::index::{Action, State};
+use crate::error::{Error, check_gamma, check_reward};
 use crate::policy::Policy;
-use crate::problem::{Status, Step};
-use crate::schedule::Schedule;
-use crate::table::{QTable, Value};
+use crate::schedule::{Clock, Schedule};
+use crate::step::{Action, State, Status, Step};
+use crate::table::QTable;
 use crate::validated::validated;
 
-/// What a learner learns from: an action, what came of it, and what follows.
+/// An action, its result, and the action that follows: what a learner learns from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Experience {
-    /// The state the action was taken in.
+    /// State the action was taken in.
     pub state: State,
     /// The action.
     pub action: Action,
-    /// The environment's answer.
+    /// Answer of the environment.
     pub step: Step,
-    /// The action that the policy has chosen in the observed state. Present for learners that ask
-    /// for it ([`Learner::on_policy`]) unless the step terminated the episode.
+    /// Action that the policy has chosen in the observed state. Present for learners that need it
+    /// ([`Learner::needs_next_action`]) unless the step terminated the episode.
     pub next_action: Option<Action>,
 }
 
 /// A rule that improves a table.
 ///
-/// The table is the caller's: it is what policies act upon and what is reported. What a rule needs
-/// beside it (traces, a model, a second table) it keeps itself, so that the pair of table and
-/// learner is the whole state of the learning.
-pub trait Learner<V: Value = f64> {
-    /// Whether the learner needs the action that will be taken next ([`Experience::next_action`]).
-    /// Then it is chosen before the update, otherwise after it.
-    fn on_policy(&self) -> bool {
+/// The table is the caller's: policies act on it and reports show it. A learner keeps what else it
+/// needs itself (traces, a model, a second table), so that table and learner together are the whole
+/// state of the learning.
+pub trait Learner {
+    /// Returns `true` if the learner needs the action that will be taken next
+    /// ([`Experience::next_action`]). Then that action is chosen before the update, otherwise
+    /// after it.
+    fn needs_next_action(&self) -> bool {
         false
     }
 
     /// Prepares for an episode: forgets what an episode that was broken off left behind.
     fn begin_episode(&mut self) {}
 
-    /// Learns from one action and returns its one-step temporal-difference error as it was before
-    /// the update. `policy` is the one that acts.
+    /// Learns from one action, counts its visit in the table, and returns its one-step
+    /// temporal-difference error before the update. `policy` is the policy that acts.
     ///
-    /// The visit is counted in the table. Nothing is bootstrapped through a step that terminated
-    /// the episode; through one that was truncated it is.
+    /// Nothing is bootstrapped through a step that terminated the episode; through a truncated step
+    /// it is.
     ///
     /// # Errors
     /// A state or action out of range or forbidden, a reward that is not finite, a value that would
-    /// not be, or something missing that the learner needs. The table never holds a value that is
-    /// not finite.
+    /// not be, or something missing that the learner needs.
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        policy: &dyn Policy<V>,
+        policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error>;
 }
 
-impl<V: Value, L: Learner<V> + ?Sized> Learner<V> for Box<L> {
-    fn on_policy(&self) -> bool {
-        (**self).on_policy()
+impl<L: Learner + ?Sized> Learner for Box<L> {
+    fn needs_next_action(&self) -> bool {
+        (**self).needs_next_action()
     }
 
     fn begin_episode(&mut self) {
@@ -71,34 +68,32 @@ impl<V: Value, L: Learner<V> + ?Sized> Learner<V> for Box<L> {
 
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        policy: &dyn Policy<V>,
+        policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         (**self).learn(table, experience, policy, rng)
     }
 }
 
-/// Learning rate, discount and clock, which nearly all learners have.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub(super) struct Rates {
-    pub(super) alpha: Schedule,
-    pub(super) gamma: f64,
-    pub(super) updates: u64,
+validated! {
+    /// Learning rate, discount factor and clock of a learner.
+    #[derive(Clone, Debug, PartialEq)]
+    pub(super) struct Rates {
+        pub(super) alpha: Schedule,
+        pub(super) gamma: f64,
+        pub(super) clock: Clock,
+    }
 }
 
 impl Rates {
     pub(super) fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
+        let clock = Clock::default();
         Self {
             alpha,
             gamma,
-            updates: 0,
+            clock,
         }
         .restore()
     }
@@ -109,14 +104,13 @@ impl Rates {
         Ok(self)
     }
 
-    /// α for the next update of a pair.
+    /// Returns α of the next update of a pair.
     #[inline]
-    pub(super) fn alpha<V: Value>(&self, table: &QTable<V>, state: State, action: Action) -> f64 {
-        self.alpha
-            .at_visit(self.updates, u64::from(table.visits(state, action)))
+    pub(super) fn alpha(&self, table: &QTable, state: State, action: Action) -> f64 {
+        self.alpha.now(&self.clock, table.visits(state, action))
     }
 
-    /// `r + γ next`, without the second term after termination.
+    /// Returns `r + γ next`, without the second term after termination.
     #[inline(always)]
     pub(super) fn target(&self, step: &Step, next: impl FnOnce() -> f64) -> f64 {
         match step.status {
@@ -125,61 +119,47 @@ impl Rates {
         }
     }
 
-    /// Moves a checked pair toward a target by α, counts the visit and ticks the clock. Returns the
-    /// error before.
+    /// Returns `r + γ max over b of Q(s',b)`.
     #[inline(always)]
-    pub(super) fn learn<V: Value>(
+    pub(super) fn greedy_target(&self, table: &QTable, step: &Step) -> f64 {
+        self.target(step, || table.max(step.observation))
+    }
+
+    /// Moves a pair toward a target by α, counts the visit and an update. Returns the error before.
+    #[inline(always)]
+    pub(super) fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         state: State,
         action: Action,
         target: f64,
     ) -> Result<f64, Error> {
         let entry = table.entry(state, action)?;
         let (old, visits) = table.at(entry);
-        let error = target - old.to_f64();
-        let alpha = self.alpha.at_visit(self.updates, u64::from(visits));
-        table.store(state, action, old.to_f64() + alpha * error)?;
+        let error = target - old;
+        let alpha = self.alpha.now(&self.clock, visits);
+        table.store(state, action, old + alpha * error)?;
         table.count(entry);
-        self.tick();
+        self.clock.tick();
         Ok(error)
-    }
-
-    /// Counts an update.
-    #[inline(always)]
-    pub(super) fn tick(&mut self) {
-        self.updates = self.updates.saturating_add(1);
     }
 }
 
-validated!(Rates);
-
 /// Checks that an experience fits the table.
 #[inline(always)]
-pub(super) fn check<V: Value>(
-    table: &QTable<V>,
+pub(super) fn check(
+    table: &QTable,
     state: State,
     action: Action,
     step: &Step,
 ) -> Result<(), Error> {
     table.check(state, action)?;
     table.check_state(step.observation)?;
-    if step.reward.is_finite() {
-        Ok(())
-    } else {
-        Err(Error::RewardNotFinite {
-            state,
-            action,
-            reward: step.reward,
-        })
-    }
+    check_reward(state, action, step.reward)
 }
 
-/// The value of the action that an on-policy learner's policy has chosen next.
-pub(super) fn next_value<V: Value>(
-    table: &QTable<V>,
-    experience: &Experience,
-) -> Result<f64, Error> {
+/// Returns the value of the action that the policy has chosen next.
+pub(super) fn next_value(table: &QTable, experience: &Experience) -> Result<f64, Error> {
     if experience.step.status == Status::Terminated {
         return Ok(0.0);
     }
@@ -188,10 +168,30 @@ pub(super) fn next_value<V: Value>(
         .next_action
         .ok_or(Error::NextActionMissing { state })?;
     table.check(state, action)?;
-    Ok(table.value(state, action).to_f64())
+    Ok(table.value(state, action))
 }
 
-/// Whether the action is one of the best of its state, as a greedy policy would choose.
-pub(super) fn is_greedy<V: Value>(table: &QTable<V>, state: State, action: Action) -> bool {
+/// Returns `true` if the action is one of the best of its state.
+pub(super) fn is_greedy(table: &QTable, state: State, action: Action) -> bool {
     table.value(state, action) >= table.max(state)
 }
+
+/// Writes the constructor of a learner that has learning rate, discount factor and clock, and no
+/// further state than the fields given.
+macro_rules! constructor {
+    ($($field:ident: $value:expr),*) => {
+        /// Creates the learner with a schedule of α over its updates, episodes or visits, and the
+        /// discount factor γ.
+        ///
+        /// # Errors
+        /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
+        pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
+            Ok(Self {
+                rates: Rates::new(alpha, gamma)?,
+                $($field: $value),*
+            })
+        }
+    };
+}
+
+pub(super) use constructor;

@@ -7,52 +7,51 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, check_gamma, check_setting};
-use crate::index::{Action, State};
 use crate::learner::rule::{Experience, Learner, check};
 use crate::model::ModelEstimate;
 use crate::policy::Policy;
-use crate::problem::Status;
-use crate::table::{QTable, Value};
+use crate::step::{Action, State, Status};
+use crate::table::QTable;
 use crate::validated::validated;
 
-/// Prioritized sweeping (Moore and Atkeson 1993): after each real step the model is brought up to
-/// date and up to k pairs, those first whose value would change most, get their full backup under
-/// the model, `Q(s,a) <- Σ p(s'|s,a) (r + γ max over b of Q(s',b))`. The pairs that lead to a
-/// changed state are queued in turn.
-///
-/// There is no α: the model's counts do the averaging. Default: k = 5, changes below 1e-4 are not
-/// queued.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct PrioritizedSweeping {
-    gamma: f64,
-    backups: u32,
-    threshold: f64,
-    model: Option<ModelEstimate>,
-    queue: Queue,
+validated! {
+    /// Prioritized sweeping (Moore and Atkeson 1993): after each real step the model is brought up
+    /// to date and up to k pairs, those first whose value would change most, get their full backup
+    /// under the model, `Q(s,a) <- Σ p(s'|s,a) (r + γ max over b of Q(s',b))`. The pairs that lead
+    /// to a changed state are queued in turn.
+    ///
+    /// There is no α: the model's counts do the averaging. Default: k = 5, changes below 1e-4 are
+    /// not queued.
+    ///
+    /// A learner belongs to the table it was made for; another table is refused with
+    /// [`Error::OtherTable`].
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct PrioritizedSweeping {
+        gamma: f64,
+        backups: u32,
+        threshold: f64,
+        model: ModelEstimate,
+        queue: Queue,
+    }
 }
 
 impl PrioritizedSweeping {
-    /// With the discount factor γ.
+    /// Creates the learner for a table with the discount factor γ.
     ///
     /// # Errors
     /// [`Error::Setting`] if γ leaves `0..=1`.
-    pub fn new(gamma: f64) -> Result<Self, Error> {
+    pub fn new(table: &QTable, gamma: f64) -> Result<Self, Error> {
         Self {
             gamma,
             backups: 5,
             threshold: 1e-4,
-            model: None,
+            model: ModelEstimate::new(table.states(), table.actions())?,
             queue: Queue::default(),
         }
         .restore()
     }
 
-    /// Another number of backups after each real step, at least 1.
+    /// Sets the number of backups after each real step, at least 1.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -60,7 +59,7 @@ impl PrioritizedSweeping {
         Self { backups, ..self }.restore()
     }
 
-    /// Another smallest change that is queued, in units of the values, positive.
+    /// Sets the smallest change that is queued, in units of the values, positive.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -68,9 +67,26 @@ impl PrioritizedSweeping {
         Self { threshold, ..self }.restore()
     }
 
-    /// What was learned of the environment, once there is something.
-    pub fn model(&self) -> Option<&ModelEstimate> {
-        self.model.as_ref()
+    /// Returns the model learned so far.
+    pub fn model(&self) -> &ModelEstimate {
+        &self.model
+    }
+
+    /// Returns the value of a pair under the model.
+    fn backup(&self, table: &QTable, state: State, action: Action) -> Option<f64> {
+        self.model
+            .backup(state, action, self.gamma, |next| table.max(next))
+    }
+
+    /// Queues a pair if its backup would change its value by more than the threshold. A change that
+    /// is not finite is the most urgent; its backup is refused if its value is not finite.
+    fn raise(&mut self, table: &QTable, state: State, action: Action) {
+        if let Some(value) = self.backup(table, state, action) {
+            let change = (value - table.value(state, action)).abs().min(f64::MAX);
+            if change > self.threshold {
+                self.queue.raise(&self.model, state, action, change);
+            }
+        }
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -83,10 +99,7 @@ impl PrioritizedSweeping {
         )?;
         let positive = self.threshold.is_finite() && self.threshold > 0.0;
         check_setting("threshold", self.threshold, positive, "positive and finite")?;
-        let needed = self
-            .model
-            .as_ref()
-            .map_or(0, |model| model.states() * model.actions());
+        let needed = self.model.states() * self.model.actions();
         let found = self.queue.priorities.len();
         if found != 0 && found != needed {
             return Err(Error::WrongLength {
@@ -107,84 +120,45 @@ impl PrioritizedSweeping {
     }
 }
 
-validated!(PrioritizedSweeping);
-
-impl<V: Value> Learner<V> for PrioritizedSweeping {
+impl Learner for PrioritizedSweeping {
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        let Experience {
-            state,
-            action,
-            step,
-            ..
-        } = *experience;
-        check(table, state, action, &step)?;
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        check(table, state, action, step)?;
+        self.model.check_table(table)?;
         let next = match step.status {
             Status::Terminated => 0.0,
-            Status::Continuing | Status::Truncated => table.max(step.observation).to_f64(),
+            Status::Continuing | Status::Truncated => table.max(step.observation),
         };
-        let error = step.reward + self.gamma * next - table.value(state, action).to_f64();
-        if let Some(model) = &self.model {
-            table.check_shape("the model", model.states(), model.actions())?;
-        }
-        let mut model = match self.model.take() {
-            Some(model) => model,
-            None => ModelEstimate::new(table.states(), table.actions())?,
-        };
+        let error = step.reward + self.gamma * next - table.value(state, action);
         // The experience fits the table, and the table the model: from here on only a backup can
         // fail.
-        model.observe(state, action, &step)?;
+        self.model.observe(state, action, step)?;
         table.visit(state, action)?;
 
-        let change = |table: &QTable<V>, state, action| {
-            model
-                .backup(state, action, self.gamma, |next| table.max(next).to_f64())
-                // A change that is not finite is the most urgent; its backup is refused if its
-                // value is not.
-                .map(|value| {
-                    (value - table.value(state, action).to_f64())
-                        .abs()
-                        .min(f64::MAX)
-                })
-        };
-        let mut outcome = Ok(error);
-        self.queue.raise(
-            &model,
-            state,
-            action,
-            change(table, state, action),
-            self.threshold,
-        );
+        self.raise(table, state, action);
         for _ in 0..self.backups {
-            let Some((state, action)) = self.queue.pop(&model) else {
+            let Some((state, action)) = self.queue.pop(&self.model) else {
                 break;
             };
-            let backup = model.backup(state, action, self.gamma, |next| table.max(next).to_f64());
             let before = table.max(state);
-            if let Err(error) = backup.map_or(Ok(()), |value| table.store(state, action, value)) {
-                outcome = Err(error);
-                break;
+            if let Some(value) = self.backup(table, state, action) {
+                table.store(state, action, value)?;
             }
             if table.max(state) == before {
                 continue;
             }
-            for (state, action) in model.predecessors(state) {
-                self.queue.raise(
-                    &model,
-                    state,
-                    action,
-                    change(table, state, action),
-                    self.threshold,
-                );
+            for place in 0..self.model.predecessors(state).len() {
+                let (state, action) = self.model.pair(self.model.predecessors(state)[place]);
+                self.raise(table, state, action);
             }
         }
-        self.model = Some(model);
-        outcome
+        Ok(error)
     }
 }
 
@@ -230,18 +204,8 @@ impl From<Queue> for Vec<f64> {
 }
 
 impl Queue {
-    /// Queues a pair, or moves it forward, if the change is above the threshold.
-    fn raise(
-        &mut self,
-        model: &ModelEstimate,
-        state: State,
-        action: Action,
-        change: Option<f64>,
-        threshold: f64,
-    ) {
-        let Some(change) = change.filter(|&change| change > threshold) else {
-            return;
-        };
+    /// Queues a pair, or moves it forward.
+    fn raise(&mut self, model: &ModelEstimate, state: State, action: Action, change: f64) {
         self.priorities
             .resize(model.states() * model.actions(), 0.0);
         let pair = state.0 * model.actions() + action.0;

@@ -5,29 +5,25 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, check_setting};
-use crate::index::{Action, State};
-use crate::learner::rule::{Experience, Learner, Rates, check, is_greedy, next_value};
+use crate::learner::rule::{Experience, Learner, Rates, check, constructor, is_greedy, next_value};
 use crate::policy::Policy;
-use crate::problem::Status;
 use crate::schedule::Schedule;
-use crate::table::{QTable, Value};
+use crate::step::{Action, State, Status};
+use crate::table::{QTable, check_value};
 use crate::validated::validated;
 
 /// Traces smaller than this are dropped.
 const SMALLEST_TRACE: f64 = 1e-6;
 
-/// Replacing traces (Singh and Sutton 1996): a visit sets the pair's trace to 1, time lets it decay
-/// by γλ.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-struct Traces {
-    lambda: f64,
-    /// Pairs with a trace, from the longest ago to the last.
-    recent: Vec<(State, Action, f64)>,
+validated! {
+    /// Replacing traces (Singh and Sutton 1996): a visit sets the pair's trace to 1, and each step
+    /// lets it decay by γλ.
+    #[derive(Clone, Debug, PartialEq)]
+    struct Traces {
+        lambda: f64,
+        /// Pairs with a trace, from the longest ago to the last.
+        recent: Vec<(State, Action, f64)>,
+    }
 }
 
 impl Traces {
@@ -61,13 +57,12 @@ impl Traces {
     }
 
     /// Moves every pair by `amount` times its trace: all of them, or none and an error.
-    fn spread<V: Value>(&self, table: &mut QTable<V>, amount: f64) -> Result<(), Error> {
-        let moved = |table: &QTable<V>, state, action, trace| {
-            table.value(state, action).to_f64() + amount * trace
-        };
+    fn spread(&self, table: &mut QTable, amount: f64) -> Result<(), Error> {
+        let moved =
+            |table: &QTable, state, action, trace| table.value(state, action) + amount * trace;
         for &(state, action, trace) in &self.recent {
             table.check(state, action)?;
-            table.check_value(state, action, moved(table, state, action, trace))?;
+            check_value(state, action, moved(table, state, action, trace))?;
         }
         for &(state, action, trace) in &self.recent {
             table.store(state, action, moved(table, state, action, trace))?;
@@ -84,34 +79,27 @@ impl Traces {
     }
 }
 
-validated!(Traces);
-
 /// One update of a trace learner: the present pair moves toward `target`, earlier ones by how far
 /// the target is from what was `expected` of the state.
-fn learn_along<V: Value>(
+fn learn_along(
     rates: &mut Rates,
     traces: &mut Traces,
-    table: &mut QTable<V>,
+    table: &mut QTable,
     experience: &Experience,
     target: f64,
     expected: f64,
 ) -> Result<f64, Error> {
-    let Experience {
-        state,
-        action,
-        step,
-        ..
-    } = *experience;
-    let old = table.value(state, action).to_f64();
+    let (state, action, step) = (experience.state, experience.action, &experience.step);
+    let old = table.value(state, action);
     let error = target - old;
     let alpha = rates.alpha(table, state, action);
-    table.check_value(state, action, old + alpha * error)?;
+    check_value(state, action, old + alpha * error)?;
     traces.forget(state, action);
     traces.spread(table, alpha * (target - expected))?;
     table.store(state, action, old + alpha * error)?;
     traces.recent.push((state, action, 1.0));
     table.visit(state, action)?;
-    rates.tick();
+    rates.clock.tick();
     match step.status {
         Status::Continuing => traces.decay(rates.gamma),
         Status::Terminated | Status::Truncated => traces.recent.clear(),
@@ -139,19 +127,9 @@ pub struct QLambda {
 }
 
 impl QLambda {
-    /// With α following a schedule over the updates made, or the visits.
-    ///
-    /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
-        Ok(Self {
-            rates: Rates::new(alpha, gamma)?,
-            traces: Traces::new(0.8)?,
-            cut: true,
-        })
-    }
+    constructor!(traces: Traces::new(0.8)?, cut: true);
 
-    /// Another λ, in `0..=1`: 0 is one-step Q-learning, 1 lets traces decay by γ alone.
+    /// Sets λ, in `0..=1`: 0 is one-step Q-learning, 1 lets traces decay by γ alone.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -171,32 +149,26 @@ impl QLambda {
     }
 }
 
-impl<V: Value> Learner<V> for QLambda {
+impl Learner for QLambda {
     fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
         self.traces.recent.clear();
     }
 
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        let Experience {
-            state,
-            action,
-            step,
-            ..
-        } = experience;
-        check(table, *state, *action, step)?;
-        let target = self
-            .rates
-            .target(step, || table.max(step.observation).to_f64());
-        if self.cut && !is_greedy(table, *state, *action) {
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        check(table, state, action, step)?;
+        let target = self.rates.greedy_target(table, step);
+        if self.cut && !is_greedy(table, state, action) {
             self.traces.recent.clear();
         }
-        let expected = table.max(*state).to_f64();
+        let expected = table.max(state);
         learn_along(
             &mut self.rates,
             &mut self.traces,
@@ -221,18 +193,9 @@ pub struct SarsaLambda {
 }
 
 impl SarsaLambda {
-    /// With α following a schedule over the updates made, or the visits.
-    ///
-    /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-    pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
-        Ok(Self {
-            rates: Rates::new(alpha, gamma)?,
-            traces: Traces::new(0.8)?,
-        })
-    }
+    constructor!(traces: Traces::new(0.8)?);
 
-    /// Another λ, in `0..=1`: 0 is one-step SARSA, 1 is close to Monte Carlo.
+    /// Sets λ, in `0..=1`: 0 is one-step SARSA, 1 is close to Monte Carlo.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -244,26 +207,27 @@ impl SarsaLambda {
     }
 }
 
-impl<V: Value> Learner<V> for SarsaLambda {
-    fn on_policy(&self) -> bool {
+impl Learner for SarsaLambda {
+    fn needs_next_action(&self) -> bool {
         true
     }
 
     fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
         self.traces.recent.clear();
     }
 
     fn learn(
         &mut self,
-        table: &mut QTable<V>,
+        table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy<V>,
+        _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         check(table, experience.state, experience.action, &experience.step)?;
         let next = next_value(table, experience)?;
         let target = self.rates.target(&experience.step, || next);
-        let expected = table.value(experience.state, experience.action).to_f64();
+        let expected = table.value(experience.state, experience.action);
         learn_along(
             &mut self.rates,
             &mut self.traces,

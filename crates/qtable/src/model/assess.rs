@@ -1,18 +1,18 @@
-//! How good a policy is under a known model: exactly, not by trying.
+//! The quality of a policy under a known model, exactly.
 
-use crate::error::{Error, check_gamma, check_setting};
-use crate::index::{Action, State};
+use crate::error::{Error, check_gamma, check_setting, positive};
 use crate::model::dynamics::Model;
-use crate::problem::Step;
-use crate::table::{QTable, Value};
+use crate::model::played::ModelEnvironment;
+use crate::problem::Environment;
+use crate::step::{Action, State};
+use crate::table::QTable;
 
-/// What a policy achieves within a limited number of steps, from a distribution of first states.
-/// These are exact expectations, not samples.
+/// The expected results of a policy within a limited number of steps. They are exact, not sampled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assessment {
     /// Probability that the episode ends in success.
     pub success: f64,
-    /// Expected number of steps of an episode, one that reaches the limit counting as the limit.
+    /// Expected number of steps of an episode; one that reaches the limit counts as the limit.
     pub steps: f64,
     /// Expected number of steps of an episode that succeeds; `None` if none does.
     pub steps_to_success: Option<f64>,
@@ -25,51 +25,41 @@ pub struct Assessment {
 /// A learned policy beside an optimal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// What the learned policy achieves.
+    /// Results of the learned policy.
     pub learned: Assessment,
-    /// What an optimal policy achieves.
+    /// Results of an optimal policy.
     pub optimal: Assessment,
 }
 
-impl Model {
-    /// What a deterministic policy achieves.
-    ///
-    /// `start` gives the probability of each first state; `limit` is the number of steps after
-    /// which an episode is truncated; `succeeded` tells which last step is a success.
+impl ModelEnvironment {
+    /// Returns the expected results of a deterministic policy from the first states, in episodes
+    /// that are truncated after `limit` steps.
     ///
     /// # Errors
-    /// A policy of the wrong length or with an action that is not offered, a first state out of
-    /// range, probabilities that do not sum to 1, γ outside `0..=1`, or a limit of 0.
-    pub fn assess(
-        &self,
-        policy: &[Action],
-        start: &[(State, f64)],
-        gamma: f64,
-        limit: u64,
-        succeeded: impl Fn(&Step) -> bool,
-    ) -> Result<Assessment, Error> {
+    /// A policy of the wrong length or with an action that is not offered, γ outside `0..=1`, or a
+    /// limit of 0.
+    pub fn assess(&self, policy: &[Action], gamma: f64, limit: u64) -> Result<Assessment, Error> {
         check_gamma(gamma)?;
-        check_setting("limit", limit as f64, limit > 0, "at least 1")?;
-        self.check_policy(policy)?;
-        let mut present = self.spread_start(start)?;
-        let mut next = vec![0.0; self.states];
+        positive("limit", limit)?;
+        self.model().check_policy(policy)?;
+        let mut present = self.model().spread_start(self.start())?;
+        let mut next = vec![0.0; present.len()];
         let mut sums = Assessment::default();
         let (mut steps_of_successes, mut discount) = (0.0, 1.0);
         for taken in 1..=limit {
             next.fill(0.0);
-            for (state, &share) in present
-                .iter()
-                .enumerate()
-                .filter(|&(_, &share)| share > 0.0)
-            {
+            for (state, &share) in present.iter().enumerate() {
+                if share <= 0.0 {
+                    continue;
+                }
                 sums.steps += share;
-                for outcome in self.outcomes(State(state), policy[state]) {
+                for outcome in self.model().outcomes(State(state), policy[state]) {
                     let share = share * outcome.probability;
                     sums.total_reward += share * outcome.reward;
                     sums.value += share * discount * outcome.reward;
                     if !outcome.terminated {
                         next[outcome.next.0] += share;
-                    } else if succeeded(&outcome.step()) {
+                    } else if self.succeeded(&outcome.step()) {
                         sums.success += share;
                         steps_of_successes += share * taken as f64;
                     }
@@ -85,26 +75,20 @@ impl Model {
         Ok(sums)
     }
 
-    /// The greedy policy of a table beside an optimal policy for γ, both assessed as by
-    /// [`Model::assess`].
+    /// Assesses the greedy policy of a table and an optimal policy for γ.
     ///
     /// # Errors
-    /// As [`Model::assess`] and [`Model::value_iteration`].
-    pub fn compare<V: Value>(
-        &self,
-        table: &QTable<V>,
-        start: &[(State, f64)],
-        gamma: f64,
-        limit: u64,
-        succeeded: impl Fn(&Step) -> bool,
-    ) -> Result<Comparison, Error> {
-        let plan = self.value_iteration(gamma, 1e-10)?;
+    /// [`assess`](ModelEnvironment::assess) and [`Model::value_iteration`] list them.
+    pub fn compare(&self, table: &QTable, gamma: f64, limit: u64) -> Result<Comparison, Error> {
+        let plan = self.model().value_iteration(gamma, 1e-10)?;
         Ok(Comparison {
-            learned: self.assess(&table.greedy(), start, gamma, limit, &succeeded)?,
-            optimal: self.assess(&plan.table.greedy(), start, gamma, limit, &succeeded)?,
+            learned: self.assess(&table.greedy(), gamma, limit)?,
+            optimal: self.assess(&plan.table.greedy(), gamma, limit)?,
         })
     }
+}
 
+impl Model {
     /// The probability of each state from a list of first states.
     pub(super) fn spread_start(&self, start: &[(State, f64)]) -> Result<Vec<f64>, Error> {
         let mut spread = vec![0.0; self.states];

@@ -3,9 +3,8 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::Error;
-use crate::index::{Action, State};
-use crate::problem::{Status, Step};
+use crate::error::{Error, check_reward};
+use crate::step::{Action, State, Status, Step};
 use crate::table::{ActionMask, checked_entries};
 use crate::validated::validated;
 
@@ -49,35 +48,32 @@ impl Outcome {
     }
 }
 
-/// A finite Markov decision process whose probabilities are known.
-///
-/// ```
-/// use qtable::{Action, Model, Outcome, State};
-///
-/// // Two cells; action 1 goes right and ends with reward 1, action 0 stays.
-/// let model = Model::new(2, 2, |state, action| match action {
-///     Action(0) => vec![Outcome::certain(state, 0.0, false)],
-///     _ => vec![Outcome::certain(State(1), 1.0, true)],
-/// })?;
-/// let plan = model.value_iteration(0.9, 1e-12)?;
-/// assert_eq!(plan.table.best(State(0)), Action(1));
-/// assert!((plan.table.value(State(0), Action(0)) - 0.9).abs() < 1e-9);
-/// # Ok::<(), qtable::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct Model {
-    pub(super) states: usize,
-    pub(super) actions: usize,
-    /// Where the outcomes of each pair begin, and one more for the end.
-    starts: Vec<usize>,
-    outcomes: Vec<Outcome>,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub(super) mask: Option<ActionMask>,
+validated! {
+    /// A finite Markov decision process whose probabilities are known.
+    ///
+    /// ```
+    /// use qtable::{Action, Model, Outcome, State};
+    ///
+    /// // Two cells; action 1 goes right and ends with reward 1, action 0 stays.
+    /// let model = Model::new(2, 2, |state, action| match action {
+    ///     Action(0) => vec![Outcome::certain(state, 0.0, false)],
+    ///     _ => vec![Outcome::certain(State(1), 1.0, true)],
+    /// })?;
+    /// let plan = model.value_iteration(0.9, 1e-12)?;
+    /// assert_eq!(plan.table.best(State(0)), Action(1));
+    /// assert!((plan.table.value(State(0), Action(0)) - 0.9).abs() < 1e-9);
+    /// # Ok::<(), qtable::Error>(())
+    /// ```
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Model {
+        pub(super) states: usize,
+        pub(super) actions: usize,
+        /// Where the outcomes of each pair begin, and one more for the end.
+        starts: Vec<usize>,
+        outcomes: Vec<Outcome>,
+        #[cfg_attr(feature = "serde", serde(skip))]
+        pub(super) mask: Option<ActionMask>,
+    }
 }
 
 impl Model {
@@ -197,13 +193,7 @@ impl Model {
                     states: self.states,
                 });
             }
-            if !outcome.reward.is_finite() {
-                return Err(Error::RewardNotFinite {
-                    state,
-                    action,
-                    reward: outcome.reward,
-                });
-            }
+            check_reward(state, action, outcome.reward)?;
         }
         let sum: f64 = outcomes.iter().map(|outcome| outcome.probability).sum();
         let each_valid = outcomes
@@ -216,5 +206,3 @@ impl Model {
         }
     }
 }
-
-validated!(Model);

@@ -4,29 +4,25 @@ use rand::{Rng, RngExt};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::Error;
-use crate::index::{Action, State};
+use crate::error::{Error, check_reward};
 use crate::model::dynamics::{Model, Outcome};
-use crate::problem::{Status, Step};
-use crate::table::checked_entries;
+use crate::step::{Action, State, Status, Step};
+use crate::table::{QTable, checked_entries};
 use crate::validated::validated;
 
-/// How often each action led to what: the maximum-likelihood model of an environment.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct ModelEstimate {
-    actions: usize,
-    /// The outcomes seen of each pair.
-    seen: Vec<Vec<Seen>>,
-    /// Pairs with an outcome, in the order of their first trial.
-    tried: Vec<usize>,
-    /// Pairs that led to each state without ending the episode, ascending.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    sources: Vec<Vec<usize>>,
+validated! {
+    /// The maximum-likelihood model of an environment: how often each action led to which outcome.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ModelEstimate {
+        actions: usize,
+        /// Outcomes seen of each pair.
+        seen: Vec<Vec<Seen>>,
+        /// Pairs with an outcome, in the order of their first trial.
+        tried: Vec<usize>,
+        /// Pairs that led to each state without ending the episode, ascending.
+        #[cfg_attr(feature = "serde", serde(skip))]
+        sources: Vec<Vec<usize>>,
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +35,7 @@ struct Seen {
 }
 
 impl ModelEstimate {
-    /// With nothing seen.
+    /// Creates a model that has seen nothing.
     ///
     /// # Errors
     /// An empty shape, or one that does not fit into memory.
@@ -71,19 +67,11 @@ impl ModelEstimate {
         {
             return Err(Error::StateOutOfRange { state, states });
         }
-        if action.0 >= self.actions {
-            return Err(Error::ActionOutOfRange {
-                action,
-                actions: self.actions,
-            });
+        let actions = self.actions;
+        if action.0 >= actions {
+            return Err(Error::ActionOutOfRange { action, actions });
         }
-        if !step.reward.is_finite() {
-            return Err(Error::RewardNotFinite {
-                state,
-                action,
-                reward: step.reward,
-            });
-        }
+        check_reward(state, action, step.reward)?;
         let pair = state.0 * self.actions + action.0;
         let terminated = step.status == Status::Terminated;
         let outcomes = &mut self.seen[pair];
@@ -111,22 +99,22 @@ impl ModelEstimate {
         Ok(())
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn states(&self) -> usize {
         self.sources.len()
     }
 
-    /// Number of actions.
+    /// Returns the number of actions.
     pub fn actions(&self) -> usize {
         self.actions
     }
 
-    /// Number of pairs tried at least once.
+    /// Returns the number of pairs tried at least once.
     pub fn tried(&self) -> usize {
         self.tried.len()
     }
 
-    /// How often a pair was tried; 0 also for one out of range.
+    /// Returns how often a pair was tried; 0 also for a pair out of range.
     pub fn trials(&self, state: State, action: Action) -> u64 {
         self.outcomes(state, action)
             .iter()
@@ -134,9 +122,9 @@ impl ModelEstimate {
             .sum()
     }
 
-    /// The model as far as it is known. A pair never tried is taken to end the episode with the
-    /// reward `untried`: a high one makes a planner curious (the R-max of Brafman and Tennenholtz
-    /// 2002), a low one careful.
+    /// Returns the model as far as it is known. A pair never tried is taken to end the episode with
+    /// the reward `untried`: a high one makes a planner curious (the R-max of Brafman and
+    /// Tennenholtz 2002), a low one careful.
     ///
     /// # Errors
     /// [`Error::RewardNotFinite`] for an `untried` that is not finite.
@@ -163,7 +151,7 @@ impl ModelEstimate {
         &self.seen[state.0 * self.actions + action.0]
     }
 
-    fn pair(&self, index: usize) -> (State, Action) {
+    pub(crate) fn pair(&self, index: usize) -> (State, Action) {
         (State(index / self.actions), Action(index % self.actions))
     }
 
@@ -221,9 +209,23 @@ impl ModelEstimate {
         (!outcomes.is_empty()).then(|| outcomes.iter().map(outcome).sum())
     }
 
-    /// The pairs that have led to a state without ending the episode.
-    pub(crate) fn predecessors(&self, state: State) -> impl Iterator<Item = (State, Action)> + '_ {
-        self.sources[state.0].iter().map(|&index| self.pair(index))
+    /// Returns the indices of the pairs that have led to a state without ending the episode.
+    pub(crate) fn predecessors(&self, state: State) -> &[usize] {
+        &self.sources[state.0]
+    }
+
+    /// Refuses a table of another shape, or one that has fewer visits of the pair tried first than
+    /// this model: knowledge of one table must not leak into another.
+    pub(crate) fn check_table(&self, table: &QTable) -> Result<(), Error> {
+        table.check_shape("the learner's model", self.states(), self.actions)?;
+        let Some(&first) = self.tried.first() else {
+            return Ok(());
+        };
+        let (state, action) = self.pair(first);
+        if u64::from(table.visits(state, action)) >= self.trials(state, action) {
+            return Ok(());
+        }
+        Err(Error::OtherTable { state, action })
     }
 
     #[cfg(feature = "serde")]
@@ -261,13 +263,7 @@ impl ModelEstimate {
                         states,
                     });
                 }
-                if !seen.mean_reward.is_finite() {
-                    return Err(Error::RewardNotFinite {
-                        state,
-                        action,
-                        reward: seen.mean_reward,
-                    });
-                }
+                check_reward(state, action, seen.mean_reward)?;
                 if seen.count == 0 {
                     return Err(Error::NotADistribution {
                         state,
@@ -283,8 +279,6 @@ impl ModelEstimate {
         Ok(self)
     }
 }
-
-validated!(ModelEstimate);
 
 /// Keeps the list sorted, so that it is the same whatever the order in which pairs were met.
 fn note_source(sources: &mut Vec<usize>, pair: usize) {

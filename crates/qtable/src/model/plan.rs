@@ -1,8 +1,8 @@
 //! The optimum of a known model, by dynamic programming.
 
 use crate::error::{Error, check_gamma, check_setting};
-use crate::index::{Action, State};
 use crate::model::dynamics::Model;
+use crate::step::{Action, State};
 use crate::table::QTable;
 
 /// Sweeps after which a computation is given up.
@@ -151,17 +151,12 @@ impl Model {
             });
         }
         for (state, &action) in policy.iter().enumerate() {
-            if action.0 >= self.actions {
-                return Err(Error::ActionOutOfRange {
-                    action,
-                    actions: self.actions,
-                });
+            let (state, actions) = (State(state), self.actions);
+            if action.0 >= actions {
+                return Err(Error::ActionOutOfRange { action, actions });
             }
-            if self.outcomes(State(state), action).is_empty() {
-                return Err(Error::ActionNotAllowed {
-                    state: State(state),
-                    action,
-                });
+            if self.outcomes(state, action).is_empty() {
+                return Err(Error::ActionNotAllowed { state, action });
             }
         }
         Ok(())

@@ -1,32 +1,25 @@
 //! A known model, played.
 
 use rand::{Rng, RngExt};
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::index::{Action, State};
-use crate::model::assess::{Assessment, Comparison};
 use crate::model::dynamics::Model;
-use crate::problem::{Environment, Status, Step};
-use crate::table::{QTable, Value};
+use crate::problem::Environment;
+use crate::step::{Action, State, Status, Step};
 use crate::validated::validated;
 
-/// An [`Environment`] that draws from a [`Model`]: problems of which the optimum is known.
-///
-/// Before the first `reset` it stands in the first of its first states. An action that the present
-/// state does not offer changes nothing and pays nothing.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct ModelEnvironment {
-    model: Model,
-    start: Vec<(State, f64)>,
-    any_termination_succeeds: bool,
-    state: State,
+validated! {
+    /// An [`Environment`] that draws from a [`Model`]: a problem whose optimum is known.
+    ///
+    /// Before the first `reset` it stands in the first of its first states. An action that the
+    /// present state does not offer changes nothing and pays nothing.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ModelEnvironment {
+        model: Model,
+        start: Vec<(State, f64)>,
+        any_termination_succeeds: bool,
+        state: State,
+    }
 }
 
 impl ModelEnvironment {
@@ -69,33 +62,6 @@ impl ModelEnvironment {
         self.state
     }
 
-    /// What a deterministic policy achieves here within `limit` steps: [`Model::assess`].
-    ///
-    /// # Errors
-    /// As there.
-    pub fn assess(&self, policy: &[Action], gamma: f64, limit: u64) -> Result<Assessment, Error> {
-        self.model
-            .assess(policy, &self.start, gamma, limit, |step| {
-                self.succeeded(step)
-            })
-    }
-
-    /// The greedy policy of a table beside an optimal one: [`Model::compare`].
-    ///
-    /// # Errors
-    /// As there.
-    pub fn compare<V: Value>(
-        &self,
-        table: &QTable<V>,
-        gamma: f64,
-        limit: u64,
-    ) -> Result<Comparison, Error> {
-        self.model
-            .compare(table, &self.start, gamma, limit, |step| {
-                self.succeeded(step)
-            })
-    }
-
     fn restore(self) -> Result<Self, Error> {
         self.model.spread_start(&self.start)?;
         if self.state.0 < self.model.states() {
@@ -109,8 +75,6 @@ impl ModelEnvironment {
     }
 }
 
-validated!(ModelEnvironment);
-
 impl Environment for ModelEnvironment {
     fn states(&self) -> usize {
         self.model.states()
@@ -120,14 +84,14 @@ impl Environment for ModelEnvironment {
         self.model.actions()
     }
 
-    fn reset(&mut self, rng: &mut dyn Rng) -> State {
+    fn reset(&mut self, rng: &mut dyn Rng) -> Result<State, Error> {
         self.state = draw(self.start.iter().copied(), rng).unwrap_or_default();
-        self.state
+        Ok(self.state)
     }
 
     /// # Panics
     /// As a slice does if the action is out of range.
-    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step {
+    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error> {
         let outcomes = self.model.outcomes(self.state, action);
         let step = match draw(
             outcomes
@@ -143,7 +107,7 @@ impl Environment for ModelEnvironment {
             },
         };
         self.state = step.observation;
-        step
+        Ok(step)
     }
 
     /// False outside the model.

@@ -1,36 +1,30 @@
-//! The Boltzmann policy, in its plain form.
+//! The Boltzmann policy.
 
 use rand::{Rng, RngExt};
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::elementary::exp_within;
 use crate::error::Error;
-use crate::index::{Action, State};
 use crate::policy::rule::Policy;
-use crate::schedule::Schedule;
+use crate::schedule::{Clock, Schedule};
 use crate::scratch::Scratch;
-use crate::table::{QTable, Value};
+use crate::step::{Action, State};
+use crate::table::QTable;
 use crate::validated::validated;
 
-/// The Boltzmann distribution over the action values (the paper's Eq. 4), also called softmax:
-/// `p(a | s) = exp(Q(s,a)/T) / sum over b of exp(Q(s,b)/T)`, over the actions that the state
-/// offers.
-///
-/// The row's maximum is subtracted first, so that nothing overflows for any finite values and any
-/// temperature: the best action has weight 1 and the sum is never 0. Equal values have equal
-/// probabilities.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct Boltzmann {
-    temperature: Schedule,
-    choices: u64,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    weights: Scratch,
+validated! {
+    /// The Boltzmann distribution over the action values, also called softmax:
+    /// `p(a | s) = exp(Q(s,a)/T) / sum over b of exp(Q(s,b)/T)`, over the actions that the state
+    /// offers.
+    ///
+    /// The row's maximum is subtracted first, so that no exponential overflows: the best action has
+    /// weight 1 and the sum is never 0.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Boltzmann {
+        temperature: Schedule,
+        clock: Clock,
+        #[cfg_attr(feature = "serde", serde(skip))]
+        weights: Scratch,
+    }
 }
 
 impl Boltzmann {
@@ -39,46 +33,44 @@ impl Boltzmann {
     /// Highest temperature allowed.
     pub const HOTTEST: f64 = 1e6;
 
-    /// With the temperature, in units of the values, following a schedule over the choices made.
+    /// Creates the policy with a schedule of the temperature over its choices, or over episodes, in
+    /// units of the values.
     ///
     /// # Errors
     /// [`Error::ScheduleRange`] if the temperature leaves `1e-6..=1e6`.
     pub fn new(temperature: Schedule) -> Result<Self, Error> {
         Self {
             temperature,
-            choices: 0,
+            clock: Clock::default(),
             weights: Scratch::default(),
         }
         .restore()
     }
 
-    /// The temperature of the next choice.
+    /// Returns the temperature of the next choice.
+    #[inline]
     pub fn temperature(&self) -> f64 {
-        self.temperature.at(self.choices)
+        self.temperature.at_time(&self.clock)
     }
 
-    /// Refuses a schedule that leaves the allowed temperatures.
-    pub(crate) fn check_temperature(temperature: &Schedule) -> Result<(), Error> {
-        temperature.check(
-            "the temperature",
-            Self::COLDEST,
-            Self::HOTTEST,
-            "in 1e-6..=1e6",
-        )
+    /// Counts a choice that was made from cached weights.
+    #[inline(always)]
+    pub(crate) fn tick(&mut self) {
+        self.clock.tick();
     }
 
     fn restore(self) -> Result<Self, Error> {
-        Self::check_temperature(&self.temperature)?;
+        let (low, high) = (Self::COLDEST, Self::HOTTEST);
+        self.temperature
+            .check("the temperature", low, high, "in 1e-6..=1e6")?;
         Ok(self)
     }
 }
 
-validated!(Boltzmann);
-
-impl<V: Value> Policy<V> for Boltzmann {
-    fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action {
+impl Policy for Boltzmann {
+    fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
         let temperature = self.temperature();
-        self.choices = self.choices.saturating_add(1);
+        self.clock.tick();
         let weights = self.weights.of_length(table.actions());
         let sum = boltzmann_weights(table, state, temperature, weights);
         let mut rest = rng.random::<f64>() * sum;
@@ -92,26 +84,25 @@ impl<V: Value> Policy<V> for Boltzmann {
         table.best(state)
     }
 
-    fn probabilities(&self, table: &QTable<V>, state: State, probabilities: &mut [f64]) -> bool {
+    fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {
         let sum = boltzmann_weights(table, state, self.temperature(), probabilities);
         for p in probabilities {
             *p /= sum;
         }
         true
     }
+
+    fn begin_episode(&mut self) {
+        self.clock.begin_episode();
+    }
 }
 
 /// Writes `exp((Q - max Q) / T)` for each action (0 below `exp(-700)`), 0 for forbidden ones, and
 /// returns the sum.
-fn boltzmann_weights<V: Value>(
-    table: &QTable<V>,
-    state: State,
-    temperature: f64,
-    weights: &mut [f64],
-) -> f64 {
-    let highest = table.max(state).to_f64();
+fn boltzmann_weights(table: &QTable, state: State, temperature: f64, weights: &mut [f64]) -> f64 {
+    let highest = table.max(state);
     for (weight, value) in weights.iter_mut().zip(table.row(state)) {
-        let exponent = (value.to_f64() - highest) / temperature;
+        let exponent = (value - highest) / temperature;
         // Below this an ordinary number cannot hold it; not a branch, but a choice of two values.
         *weight = if exponent < -700.0 {
             0.0

@@ -1,53 +1,51 @@
 //! The ε-greedy policy.
 
 use rand::{Rng, RngExt};
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::index::{Action, State};
 use crate::policy::rule::{Policy, Ties};
-use crate::schedule::Schedule;
-use crate::table::{QTable, Value};
+use crate::schedule::{Clock, Schedule};
+use crate::step::{Action, State};
+use crate::table::QTable;
 use crate::validated::validated;
 
-/// A random offered action with probability ε, the best one otherwise. Of equals the lowest index,
-/// unless [`with_ties`](EpsilonGreedy::with_ties) says otherwise.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct EpsilonGreedy {
-    epsilon: Schedule,
-    ties: Ties,
-    choices: u64,
+validated! {
+    /// The policy that takes a random offered action with probability ε and the best one otherwise.
+    /// Of several best ones it takes the lowest index, unless
+    /// [`with_ties`](EpsilonGreedy::with_ties) says otherwise.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct EpsilonGreedy {
+        epsilon: Schedule,
+        ties: Ties,
+        clock: Clock,
+    }
 }
 
 impl EpsilonGreedy {
-    /// With ε following a schedule over the choices made.
+    /// Creates the policy with a schedule of ε over its choices, or over episodes.
     ///
     /// # Errors
     /// [`Error::ScheduleRange`] if ε leaves `0..=1`.
     pub fn new(epsilon: Schedule) -> Result<Self, Error> {
+        let (ties, clock) = (Ties::default(), Clock::default());
         Self {
             epsilon,
-            ties: Ties::Lowest,
-            choices: 0,
+            ties,
+            clock,
         }
         .restore()
     }
 
-    /// Takes one of equally good actions by another rule.
+    /// Sets the choice among equally good actions.
+    #[must_use]
     pub fn with_ties(self, ties: Ties) -> Self {
         Self { ties, ..self }
     }
 
-    /// ε of the next choice.
+    /// Returns ε of the next choice.
     #[inline]
     pub fn epsilon(&self) -> f64 {
-        self.epsilon.at_visit(self.choices, self.choices)
+        self.epsilon.at_time(&self.clock)
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -56,51 +54,50 @@ impl EpsilonGreedy {
     }
 }
 
-validated!(EpsilonGreedy);
-
-impl<V: Value> Policy<V> for EpsilonGreedy {
+impl Policy for EpsilonGreedy {
     #[inline]
-    fn choose(&mut self, table: &QTable<V>, state: State, rng: &mut dyn Rng) -> Action {
+    fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
         let epsilon = self.epsilon();
-        self.choices = self.choices.saturating_add(1);
+        self.clock.tick();
+        let lowest = table.best(state);
         if rng.random::<f64>() >= epsilon {
-            return match self.ties {
-                Ties::Lowest => table.best(state),
-                Ties::Random => self.ties.pick(table, state, rng, |action| {
-                    table.value(state, action).to_f64()
-                }),
-            };
+            return self.ties.pick(lowest, table.equals(state), rng, || {
+                let offered = table.offered(state);
+                offered.filter(|&action| is_best(table, state, action))
+            });
         }
-        if table.mask().is_none() {
+        let Some(mask) = table.mask() else {
             return Action(rng.random_range(0..table.actions()));
-        }
-        let offered = table.offered(state).count();
+        };
+        let offered = mask.row(state).iter().filter(|&&offered| offered).count();
         table
             .offered(state)
             .nth(rng.random_range(0..offered))
-            .unwrap_or_else(|| table.best(state))
+            .unwrap_or(lowest)
     }
 
-    fn probabilities(&self, table: &QTable<V>, state: State, probabilities: &mut [f64]) -> bool {
+    fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {
         let epsilon = self.epsilon();
         probabilities.fill(0.0);
         let share = epsilon / table.offered(state).count() as f64;
-        let is_best = |action| match self.ties {
-            Ties::Lowest => action == table.best(state),
-            Ties::Random => table.value(state, action) >= table.max(state),
-        };
-        let equals = table
-            .offered(state)
-            .filter(|&action| is_best(action))
-            .count();
+        let (lowest, equals) = (table.best(state), table.equals(state) as f64);
         for action in table.offered(state) {
-            let greedy = if is_best(action) {
-                (1.0 - epsilon) / equals as f64
-            } else {
-                0.0
+            let greedy = match self.ties {
+                Ties::Lowest if action == lowest => 1.0 - epsilon,
+                Ties::Random if is_best(table, state, action) => (1.0 - epsilon) / equals,
+                _ => 0.0,
             };
             probabilities[action.0] = share + greedy;
         }
         true
     }
+
+    fn begin_episode(&mut self) {
+        self.clock.begin_episode();
+    }
+}
+
+/// Returns `true` for an action of the highest value.
+fn is_best(table: &QTable, state: State, action: Action) -> bool {
+    table.value(state, action) >= table.max(state)
 }

@@ -1,70 +1,83 @@
-//! The door to a problem, in Gymnasium's words.
+//! The trait of a problem, in Gymnasium's words.
 
 use rand::Rng;
 
-use crate::index::{Action, State};
-
-/// Whether an episode goes on, and if not, why not. The two endings mean different things to a
-/// learner: nothing comes after termination, while truncation only stops the clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Status {
-    /// The episode goes on.
-    Continuing,
-    /// The task itself ended, in success or failure: the value of what follows is 0.
-    Terminated,
-    /// The episode was cut short from outside, by a time limit for example. What would have
-    /// followed still has its value, so a learner bootstraps from the observation.
-    Truncated,
-}
-
-/// What an environment answers to an action.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// The state that the action led to, also when the episode ended there.
-    pub observation: State,
-    /// The immediate reward, finite.
-    pub reward: f64,
-    /// Whether the episode goes on.
-    pub status: Status,
-}
+use crate::error::Error;
+use crate::step::{Action, State, Status, Step};
 
 /// A problem with finitely many states and actions.
 ///
 /// An episode starts with [`reset`](Environment::reset) and goes on with
-/// [`step`](Environment::step) until its status is other than [`Status::Continuing`]; then only
+/// [`step`](Environment::step) until the status is other than [`Status::Continuing`]; then only
 /// `reset` may follow. All randomness comes from the generator handed in, so that the same seed
 /// gives the same episode.
+///
+/// ```
+/// use qtable::rand::Rng;
+/// use qtable::{Action, Environment, Error, State, Status, Step};
+///
+/// /// Five cells in a row; the right end pays 1.
+/// struct Row(usize);
+///
+/// impl Environment for Row {
+///     fn states(&self) -> usize {
+///         5
+///     }
+///     fn actions(&self) -> usize {
+///         2
+///     }
+///     fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
+///         self.0 = 0;
+///         Ok(State(self.0))
+///     }
+///     fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
+///         self.0 = if action == Action(1) { self.0 + 1 } else { self.0.saturating_sub(1) };
+///         let done = self.0 == 4;
+///         Ok(Step {
+///             observation: State(self.0),
+///             reward: if done { 1.0 } else { 0.0 },
+///             status: if done { Status::Terminated } else { Status::Continuing },
+///         })
+///     }
+/// }
+/// ```
 pub trait Environment {
-    /// Number of states; every observation is below it. At least 1.
+    /// Returns the number of states, at least 1. Every observation is below it.
     fn states(&self) -> usize;
 
-    /// Number of actions. At least 1.
+    /// Returns the number of actions, at least 1.
     fn actions(&self) -> usize;
 
-    /// Starts an episode and reports its first state.
-    fn reset(&mut self, rng: &mut dyn Rng) -> State;
+    /// Starts an episode and returns its first state.
+    ///
+    /// # Errors
+    /// A failure of the environment, for example a lost connection ([`Error::environment`]).
+    fn reset(&mut self, rng: &mut dyn Rng) -> Result<State, Error>;
 
     /// Takes an action.
-    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step;
+    ///
+    /// # Errors
+    /// A failure of the environment. Training gives the episode up and keeps what it has learned.
+    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error>;
 
-    /// Whether a state offers an action: the action mask. Every state must offer at least one, and
-    /// the answer must not change. All are offered unless this is overridden.
+    /// Returns `true` if a state offers an action (the action mask). Every state must offer at
+    /// least one, and the answer must not change. By default all actions are offered.
     fn allows(&self, state: State, action: Action) -> bool {
         let _ = (state, action);
         true
     }
 
-    /// Whether an episode that ended with this step was a success, for reports only. Unless
-    /// overridden: it terminated with a positive reward.
+    /// Returns `true` if an episode that ended with this step was a success, for reports only. By
+    /// default a success is a termination with a positive reward.
     fn succeeded(&self, last: &Step) -> bool {
         last.status == Status::Terminated && last.reward > 0.0
     }
 }
 
-/// Lends an environment to whatever takes one by value.
+/// Implements the trait for a pointer to an environment.
 macro_rules! forwarded {
-    ($holder:ty) => {
-        impl<E: Environment + ?Sized> Environment for $holder {
+    ($pointer:ty) => {
+        impl<E: Environment + ?Sized> Environment for $pointer {
             fn states(&self) -> usize {
                 (**self).states()
             }
@@ -73,11 +86,11 @@ macro_rules! forwarded {
                 (**self).actions()
             }
 
-            fn reset(&mut self, rng: &mut dyn Rng) -> State {
+            fn reset(&mut self, rng: &mut dyn Rng) -> Result<State, Error> {
                 (**self).reset(rng)
             }
 
-            fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step {
+            fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error> {
                 (**self).step(action, rng)
             }
 

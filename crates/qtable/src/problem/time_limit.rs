@@ -1,61 +1,43 @@
 //! A limit on the steps of an episode.
 
+use std::num::NonZeroU64;
+
 use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_count};
-use crate::index::{Action, State};
-use crate::problem::environment::{Environment, Status, Step};
-use crate::validated::validated;
+use crate::error::{Error, positive};
+use crate::problem::environment::Environment;
+use crate::step::{Action, State, Status, Step};
 
-/// An environment whose episodes are truncated after a number of steps.
+/// An environment whose episodes are truncated after a number of steps. Training has a limit of its
+/// own ([`Training::with_episode_limit`](crate::Training::with_episode_limit)).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(
-        remote = "Self",
-        bound(serialize = "E: Serialize", deserialize = "E: Deserialize<'de>")
-    )
-)]
-pub struct TimeLimit<E: Environment> {
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct TimeLimit<E> {
     inner: E,
-    limit: u64,
+    limit: NonZeroU64,
     steps: u64,
 }
 
 impl<E: Environment> TimeLimit<E> {
-    /// With at most `limit` steps to an episode, at least 1.
+    /// Limits episodes to `limit` steps, at least 1.
     ///
     /// # Errors
     /// [`Error::Setting`].
     pub fn new(inner: E, limit: u64) -> Result<Self, Error> {
-        Self {
+        Ok(Self {
             inner,
-            limit,
+            limit: positive("limit", limit)?,
             steps: 0,
-        }
-        .restore()
+        })
     }
 
-    /// The environment inside.
+    /// Returns the environment inside.
     pub fn inner(&self) -> &E {
         &self.inner
     }
-
-    /// The environment alone.
-    pub fn into_inner(self) -> E {
-        self.inner
-    }
-
-    fn restore(self) -> Result<Self, Error> {
-        check_count("limit", self.limit)?;
-        Ok(self)
-    }
 }
-
-validated!(TimeLimit<E: Environment>);
 
 impl<E: Environment> Environment for TimeLimit<E> {
     fn states(&self) -> usize {
@@ -66,18 +48,18 @@ impl<E: Environment> Environment for TimeLimit<E> {
         self.inner.actions()
     }
 
-    fn reset(&mut self, rng: &mut dyn Rng) -> State {
+    fn reset(&mut self, rng: &mut dyn Rng) -> Result<State, Error> {
         self.steps = 0;
         self.inner.reset(rng)
     }
 
-    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Step {
-        let mut step = self.inner.step(action, rng);
+    fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error> {
+        let mut step = self.inner.step(action, rng)?;
         self.steps = self.steps.saturating_add(1);
-        if step.status == Status::Continuing && self.steps >= self.limit {
+        if step.status == Status::Continuing && self.steps >= self.limit.get() {
             step.status = Status::Truncated;
         }
-        step
+        Ok(step)
     }
 
     fn allows(&self, state: State, action: Action) -> bool {

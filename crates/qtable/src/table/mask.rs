@@ -1,31 +1,25 @@
-//! Which actions a state offers.
-
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
+//! The actions that a state offers.
 
 use crate::error::Error;
-use crate::index::{Action, State};
 use crate::problem::Environment;
+use crate::step::{Action, State};
 use crate::validated::validated;
 
-/// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by
-/// `actions` truth values with at least one `true` in every row.
-///
-/// A [`QTable`](crate::QTable) that holds a mask never reports a forbidden action as its best,
-/// never lets its value count as the state's maximum, and no policy chooses it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(remote = "Self")
-)]
-pub struct ActionMask {
-    actions: usize,
-    allowed: Vec<bool>,
+validated! {
+    /// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by
+    /// `actions` truth values with at least one `true` in every row.
+    ///
+    /// A [`QTable`](crate::QTable) with a mask never reports a forbidden action as its best, and no
+    /// policy chooses one.
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct ActionMask {
+        actions: usize,
+        allowed: Vec<bool>,
+    }
 }
 
 impl ActionMask {
-    /// Asks `allows` for every pair.
+    /// Creates a mask by asking `allows` for every pair.
     ///
     /// # Errors
     /// An empty shape, one that does not fit into memory, or a state without any action.
@@ -45,40 +39,39 @@ impl ActionMask {
         Self { actions, allowed }.restore()
     }
 
-    /// The mask of an environment, or `None` if it offers every action in every state.
+    /// Returns the mask of an environment, or `None` if it offers every action in every state.
     ///
     /// # Errors
-    /// As [`ActionMask::new`].
+    /// [`ActionMask::new`] lists them.
     pub fn of<E: Environment + ?Sized>(environment: &E) -> Result<Option<Self>, Error> {
-        let mask = Self::new(
-            environment.states(),
-            environment.actions(),
-            |state, action| environment.allows(state, action),
-        )?;
+        let (states, actions) = (environment.states(), environment.actions());
+        let mask = Self::new(states, actions, |s, a| environment.allows(s, a))?;
         Ok(mask.restricts().then_some(mask))
     }
 
-    /// Whether any action of any state is forbidden.
+    /// Returns `true` if an action of any state is forbidden.
     pub fn restricts(&self) -> bool {
         self.allowed.contains(&false)
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn states(&self) -> usize {
         self.allowed.len() / self.actions
     }
 
-    /// Number of actions.
+    /// Returns the number of actions.
     pub fn actions(&self) -> usize {
         self.actions
     }
 
-    /// One truth value for each action of a state.
+    /// Returns one truth value for each action of a state.
     ///
     /// # Panics
-    /// As a slice does if the state is outside the mask.
+    /// If the state is outside the mask.
+    #[inline]
     pub fn row(&self, state: State) -> &[bool] {
-        &self.allowed[state.0 * self.actions..][..self.actions]
+        // A product that wraps would lead to another row.
+        &self.allowed[state.0.saturating_mul(self.actions)..][..self.actions]
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -100,10 +93,8 @@ impl ActionMask {
     }
 }
 
-validated!(ActionMask);
-
-/// `states * actions` where both are positive, the action index fits into 32 bits and the product
-/// into memory.
+/// Returns `states * actions` where both are positive, the action index fits into 32 bits and the
+/// product into memory.
 pub(crate) fn checked_entries(states: usize, actions: usize) -> Result<usize, Error> {
     if states == 0 || actions == 0 {
         return Err(Error::EmptyShape { states, actions });

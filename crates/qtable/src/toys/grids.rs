@@ -1,8 +1,8 @@
 //! FrozenLake, CliffWalking and a chain.
 
 use crate::error::{Error, check_setting};
-use crate::index::{Action, State};
 use crate::model::{Model, ModelEnvironment, Outcome};
+use crate::step::{Action, State};
 
 /// The small lake of FrozenLake: `S`tart, `F`rozen, `H`ole, `G`oal.
 pub const FROZEN_LAKE_4X4: [&str; 4] = ["SFFF", "FHFH", "FFFH", "HFFG"];

@@ -1,8 +1,8 @@
 //! Taxi-v4.
 
 use crate::error::Error;
-use crate::index::{Action, State};
 use crate::model::{Model, ModelEnvironment, Outcome};
+use crate::step::{Action, State};
 
 /// Row and column of the four stands: 0 red, 1 green, 2 yellow, 3 blue.
 pub const TAXI_STANDS: [(usize, usize); 4] = [(0, 0), (0, 4), (4, 0), (4, 3)];

@@ -5,11 +5,10 @@ use std::f64::consts::LOG2_E;
 use rand::Rng;
 
 use crate::elementary::{PARTS, exp2_parts};
-use crate::error::{Error, check_setting};
-use crate::index::{Action, State};
+use crate::error::{Error, check_reward, check_setting};
 use crate::policy::Boltzmann;
-use crate::problem::{Status, Step};
-use crate::table::{QTable, Value};
+use crate::step::{Action, State, Status, Step};
+use crate::table::QTable;
 
 /// Actions that lie together, and blocks that a row is divided into: what is compared at once.
 const GROUP: usize = 16;
@@ -24,13 +23,33 @@ const DRIFT: f64 = 30.0;
 ///
 /// The weights `exp((Q - c) / T)` are kept beside the values, with one offset c for each state and
 /// running sums over the eight blocks of a row and within each block. A choice compares them with
-/// one random number, which needs no branch and no sum; an update writes one weight and sums its
-/// block anew, so that nothing drifts. While T stands still this is the distribution of
-/// [`Boltzmann`] to the rounding of `f32`: no probability is off by more than 1e-6. The draws are
-/// not the same ones. A change of the temperature rebuilds all weights, so it is made in blocks of
-/// many actions: [`train_in_blocks`](crate::train_in_blocks).
+/// one random number, without a branch and without a sum; an update writes one weight and sums its
+/// block anew, so that no error builds up.
 ///
-/// [`Boltzmann`] with [`QLearning`](crate::QLearning) is the readable form of the same thing.
+/// While T stands still the distribution is that of [`Boltzmann`], with single precision and 24
+/// random bits. A change of the temperature rebuilds all weights, so it is made in blocks of many
+/// actions: [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions
+/// [`Boltzmann`] itself is faster.
+///
+/// ```
+/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::{CachedBoltzmann, QTable, State, Status, Step};
+///
+/// fn main() -> Result<(), qtable::Error> {
+///     let mut table = QTable::new(1, 81)?;
+///     let mut cached = CachedBoltzmann::new(&table, 0.5)?;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     for _ in 0..1000 {
+///         let action = cached.choose(State(0), &mut rng);
+///         let reward = if action.0 == 7 { 9.0 } else { 0.0 };
+///         let step = Step { observation: State(0), reward, status: Status::Terminated };
+///         cached.update(State(0), action, &step, 0.5, 0.9)?;
+///     }
+///     cached.write_to(&mut table)?;
+///     assert_eq!(table.best(State(0)).0, 7);
+///     Ok(())
+/// }
+/// ```
 #[derive(Clone, Debug)]
 pub struct CachedBoltzmann {
     actions: usize,
@@ -100,12 +119,12 @@ const NO_ACTIONS: Group = Group {
 };
 
 impl CachedBoltzmann {
-    /// A copy of a table (values, visits and mask) with the weights for a temperature, in units of
-    /// the values.
+    /// Copies values, visits and mask of a table and makes the weights for a temperature, in units
+    /// of the values.
     ///
     /// # Errors
     /// A temperature outside `1e-6..=1e6`, or a value too large for `f32`.
-    pub fn new<V: Value>(table: &QTable<V>, temperature: f64) -> Result<Self, Error> {
+    pub fn new(table: &QTable, temperature: f64) -> Result<Self, Error> {
         let (states, actions) = (table.states(), table.actions());
         let groups_per_row = actions.div_ceil(GROUP);
         let block_shift = groups_per_row
@@ -125,7 +144,7 @@ impl CachedBoltzmann {
         };
         for state in (0..states).map(State) {
             for action in table.offered(state) {
-                let value = table.value(state, action).to_f64();
+                let value = table.value(state, action);
                 let group = &mut cached.groups[state.0 * groups_per_row + action.0 / GROUP];
                 group.values[action.0 % GROUP] = finite(state, action, value)?;
                 group.visits[action.0 % GROUP] = table.visits(state, action);
@@ -151,7 +170,7 @@ impl CachedBoltzmann {
         Ok(())
     }
 
-    /// One step of Q-learning (Eq. 3) with a given α: `action` taken in `state` led to `step`.
+    /// Makes one step of Q-learning with a given α: `action` taken in `state` led to `step`.
     /// Counts the visit and returns the error before the update. Nothing is bootstrapped through a
     /// step that terminated the episode.
     ///
@@ -215,7 +234,7 @@ impl CachedBoltzmann {
         Ok(error)
     }
 
-    /// What was wrong with an update that cannot be made.
+    /// Returns the error of an update that cannot be made.
     #[cold]
     #[inline(never)]
     fn fault(&self, state: State, action: Action, step: &Step, value: f64) -> Error {
@@ -223,18 +242,12 @@ impl CachedBoltzmann {
         if let Some(error) = outside(state).or_else(|| outside(step.observation)) {
             error
         } else if action.0 >= self.actions {
-            Error::ActionOutOfRange {
-                action,
-                actions: self.actions,
-            }
+            let actions = self.actions;
+            Error::ActionOutOfRange { action, actions }
         } else if self.value(state, action) == f32::NEG_INFINITY {
             Error::ActionNotAllowed { state, action }
-        } else if !step.reward.is_finite() {
-            Error::RewardNotFinite {
-                state,
-                action,
-                reward: step.reward,
-            }
+        } else if let Err(error) = check_reward(state, action, step.reward) {
+            error
         } else {
             Error::ValueNotFinite {
                 state,
@@ -248,7 +261,7 @@ impl CachedBoltzmann {
     ///
     /// # Errors
     /// [`Error::ShapeMismatch`], or a table that forbids an action that was allowed here.
-    pub fn write_to<V: Value>(&self, table: &mut QTable<V>) -> Result<(), Error> {
+    pub fn write_to(&self, table: &mut QTable) -> Result<(), Error> {
         table.check_shape("the cached table", self.heads.len(), self.actions)?;
         for state in (0..self.heads.len()).map(State) {
             for action in (0..self.actions).map(Action) {
@@ -258,7 +271,7 @@ impl CachedBoltzmann {
                     group.visits[action.0 % GROUP],
                 );
                 if value > f32::NEG_INFINITY {
-                    table.set(state, action, V::from_f64(f64::from(value)))?;
+                    table.set(state, action, f64::from(value))?;
                     table.set_visits(state, action, visits);
                 }
             }
@@ -269,7 +282,7 @@ impl CachedBoltzmann {
     /// Draws an action with its probability by Boltzmann.
     ///
     /// # Panics
-    /// As a slice does if the state is out of range.
+    /// If the state is out of range.
     #[inline(always)]
     pub fn choose<R: Rng + ?Sized>(&self, state: State, rng: &mut R) -> Action {
         // As many random bits as an f32 holds; all that is drawn is below the total.
@@ -313,7 +326,7 @@ impl CachedBoltzmann {
     /// Writes the probability of each action into `probabilities`, one entry for each.
     ///
     /// # Panics
-    /// As a slice does if the state is out of range.
+    /// If the state is out of range.
     pub fn probabilities(&self, state: State, probabilities: &mut [f64]) {
         let weights = || {
             self.row(state)
@@ -327,56 +340,38 @@ impl CachedBoltzmann {
         }
     }
 
-    /// The value of a pair; negative infinity for a forbidden one.
+    /// Returns the value of a pair, negative infinity for a forbidden one.
     ///
     /// # Panics
-    /// As a slice does if the pair is out of range.
+    /// If the pair is out of range.
     pub fn value(&self, state: State, action: Action) -> f32 {
-        assert!(
-            action.0 < self.actions,
-            "action {} is outside 0..{}",
-            action.0,
-            self.actions
-        );
-        self.row(state)[action.0 / GROUP].values[action.0 % GROUP]
+        let (index, actions) = (action.0, self.actions);
+        assert!(index < actions, "action {index} is outside 0..{actions}");
+        self.row(state)[index / GROUP].values[index % GROUP]
     }
 
-    /// How often a pair was visited.
-    ///
-    /// # Panics
-    /// As a slice does if the pair is out of range.
+    /// Returns how often a pair inside the table was visited.
     #[inline]
-    pub fn visits(&self, state: State, action: Action) -> u32 {
-        assert!(
-            action.0 < self.actions,
-            "action {} is outside 0..{}",
-            action.0,
-            self.actions
-        );
+    pub(crate) fn visits(&self, state: State, action: Action) -> u32 {
         self.row(state)[action.0 / GROUP].visits[action.0 % GROUP]
     }
 
-    /// The highest value of a state.
+    /// Returns the highest value of a state.
     ///
     /// # Panics
-    /// As a slice does if the state is out of range.
+    /// If the state is out of range.
     #[inline(always)]
     pub fn max(&self, state: State) -> f32 {
         self.heads[state.0].max
     }
 
-    /// The action of the highest value; of equals the lowest index.
+    /// Returns the action of the highest value; of several, the one with the lowest index.
     ///
     /// # Panics
-    /// As a slice does if the state is out of range.
+    /// If the state is out of range.
     #[inline(always)]
     pub fn best(&self, state: State) -> Action {
         Action(self.heads[state.0].best as usize)
-    }
-
-    /// The temperature.
-    pub fn temperature(&self) -> f64 {
-        self.temperature
     }
 
     /// Checks that a state lies in the table.

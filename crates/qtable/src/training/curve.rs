@@ -1,10 +1,10 @@
-//! The learning curve: what happened between one record and the next.
+//! The learning curve.
 
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// One point of a learning curve. Counts are totals since the start; shares and means are over the
-/// actions and the episodes ended since the record before, and `None` where there were none.
+/// One point of a learning curve. Counts are totals since the start; fractions and means are over
+/// the actions and the ended episodes since the record before, and `None` where there were none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Record {
@@ -12,8 +12,7 @@ pub struct Record {
     pub actions: u64,
     /// Episodes ended so far.
     pub episodes: u64,
-    /// Share of the episodes that ended in success, `0..=1`: terminated with a positive reward,
-    /// unless the environment says otherwise
+    /// Fraction of the episodes that ended in success, `0..=1`
     /// ([`Environment::succeeded`](crate::Environment::succeeded)).
     pub success_share: Option<f64>,
     /// Mean reward of an action.
@@ -40,6 +39,10 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
+    pub(crate) fn actions(&self) -> u64 {
+        self.actions
+    }
+
     pub(crate) fn add_action(&mut self, reward: f64, td_error: f64) {
         self.actions = self.actions.saturating_add(1);
         self.reward += reward;
@@ -53,7 +56,7 @@ impl Tally {
         self.successes = self.successes.saturating_add(u64::from(success));
     }
 
-    /// The record of what was added, at the totals given.
+    /// Returns the record of what was added, at the totals given.
     pub(crate) fn record(&self, actions: u64, episodes: u64) -> Record {
         let mean = |sum: f64, count: u64| (count > 0).then(|| sum / count as f64);
         Record {

@@ -1,21 +1,23 @@
-//! How good a policy is, by trying it.
+//! The quality of a policy, measured by trying it.
 
 use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_count};
+use crate::error::{Error, check_reward, positive};
 use crate::policy::Policy;
-use crate::problem::{Environment, Status};
-use crate::table::{QTable, Value};
+use crate::problem::Environment;
+use crate::step::Status;
+use crate::table::{ActionMask, QTable};
+use crate::training::driver::check_fit;
 
-/// What a policy achieved in a number of episodes.
+/// The results of a policy in a number of episodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Evaluation {
     /// Episodes played.
     pub episodes: u64,
-    /// Share of them that ended in success ([`Environment::succeeded`]), `0..=1`.
+    /// Fraction of them that ended in success ([`Environment::succeeded`]), `0..=1`.
     pub success_share: f64,
     /// Mean number of steps of an episode.
     pub mean_steps: f64,
@@ -23,44 +25,60 @@ pub struct Evaluation {
     pub mean_steps_to_success: Option<f64>,
     /// Mean sum of rewards of an episode, undiscounted.
     pub mean_return: f64,
+    /// Standard deviation of the sums of rewards of the episodes; `None` for a single episode.
+    pub return_deviation: Option<f64>,
 }
 
-/// Plays episodes of at most `limit` steps with a policy, without learning. A mask is the table's
-/// own affair here: it is not taken over from the environment.
+/// Plays episodes of at most `limit` steps with a policy, without learning. If the environment
+/// restricts its actions, the policy sees the table under this mask.
+///
+/// ```
+/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::{Greedy, evaluate, toys};
+///
+/// fn main() -> Result<(), qtable::Error> {
+///     let mut lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true)?;
+///     let optimum = lake.model().value_iteration(0.99, 1e-9)?.table;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     let found = evaluate(&mut lake, &optimum, &mut Greedy, 2_000, 100, &mut rng)?;
+///     assert!((found.success_share - 0.74).abs() < 0.05);
+///     Ok(())
+/// }
+/// ```
 ///
 /// # Errors
 /// A table of the wrong shape, no episode or no step to play, an action that the table does not
 /// offer, or an environment that reports a state out of range or a reward that is not finite.
-pub fn evaluate<V: Value, E: Environment + ?Sized, P: Policy<V> + ?Sized>(
+pub fn evaluate<E: Environment + ?Sized, P: Policy + ?Sized>(
     environment: &mut E,
-    table: &QTable<V>,
+    table: &QTable,
     policy: &mut P,
     episodes: u64,
     limit: u64,
     rng: &mut dyn Rng,
 ) -> Result<Evaluation, Error> {
-    check_count("episodes", episodes)?;
-    check_count("limit", limit)?;
-    table.check_shape(
-        "the environment",
-        environment.states(),
-        environment.actions(),
-    )?;
-    let (mut successes, mut steps_of_successes, mut all_steps, mut sum) = (0, 0, 0, 0.0);
-    for _ in 0..episodes {
-        let mut state = environment.reset(rng);
+    positive("episodes", episodes)?;
+    positive("limit", limit)?;
+    check_fit(environment, table)?;
+    let mut masked = None;
+    let mask = ActionMask::of(environment)?;
+    if mask.is_some() && table.mask() != mask.as_ref() {
+        masked.insert(table.clone()).set_mask(mask)?;
+    }
+    let table = masked.as_ref().unwrap_or(table);
+    let (mut successes, mut steps_of_successes, mut all_steps) = (0, 0, 0);
+    // Mean and sum of squares about it, after Welford.
+    let (mut mean, mut squares, mut total) = (0.0, 0.0, 0.0);
+    for episode in 1..=episodes {
+        policy.begin_episode();
+        let mut state = environment.reset(rng)?;
+        let mut sum = 0.0;
         for taken in 1..=limit {
             table.check_state(state)?;
             let action = policy.choose(table, state, rng);
             table.check(state, action)?;
-            let step = environment.step(action, rng);
-            if !step.reward.is_finite() {
-                return Err(Error::RewardNotFinite {
-                    state,
-                    action,
-                    reward: step.reward,
-                });
-            }
+            let step = environment.step(action, rng)?;
+            check_reward(state, action, step.reward)?;
             all_steps += 1;
             sum += step.reward;
             state = step.observation;
@@ -72,13 +90,19 @@ pub fn evaluate<V: Value, E: Environment + ?Sized, P: Policy<V> + ?Sized>(
                 break;
             }
         }
+        total += sum;
+        let off = sum - mean;
+        mean += off / episode as f64;
+        squares += off * (sum - mean);
     }
+    let count = episodes as f64;
     Ok(Evaluation {
         episodes,
-        success_share: successes as f64 / episodes as f64,
-        mean_steps: all_steps as f64 / episodes as f64,
+        success_share: successes as f64 / count,
+        mean_steps: all_steps as f64 / count,
         mean_steps_to_success: (successes > 0)
             .then(|| steps_of_successes as f64 / successes as f64),
-        mean_return: sum / episodes as f64,
+        mean_return: total / count,
+        return_deviation: (episodes > 1).then(|| f64::sqrt(squares / (count - 1.0))),
     })
 }

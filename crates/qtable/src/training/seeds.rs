@@ -1,4 +1,4 @@
-//! The same experiment with many seeds: means with their intervals, never one run.
+//! Experiments over many seeds, and means with their intervals.
 
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -11,19 +11,24 @@ use crate::training::curve::Record;
 /// same to the bit, because a run sees nothing but its seed.
 ///
 /// ```
-/// use qtable::{Estimate, QTable, TrainConfig, over_seeds, toys, train};
-/// use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::{
+///     EpsilonGreedy, Estimate, QLearning, QTable, Schedule, State, Training, Until, over_seeds, toys,
+/// };
 ///
-/// let values = over_seeds(0..10, |seed| {
-///     let mut chain = toys::chain(4)?;
-///     let mut table = QTable::new(4, 2)?;
-///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-///     train(&mut chain, &mut table, &TrainConfig::paper(2_000), &mut rng, &mut |_| {})?;
-///     Ok::<_, qtable::Error>(table.max(qtable::State(0)))
-/// })?;
-/// let value = Estimate::of(&values);
-/// assert!((value.mean - 0.81).abs() < 0.01);
-/// # Ok::<(), qtable::Error>(())
+/// fn main() -> Result<(), qtable::Error> {
+///     let values = over_seeds(0..10, |seed| {
+///         let mut chain = toys::chain(4)?;
+///         let learner = QLearning::new(Schedule::constant(0.5)?, 0.9)?;
+///         let policy = EpsilonGreedy::new(Schedule::constant(0.5)?)?;
+///         let mut training = Training::new(&chain, QTable::new(4, 2)?, learner, policy)?;
+///         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+///         training.run(&mut chain, Until::Actions(2_000), &mut rng)?;
+///         Ok::<_, qtable::Error>(training.table().max(State(0)))
+///     })?;
+///     assert!((Estimate::of(&values).mean - 0.81).abs() < 0.01);
+///     Ok(())
+/// }
 /// ```
 ///
 /// # Errors
@@ -43,7 +48,7 @@ pub fn over_seeds<T: Send, E: Send>(
     results.into_iter().collect()
 }
 
-/// A mean and how well it is known.
+/// A mean of several runs with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Estimate {
@@ -57,7 +62,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Of independent values, one a run.
+    /// Estimates the mean of independent values, one a run.
     pub fn of(values: &[f64]) -> Self {
         let count = values.len();
         let mean = values.iter().sum::<f64>() / count as f64;
@@ -80,8 +85,8 @@ impl Estimate {
         }
     }
 
-    /// Of a quantity at each point of several learning curves; runs in which it is `None` are left
-    /// out at that point. As long as the shortest curve.
+    /// Estimates the mean of a quantity at each point of several learning curves, up to the end of
+    /// the shortest. Runs in which it is `None` are left out at that point.
     pub fn of_curves(
         curves: &[Vec<Record>],
         quantity: impl Fn(&Record) -> Option<f64>,
@@ -100,7 +105,7 @@ impl Estimate {
 }
 
 impl std::fmt::Display for Estimate {
-    /// `mean ± half width`, with the precision asked for (3 unless given).
+    /// Writes `mean ± half width`, with three decimals unless a precision is given.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let precision = f.precision().unwrap_or(3);
         write!(
@@ -111,7 +116,7 @@ impl std::fmt::Display for Estimate {
     }
 }
 
-/// The 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher and
+/// Returns the 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher and
 /// Cornish from six degrees of freedom on).
 fn student_t(degrees: usize) -> f64 {
     const FEW: [f64; 5] = [12.706_2, 4.302_65, 3.182_45, 2.776_45, 2.570_58];

@@ -1,11 +1,9 @@
 //! Files: what is written comes back, and nothing damaged does.
-#![cfg(feature = "serde")]
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use std::path::Path;
 
 use qtable::{
-    Action, EpsilonGreedy, Intervals, ModelEnvironment, Problem, Product, QTable, Sarsa, Schedule,
+    Action, EpsilonGreedy, FileError, Intervals, ModelEnvironment, Product, QTable, Sarsa, Schedule,
     State, Training, Until, decode, encode, load, save, toys,
 };
 use rand::rngs::Xoshiro256PlusPlus;

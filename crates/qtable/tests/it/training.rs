@@ -1,16 +1,14 @@
-//! The drivers: what they report, when they stop, and what they refuse.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
-
-mod odd;
+//! The driver: its records, its end, its errors.
 
 use std::ops::ControlFlow;
 
-use odd::{odd, rng, step, trained};
 use qtable::{
-    Action, EnvironmentFault, EpsilonGreedy, Error, Policy, QLearning, QTable, Schedule, State,
-    Status, TrainConfig, Training, Until, check_env, evaluate, toys, train, train_in_blocks,
+    Action, EpsilonGreedy, Error, Policy, QLearning, QTable, Schedule, State, Status, Training,
+    Until, check_env, evaluate, toys,
 };
 use rand::Rng;
+
+use crate::support::{Settings, constant, odd, rng, step};
 
 #[test]
 fn the_learning_curve_counts_what_happened() {
@@ -20,32 +18,22 @@ fn the_learning_curve_counts_what_happened() {
         0 => step(2, 4.0, Status::Truncated),
         _ => step(1, 1.0, Status::Continuing),
     });
-    let mut table = QTable::new(3, 2).unwrap();
-    let config = TrainConfig {
+    let settings = Settings {
         record_every: 12,
-        ..TrainConfig::paper(30)
+        ..Settings::new(30)
     };
+    let mut training = settings.begin(&environment, QTable::new(3, 2).unwrap()).unwrap();
     let mut told = Vec::new();
-    let report = train(
-        &mut environment,
-        &mut table,
-        &config,
-        &mut rng(1),
-        &mut |progress| {
-            told.push((progress.actions, progress.of, progress.latest));
-        },
-    )
-    .unwrap();
-    assert_eq!(
-        (report.actions, report.episodes, report.curve.len()),
-        (30, 10, 3)
-    );
-    assert_eq!(
-        told.iter().map(|t| (t.0, t.1)).collect::<Vec<_>>(),
-        [(12, 30), (24, 30), (30, 30)]
-    );
-    assert_eq!(told.iter().map(|t| t.2).collect::<Vec<_>>(), report.curve);
-    let first = report.curve[0];
+    let stopped = training.run_with(&mut environment, Until::Actions(30), &mut rng(1), |record, _| {
+        told.push(*record);
+        ControlFlow::Continue(())
+    });
+    assert_eq!(stopped, Ok(false));
+    assert_eq!((training.actions(), training.episodes()), (30, 10));
+    assert_eq!(told, training.curve());
+    assert_eq!(told.iter().map(|record| record.actions).collect::<Vec<_>>(), [12, 24]);
+    let table = training.table();
+    let first = training.curve()[0];
     assert_eq!((first.actions, first.episodes), (12, 4));
     for (found, wanted) in [
         (first.success_share, 0.5),
@@ -66,11 +54,14 @@ fn the_learning_curve_counts_what_happened() {
 fn the_episode_limit_truncates_and_the_value_goes_on() {
     // One action forever, 1 a step: worth 1 / (1 - 0.9), whatever the limit.
     let mut environment = odd(|_| step(0, 1.0, Status::Continuing));
-    let config = TrainConfig {
+    let settings = Settings {
         episode_limit: 5,
-        ..TrainConfig::paper(20_000)
+        ..Settings::new(20_000)
     };
-    let table = trained(&mut environment, &config).unwrap();
+    let trained = |environment: &mut dyn qtable::Environment| {
+        settings.run(environment).unwrap().into_parts().0
+    };
+    let table = trained(&mut environment);
     assert!(
         (table.max(State(0)) - 10.0).abs() < 1e-3,
         "{}",
@@ -87,12 +78,12 @@ fn the_episode_limit_truncates_and_the_value_goes_on() {
             },
         )
     });
-    assert!(trained(&mut ends, &config).unwrap().max(State(0)) < 5.0);
+    assert!(trained(&mut ends).max(State(0)) < 5.0);
 }
 
 #[test]
 fn faults_of_the_environment_are_named() {
-    let config = TrainConfig::paper(100);
+    let settings = Settings::new(100);
     for reward in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let faulty = || odd(|n| step(1, if n == 7 { reward } else { 1.0 }, Status::Continuing));
         let is_it = |error: &Error| match error {
@@ -103,59 +94,35 @@ fn faults_of_the_environment_are_named() {
             } => found.to_bits() == reward.to_bits(),
             _ => false,
         };
-        let error = trained(&mut faulty(), &config).unwrap_err();
+        let error = settings.run(&mut faulty()).unwrap_err();
         assert!(is_it(&error), "{error}");
-        let fault = check_env(&mut faulty(), 100, 1).unwrap_err();
-        assert!(
-            matches!(&fault, EnvironmentFault::Invalid { steps: 0, error } if is_it(error)),
-            "{fault}"
-        );
+        let error = check_env(&mut faulty(), 100, 1).unwrap_err();
+        assert!(is_it(&error), "{error}");
     }
     let mut outside = odd(|_| step(3, 0.0, Status::Continuing));
-    assert_eq!(
-        trained(&mut outside, &config).unwrap_err(),
-        Error::StateOutOfRange {
-            state: State(3),
-            states: 3
-        }
-    );
-    let mut small = QTable::new(2, 2).unwrap();
-    let wrong = train(&mut outside, &mut small, &config, &mut rng(0), &mut |_| {}).unwrap_err();
+    let (state, states) = (State(3), 3);
+    let refused = settings.run(&mut outside).unwrap_err();
+    assert_eq!(refused, Error::StateOutOfRange { state, states });
+    let small = settings.begin(&outside, QTable::new(2, 2).unwrap());
     assert!(matches!(
-        wrong,
-        Error::ShapeMismatch {
+        small,
+        Err(Error::ShapeMismatch {
             found_states: 3,
             states: 2,
             ..
-        }
+        })
     ));
-    for config in [
-        TrainConfig {
-            actions: 0,
-            ..config.clone()
-        },
-        TrainConfig {
-            episode_limit: 0,
-            ..config.clone()
-        },
-        TrainConfig {
-            record_every: 0,
-            ..config.clone()
-        },
-        TrainConfig {
-            gamma: -0.1,
-            ..config.clone()
-        },
-        TrainConfig {
-            alpha: Schedule::constant(2.0).unwrap(),
-            ..config.clone()
-        },
-        TrainConfig {
-            temperature: Schedule::constant(0.0).unwrap(),
-            ..config.clone()
-        },
+    let new = || Settings::new(100);
+    for settings in [
+        Settings { episode_limit: 0, ..new() },
+        Settings { record_every: 0, ..new() },
+        Settings { gamma: -0.1, ..new() },
+        Settings { alpha: constant(2.0), ..new() },
+        Settings { temperature: constant(0.0), ..new() },
     ] {
-        let error = trained(&mut odd(|_| step(0, 0.0, Status::Continuing)), &config).unwrap_err();
+        let error = settings
+            .run(&mut odd(|_| step(0, 0.0, Status::Continuing)))
+            .unwrap_err();
         assert!(
             matches!(error, Error::Setting { .. } | Error::ScheduleRange { .. }),
             "{error}"
@@ -175,7 +142,7 @@ impl Policy for Wild {
 #[test]
 fn a_policy_that_chooses_outside_the_table_is_refused_before_the_environment_sees_it() {
     let mut chain = toys::chain(4).unwrap();
-    let learner = QLearning::new(Schedule::constant(0.5).unwrap(), 0.9).unwrap();
+    let learner = QLearning::new(constant(0.5), 0.9).unwrap();
     let mut training = Training::new(&chain, QTable::new(4, 2).unwrap(), learner, Wild).unwrap();
     let refused = training.run(&mut chain, Until::Actions(5), &mut rng(0));
     assert_eq!(
@@ -192,8 +159,8 @@ fn a_policy_that_chooses_outside_the_table_is_refused_before_the_environment_see
 #[test]
 fn a_run_stops_where_it_is_told() {
     let mut chain = toys::chain(5).unwrap();
-    let learner = QLearning::new(Schedule::constant(0.5).unwrap(), 0.9).unwrap();
-    let policy = EpsilonGreedy::new(Schedule::constant(0.3).unwrap()).unwrap();
+    let learner = QLearning::new(constant(0.5), 0.9).unwrap();
+    let policy = EpsilonGreedy::new(constant(0.3)).unwrap();
     let table = QTable::new(5, 2).unwrap();
     let mut training = Training::new(&chain, table, learner, policy)
         .unwrap()
@@ -214,8 +181,8 @@ fn a_run_stops_where_it_is_told() {
             &mut chain,
             Until::Actions(100_000),
             &mut rng,
-            |record, table| {
-                assert_eq!(table.actions(), 2);
+            |record, training| {
+                assert_eq!(training.table().actions(), 2);
                 if record.actions >= so_far + 500 {
                     ControlFlow::Break(())
                 } else {
@@ -229,18 +196,15 @@ fn a_run_stops_where_it_is_told() {
         stopped && reached.is_multiple_of(10) && (so_far + 500..so_far + 510).contains(&reached)
     );
     assert_eq!(training.curve().len() as u64, reached / 10);
-    let more: Vec<_> = training
-        .records(&mut chain, Until::Actions(reached + 45), &mut rng)
-        .collect();
-    assert_eq!((more.len(), training.actions()), (4, reached + 45));
-    assert!(more.iter().all(Result::is_ok));
+    let parts = training.into_parts();
+    assert_eq!(parts.0.states(), 5);
 }
 
 #[test]
 fn settings_changed_on_the_way_leave_the_counters_alone() {
     let mut chain = toys::chain(9).unwrap();
-    let learner = QLearning::new(Schedule::constant(0.5).unwrap(), 0.9).unwrap();
-    let policy = EpsilonGreedy::new(Schedule::constant(1.0).unwrap()).unwrap();
+    let learner = QLearning::new(constant(0.5), 0.9).unwrap();
+    let policy = EpsilonGreedy::new(constant(1.0)).unwrap();
     let table = QTable::new(9, 2).unwrap();
     let mut training = Training::new(&chain, table, learner, policy).unwrap();
     let mut rng = rng(3);
@@ -249,58 +213,70 @@ fn settings_changed_on_the_way_leave_the_counters_alone() {
         .unwrap();
     let (before, episodes) = (training.clone(), training.episodes());
     assert!(training.is_in_episode() && episodes > 3);
-    let mut training = training
-        .with_episode_limit(u64::MAX)
-        .unwrap()
-        .with_record_every(1_000)
-        .unwrap();
-    assert_eq!(training, before);
-    training = training
-        .with_episode_limit(20)
-        .unwrap()
-        .with_record_every(100)
-        .unwrap();
+    let same = training.with_episode_limit(u64::MAX).unwrap();
+    let same = same.with_record_every(1_000).unwrap();
+    assert_eq!(same, before);
+    training = same.with_episode_limit(20).unwrap();
+    training = training.with_record_every(600).unwrap();
     assert_eq!((training.actions(), training.episodes()), (1_503, episodes));
     assert!(training.is_in_episode() && training.curve() == before.curve());
     training
         .run(&mut chain, Until::Actions(1_600), &mut rng)
         .unwrap();
+    // 600 actions after the record at 1000.
     let record = training.curve().last().unwrap();
     assert_eq!((training.curve().len(), record.actions), (2, 1_600));
-    assert!(
-        training.clone().with_episode_limit(0).is_err() && training.with_record_every(0).is_err()
-    );
+    let (limit, every) = (training.clone().with_episode_limit(0), training.with_record_every(0));
+    assert!(limit.is_err() && every.is_err());
 }
 
 #[test]
-fn more_blocks_than_actions_are_as_many_as_actions() {
-    let run = |blocks| {
-        let mut table = QTable::<f32>::filled(6, 2, 0.0).unwrap();
-        let config = TrainConfig::paper(300);
-        let chain = &mut toys::chain(6).unwrap();
-        train_in_blocks(chain, &mut table, &config, blocks, &mut rng(4), &mut |_| {}).unwrap();
-        table.to_csv()
-    };
-    assert_eq!(run(u64::MAX), run(300));
+fn an_episode_given_up_is_not_counted() {
+    let mut environment = odd(|_| step(1, 1.0, Status::Continuing));
+    let table = QTable::new(3, 2).unwrap();
+    let mut training = Settings::new(100).begin(&environment, table).unwrap();
+    training.run(&mut environment, Until::Actions(7), &mut rng(0)).unwrap();
+    assert!(training.is_in_episode());
+    training.end_episode();
+    assert_eq!((training.is_in_episode(), training.episodes()), (false, 0));
 }
 
-#[test]
-fn plateaus_at_the_ends_of_a_range_are_trained_on() {
-    for level in [1e-6, 1e6] {
-        for temperature in [
-            Schedule::linear(level, level, 1_000),
-            Schedule::exponential(level, level, 1_000),
-            Schedule::piecewise(&[(0, level), (999, level)]),
-        ] {
-            let config = TrainConfig {
-                temperature: temperature.unwrap(),
-                alpha: Schedule::linear(1.0, 1.0, 997).unwrap(),
-                ..TrainConfig::paper(1_000)
-            };
-            let mut table = QTable::<f32>::filled(6, 2, 0.0).unwrap();
-            let chain = &mut toys::chain(6).unwrap();
-            train_in_blocks(chain, &mut table, &config, 1_000, &mut rng(4), &mut |_| {}).unwrap();
-            assert!(trained(chain, &config).is_ok());
-        }
+/// A policy that tells how often it was told that an episode begins.
+#[derive(Default)]
+struct Counting(u32);
+
+impl Policy for Counting {
+    fn choose(&mut self, _table: &QTable, _state: State, _rng: &mut dyn Rng) -> Action {
+        Action(0)
     }
+    fn begin_episode(&mut self) {
+        self.0 += 1;
+    }
+}
+
+#[test]
+fn schedules_by_episode_see_every_episode() {
+    // Episodes of three steps.
+    let mut environment = odd(|n| match n % 3 {
+        0 => step(2, 1.0, Status::Terminated),
+        _ => step(1, 0.0, Status::Continuing),
+    });
+    let table = || QTable::new(3, 2).unwrap();
+    let learner = QLearning::new(constant(0.5), 0.9).unwrap();
+    let mut counted =
+        Training::new(&environment, table(), learner.clone(), Counting::default()).unwrap();
+    counted.run(&mut environment, Until::Episodes(5), &mut rng(0)).unwrap();
+    assert_eq!(counted.policy().0, 5);
+
+    let epsilon = Schedule::linear(1.0, 0.0, 10).unwrap().by_episode();
+    let policy = EpsilonGreedy::new(epsilon).unwrap();
+    let mut training = Training::new(&environment, table(), learner, policy).unwrap();
+    for (episodes, epsilon) in [(1, 1.0), (2, 0.9), (6, 0.5), (11, 0.0), (20, 0.0)] {
+        training
+            .run(&mut environment, Until::Episodes(episodes), &mut rng(0))
+            .unwrap();
+        assert!((training.policy().epsilon() - epsilon).abs() < 1e-12);
+    }
+    *training.policy_mut() = EpsilonGreedy::new(constant(0.25)).unwrap();
+    assert!((training.policy().epsilon() - 0.25).abs() < 1e-12);
 }

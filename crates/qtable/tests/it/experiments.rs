@@ -1,16 +1,11 @@
-//! What is made of runs: policies tried, models estimated, seeds compared.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
+//! Policies tried, models estimated, seeds compared.
 
 use qtable::{
-    Environment, EpsilonGreedy, Error, Estimate, Greedy, Policy, QTable, Schedule, State, Status,
-    TrainConfig, evaluate, over_seeds, toys, train,
+    Environment, EpsilonGreedy, Error, Estimate, Greedy, Policy, QTable, Status, evaluate,
+    over_seeds, toys,
 };
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
 
-fn rng(seed: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(seed)
-}
+use crate::support::{Settings, constant, rng};
 
 #[test]
 fn trying_a_policy_agrees_with_its_exact_assessment() {
@@ -25,6 +20,9 @@ fn trying_a_policy_agrees_with_its_exact_assessment() {
     assert!((tried.mean_steps - exact.steps).abs() < 0.5);
     assert!((tried.mean_steps_to_success.unwrap() - exact.steps_to_success.unwrap()).abs() < 0.5);
     assert!((tried.mean_return - exact.total_reward).abs() < 0.01);
+    // The returns are 0 or 1.
+    let (p, deviation) = (tried.mean_return, tried.return_deviation.unwrap());
+    assert!((deviation - (p * (1.0 - p)).sqrt()).abs() < 1e-4);
 }
 
 #[test]
@@ -33,12 +31,12 @@ fn a_model_estimated_from_experience_gives_the_optimal_policy() {
     let mut estimate = qtable::ModelEstimate::new(16, 4).unwrap();
     let mut rng = rng(4);
     let table = QTable::new(16, 4).unwrap();
-    let mut explorer = EpsilonGreedy::new(Schedule::constant(1.0).unwrap()).unwrap();
+    let mut explorer = EpsilonGreedy::new(constant(1.0)).unwrap();
     for _ in 0..20_000 {
-        let mut state = lake.reset(&mut rng);
+        let mut state = lake.reset(&mut rng).unwrap();
         loop {
             let action = explorer.choose(&table, state, &mut rng);
-            let step = lake.step(action, &mut rng);
+            let step = lake.step(action, &mut rng).unwrap();
             estimate.observe(state, action, &step).unwrap();
             if step.status != Status::Continuing {
                 break;
@@ -69,15 +67,9 @@ fn a_model_estimated_from_experience_gives_the_optimal_policy() {
 fn seeds_come_back_in_order_and_the_first_failure_is_told() {
     let run = |seed: u64| -> Result<String, Error> {
         let mut chain = toys::chain(6)?;
-        let mut table = QTable::new(6, 2)?;
-        train(
-            &mut chain,
-            &mut table,
-            &TrainConfig::paper(300),
-            &mut rng(seed),
-            &mut |_| {},
-        )?;
-        Ok(table.to_csv())
+        let mut training = Settings::new(300).begin(&chain, QTable::new(6, 2)?)?;
+        training.run(&mut chain, qtable::Until::Actions(300), &mut rng(seed))?;
+        Ok(training.table().to_csv())
     };
     let all = over_seeds(0..24, run).unwrap();
     let one_by_one: Vec<String> = (0..24).map(|seed| run(seed).unwrap()).collect();

@@ -1,5 +1,4 @@
 //! How near Q-learning comes to the known optimum of the larger toys and of those with chance.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
     Comparison, EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Training, Until, toys,

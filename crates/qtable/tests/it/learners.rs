@@ -1,5 +1,4 @@
 //! Every learner finds the known optimum, and none falls for a fault of its environment.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use qtable::{
     Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience,
@@ -10,7 +9,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 
 /// Every learner of the crate with the same rates.
-fn learners(alpha: &Schedule, gamma: f64) -> Vec<(&'static str, Box<dyn Learner>)> {
+fn learners(table: &QTable, alpha: &Schedule, gamma: f64) -> Vec<(&'static str, Box<dyn Learner>)> {
     let alpha = || alpha.clone();
     vec![
         ("Q", Box::new(QLearning::new(alpha(), gamma).unwrap())),
@@ -21,7 +20,7 @@ fn learners(alpha: &Schedule, gamma: f64) -> Vec<(&'static str, Box<dyn Learner>
         ),
         (
             "double Q",
-            Box::new(DoubleQLearning::<f64>::new(alpha(), gamma).unwrap()),
+            Box::new(DoubleQLearning::new(table, alpha(), gamma).unwrap()),
         ),
         ("Q(lambda)", Box::new(QLambda::new(alpha(), gamma).unwrap())),
         (
@@ -37,12 +36,16 @@ fn learners(alpha: &Schedule, gamma: f64) -> Vec<(&'static str, Box<dyn Learner>
             "n-step Q uncut",
             Box::new(NStepQ::new(alpha(), gamma).unwrap().uncut()),
         ),
-        ("Dyna-Q", Box::new(DynaQ::new(alpha(), gamma).unwrap())),
+        ("Dyna-Q", Box::new(DynaQ::new(table, alpha(), gamma).unwrap())),
         (
             "prioritized sweeping",
-            Box::new(PrioritizedSweeping::new(gamma).unwrap()),
+            Box::new(PrioritizedSweeping::new(table, gamma).unwrap()),
         ),
     ]
+}
+
+fn zeros(toy: &ModelEnvironment) -> QTable {
+    QTable::new(toy.model().states(), toy.model().actions()).unwrap()
 }
 
 /// The table after learning with exploration that fades, so that on-policy learners find the
@@ -54,8 +57,7 @@ fn learned(
     actions: u64,
     seed: u64,
 ) -> QTable {
-    let table = QTable::new(toy.model().states(), toy.model().actions()).unwrap();
-    let mut training = Training::new(toy, table, learner, policy)
+    let mut training = Training::new(toy, zeros(toy), learner, policy)
         .unwrap()
         .with_episode_limit(200)
         .unwrap();
@@ -63,7 +65,7 @@ fn learned(
     training
         .run(&mut toy.clone(), Until::Actions(actions), &mut rng)
         .unwrap();
-    training.into_table()
+    training.into_parts().0
 }
 
 #[test]
@@ -72,7 +74,7 @@ fn every_learner_finds_the_optimal_values_of_the_chain() {
     let gamma = 0.9;
     let optimal = toy.model().value_iteration(gamma, 1e-13).unwrap().table;
     let actions = 30_000;
-    for (name, learner) in learners(&Schedule::linear(0.5, 0.1, actions).unwrap(), gamma) {
+    for (name, learner) in learners(&zeros(&toy), &Schedule::linear(0.5, 0.1, actions).unwrap(), gamma) {
         let epsilon = Schedule::linear(1.0, 0.0, actions * 3 / 4).unwrap();
         let policy = Box::new(EpsilonGreedy::new(epsilon).unwrap());
         let table = learned(&toy, learner, policy, actions, 3);
@@ -91,7 +93,7 @@ fn every_learner_finds_the_optimal_values_of_the_chain() {
 fn every_learner_walks_along_the_cliff_in_13_steps() {
     let toy = toys::cliff_walking().unwrap();
     let actions = 200_000;
-    for (name, learner) in learners(&Schedule::constant(0.2).unwrap(), 0.99) {
+    for (name, learner) in learners(&zeros(&toy), &Schedule::constant(0.2).unwrap(), 0.99) {
         let epsilon =
             Schedule::piecewise(&[(0, 0.5), (actions / 2, 0.05), (actions * 3 / 4, 0.0)]).unwrap();
         let policy = Box::new(EpsilonGreedy::new(epsilon).unwrap());
@@ -115,7 +117,7 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
     let gamma = 0.95;
     let actions = 800_000;
     let alpha = Schedule::inverse_visits(1.0, 30.0).unwrap();
-    for (name, learner) in learners(&alpha, gamma) {
+    for (name, learner) in learners(&zeros(&toy), &alpha, gamma) {
         if name.contains("SARSA") || name.contains("uncut") {
             continue;
         }
@@ -141,7 +143,7 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
 #[test]
 fn uncut_learners_are_unbiased_once_exploration_has_faded() {
     let toy = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, false).unwrap();
-    for (name, learner) in learners(&Schedule::constant(0.2).unwrap(), 0.9) {
+    for (name, learner) in learners(&zeros(&toy), &Schedule::constant(0.2).unwrap(), 0.9) {
         let actions = 60_000;
         let temperature = Schedule::exponential(1.0, 1e-3, actions).unwrap();
         let policy = Box::new(Boltzmann::new(temperature).unwrap());
@@ -162,9 +164,9 @@ fn uncut_learners_are_unbiased_once_exploration_has_faded() {
 #[test]
 fn double_q_counts_the_visits_of_the_table_that_learns() {
     // With α = 1/n each table holds the mean of what it alone has seen.
-    let mut learner =
-        DoubleQLearning::<f64>::new(Schedule::inverse_visits(1.0, 1.0).unwrap(), 0.9).unwrap();
     let mut table = QTable::new(1, 1).unwrap();
+    let alpha = Schedule::inverse_visits(1.0, 1.0).unwrap();
+    let mut learner = DoubleQLearning::new(&table, alpha, 0.9).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
     let mut seen = [(0.0, 0.0); 2];
     for n in 0..40 {
@@ -209,9 +211,10 @@ fn no_learner_bootstraps_through_termination_and_all_do_through_truncation() {
         (Status::Terminated, 1.0),
         (Status::Truncated, 1.0 + 0.5 * 8.0),
     ] {
-        for (name, mut learner) in learners(&Schedule::constant(1.0).unwrap(), 0.5) {
-            let mut table = QTable::new(2, 2).unwrap();
-            table.set(State(1), Action(1), 8.0).unwrap();
+        let mut begun = QTable::new(2, 2).unwrap();
+        begun.set(State(1), Action(1), 8.0).unwrap();
+        for (name, mut learner) in learners(&begun, &Schedule::constant(1.0).unwrap(), 0.5) {
+            let mut table = begun.clone();
             let next_action = (status == Status::Truncated).then_some(Action(1));
             let step = answer(1, 1.0, status);
             let experience = Experience {
@@ -255,9 +258,9 @@ fn no_learner_lets_a_fault_into_the_table() {
         (0, 2, answer(1, 0.0, Status::Continuing)),
     ];
     for (state, action, step) in faults {
-        for (name, mut learner) in learners(&Schedule::constant(0.5).unwrap(), 0.9) {
-            let mut table = QTable::new(2, 2).unwrap();
-            let untouched = table.clone();
+        let untouched = QTable::new(2, 2).unwrap();
+        for (name, mut learner) in learners(&untouched, &Schedule::constant(0.5).unwrap(), 0.9) {
+            let mut table = untouched.clone();
             let (state, action) = (State(state), Action(action));
             let experience = Experience {
                 state,
@@ -285,8 +288,9 @@ fn no_learner_lets_a_fault_into_the_table() {
 
 #[test]
 fn values_that_overflow_are_refused() {
-    for (name, mut learner) in learners(&Schedule::constant(1.0).unwrap(), 1.0) {
-        let mut table = QTable::new(1, 1).unwrap();
+    let begun = QTable::new(1, 1).unwrap();
+    for (name, mut learner) in learners(&begun, &Schedule::constant(1.0).unwrap(), 1.0) {
+        let mut table = begun.clone();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
         let mut refused = false;
         for _ in 0..40 {
@@ -344,7 +348,7 @@ fn settings_out_of_range_are_refused() {
         QLearning::new(above.clone(), 0.9),
         Err(Error::ScheduleRange { .. })
     ));
-    let alpha = Schedule::constant(0.5).unwrap();
+    let (alpha, table) = (Schedule::constant(0.5).unwrap(), QTable::new(2, 2).unwrap());
     assert!(matches!(
         Sarsa::new(alpha.clone(), 1.1),
         Err(Error::Setting { name: "gamma", .. })
@@ -367,13 +371,13 @@ fn settings_out_of_range_are_refused() {
     );
     assert!(NStepQ::new(alpha, 0.9).unwrap().with_steps(0).is_err());
     assert!(
-        PrioritizedSweeping::new(0.9)
+        PrioritizedSweeping::new(&table, 0.9)
             .unwrap()
             .with_backups(0)
             .is_err()
     );
     assert!(
-        PrioritizedSweeping::new(0.9)
+        PrioritizedSweeping::new(&table, 0.9)
             .unwrap()
             .with_threshold(0.0)
             .is_err()

@@ -1,5 +1,4 @@
 //! The toy problems: Gymnasium's dynamics and the optima that are known of them.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
 use std::collections::BTreeSet;
 use std::fmt::Write;

@@ -1,14 +1,12 @@
 //! Environments: masks, limits, lent and boxed ones, and the check of their contract.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
 
-mod odd;
-
-use odd::{odd, rng, step, trained};
 use qtable::{
-    Action, ActionMask, Environment, EnvironmentFault, Error, QTable, Schedule, State, Status,
-    Step, TimeLimit, TrainConfig, check_env, toys, train,
+    Action, ActionMask, Environment, Error, QTable, State, Status, Step, TimeLimit, Until,
+    check_env, toys,
 };
 use rand::Rng;
+
+use crate::support::{Settings, constant, odd, rng, step};
 
 #[test]
 fn a_mask_keeps_its_actions_out_of_everything() {
@@ -21,31 +19,28 @@ fn a_mask_keeps_its_actions_out_of_everything() {
         fn actions(&self) -> usize {
             3
         }
-        fn reset(&mut self, _rng: &mut dyn Rng) -> State {
-            State(0)
+        fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
+            Ok(State(0))
         }
-        fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
+        fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
             assert_ne!(action, Action(1), "a forbidden action was taken");
-            step(1, action.0 as f64, Status::Terminated)
+            Ok(step(1, action.0 as f64, Status::Terminated))
         }
         fn allows(&self, state: State, action: Action) -> bool {
             state == State(1) || action != Action(1)
         }
     }
     let mut environment = Masked;
-    let mut table = QTable::filled(2, 3, 50.0f64).unwrap();
-    let config = TrainConfig {
-        alpha: Schedule::constant(0.5).unwrap(),
-        ..TrainConfig::paper(500)
+    let table = QTable::filled(2, 3, 50.0).unwrap();
+    let settings = Settings {
+        alpha: constant(0.5),
+        ..Settings::new(500)
     };
-    train(
-        &mut environment,
-        &mut table,
-        &config,
-        &mut rng(5),
-        &mut |_| {},
-    )
-    .unwrap();
+    let mut training = settings.begin(&environment, table).unwrap();
+    training
+        .run(&mut environment, Until::Actions(500), &mut rng(5))
+        .unwrap();
+    let mut table = training.into_parts().0;
     assert_eq!(table.best(State(0)), Action(2));
     assert_eq!(table.visits(State(0), Action(1)), 0);
     assert!((table.value(State(0), Action(1)) - 50.0).abs() < 1e-12 && table.max(State(0)) < 50.0);
@@ -72,7 +67,7 @@ fn check_env_tells_what_is_wrong() {
         "{report:?}"
     );
     let endless = check_env(&mut odd(|_| step(0, 0.0, Status::Continuing)), 500, 1).unwrap_err();
-    assert_eq!(endless, EnvironmentFault::Endless { steps: 500 });
+    assert_eq!(endless, Error::Endless { steps: 500 });
     // What it answers depends on all the steps it ever took.
     let forgetful = odd(|n| {
         step(
@@ -87,7 +82,7 @@ fn check_env_tells_what_is_wrong() {
     });
     let fault = check_env(&mut { forgetful }, 500, 1).unwrap_err();
     assert!(
-        matches!(fault, EnvironmentFault::NotReproducible { .. }),
+        matches!(fault, Error::NotReproducible { .. }),
         "{fault}"
     );
 }
@@ -105,12 +100,12 @@ impl Environment for Shifting {
     fn actions(&self) -> usize {
         2
     }
-    fn reset(&mut self, _rng: &mut dyn Rng) -> State {
-        State(0)
+    fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
+        Ok(State(0))
     }
-    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Step {
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
         self.steps += 1;
-        step(1, 0.0, Status::Terminated)
+        Ok(step(1, 0.0, Status::Terminated))
     }
     fn allows(&self, _state: State, action: Action) -> bool {
         self.grows || self.steps <= 40 || action == Action(0)
@@ -123,7 +118,7 @@ fn check_env_tells_what_has_changed() {
         let still = check_env(&mut Shifting { steps: 0, grows }, 20, 1);
         assert!(still.is_ok(), "{still:?}");
         let fault = check_env(&mut Shifting { steps: 0, grows }, 100, 1).unwrap_err();
-        let EnvironmentFault::Changed { what: found, .. } = fault else {
+        let Error::EnvironmentChanged { what: found, .. } = fault else {
             panic!("{fault}");
         };
         assert_eq!(found, what);
@@ -133,11 +128,11 @@ fn check_env_tells_what_has_changed() {
 #[test]
 fn a_lent_or_boxed_environment_is_the_same_environment() {
     let play = |environment: &mut dyn Environment| {
-        let config = TrainConfig {
+        let settings = Settings {
             episode_limit: 9,
-            ..TrainConfig::paper(2_000)
+            ..Settings::new(2_000)
         };
-        trained(environment, &config).unwrap().to_csv()
+        settings.run(environment).unwrap().into_parts().0.to_csv()
     };
     let mut chain = toys::chain(6).unwrap();
     let wanted = play(&mut chain.clone());
@@ -162,9 +157,9 @@ fn a_time_limit_truncates() {
     let mut limited = TimeLimit::new(toys::chain(9).unwrap(), 3).unwrap();
     let mut rng = rng(0);
     for _ in 0..2 {
-        limited.reset(&mut rng);
+        limited.reset(&mut rng).unwrap();
         let ends: Vec<Status> = (0..3)
-            .map(|_| limited.step(Action(0), &mut rng).status)
+            .map(|_| limited.step(Action(0), &mut rng).unwrap().status)
             .collect();
         assert_eq!(
             ends,
@@ -175,4 +170,42 @@ fn a_time_limit_truncates() {
         TimeLimit::new(toys::chain(9).unwrap(), 0),
         Err(Error::Setting { .. })
     ));
+}
+
+/// An environment that fails after some steps.
+struct Failing(u32);
+
+impl Environment for Failing {
+    fn states(&self) -> usize {
+        1
+    }
+    fn actions(&self) -> usize {
+        1
+    }
+    fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
+        Ok(State(0))
+    }
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
+        self.0 += 1;
+        match self.0 {
+            4 => Err(Error::environment("the serial line is gone")),
+            _ => Ok(step(0, 1.0, Status::Continuing)),
+        }
+    }
+}
+
+#[test]
+fn a_failing_environment_ends_the_episode_and_not_the_run() {
+    let mut failing = Failing(0);
+    let settings = Settings::new(100);
+    let mut training = settings.begin(&failing, QTable::new(1, 1).unwrap()).unwrap();
+    let failed = training.run(&mut failing, Until::Actions(10), &mut rng(0));
+    let text = failed.unwrap_err().to_string();
+    assert_eq!(text, "the environment failed: the serial line is gone");
+    assert_eq!((training.actions(), training.is_in_episode()), (3, false));
+    assert!(training.table().max(State(0)) > 0.0);
+    training
+        .run(&mut failing, Until::Actions(10), &mut rng(0))
+        .unwrap();
+    assert_eq!(training.actions(), 10);
 }

@@ -1,22 +1,16 @@
 //! The fast form of Boltzmann exploration against the plain one.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on should fail")]
+
+use std::ops::ControlFlow;
 
 use qtable::{
-    Action, ActionMask, Boltzmann, CachedBoltzmann, Environment, Error, Policy, QLearning, QTable,
-    Schedule, State, Status, Step, TrainConfig, over_seeds, toys, train, train_in_blocks,
+    Action, ActionMask, Boltzmann, CachedBoltzmann, Error, Policy, QLearning, QTable, Schedule,
+    State, Status, Step, Training, Until, over_seeds, toys,
 };
-use rand::rngs::Xoshiro256PlusPlus;
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt};
 
-fn rng(seed: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(seed)
-}
+use crate::support::{Settings, constant, odd, rng, step};
 
-fn constant(value: f64) -> Schedule {
-    Schedule::constant(value).unwrap()
-}
-
-fn plain_probabilities(table: &QTable<f32>, temperature: f64, state: State) -> Vec<f64> {
+fn plain_probabilities(table: &QTable, temperature: f64, state: State) -> Vec<f64> {
     let mut p = vec![0.0; table.actions()];
     Boltzmann::new(constant(temperature))
         .unwrap()
@@ -42,7 +36,7 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
         (1000, 10.0, 100.0),
     ] {
         let mut rng = rng(actions as u64);
-        let mut table = QTable::<f32>::filled(3, actions, 0.0).unwrap();
+        let mut table = QTable::filled(3, actions, 0.0).unwrap();
         let mask = ActionMask::new(3, actions, |s, a| s != State(1) || a.0 % 3 == 0).unwrap();
         table.set_mask(Some(mask)).unwrap();
         let mut cached = CachedBoltzmann::new(&table, temperature).unwrap();
@@ -60,6 +54,9 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
             let here = learner.update(&mut table, state, action, &step).unwrap();
             let there = cached.update(state, action, &step, 0.5, 0.9).unwrap();
             assert_eq!(here.to_bits(), there.to_bits());
+            // What the cached table stores is rounded to `f32`.
+            let rounded = f64::from(table.value(state, action) as f32);
+            table.set(state, action, rounded).unwrap();
             assert_eq!(cached.best(state), table.best(state));
         }
         for state in (0..3).map(State) {
@@ -94,7 +91,7 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
 fn choices_have_the_distribution_of_the_plain_softmax() {
     for (seed, temperature) in [(1, 0.3), (2, 1.0), (3, 5.0), (4, 1000.0)] {
         let mut rng = rng(seed);
-        let mut table = QTable::<f32>::filled(2, 81, 0.0).unwrap();
+        let mut table = QTable::filled(2, 81, 0.0).unwrap();
         let mut cached = CachedBoltzmann::new(&table, temperature).unwrap();
         // Learned values, not fresh ones: through as many updates as an entry sees.
         let mut learner = QLearning::new(constant(0.3), 0.5).unwrap();
@@ -149,53 +146,30 @@ fn choices_have_the_distribution_of_the_plain_softmax() {
 
 /// The same learning, by result: mean return of the last tenth of the run over seeds.
 #[test]
-fn training_in_blocks_learns_what_plain_training_learns() {
+fn runs_in_blocks_learn_what_plain_runs_learn() {
     let toy = toys::cliff_walking().unwrap();
-    let config = TrainConfig {
+    let settings = Settings {
         gamma: 0.99,
         alpha: Schedule::exponential(0.6, 0.05, 60_000).unwrap(),
         temperature: Schedule::exponential(50.0, 0.05, 60_000).unwrap(),
         episode_limit: 200,
         record_every: 6_000,
-        ..TrainConfig::paper(60_000)
+        ..Settings::new(60_000)
     };
     let outcomes = over_seeds(0..8, |seed| {
-        let mut plain = QTable::<f32>::filled(48, 4, 0.0)?;
-        let mut fast = plain.clone();
-        let told = train(
-            &mut toy.clone(),
-            &mut plain,
-            &config,
-            &mut rng(seed),
-            &mut |_| {},
-        )?;
-        let in_blocks = train_in_blocks(
-            &mut toy.clone(),
-            &mut fast,
-            &config,
-            500,
-            &mut rng(seed + 100),
-            &mut |_| {},
-        )?;
-        assert_eq!(
-            (told.actions, in_blocks.actions, in_blocks.curve.len()),
-            (60_000, 60_000, 10)
-        );
-        let visits: u32 = (0..48)
-            .flat_map(|s| fast.visit_row(State(s)).to_vec())
-            .sum();
-        assert_eq!(visits, 60_000);
-        let middle = |report: &qtable::TrainReport| report.curve[4].mean_return.unwrap();
-        let steps = |table: &QTable<f32>| {
-            toy.assess(&table.greedy(), 0.99, 200)
-                .map(|found| found.steps)
+        let begin = || settings.begin(&toy, QTable::new(48, 4)?);
+        let (mut plain, mut fast, all) = (begin()?, begin()?, Until::Actions(60_000));
+        plain.run(&mut toy.clone(), all, &mut rng(seed))?;
+        in_blocks(&mut fast, &mut toy.clone(), 60_000, 50, &mut rng(seed + 100))?;
+        assert_eq!((fast.actions(), fast.curve().len()), (60_000, 10));
+        let visits = (0..48).flat_map(|s| fast.table().visit_row(State(s)).to_vec());
+        assert_eq!(visits.sum::<u32>(), 60_000);
+        let middle = |run: &Run| run.curve()[4].mean_return.unwrap();
+        let steps = |run: &Run| {
+            let found = toy.assess(&run.table().greedy(), 0.99, 200);
+            found.map(|found| found.steps)
         };
-        Ok::<_, Error>((
-            middle(&told),
-            middle(&in_blocks),
-            steps(&plain)?,
-            steps(&fast)?,
-        ))
+        Ok::<_, Error>((middle(&plain), middle(&fast), steps(&plain)?, steps(&fast)?))
     })
     .unwrap();
     let mean = |of: fn(&(f64, f64, f64, f64)) -> f64| outcomes.iter().map(of).sum::<f64>() / 8.0;
@@ -204,66 +178,131 @@ fn training_in_blocks_learns_what_plain_training_learns() {
         (plain - fast).abs() < 0.15 * plain.abs(),
         "half-way returns {plain} and {fast}"
     );
+    let steps = (mean(|o| o.2), mean(|o| o.3));
     assert!(
-        (mean(|o| o.2) - 13.0).abs() < 1e-9 && (mean(|o| o.3) - 13.0).abs() < 1e-9,
+        (steps.0 - 13.0).abs() < 1e-9 && (steps.1 - 13.0).abs() < 1e-9,
         "{outcomes:?}"
     );
 }
 
+type Run = Training<QLearning, Boltzmann>;
+
+fn in_blocks(
+    run: &mut Run,
+    environment: &mut dyn qtable::Environment,
+    actions: u64,
+    blocks: u64,
+    rng: &mut dyn Rng,
+) -> Result<(), Error> {
+    run.run_in_blocks(environment, Until::Actions(actions), blocks, rng, |_, _| {
+        ControlFlow::Continue(())
+    })
+    .map(|_| ())
+}
+
+#[test]
+fn more_blocks_than_actions_are_one_an_action() {
+    let run = |blocks| {
+        let mut chain = toys::chain(6).unwrap();
+        let settings = Settings::new(300);
+        let mut run = settings.begin(&chain, QTable::new(6, 2).unwrap()).unwrap();
+        in_blocks(&mut run, &mut chain, 300, blocks, &mut rng(4)).unwrap();
+        run.into_parts().0
+    };
+    assert_eq!(run(u64::MAX), run(3));
+}
+
+#[test]
+fn records_of_a_run_in_blocks_see_the_table_and_can_stop_it() {
+    let mut chain = toys::chain(6).unwrap();
+    let settings = Settings {
+        record_every: 100,
+        ..Settings::new(1_000)
+    };
+    let mut run = settings.begin(&chain, QTable::new(6, 2).unwrap()).unwrap();
+    let stopped = run.run_in_blocks(&mut chain, Until::Actions(1_000), 7, &mut rng(4), |record, run| {
+        let visits = (0..6).flat_map(|s| run.table().visit_row(State(s)).to_vec());
+        assert_eq!(u64::from(visits.sum::<u32>()), record.actions);
+        match record.actions {
+            300 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    });
+    assert_eq!((stopped, run.actions(), run.take_curve().len()), (Ok(true), 300, 3));
+    assert!(run.curve().is_empty());
+}
+
+#[test]
+fn plateaus_at_the_ends_of_a_range_are_trained_on() {
+    for level in [1e-6, 1e6] {
+        for temperature in [
+            Schedule::linear(level, level, 1_000),
+            Schedule::exponential(level, level, 1_000),
+            Schedule::piecewise(&[(0, level), (999, level)]),
+        ] {
+            let settings = Settings {
+                temperature: temperature.unwrap(),
+                alpha: Schedule::linear(1.0, 1.0, 997).unwrap(),
+                ..Settings::new(1_000)
+            };
+            let mut chain = toys::chain(6).unwrap();
+            let mut run = settings.begin(&chain, QTable::new(6, 2).unwrap()).unwrap();
+            in_blocks(&mut run, &mut chain, 1_000, 10, &mut rng(4)).unwrap();
+            assert!(settings.run(&mut chain).is_ok());
+        }
+    }
+}
+
 #[test]
 fn faults_are_refused_and_what_was_learned_stays() {
-    let mut table = QTable::<f32>::filled(2, 3, 0.0).unwrap();
+    let mut table = QTable::filled(2, 3, 0.0).unwrap();
     table
         .set_mask(Some(
             ActionMask::new(2, 3, |_, action| action != Action(1)).unwrap(),
         ))
         .unwrap();
     let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();
-    let step = |observation, reward| Step {
-        observation: State(observation),
-        reward,
-        status: Status::Continuing,
-    };
+    let step_to = |observation, reward| step(observation, reward, Status::Continuing);
     let mut update =
         |state, action, step: &Step| cached.update(State(state), Action(action), step, 1.0, 1.0);
     assert!(matches!(
-        update(2, 0, &step(0, 0.0)),
+        update(2, 0, &step_to(0, 0.0)),
         Err(Error::StateOutOfRange {
             state: State(2),
             ..
         })
     ));
     assert!(matches!(
-        update(0, 0, &step(7, 0.0)),
+        update(0, 0, &step_to(7, 0.0)),
         Err(Error::StateOutOfRange {
             state: State(7),
             ..
         })
     ));
     assert!(matches!(
-        update(0, 3, &step(0, 0.0)),
+        update(0, 3, &step_to(0, 0.0)),
         Err(Error::ActionOutOfRange { .. })
     ));
     assert!(matches!(
-        update(0, 1, &step(0, 0.0)),
+        update(0, 1, &step_to(0, 0.0)),
         Err(Error::ActionNotAllowed { .. })
     ));
     assert!(matches!(
-        update(0, 0, &step(0, f64::NAN)),
+        update(0, 0, &step_to(0, f64::NAN)),
         Err(Error::RewardNotFinite { .. })
     ));
     assert!(matches!(
-        update(0, 0, &step(0, 1e39)),
+        update(0, 0, &step_to(0, 1e39)),
         Err(Error::ValueNotFinite { .. })
     ));
     // Not even where the learning rate lets nothing in.
     let mut update = |action, step: &Step| cached.update(State(0), Action(action), step, 0.0, 1.0);
     assert!(matches!(
-        update(1, &step(0, 0.0)),
+        update(1, &step_to(0, 0.0)),
         Err(Error::ActionNotAllowed { .. })
     ));
     assert!(matches!(
-        update(0, &step(0, f64::INFINITY)),
+        update(0, &step_to(0, f64::INFINITY)),
         Err(Error::RewardNotFinite { .. })
     ));
     let mut same = table.clone();
@@ -274,72 +313,37 @@ fn faults_are_refused_and_what_was_learned_stays() {
         assert!(cached.set_temperature(temperature).is_err());
     }
     assert!(cached.write_to(&mut QTable::new(3, 3).unwrap()).is_err());
-    let huge = QTable::filled(1, 1, 1e300f64).unwrap();
+    let huge = QTable::filled(1, 1, 1e300).unwrap();
     assert!(matches!(
         CachedBoltzmann::new(&huge, 1.0),
         Err(Error::ValueNotFinite { .. })
     ));
 
-    /// Pays well twice, then breaks.
-    struct Breaks(u32);
-    impl Environment for Breaks {
-        fn states(&self) -> usize {
-            1
-        }
-        fn actions(&self) -> usize {
-            1
-        }
-        fn reset(&mut self, _rng: &mut dyn rand::Rng) -> State {
-            State(0)
-        }
-        fn step(&mut self, _action: Action, _rng: &mut dyn rand::Rng) -> Step {
-            self.0 += 1;
-            let reward = if self.0 > 2 { f64::INFINITY } else { 8.0 };
-            Step {
-                observation: State(0),
-                reward,
-                status: Status::Terminated,
-            }
-        }
-    }
-    let mut table = QTable::new(1, 1).unwrap();
-    let config = TrainConfig {
+    // Pays well twice, then breaks.
+    let mut breaks = odd(|n| step(0, if n > 2 { f64::INFINITY } else { 8.0 }, Status::Terminated));
+    let settings = Settings {
         alpha: constant(0.5),
-        ..TrainConfig::paper(10)
+        temperature: constant(1e-6),
+        ..Settings::new(10)
     };
-    let outcome = train_in_blocks(
-        &mut Breaks(0),
-        &mut table,
-        &config,
-        5,
-        &mut rng(0),
-        &mut |_| {},
-    );
+    let mut table = QTable::new(3, 2).unwrap();
+    table.set(State(0), Action(0), 1e-3).unwrap();
+    let mut run = settings.begin(&breaks, table).unwrap();
+    let outcome = in_blocks(&mut run, &mut breaks, 10, 1, &mut rng(0));
     assert!(matches!(outcome, Err(Error::RewardNotFinite { .. })));
-    assert!((table.max(State(0)) - 6.0).abs() < 1e-6 && table.visits(State(0), Action(0)) == 2);
-    assert!(
-        train_in_blocks(
-            &mut Breaks(0),
-            &mut table,
-            &config,
-            0,
-            &mut rng(0),
-            &mut |_| {}
-        )
-        .is_err()
-    );
+    assert!((run.table().max(State(0)) - 6.0).abs() < 1e-3);
+    assert_eq!(run.table().visits(State(0), Action(0)), 2);
+    let none = in_blocks(&mut run, &mut breaks, 10, 0, &mut rng(0));
+    assert!(matches!(none, Err(Error::Setting { name: "blocks", .. })));
 }
 
 #[test]
 fn an_action_out_of_range_is_no_padding() {
     let cached = CachedBoltzmann::new(&QTable::new(2, 5).unwrap(), 1.0).unwrap();
-    assert!(
-        cached.value(State(1), Action(4)).abs() < 1e-30 && cached.visits(State(1), Action(4)) == 0
-    );
+    assert!(cached.value(State(1), Action(4)).abs() < 1e-30);
     for action in [5, 15, 16] {
         let action = Action(action);
         assert!(std::panic::catch_unwind(|| cached.value(State(0), action)).is_err());
-        assert!(std::panic::catch_unwind(|| cached.visits(State(0), action)).is_err());
     }
 }
 

@@ -1,0 +1,97 @@
+//! An environment that answers as a test wants, and runs with settings of one's own.
+
+use qtable::{
+    Action, Boltzmann, Environment, Error, QLearning, QTable, Schedule, State, Status, Step,
+    Training, Until,
+};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
+
+pub(crate) fn rng(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+pub(crate) fn constant(value: f64) -> Schedule {
+    Schedule::constant(value).unwrap()
+}
+
+/// An environment of three states and two actions whose n-th answer is given.
+pub(crate) struct Odd<F: FnMut(u64) -> Step> {
+    steps: u64,
+    answer: F,
+}
+
+impl<F: FnMut(u64) -> Step> Environment for Odd<F> {
+    fn states(&self) -> usize {
+        3
+    }
+    fn actions(&self) -> usize {
+        2
+    }
+    fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
+        Ok(State(0))
+    }
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
+        self.steps += 1;
+        Ok((self.answer)(self.steps))
+    }
+}
+
+pub(crate) fn odd(answer: impl FnMut(u64) -> Step) -> Odd<impl FnMut(u64) -> Step> {
+    Odd { steps: 0, answer }
+}
+
+pub(crate) fn step(observation: usize, reward: f64, status: Status) -> Step {
+    Step {
+        observation: State(observation),
+        reward,
+        status,
+    }
+}
+
+/// Settings of Q-learning with a Boltzmann policy.
+#[derive(Clone)]
+pub(crate) struct Settings {
+    pub(crate) gamma: f64,
+    pub(crate) alpha: Schedule,
+    pub(crate) temperature: Schedule,
+    pub(crate) actions: u64,
+    pub(crate) episode_limit: u64,
+    pub(crate) record_every: u64,
+}
+
+impl Settings {
+    pub(crate) fn new(actions: u64) -> Self {
+        Self {
+            gamma: 0.9,
+            alpha: Schedule::exponential(0.6, 0.02, actions).unwrap(),
+            temperature: Schedule::exponential(1000.0, 0.1, actions).unwrap(),
+            actions,
+            episode_limit: 60,
+            record_every: actions.div_ceil(100),
+        }
+    }
+
+    pub(crate) fn begin<E: Environment + ?Sized>(
+        &self,
+        environment: &E,
+        table: QTable,
+    ) -> Result<Training<QLearning, Boltzmann>, Error> {
+        let learner = QLearning::new(self.alpha.clone(), self.gamma)?;
+        let policy = Boltzmann::new(self.temperature.clone())?;
+        Training::new(environment, table, learner, policy)?
+            .with_episode_limit(self.episode_limit)?
+            .with_record_every(self.record_every)
+    }
+
+    /// The run after all its actions, from a table of zeros.
+    pub(crate) fn run(
+        &self,
+        environment: &mut dyn Environment,
+    ) -> Result<Training<QLearning, Boltzmann>, Error> {
+        let table = QTable::new(environment.states(), environment.actions())?;
+        let mut training = self.begin(environment, table)?;
+        training.run(environment, Until::Actions(self.actions), &mut rng(0))?;
+        Ok(training)
+    }
+}
