@@ -130,7 +130,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         );
         let mut floored = literal.approaching.clone();
         floored.reward.floor = 1.0;
-        let quiet = &mut |_: &qtable::Record| ();
+        let quiet = &mut |_: &Record| ();
         let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
         let centering = rigid.learn(mended.centering, &anywhere, 60_000, &mut rng, quiet)?;
         let found = search_percepts(1_000, seed.wrapping_add(1_000_000));

@@ -7,7 +7,7 @@
 use example_support::plane::ExactPlane;
 use grasp_agent::{BehaviourPair, BehaviourSpec, Percept, Reward};
 use hough_heuristic::Features;
-use qtable::{Action, Model, ModelEstimate, Outcome, State, Status, Step};
+use qtable::{Action, Model, ModelEnvironment, ModelEstimate, Outcome, State, Status, Step};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
@@ -58,9 +58,8 @@ fn best_centering(reward: &Reward) -> (f64, f64) {
         .iter()
         .map(|state| (*state, 1.0 / outside.len() as f64))
         .collect();
-    let arrived = |step: &Step| step.status == Status::Terminated && step.reward > 0.0;
-    let assessed = model
-        .assess(&plan.table.greedy(), &start, GAMMA, 60, arrived)
+    let assessed = ModelEnvironment::new(model, &start)
+        .and_then(|environment| environment.assess(&plan.table.greedy(), GAMMA, 60))
         .expect("a policy of the model");
     let most = outside
         .iter()
@@ -142,9 +141,8 @@ fn best_approaching(reward: &Reward) -> (f64, f64, usize) {
     let start: Vec<(State, f64)> = (0..spec.states())
         .map(|s| (State(s), 1.0 / starts))
         .collect();
-    let arrived = |step: &Step| step.status == Status::Terminated && step.reward > 0.0;
-    let assessed = model
-        .assess(&plan.table.greedy(), &start, GAMMA, 60, arrived)
+    let assessed = ModelEnvironment::new(model, &start)
+        .and_then(|environment| environment.assess(&plan.table.greedy(), GAMMA, 60))
         .expect("a policy of the model");
     let mean = (0..spec.states())
         .map(|s| plan.table.max(State(s)))

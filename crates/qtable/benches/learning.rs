@@ -14,7 +14,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use qtable::{
     Action, Boltzmann, CachedBoltzmann, EpsilonGreedy, Policy, QLearning, QTable, Schedule, State,
-    Status, Step, Value, toys,
+    Status, Step, toys,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -38,8 +38,8 @@ fn constant(value: f64) -> Schedule {
     Schedule::constant(value).unwrap()
 }
 
-fn follow<V: Value>(c: &mut Criterion, name: &str, mut policy: impl Policy<V>) {
-    let mut table = QTable::<V>::filled(STATES, ACTIONS, V::from_f64(0.0)).unwrap();
+fn follow(c: &mut Criterion, name: &str, mut policy: impl Policy) {
+    let mut table = QTable::new(STATES, ACTIONS).unwrap();
     let mut learner = QLearning::new(constant(0.1), 0.9).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut state = State(0);
@@ -59,23 +59,18 @@ fn follow<V: Value>(c: &mut Criterion, name: &str, mut policy: impl Policy<V>) {
 }
 
 fn updates(c: &mut Criterion) {
-    follow::<f32>(
-        c,
-        "epsilon-greedy f32",
-        EpsilonGreedy::new(constant(0.1)).unwrap(),
-    );
-    follow::<f64>(
+    follow(
         c,
         "epsilon-greedy f64",
         EpsilonGreedy::new(constant(0.1)).unwrap(),
     );
-    follow::<f64>(
+    follow(
         c,
         "Boltzmann plain f64",
         Boltzmann::new(constant(1.0)).unwrap(),
     );
 
-    let table = QTable::<f32>::filled(STATES, ACTIONS, 0.0).unwrap();
+    let table = QTable::new(STATES, ACTIONS).unwrap();
     let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut state = State(0);
@@ -95,14 +90,14 @@ fn updates(c: &mut Criterion) {
 }
 
 fn rebuilding(c: &mut Criterion) {
-    let table = QTable::<f32>::filled(STATES, ACTIONS, 0.0).unwrap();
+    let table = QTable::new(STATES, ACTIONS).unwrap();
     let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();
     c.bench_function("change of the temperature, 90x81", |b| {
         b.iter(|| cached.set_temperature(black_box(1.5)).unwrap());
     });
 }
 
-#[cfg(feature = "serde")]
+#[cfg(feature = "files")]
 fn files(c: &mut Criterion) {
     let mut table = QTable::new(540, ACTIONS).unwrap();
     for state in 0..540 {
@@ -132,7 +127,7 @@ fn files(c: &mut Criterion) {
     });
 }
 
-#[cfg(not(feature = "serde"))]
+#[cfg(not(feature = "files"))]
 fn files(_c: &mut Criterion) {}
 
 fn planning(c: &mut Criterion) {

@@ -358,54 +358,41 @@ mod tests {
             assert_eq!(linear.at(step).to_bits(), f64::to_bits(wanted));
         }
         let exponential = Schedule::exponential(1000.0, 0.1, 4).unwrap();
-        for (step, wanted) in [
-            (0, 1000.0),
-            (1, 100.0),
-            (2, 10.0),
-            (3, 1.0),
-            (4, 0.1),
-            (5, 0.1),
-        ] {
+        let wanted = [1000.0, 100.0, 10.0, 1.0, 0.1, 0.1];
+        for (step, wanted) in (0..).zip(wanted) {
             assert!((exponential.at(step) / wanted - 1.0).abs() < 1e-14);
         }
-        assert!((Schedule::paper_alpha(100).at(0) - 0.6).abs() < 1e-15);
-        assert!((Schedule::paper_temperature(0).at(0) - 1000.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn inverse_visits_run_by_visits_and_piecewise_through_its_points() {
-        let mean = Schedule::inverse_visits(1.0, 1.0).unwrap();
-        assert!((mean.at_visit(1_000, 3) - 0.25).abs() < 1e-15);
-        assert_eq!(mean.range(), (0.0, 1.0));
         let piecewise = Schedule::piecewise(&[(10, 1.0), (20, 3.0), (21, -1.0)]).unwrap();
-        for (step, wanted) in [
+        let wanted = [
             (0, 1.0),
             (10, 1.0),
             (15, 2.0),
             (20, 3.0),
             (21, -1.0),
             (99, -1.0),
-        ] {
-            assert!(
-                (piecewise.at_visit(step, 7) - wanted).abs() < 1e-15,
-                "{step}"
-            );
+        ];
+        for (step, wanted) in wanted {
+            assert!((piecewise.at(step) - wanted).abs() < 1e-15, "{step}");
         }
         assert_eq!(piecewise.range(), (-1.0, 3.0));
-        assert_eq!(Schedule::piecewise(&[]), Err(ScheduleError::NoPoints));
-        let twice = Schedule::piecewise(&[(3, 0.0), (3, 1.0)]);
-        assert_eq!(
-            twice,
-            Err(ScheduleError::PointsNotAscending { index: 1, step: 3 })
-        );
-        assert!(matches!(
-            Schedule::inverse_visits(1.0, 0.0),
-            Err(ScheduleError::Scale { .. })
-        ));
     }
 
     #[test]
-    fn rounding_never_leads_out_of_the_range() {
+    fn each_schedule_counts_its_own_time() {
+        let mut clock = Clock::default();
+        clock.begin_episode();
+        clock.begin_episode();
+        (0..7).for_each(|_| clock.tick());
+        let mean = Schedule::inverse_visits(1.0, 1.0).unwrap();
+        assert!((mean.now(&clock, 3) - 0.25).abs() < 1e-15);
+        assert_eq!(mean.range(), (0.0, 1.0));
+        let linear = Schedule::linear(0.0, 10.0, 10).unwrap();
+        assert!((linear.now(&clock, 3) - 7.0).abs() < 1e-15);
+        assert!((linear.by_episode().now(&clock, 3) - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rounding_and_functions_never_lead_out_of_the_range() {
         for level in [1e-6, 0.1, 0.6, 1.0 / 3.0, 1.0, 1e6] {
             for steps in [3, 10, 49, 1_000] {
                 let near = level * (1.0 + f64::EPSILON);
@@ -414,6 +401,8 @@ mod tests {
                         Schedule::linear(start, end, steps),
                         Schedule::exponential(start, end, steps),
                         Schedule::piecewise(&[(0, start), (steps, end)]),
+                        Schedule::custom((start, end), |step| f64::powi(-2.0, step as i32)),
+                        Schedule::custom((start, end), |_| f64::NAN),
                     ] {
                         let schedule = schedule.unwrap();
                         let (low, high) = schedule.range();
@@ -432,22 +421,23 @@ mod tests {
 
     #[test]
     fn impossible_schedules_are_refused() {
-        assert_eq!(Schedule::linear(1.0, 0.0, 0), Err(ScheduleError::NoSteps));
-        assert!(matches!(
+        let refused = [
             Schedule::constant(f64::NAN),
-            Err(ScheduleError::NotFinite { .. })
-        ));
-        assert!(matches!(
+            Schedule::linear(1.0, 0.0, 0),
             Schedule::linear(f64::INFINITY, 0.0, 3),
-            Err(ScheduleError::NotFinite { .. })
-        ));
-        assert!(matches!(
             Schedule::linear(0.0, f64::NAN, 3),
-            Err(ScheduleError::NotFinite { .. })
-        ));
-        assert!(matches!(
             Schedule::exponential(1.0, 0.0, 3),
-            Err(ScheduleError::NotPositive { .. })
-        ));
+            Schedule::inverse_visits(1.0, 0.0),
+            Schedule::piecewise(&[]),
+            Schedule::custom((0.0, f64::INFINITY), |_| 0.0),
+        ];
+        for schedule in refused {
+            assert!(
+                matches!(schedule, Err(Error::Setting { .. })),
+                "{schedule:?}"
+            );
+        }
+        let twice = Schedule::piecewise(&[(3, 0.0), (3, 1.0)]);
+        assert!(matches!(twice, Err(Error::NotAscending { index: 1, .. })));
     }
 }

@@ -160,7 +160,13 @@ fn runs_in_blocks_learn_what_plain_runs_learn() {
         let begin = || settings.begin(&toy, QTable::new(48, 4)?);
         let (mut plain, mut fast, all) = (begin()?, begin()?, Until::Actions(60_000));
         plain.run(&mut toy.clone(), all, &mut rng(seed))?;
-        in_blocks(&mut fast, &mut toy.clone(), 60_000, 50, &mut rng(seed + 100))?;
+        in_blocks(
+            &mut fast,
+            &mut toy.clone(),
+            60_000,
+            50,
+            &mut rng(seed + 100),
+        )?;
         assert_eq!((fast.actions(), fast.curve().len()), (60_000, 10));
         let visits = (0..48).flat_map(|s| fast.table().visit_row(State(s)).to_vec());
         assert_eq!(visits.sum::<u32>(), 60_000);
@@ -220,15 +226,24 @@ fn records_of_a_run_in_blocks_see_the_table_and_can_stop_it() {
         ..Settings::new(1_000)
     };
     let mut run = settings.begin(&chain, QTable::new(6, 2).unwrap()).unwrap();
-    let stopped = run.run_in_blocks(&mut chain, Until::Actions(1_000), 7, &mut rng(4), |record, run| {
-        let visits = (0..6).flat_map(|s| run.table().visit_row(State(s)).to_vec());
-        assert_eq!(u64::from(visits.sum::<u32>()), record.actions);
-        match record.actions {
-            300 => ControlFlow::Break(()),
-            _ => ControlFlow::Continue(()),
-        }
-    });
-    assert_eq!((stopped, run.actions(), run.take_curve().len()), (Ok(true), 300, 3));
+    let stopped = run.run_in_blocks(
+        &mut chain,
+        Until::Actions(1_000),
+        7,
+        &mut rng(4),
+        |record, run| {
+            let visits = (0..6).flat_map(|s| run.table().visit_row(State(s)).to_vec());
+            assert_eq!(u64::from(visits.sum::<u32>()), record.actions);
+            match record.actions {
+                300 => ControlFlow::Break(()),
+                _ => ControlFlow::Continue(()),
+            }
+        },
+    );
+    assert_eq!(
+        (stopped, run.actions(), run.take_curve().len()),
+        (Ok(true), 300, 3)
+    );
     assert!(run.curve().is_empty());
 }
 
@@ -320,7 +335,13 @@ fn faults_are_refused_and_what_was_learned_stays() {
     ));
 
     // Pays well twice, then breaks.
-    let mut breaks = odd(|n| step(0, if n > 2 { f64::INFINITY } else { 8.0 }, Status::Terminated));
+    let mut breaks = odd(|n| {
+        step(
+            0,
+            if n > 2 { f64::INFINITY } else { 8.0 },
+            Status::Terminated,
+        )
+    });
     let settings = Settings {
         alpha: constant(0.5),
         temperature: constant(1e-6),

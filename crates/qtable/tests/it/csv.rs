@@ -39,13 +39,17 @@ proptest! {
 
 #[test]
 fn other_programs_csv_is_read() {
-    let table = QTable::from_csv("state,action,value,visits,offered\n0,0,1,3,1\n0,1,2,0,1\n").unwrap();
+    let table =
+        QTable::from_csv("state,action,value,visits,offered\n0,0,1,3,1\n0,1,2,0,1\n").unwrap();
     // A byte-order mark, columns and lines in another order, counts as floats, Windows line ends,
     // spaces.
     let other = "\u{feff}action, state,visits,value\r\n1,0,0.0,2\r\n0,0,3.0,1.0\r\n";
     assert_eq!(QTable::from_csv(other).unwrap(), table);
     let bare = QTable::from_csv("state,action,value\n0,0,1\n0,1,2\n").unwrap();
-    assert_eq!((bare.row(State(0)), bare.visits(State(0), Action(0))), (&[1.0, 2.0][..], 0));
+    assert_eq!(
+        (bare.row(State(0)), bare.visits(State(0), Action(0))),
+        (&[1.0, 2.0][..], 0)
+    );
 }
 
 #[test]
@@ -62,12 +66,28 @@ fn damaged_csv_is_refused_with_its_line() {
     assert_eq!(line("0,0,1,0,2"), 2);
     assert_eq!(line("0,0,1,0,1,7"), 2);
     assert_eq!(line("99999999999999999999,0,1,0,1"), 2);
-    assert_eq!(line("0,0,1,0,1\n0,0,1,0,1"), 3);
-    for body in ["0,0,1,0,1\n0,2,1,0,1", "0,0,1,0,1\n0,1,1,0,1\n1,0,1,0,1", "1000000000000,0,1,0,1"] {
-        assert!(matches!(read(body), Err(Error::WrongLength { .. })), "{body}");
+    assert_eq!(line("0,0,1,0,1\n0,0,1,0,1\n1,0,1,0,1\n1,1,1,0,1"), 3);
+    for body in [
+        "0,0,1,0,1\n0,2,1,0,1",
+        "0,0,1,0,1\n0,1,1,0,1\n1,0,1,0,1",
+        "1000000000000,0,1,0,1",
+    ] {
+        assert!(
+            matches!(read(body), Err(Error::WrongLength { .. })),
+            "{body}"
+        );
     }
-    assert!(matches!(read("0,0,NaN,0,1"), Err(Error::ValueNotFinite { .. })));
-    assert!(matches!(read("0,0,1,0,0"), Err(Error::NoActionAllowed { .. })));
+    assert!(matches!(
+        read("0,0,NaN,0,1"),
+        Err(Error::ValueNotFinite { .. })
+    ));
+    assert!(matches!(
+        read("0,0,1,0,0"),
+        Err(Error::NoActionAllowed { .. })
+    ));
     assert!(matches!(read(""), Err(Error::EmptyShape { .. })));
-    assert!(matches!(QTable::from_csv("0,0,1,1,1\n0,1,1,1,1"), Err(Error::Csv { line: 2, .. })));
+    assert!(matches!(
+        QTable::from_csv("0,0,1,1,1\n0,1,1,1,1"),
+        Err(Error::Csv { line: 2, .. })
+    ));
 }

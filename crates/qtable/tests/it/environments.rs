@@ -81,10 +81,7 @@ fn check_env_tells_what_is_wrong() {
         )
     });
     let fault = check_env(&mut { forgetful }, 500, 1).unwrap_err();
-    assert!(
-        matches!(fault, Error::NotReproducible { .. }),
-        "{fault}"
-    );
+    assert!(matches!(fault, Error::NotReproducible { .. }), "{fault}");
 }
 
 /// An environment whose shape or mask is another one after some steps.
@@ -198,7 +195,9 @@ impl Environment for Failing {
 fn a_failing_environment_ends_the_episode_and_not_the_run() {
     let mut failing = Failing(0);
     let settings = Settings::new(100);
-    let mut training = settings.begin(&failing, QTable::new(1, 1).unwrap()).unwrap();
+    let mut training = settings
+        .begin(&failing, QTable::new(1, 1).unwrap())
+        .unwrap();
     let failed = training.run(&mut failing, Until::Actions(10), &mut rng(0));
     let text = failed.unwrap_err().to_string();
     assert_eq!(text, "the environment failed: the serial line is gone");

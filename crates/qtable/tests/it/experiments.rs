@@ -1,7 +1,7 @@
 //! Policies tried, models estimated, seeds compared.
 
 use qtable::{
-    Environment, EpsilonGreedy, Error, Estimate, Greedy, Policy, QTable, Status, evaluate,
+    Environment, EpsilonGreedy, Error, Estimate, Greedy, Policy, QTable, State, Status, evaluate,
     over_seeds, toys,
 };
 

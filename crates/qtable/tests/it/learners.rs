@@ -36,7 +36,10 @@ fn learners(table: &QTable, alpha: &Schedule, gamma: f64) -> Vec<(&'static str, 
             "n-step Q uncut",
             Box::new(NStepQ::new(alpha(), gamma).unwrap().uncut()),
         ),
-        ("Dyna-Q", Box::new(DynaQ::new(table, alpha(), gamma).unwrap())),
+        (
+            "Dyna-Q",
+            Box::new(DynaQ::new(table, alpha(), gamma).unwrap()),
+        ),
         (
             "prioritized sweeping",
             Box::new(PrioritizedSweeping::new(table, gamma).unwrap()),
@@ -74,7 +77,11 @@ fn every_learner_finds_the_optimal_values_of_the_chain() {
     let gamma = 0.9;
     let optimal = toy.model().value_iteration(gamma, 1e-13).unwrap().table;
     let actions = 30_000;
-    for (name, learner) in learners(&zeros(&toy), &Schedule::linear(0.5, 0.1, actions).unwrap(), gamma) {
+    for (name, learner) in learners(
+        &zeros(&toy),
+        &Schedule::linear(0.5, 0.1, actions).unwrap(),
+        gamma,
+    ) {
         let epsilon = Schedule::linear(1.0, 0.0, actions * 3 / 4).unwrap();
         let policy = Box::new(EpsilonGreedy::new(epsilon).unwrap());
         let table = learned(&toy, learner, policy, actions, 3);

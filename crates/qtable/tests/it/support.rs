@@ -95,3 +95,28 @@ impl Settings {
         Ok(training)
     }
 }
+
+/// The envelope of any payload, checksum included.
+#[cfg(feature = "files")]
+pub(crate) fn sealed(format: u32, kind: &str, types: &str, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = b"\x89QTBL\r\n\x1a".to_vec();
+    bytes.extend(format.to_le_bytes());
+    for name in [kind, types] {
+        bytes.extend((name.len() as u32).to_le_bytes());
+        bytes.extend(name.as_bytes());
+    }
+    bytes.extend(payload);
+    let checksum = crc32fast::hash(&bytes);
+    bytes.extend(checksum.to_le_bytes());
+    bytes
+}
+
+/// A value read from the bytes of other values of the same layout.
+#[cfg(feature = "files")]
+pub(crate) fn forged<T: serde::de::DeserializeOwned>(
+    types: &str,
+    parts: impl serde::Serialize,
+) -> Result<T, qtable::FileError> {
+    let payload = bincode::serde::encode_to_vec(parts, bincode::config::standard()).unwrap();
+    qtable::decode("forged", &sealed(2, "forged", types, &payload))
+}

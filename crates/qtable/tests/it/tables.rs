@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use qtable::{
-    Action, ActionMask, Boltzmann, EpsilonGreedy, Error, Greedy,
-    Intervals, Policy, Product, QTable, Schedule, State, Ties, Ucb,
+    Action, ActionMask, Boltzmann, EpsilonGreedy, Error, Greedy, Intervals, Policy, Product,
+    QTable, State, Ties, Ucb,
 };
 
 use crate::support::{constant, rng};
@@ -147,18 +147,35 @@ fn impossible_discretisations_are_refused() {
     let not_ascending = Intervals::new(&[1.0, 1.0]);
     assert!(matches!(
         not_ascending,
-        Err(Error::NotAscending { what: "edge", index: 1, .. })
+        Err(Error::NotAscending {
+            what: "edge",
+            index: 1,
+            ..
+        })
     ));
     for edge in [f64::NAN, f64::INFINITY] {
         let refused = Intervals::new(&[1.0, edge]);
-        assert!(matches!(refused, Err(Error::Setting { name: "an edge", .. })));
+        assert!(matches!(
+            refused,
+            Err(Error::Setting {
+                name: "an edge",
+                ..
+            })
+        ));
     }
     let two = Intervals::new(&[1.0]).unwrap();
     let no_bin = Err(Error::BinOutOfRange { bin: 2, bins: 2 });
     assert_eq!(two.clone().with_goal(2), no_bin);
     let product = Product::new(vec![two.clone(), two.clone()]).unwrap();
     let one_short = product.index(&[0.0]);
-    assert!(matches!(one_short, Err(Error::WrongLength { needed: 2, found: 1, .. })));
+    assert!(matches!(
+        one_short,
+        Err(Error::WrongLength {
+            needed: 2,
+            found: 1,
+            ..
+        })
+    ));
     let nan = Err(Error::NotANumber { quantity: 1 });
     assert_eq!(product.index(&[0.0, f64::NAN]), nan);
     let outside = Error::BinOutOfRange { bin: 2, bins: 2 };

@@ -22,16 +22,26 @@ fn the_learning_curve_counts_what_happened() {
         record_every: 12,
         ..Settings::new(30)
     };
-    let mut training = settings.begin(&environment, QTable::new(3, 2).unwrap()).unwrap();
+    let mut training = settings
+        .begin(&environment, QTable::new(3, 2).unwrap())
+        .unwrap();
     let mut told = Vec::new();
-    let stopped = training.run_with(&mut environment, Until::Actions(30), &mut rng(1), |record, _| {
-        told.push(*record);
-        ControlFlow::Continue(())
-    });
+    let stopped = training.run_with(
+        &mut environment,
+        Until::Actions(30),
+        &mut rng(1),
+        |record, _| {
+            told.push(*record);
+            ControlFlow::Continue(())
+        },
+    );
     assert_eq!(stopped, Ok(false));
     assert_eq!((training.actions(), training.episodes()), (30, 10));
     assert_eq!(told, training.curve());
-    assert_eq!(told.iter().map(|record| record.actions).collect::<Vec<_>>(), [12, 24]);
+    assert_eq!(
+        told.iter().map(|record| record.actions).collect::<Vec<_>>(),
+        [12, 24]
+    );
     let table = training.table();
     let first = training.curve()[0];
     assert_eq!((first.actions, first.episodes), (12, 4));
@@ -114,11 +124,26 @@ fn faults_of_the_environment_are_named() {
     ));
     let new = || Settings::new(100);
     for settings in [
-        Settings { episode_limit: 0, ..new() },
-        Settings { record_every: 0, ..new() },
-        Settings { gamma: -0.1, ..new() },
-        Settings { alpha: constant(2.0), ..new() },
-        Settings { temperature: constant(0.0), ..new() },
+        Settings {
+            episode_limit: 0,
+            ..new()
+        },
+        Settings {
+            record_every: 0,
+            ..new()
+        },
+        Settings {
+            gamma: -0.1,
+            ..new()
+        },
+        Settings {
+            alpha: constant(2.0),
+            ..new()
+        },
+        Settings {
+            temperature: constant(0.0),
+            ..new()
+        },
     ] {
         let error = settings
             .run(&mut odd(|_| step(0, 0.0, Status::Continuing)))
@@ -226,7 +251,10 @@ fn settings_changed_on_the_way_leave_the_counters_alone() {
     // 600 actions after the record at 1000.
     let record = training.curve().last().unwrap();
     assert_eq!((training.curve().len(), record.actions), (2, 1_600));
-    let (limit, every) = (training.clone().with_episode_limit(0), training.with_record_every(0));
+    let (limit, every) = (
+        training.clone().with_episode_limit(0),
+        training.with_record_every(0),
+    );
     assert!(limit.is_err() && every.is_err());
 }
 
@@ -235,7 +263,9 @@ fn an_episode_given_up_is_not_counted() {
     let mut environment = odd(|_| step(1, 1.0, Status::Continuing));
     let table = QTable::new(3, 2).unwrap();
     let mut training = Settings::new(100).begin(&environment, table).unwrap();
-    training.run(&mut environment, Until::Actions(7), &mut rng(0)).unwrap();
+    training
+        .run(&mut environment, Until::Actions(7), &mut rng(0))
+        .unwrap();
     assert!(training.is_in_episode());
     training.end_episode();
     assert_eq!((training.is_in_episode(), training.episodes()), (false, 0));
@@ -265,7 +295,9 @@ fn schedules_by_episode_see_every_episode() {
     let learner = QLearning::new(constant(0.5), 0.9).unwrap();
     let mut counted =
         Training::new(&environment, table(), learner.clone(), Counting::default()).unwrap();
-    counted.run(&mut environment, Until::Episodes(5), &mut rng(0)).unwrap();
+    counted
+        .run(&mut environment, Until::Episodes(5), &mut rng(0))
+        .unwrap();
     assert_eq!(counted.policy().0, 5);
 
     let epsilon = Schedule::linear(1.0, 0.0, 10).unwrap().by_episode();
