@@ -11,8 +11,8 @@
 //! only the action needed, which is the fastest that its interface allows.
 
 use qtable::{
-    Action, CachedBoltzmann, Environment, EpsilonGreedy, Policy, QLearning, QTable, Schedule,
-    State, Status, Step, TrainConfig, Value, train, train_in_blocks,
+    Action, Boltzmann, CachedBoltzmann, Environment, EpsilonGreedy, Error, Policy, QLearning,
+    QTable, Schedule, State, Status, Step, Training, Until,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -21,6 +21,7 @@ use rurel::strategy::explore::RandomExploration;
 use rurel::strategy::learn::QLearning as RurelQLearning;
 use rurel::strategy::terminate::FixedIterations;
 use std::hint::black_box;
+use std::ops::ControlFlow;
 
 const STATES: usize = 90;
 const ACTIONS: usize = 81;
@@ -154,27 +155,20 @@ fn rurel(updates: u64) -> Result<f64> {
     Ok(f64::NAN)
 }
 
-fn epsilon_greedy<V: Value>(updates: u64, epsilon: f64) -> Result<f64> {
-    let mut table = QTable::<V>::filled(STATES, ACTIONS, V::from_f64(0.0))?;
-    let mut learner = QLearning::new(Schedule::constant(ALPHA)?, GAMMA)?;
+fn epsilon_greedy(updates: u64, epsilon: f64) -> Result<f64> {
     let mut policy = EpsilonGreedy::new(Schedule::constant(epsilon)?)?;
-    follow(updates, &mut table, &mut learner, &mut policy)
+    follow(updates, &mut policy)
 }
 
 fn plain_boltzmann(updates: u64) -> Result<f64> {
-    let mut table = QTable::new(STATES, ACTIONS)?;
-    let mut learner = QLearning::new(Schedule::constant(ALPHA)?, GAMMA)?;
-    let mut policy = qtable::Boltzmann::new(Schedule::constant(TEMPERATURE)?)?;
-    follow(updates, &mut table, &mut learner, &mut policy)
+    let mut policy = Boltzmann::new(Schedule::constant(TEMPERATURE)?)?;
+    follow(updates, &mut policy)
 }
 
 #[inline(always)]
-fn follow<V: Value, P: Policy<V>>(
-    updates: u64,
-    table: &mut QTable<V>,
-    learner: &mut QLearning,
-    policy: &mut P,
-) -> Result<f64> {
+fn follow<P: Policy>(updates: u64, policy: &mut P) -> Result<f64> {
+    let table = &mut QTable::new(STATES, ACTIONS)?;
+    let mut learner = QLearning::new(Schedule::constant(ALPHA)?, GAMMA)?;
     let (mut rng, mut state) = (rng(1), State(0));
     let measured = rate(updates, || {
         for _ in 0..updates {
@@ -191,7 +185,7 @@ fn follow<V: Value, P: Policy<V>>(
 
 /// `LEARNERS` independent ones, one update of each in turn.
 fn cached<const LEARNERS: usize>(updates: u64, seed: u64) -> Result<f64> {
-    let table = QTable::<f32>::filled(STATES, ACTIONS, 0.0)?;
+    let table = QTable::new(STATES, ACTIONS)?;
     let mut learners = Vec::new();
     for learner in 0..LEARNERS as u64 {
         learners.push((
@@ -247,37 +241,39 @@ impl Environment for Problem {
     fn actions(&self) -> usize {
         ACTIONS
     }
-    fn reset(&mut self, rng: &mut dyn Rng) -> State {
+    fn reset(&mut self, rng: &mut dyn Rng) -> std::result::Result<State, Error> {
         self.0 = State(rng.random_range(0..STATES));
-        self.0
+        Ok(self.0)
     }
-    fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Step {
+    fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> std::result::Result<Step, Error> {
         let step = step(self.0, action);
         self.0 = step.observation;
-        step
+        Ok(step)
     }
 }
 
+/// Exponential schedules, 60 actions to an episode, 100 records.
 fn whole_training(updates: u64, in_blocks: bool) -> Result<f64> {
-    let mut table = QTable::<f32>::filled(STATES, ACTIONS, 0.0)?;
-    let config = TrainConfig::paper(updates);
-    let mut rng = rng(3);
+    let learner = QLearning::new(Schedule::exponential(0.6, 0.02, updates)?, GAMMA)?;
+    let policy = Boltzmann::new(Schedule::exponential(1000.0, 0.1, updates)?)?;
+    let mut problem = Problem(State(0));
+    let table = QTable::new(STATES, ACTIONS)?;
+    let mut training = Training::new(&problem, table, learner, policy)?
+        .with_episode_limit(60)?
+        .with_record_every(updates / 100)?;
+    let (mut rng, until) = (rng(3), Until::Actions(updates));
     let measured = rate(updates, || {
-        let mut problem = Problem(State(0));
         match in_blocks {
-            true => train_in_blocks(
-                &mut problem,
-                &mut table,
-                &config,
-                500,
-                &mut rng,
-                &mut |_| {},
-            )?,
-            false => train(&mut problem, &mut table, &config, &mut rng, &mut |_| {})?,
-        };
+            true => training
+                .run_in_blocks(&mut problem, until, 5, &mut rng, |_, _| {
+                    ControlFlow::Continue(())
+                })
+                .map(|_| ())?,
+            false => training.run(&mut problem, until, &mut rng)?,
+        }
         Ok(())
     });
-    black_box(table.max(State(0)));
+    black_box(training.table().max(State(0)));
     measured
 }
 
@@ -288,11 +284,10 @@ fn main() -> Result<()> {
         .next()
         .map_or(Ok(4_000_000), |text| text.parse())?;
     type Entry = (&'static str, fn(u64) -> Result<f64>);
-    let entries: [Entry; 11] = [
+    let entries: [Entry; 10] = [
         ("rurel 0.6.0, random actions, f64", rurel),
-        ("random actions, f64", |n| epsilon_greedy::<f64>(n, 1.0)),
-        ("epsilon-greedy 0.1, f64", |n| epsilon_greedy::<f64>(n, 0.1)),
-        ("epsilon-greedy 0.1, f32", |n| epsilon_greedy::<f32>(n, 0.1)),
+        ("random actions, f64", |n| epsilon_greedy(n, 1.0)),
+        ("epsilon-greedy 0.1, f64", |n| epsilon_greedy(n, 0.1)),
         ("Boltzmann, plain, f64", |n| plain_boltzmann(n / 8)),
         ("Boltzmann, cached, f32", |n| cached::<1>(n, 1)),
         ("Boltzmann, cached, 2 interleaved", |n| cached::<2>(n, 1)),
@@ -300,10 +295,10 @@ fn main() -> Result<()> {
         ("Boltzmann, cached, on 2 threads", |n| {
             cached_on_two_threads(n)
         }),
-        ("train(), 500 000 actions", |_| {
+        ("Training::run, 500 000 actions", |_| {
             whole_training(500_000, false)
         }),
-        ("train_in_blocks(), 500 000 actions", |_| {
+        ("run_in_blocks, 500 000 actions", |_| {
             whole_training(500_000, true)
         }),
     ];
