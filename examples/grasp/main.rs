@@ -375,10 +375,7 @@ fn teach(
         bar.set_position(progress.actions);
     })?;
     bar.finish_and_clear();
-    let success = lesson
-        .curve
-        .last()
-        .and_then(|record| record.success_share);
+    let success = lesson.curve.last().and_then(|record| record.success_share);
     let success = success.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
     say(
         options,

@@ -220,6 +220,11 @@ mod tests {
         let lesson = plane
             .learn(spec, &[], 2_000, &mut rng, &mut |_| ())
             .expect("learns");
-        assert!(lesson.curve.last().is_some_and(|record| record.episodes > 0));
+        assert!(
+            lesson
+                .curve
+                .last()
+                .is_some_and(|record| record.episodes > 0)
+        );
     }
 }

@@ -3,9 +3,7 @@
 use std::ops::ControlFlow;
 
 use puma_val2::{Joint, JointDelta};
-use qtable::{
-    Action, Boltzmann, QLearning, QTable, Record, Schedule, State, Training, Until,
-};
+use qtable::{Action, Boltzmann, QLearning, QTable, Record, Schedule, State, Training, Until};
 use rand::Rng;
 
 use crate::behaviour::policy::{Behaviour, Episode, KAPPA};

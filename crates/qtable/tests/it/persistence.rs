@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use qtable::{
-    Action, FileError, Intervals, Product, QLearning, QTable, Sarsa, Schedule, State, Training,
-    Until, decode, encode, load, save, toys,
+    Action, FileError, Intervals, Product, QLearning, QTable, Sarsa, Schedule, State, decode,
+    encode, load, save,
 };
 use rand::{Rng, RngExt};
 
