@@ -10,7 +10,7 @@ use pipeline_sim::{Ball, Cell, CellCamera, Contacts, Renderer, Scene, SharedCell
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, GuardedArm, Joints, Manipulator, Profile,
+    ArmError, ClientConfig, Emulator, EmulatorServer, Gripper, GuardedArm, Joints, Manipulator, Profile,
     ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
@@ -64,19 +64,19 @@ impl Rig {
         };
         #[cfg(all(unix, feature = "serial"))]
         let (server, line) = {
-            let server = puma_val2::PtyServer::spawn(emulator, config).map_err(RigError::Serve)?;
-            let line = SerialLine::open(&server.path().to_string_lossy(), BAUD)?;
+            let server = EmulatorServer::pty(emulator, config).map_err(RigError::Serve)?;
+            let line = SerialLine::open(server.address(), BAUD)?;
             (server, line)
         };
         #[cfg(not(all(unix, feature = "serial")))]
         let (server, line) = {
-            let server = puma_val2::TcpServer::spawn("127.0.0.1:0", emulator, config)
-                .map_err(RigError::Serve)?;
-            let line = TcpLine::connect(&server.address().to_string(), SOCKET_TIMEOUT)?;
+            let server =
+                EmulatorServer::tcp("127.0.0.1:0", emulator, config).map_err(RigError::Serve)?;
+            let line = TcpLine::connect(server.address(), SOCKET_TIMEOUT)?;
             (server, line)
         };
         let name = line.name().to_owned();
-        let pose: Pose = Arc::new(move || server.joints());
+        let pose: Pose = Arc::new(move || server.with_emulator(|emulator| emulator.joints()));
         let arm = {
             let pose = Arc::clone(&pose);
             cell.with_jaws_of(connect(line, client_config)?, move || pose())

@@ -11,5 +11,5 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let words = ["val2", "emulate"].map(OsString::from);
-    puma_val2::program::run(words.into_iter().chain(std::env::args_os().skip(1)))
+    puma_val2::val2(words.into_iter().chain(std::env::args_os().skip(1)))
 }

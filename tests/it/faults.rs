@@ -331,12 +331,13 @@ fn an_arm_that_does_not_go_where_it_is_sent_ends_the_run() {
 #[cfg(all(unix, feature = "serial"))]
 #[test]
 fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
-    use puma_val2::{Emulator, Profile, PtyServer, PumaParams, ServeConfig};
+    use puma_val2::{Emulator, EmulatorServer, Profile, PumaParams, ServeConfig};
     // When the controller goes: before anything moves, and in the middle.
     for after in [0, 2] {
         let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-        let server = PtyServer::spawn(emulator, ServeConfig::default()).expect("a pseudo-terminal");
-        let path = server.path().to_string_lossy().into_owned();
+        let server =
+            EmulatorServer::pty(emulator, ServeConfig::default()).expect("a pseudo-terminal");
+        let path = server.address().to_owned();
         let mut rig = Rig::on_port(&path, &bright_ball_scene(), 5).expect("the controller answers");
         rig.place(&Ball::at(IN_VIEW[0], IN_VIEW[1], IN_VIEW[2]))
             .expect("away from the hand");

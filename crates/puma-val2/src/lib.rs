@@ -102,32 +102,30 @@ mod kinematics;
 mod limits;
 mod manipulator;
 #[cfg(feature = "cli")]
-pub mod program;
+mod program;
 mod serve;
 mod transport;
 
-pub use client::{
-    ClientConfig, Ending, GuardedArm, Location, MoveWay, ReplyReader, Resident, Val2Client,
-};
+pub use client::{ClientConfig, GuardedArm, Location, MoveWay, Resident, Val2Client};
 pub use emulator::{
     BootQuestion, Emulator, Event, Fault, Message, Place, Profile, StartPower, TextError,
-    WhereLayout, char_time,
 };
 pub use error::ArmError;
 pub use joints::{Joint, JointDelta, Joints};
 pub use kinematics::{
     ArmDynamics, ArmSide, Configuration, DriveTrain, Elbow, Frames, LinkDynamics, PumaParams,
-    Singularity, Solution, Solutions, Unreachable, Wrist, Xyzoat,
+    Singularity, Solution, Unreachable, Wrist, Xyzoat,
 };
 pub use limits::JointRange;
 pub use manipulator::{Gripper, Manipulator, ProximitySensor};
 pub use nalgebra;
-#[cfg(unix)]
-pub use serve::PtyServer;
-pub use serve::{ServeConfig, TcpServer};
+pub use serve::{EmulatorServer, ServeConfig};
 #[cfg(feature = "serial")]
 pub use transport::SerialLine;
 pub use transport::{MemoryLine, Recorded, TcpLine, Transport};
+
+#[cfg(feature = "cli")]
+pub use program::val2;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puma_val2::program::run(std::env::args_os())
+    puma_val2::val2(std::env::args_os())
 }

@@ -17,7 +17,6 @@ pub(crate) mod wire;
 
 pub use config::{ClientConfig, MoveWay};
 pub use guarded::GuardedArm;
-pub use reader::{Ending, ReplyReader};
 pub use resident::Resident;
 pub use val2_client::Val2Client;
 pub use whereabouts::Location;

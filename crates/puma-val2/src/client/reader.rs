@@ -2,7 +2,7 @@
 
 /// How a reply ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub(crate) enum Ending {
     /// With the idle monitor's prompt.
     Idle,
     /// With the prompt of a monitor under which a program runs.
@@ -15,7 +15,7 @@ pub enum Ending {
 /// [`Ending`] must still wait for silence, for a `.` at the start of a line may be the beginning of
 /// something.
 #[derive(Clone, Debug)]
-pub struct ReplyReader {
+pub(crate) struct ReplyReader {
     text: String,
     limit: usize,
     idle_prompt: char,
@@ -25,7 +25,7 @@ pub struct ReplyReader {
 
 impl ReplyReader {
     /// A reader for replies of up to `limit` bytes.
-    pub fn new(limit: usize, idle_prompt: char, run_prompt: char) -> Self {
+    pub(crate) fn new(limit: usize, idle_prompt: char, run_prompt: char) -> Self {
         Self {
             text: String::new(),
             limit,
@@ -37,7 +37,7 @@ impl ReplyReader {
 
     /// Adds bytes. Of what exceeds the limit the older half is forgotten, so that the end is still
     /// found.
-    pub fn push(&mut self, bytes: &[u8]) {
+    pub(crate) fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             match byte {
                 b'\r' | b'\n' | b'\t' | 0x20..=0x7e => self.text.push(byte as char),
@@ -56,17 +56,17 @@ impl ReplyReader {
     }
 
     /// Whether more came than is kept.
-    pub fn overflowed(&self) -> bool {
+    pub(crate) fn overflowed(&self) -> bool {
         self.overflowed
     }
 
     /// What has come so far.
-    pub fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         &self.text
     }
 
     /// How the reply ends, if nothing more comes.
-    pub fn ending(&self) -> Option<Ending> {
+    pub(crate) fn ending(&self) -> Option<Ending> {
         let last_line = self
             .text
             .rsplit(['\r', '\n'])
@@ -129,8 +129,10 @@ mod tests {
     #[test]
     fn a_reply_without_end_stays_within_its_limit() {
         let mut reader = ReplyReader::new(1000, '.', '*');
-        for _ in 0..100 {
-            reader.push(&[b'7'; 333]);
+        for piece in 0..=255 {
+            reader.push(&[piece; 333]);
+            assert!(reader.text().len() <= 1000 + 3 * 333);
+            let _ = reader.ending();
         }
         reader.push(b"\r\n.");
         assert!(reader.text().len() <= 1000 && reader.overflowed());

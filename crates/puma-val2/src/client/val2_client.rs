@@ -189,7 +189,7 @@ impl<T: Transport> Val2Client<T> {
     ///
     /// # Errors
     /// What the line or the controller said.
-    pub fn set_hand(&mut self, gripper: Gripper) -> Result<(), ArmError> {
+    fn set_hand(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         self.command(match gripper {
             Gripper::Open => "DO OPENI",
             Gripper::Closed => "DO CLOSEI",
@@ -247,7 +247,7 @@ impl<T: Transport> Val2Client<T> {
     ///
     /// # Errors
     /// [`ArmError::Line`] if the line did not take it.
-    pub fn panic_stop(&mut self) -> Result<(), ArmError> {
+    pub(super) fn panic_stop(&mut self) -> Result<(), ArmError> {
         self.wire.send(b"PANIC\rPANIC\r\x03", "PANIC")?;
         // Whatever is said to that, in whichever number of prompts, is of no interest; only a dead
         // line is.

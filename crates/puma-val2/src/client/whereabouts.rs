@@ -65,7 +65,7 @@ impl Location {
 
     /// Whether the two halves belong together for an arm without tool and base shift: within 0.1 mm
     /// and 0.01 degrees. A check against characters that changed on the line.
-    pub fn agrees(&self, arm: &PumaParams) -> bool {
+    pub(crate) fn agrees(&self, arm: &PumaParams) -> bool {
         let (by_joints, by_hand) = (arm.forward(&self.joints), self.hand.pose());
         let off = (by_joints.translation.vector - by_hand.translation.vector).norm();
         off < 1e-4 && by_joints.rotation.angle_to(&by_hand.rotation) < 0.01_f64.to_radians()

@@ -296,16 +296,6 @@ impl Emulator {
         &self.arm.params
     }
 
-    /// What the controller is like.
-    pub fn profile(&self) -> &Profile {
-        &self.profile
-    }
-
-    /// Whether arm power is on.
-    pub fn arm_power(&self) -> bool {
-        self.arm.power
-    }
-
     /// The ARM POWER button, or the emergency stop. Without power a motion stops at once and the
     /// brakes hold the arm.
     pub fn set_arm_power(&mut self, on: bool) {

@@ -69,7 +69,7 @@ pub enum Message {
 
 impl Message {
     /// The wording of the standard profile.
-    pub const fn default_text(self) -> &'static str {
+    pub(crate) const fn default_text(self) -> &'static str {
         match self {
             Self::IllegalCommand => "Illegal monitor command",
             Self::IllegalInstruction => "Illegal instruction",

@@ -15,15 +15,6 @@ pub struct BootQuestion {
     pub initializes: bool,
 }
 
-/// Which block of `WHERE` comes first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WhereLayout {
-    /// X Y Z O A T, then the joints (VAL II).
-    CartesianFirst,
-    /// The joints, then X Y Z O A T (AS, its Japanese relative).
-    JointsFirst,
-}
-
 /// Where arm power stands when the controller starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartPower {
@@ -59,8 +50,9 @@ pub struct Profile {
     pub idle_prompt: char,
     /// Prompt while a program runs (default: `*`).
     pub run_prompt: char,
-    /// Order of the two blocks of `WHERE` (default: Cartesian first).
-    pub where_layout: WhereLayout,
+    /// Prints the joints before X Y Z O A T in `WHERE`, in the manner of AS, the Japanese relative of
+    /// VAL (default: no).
+    pub joints_first: bool,
     /// Width of a number column (default: 9 in `WHERE`; `HERE` and `POINT` add one).
     pub width: usize,
     /// Decimals of millimetres (default: 2).
@@ -94,9 +86,8 @@ pub struct Profile {
     /// Most entries of each kind (programs, locations, variables) and most steps of a program
     /// (default: 1000).
     pub max_entries: usize,
-    /// Time one character takes on the line in either direction (default: none); 9600 baud: 10/9600
-    /// s.
-    pub char_time: Option<Duration>,
+    /// Speed of the line, bits per second (default: none, characters take no time).
+    pub baud: Option<u32>,
     /// Time the monitor takes to digest a line (default: 0). Characters that arrive meanwhile wait
     /// in `input_buffer`.
     pub line_time: Duration,
@@ -165,7 +156,7 @@ impl Profile {
             blank_lines: 0,
             idle_prompt: '.',
             run_prompt: '*',
-            where_layout: WhereLayout::CartesianFirst,
+            joints_first: false,
             width: 9,
             length_decimals: 2,
             angle_decimals: 3,
@@ -181,7 +172,7 @@ impl Profile {
             max_name: 15,
             max_line: 128,
             max_entries: 1000,
-            char_time: None,
+            baud: None,
             line_time: Duration::ZERO,
             input_buffer: 256,
             step_time: Duration::from_millis(2),
@@ -226,7 +217,7 @@ impl Profile {
     pub fn val2_hardware() -> Self {
         Self {
             name: "val2_hardware",
-            char_time: Some(char_time(9600)),
+            baud: Some(9600),
             line_time: Duration::from_millis(20),
             input_buffer: 80,
             encoder_counts: true,
@@ -244,6 +235,11 @@ impl Profile {
         Self::all().into_iter().find(|p| p.name == name)
     }
 
+    /// Returns the time of one character: a start bit, eight data bits and a stop bit.
+    pub(crate) fn char_time(&self) -> Option<Duration> {
+        self.baud.map(|baud| Duration::from_secs(10) / baud.max(1))
+    }
+
     /// Refuses a name that is too long for the controller.
     pub(crate) fn check_name(&self, name: &str) -> Result<(), Fault> {
         if name.len() > self.max_name {
@@ -253,7 +249,7 @@ impl Profile {
     }
 
     /// The wording of a message.
-    pub fn text(&self, message: Message) -> &str {
+    pub(crate) fn text(&self, message: Message) -> &str {
         self.messages
             .get(&message)
             .map_or(message.default_text(), String::as_str)
@@ -265,10 +261,4 @@ impl Default for Profile {
     fn default() -> Self {
         Self::val2()
     }
-}
-
-/// Time of one character (start bit, eight data bits, stop bit) at `baud` bits per second; at least
-/// one baud is assumed.
-pub fn char_time(baud: u32) -> Duration {
-    Duration::from_secs(10) / baud.max(1)
 }

@@ -39,7 +39,7 @@ impl DriveTrain {
     }
 
     /// Radians of the joint per encoder count, without coupling.
-    pub fn radians_per_count(&self) -> [f64; 6] {
+    pub(crate) fn radians_per_count(&self) -> [f64; 6] {
         std::array::from_fn(|i| TAU / (self.gear[i] * self.counts_per_motor_turn[i]))
     }
 

@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use crate::joints::Joints;
-use crate::kinematics::drive_train::DriveTrain;
 use crate::kinematics::params::PumaParams;
 
 /// Mass, motor and friction of one link and its drive.
@@ -113,14 +112,6 @@ impl ArmDynamics {
             ],
             gravity: 9.81,
         }
-    }
-
-    /// The same masses with the gears of `drives`.
-    pub fn with_drives(mut self, drives: &DriveTrain) -> Self {
-        for (link, gear) in self.links.iter_mut().zip(drives.gear) {
-            link.gear = gear;
-        }
-        self
     }
 
     /// Torques (N m) that hold the arm still.

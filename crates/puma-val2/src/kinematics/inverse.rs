@@ -78,21 +78,6 @@ pub struct Solution {
     pub configuration: Configuration,
 }
 
-/// Up to eight solutions of one pose, without allocation. Dereferences to a slice.
-#[derive(Clone, Copy, Debug)]
-pub struct Solutions {
-    items: [Solution; 8],
-    len: usize,
-}
-
-impl std::ops::Deref for Solutions {
-    type Target = [Solution];
-
-    fn deref(&self) -> &[Solution] {
-        &self.items[..self.len]
-    }
-}
-
 /// Why a pose cannot be taken up.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -140,7 +125,7 @@ impl PumaParams {
     ///
     /// # Errors
     /// [`Unreachable`], never its `Limit`.
-    pub fn inverse(&self, flange: &Isometry3<f64>) -> Result<Solutions, Unreachable> {
+    pub fn inverse(&self, flange: &Isometry3<f64>) -> Result<[Solution; 8], Unreachable> {
         let r = flange.rotation.to_rotation_matrix().into_inner();
         let p = flange.translation.vector - r.column(2) * self.d6;
         if !(p.iter().chain(r.iter()).all(|v| v.is_finite())) {
@@ -174,10 +159,8 @@ impl PumaParams {
         let elbow_offset = self.a3.atan2(self.d4);
         let bend_above = k.atan2(lever);
         let raised = lever.atan2(self.a2 + k);
-        let mut found = Solutions {
-            items: [EMPTY; 8],
-            len: 0,
-        };
+        let mut found = [EMPTY; 8];
+        let mut places = found.iter_mut();
         for side in [ArmSide::Righty, ArmSide::Lefty] {
             let (sign, x, t1, ahead) = match side {
                 ArmSide::Righty => (1.0, -forward, azimuth + lateral - PI, PI - elevation),
@@ -223,11 +206,13 @@ impl PumaParams {
                 };
                 for (wrist, (t4, t5, t6)) in [(Wrist::NoFlip, (t4, t5, t6)), (Wrist::Flip, flipped)]
                 {
-                    found.items[found.len] = Solution {
+                    let solution = Solution {
                         joints: Joints([t1, t2, t3, t4, t5, t6].map(wrap)),
                         configuration: Configuration { side, elbow, wrist },
                     };
-                    found.len += 1;
+                    if let Some(place) = places.next() {
+                        *place = solution;
+                    }
                 }
             }
         }
@@ -284,7 +269,7 @@ impl PumaParams {
     ///
     /// # Errors
     /// As for [`PumaParams::inverse_near`]; [`Unreachable::NotAllowed`] if no posture is accepted.
-    pub fn inverse_among(
+    pub(crate) fn inverse_among(
         &self,
         flange: &Isometry3<f64>,
         near: &Joints,

@@ -96,7 +96,7 @@ impl Xyzoat {
     }
 
     /// Whether all six numbers are finite.
-    pub fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         self.val().iter().all(|v| v.is_finite())
     }
 }

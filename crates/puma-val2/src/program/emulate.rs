@@ -10,12 +10,10 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::emulator::controller::Emulator;
-use crate::emulator::profile::{Profile, char_time};
+use crate::emulator::profile::Profile;
 use crate::kinematics::params::PumaParams;
 use crate::program::floppy::Floppy;
-#[cfg(unix)]
-use crate::serve::PtyServer;
-use crate::serve::{ServeConfig, TcpServer};
+use crate::serve::{EmulatorServer, ServeConfig};
 
 /// Options of `emulate`.
 #[derive(Debug, Args)]
@@ -49,38 +47,13 @@ pub(super) struct Options {
     floppy: Option<PathBuf>,
 }
 
-/// An emulator on a pseudo-terminal or on a socket.
-enum Server {
-    #[cfg(unix)]
-    Pty(PtyServer),
-    Tcp(TcpServer),
-}
-
-impl Server {
-    fn place(&self) -> String {
-        match self {
-            #[cfg(unix)]
-            Self::Pty(server) => server.path().display().to_string(),
-            Self::Tcp(server) => server.address().to_string(),
-        }
-    }
-
-    fn with<R>(&self, f: impl FnOnce(&mut Emulator) -> R) -> R {
-        match self {
-            #[cfg(unix)]
-            Self::Pty(server) => server.with_emulator(f),
-            Self::Tcp(server) => server.with_emulator(f),
-        }
-    }
-}
-
 pub(super) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut profile = Profile::named(&options.profile).ok_or_else(|| {
         let names = Profile::all().map(|p| p.name).join(", ");
         format!("no profile `{}`: there are {names}", options.profile)
     })?;
     if let Some(baud) = options.baud {
-        profile.char_time = Some(char_time(baud));
+        profile.baud = Some(baud);
     }
     let mut emulator = Emulator::new(PumaParams::unimation(), profile);
     let floppy = match &options.floppy {
@@ -98,7 +71,7 @@ pub(super) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         },
     };
     let server = serve(options, emulator, config)?;
-    println!("listening on {}", server.place());
+    println!("listening on {}", server.address());
     io::stdout().flush()?;
     attend(&server, floppy)
 }
@@ -108,10 +81,10 @@ fn serve(
     options: &Options,
     emulator: Emulator,
     config: ServeConfig,
-) -> Result<Server, Box<dyn Error>> {
+) -> Result<EmulatorServer, Box<dyn Error>> {
     match &options.tcp {
         Some(address) => on_socket(address, emulator, config),
-        None => Ok(Server::Pty(PtyServer::spawn(emulator, config)?)),
+        None => Ok(EmulatorServer::pty(emulator, config)?),
     }
 }
 
@@ -120,7 +93,7 @@ fn serve(
     options: &Options,
     emulator: Emulator,
     config: ServeConfig,
-) -> Result<Server, Box<dyn Error>> {
+) -> Result<EmulatorServer, Box<dyn Error>> {
     on_socket(
         options.tcp.as_deref().unwrap_or("127.0.0.1:5600"),
         emulator,
@@ -132,16 +105,14 @@ fn on_socket(
     address: &str,
     emulator: Emulator,
     config: ServeConfig,
-) -> Result<Server, Box<dyn Error>> {
-    match TcpServer::spawn(address, emulator, config) {
-        Ok(server) => Ok(Server::Tcp(server)),
-        Err(problem) => Err(format!("{address} cannot be listened at: {problem}").into()),
-    }
+) -> Result<EmulatorServer, Box<dyn Error>> {
+    EmulatorServer::tcp(address, emulator, config)
+        .map_err(|problem| format!("{address} cannot be listened at: {problem}").into())
 }
 
 /// Carries out the lines of the panel and keeps the floppy disk's folder up to date until `quit`.
 /// Where the input is closed there is no panel, and the program serves until it is killed.
-fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Error>> {
+fn attend(server: &EmulatorServer, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Error>> {
     let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || {
         io::stdin()
@@ -162,7 +133,7 @@ fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Err
         };
         if let Some(floppy) = &mut floppy {
             let problem = server
-                .with(|emulator| floppy.changed(emulator))
+                .with_emulator(|emulator| floppy.changed(emulator))
                 .and_then(|now| floppy.follow(now).err())
                 .map(|problem| problem.to_string());
             if let Some(problem) = problem.as_ref().filter(|_| problem != trouble) {
@@ -179,7 +150,7 @@ fn attend(server: &Server, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Err
     }
 }
 
-fn panel(server: &Server, line: &str) -> Result<(), String> {
+fn panel(server: &EmulatorServer, line: &str) -> Result<(), String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let state = |word: &str| match word {
         "on" => Ok(true),
@@ -190,7 +161,7 @@ fn panel(server: &Server, line: &str) -> Result<(), String> {
         [] => {}
         ["power", word] => {
             let on = state(word)?;
-            server.with(|e| e.set_arm_power(on));
+            server.with_emulator(|e| e.set_arm_power(on));
         }
         ["signal", number, word] => {
             let number: u16 = number
@@ -198,15 +169,15 @@ fn panel(server: &Server, line: &str) -> Result<(), String> {
                 .map_err(|_| format!("`{number}` is no signal"))?;
             let on = state(word)?;
             server
-                .with(|e| e.set_signal(number, on))
+                .with_emulator(|e| e.set_signal(number, on))
                 .map_err(|fault| fault.to_string())?;
         }
         ["joints"] => println!(
             "{} {:?}",
-            server.with(|e| e.joints()),
-            server.with(|e| e.gripper())
+            server.with_emulator(|e| e.joints()),
+            server.with_emulator(|e| e.gripper())
         ),
-        ["restart"] => server.with(Emulator::restart),
+        ["restart"] => server.with_emulator(Emulator::restart),
         _ => return Err("power on|off, signal NUMBER on|off, joints, restart, quit".into()),
     }
     Ok(())

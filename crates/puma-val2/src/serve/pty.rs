@@ -1,4 +1,4 @@
-//! On a pseudo-terminal.
+//! Service on a pseudo-terminal.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -14,100 +14,28 @@ use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use crate::emulator::controller::Emulator;
-use crate::joints::Joints;
-use crate::manipulator::Gripper;
-use crate::serve::ServeConfig;
 use crate::serve::station::Station;
 
 /// Most output that waits for a terminal that does not read; older output is dropped beyond it.
 const PENDING_LIMIT: usize = 256 * 1024;
 
-/// An emulated controller on a pseudo-terminal: any program that opens its path as a serial port
-/// can talk to it, close it and open it again.
-///
-/// The thread that serves it ends, and the link is removed, when this is dropped.
+/// Means of waking and ending the thread.
 #[derive(Debug)]
-pub struct PtyServer {
-    station: Station,
+pub(super) struct Closing {
     path: PathBuf,
     link: Option<PathBuf>,
     wake: PipeWriter,
-    thread: Option<JoinHandle<()>>,
 }
 
-impl PtyServer {
-    /// Opens a pseudo-terminal and serves `emulator` on it.
-    ///
-    /// # Errors
-    /// The system has no pseudo-terminal to spare, or the link cannot be made.
-    pub fn spawn(emulator: Emulator, config: ServeConfig) -> io::Result<Self> {
-        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
-        // Not every system opens a pseudo-terminal with this flag.
-        fcntl_setfd(&master, FdFlags::CLOEXEC)?;
-        grantpt(&master)?;
-        unlockpt(&master)?;
-        let name = ptsname(&master, Vec::new())?;
-        let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
-        // As long as somebody holds the terminal's side open, a client that closes it does not
-        // break the line.
-        let held = open(
-            &path,
-            OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC,
-            Mode::empty(),
-        )?;
-        let mut attributes = tcgetattr(&held)?;
-        attributes.make_raw();
-        tcsetattr(&held, OptionalActions::Now, &attributes)?;
-        fcntl_setfl(&master, fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
-        if let Some(link) = &config.link {
-            replace_link(&path, link)?;
-        }
-        let station = Station::new(emulator, config.realtime, config.transcript);
-        let (woken, wake) = io::pipe()?;
-        let thread = std::thread::Builder::new().name("val2-pty".into()).spawn({
-            let station = station.clone();
-            move || serve(&station, File::from(master), held, woken)
-        })?;
-        Ok(Self {
-            station,
-            path,
-            link: config.link,
-            wake,
-            thread: Some(thread),
-        })
-    }
-
-    /// The path to open as a serial port, `/dev/pts/3` for instance.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The arm's true joint angles right now.
-    pub fn joints(&self) -> Joints {
-        self.station.with(|emulator| emulator.joints())
-    }
-
-    /// The hand right now.
-    pub fn gripper(&self) -> Gripper {
-        self.station.with(|emulator| emulator.gripper())
-    }
-
-    /// Looks at or changes the emulator: its signals, its arm power, its events.
-    pub fn with_emulator<R>(&self, f: impl FnOnce(&mut Emulator) -> R) -> R {
-        let result = self.station.with(f);
-        // What has been changed may be something to tell the terminal.
+impl Closing {
+    /// Makes the thread look at the emulator, which may have something to say.
+    pub(super) fn wake(&self) {
         let _ = (&self.wake).write(&[0]);
-        result
     }
-}
 
-impl Drop for PtyServer {
-    fn drop(&mut self) {
+    /// Ends the thread and removes the link.
+    pub(super) fn end(&self) {
         let _ = (&self.wake).write(&[1]);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
         if let Some(link) = &self.link
             && fs::read_link(link).is_ok_and(|to| to == self.path)
         {
@@ -116,12 +44,53 @@ impl Drop for PtyServer {
     }
 }
 
-/// Makes `link` point to `path` in one step, replacing nothing but another link.
+/// Opens a pseudo-terminal and serves the emulator on it.
+pub(super) fn spawn(
+    station: &Station,
+    link: Option<PathBuf>,
+) -> io::Result<(PathBuf, Closing, JoinHandle<()>)> {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+    // Not every system opens a pseudo-terminal with this flag.
+    fcntl_setfd(&master, FdFlags::CLOEXEC)?;
+    grantpt(&master)?;
+    unlockpt(&master)?;
+    let name = ptsname(&master, Vec::new())?;
+    let path = PathBuf::from(OsStr::from_bytes(name.to_bytes()));
+    // While the terminal's side is held open, a client that closes it does not break the line.
+    let held = open(
+        &path,
+        OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC,
+        Mode::empty(),
+    )?;
+    let mut attributes = tcgetattr(&held)?;
+    attributes.make_raw();
+    tcsetattr(&held, OptionalActions::Now, &attributes)?;
+    fcntl_setfl(&master, fcntl_getfl(&master)? | OFlags::NONBLOCK)?;
+    if let Some(link) = &link {
+        replace_link(&path, link)?;
+    }
+    let (woken, wake) = io::pipe()?;
+    let thread = std::thread::Builder::new().name("val2-pty".into()).spawn({
+        let station = station.clone();
+        move || serve(&station, File::from(master), held, woken)
+    })?;
+    let closing = Closing {
+        path: path.clone(),
+        link,
+        wake,
+    };
+    Ok((path, closing, thread))
+}
+
+/// Makes `link` point to `path` in one step. It replaces nothing but another link.
 fn replace_link(path: &Path, link: &Path) -> io::Result<()> {
     if let Ok(there) = fs::symlink_metadata(link)
         && !there.file_type().is_symlink()
     {
-        let what = format!("{} is there and is not a symbolic link", link.display());
+        let what = format!(
+            "{} is there and is no symbolic link: choose another path",
+            link.display()
+        );
         return Err(io::Error::new(io::ErrorKind::AlreadyExists, what));
     }
     let mut beside = link.as_os_str().to_owned();
@@ -139,7 +108,7 @@ fn replace_link(path: &Path, link: &Path) -> io::Result<()> {
         })
 }
 
-/// Until the pipe says 1, or the pseudo-terminal fails.
+/// Serves until the pipe says 1 or the pseudo-terminal fails.
 fn serve(station: &Station, mut master: File, _held: OwnedFd, mut woken: PipeReader) {
     let mut pending: Vec<u8> = Vec::new();
     let mut input = [0; 4096];

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use puma_val2::{
     ClientConfig, Emulator, JointDelta, Manipulator, MemoryLine, MoveWay, Profile, PumaParams,
-    Transport, Val2Client, char_time,
+    Transport, Val2Client,
 };
 
 /// A calibrated client of an arm that is everywhere at once, on a paced line.
@@ -13,7 +13,7 @@ fn client(way: MoveWay, quiet: u64) -> Val2Client<MemoryLine> {
     let mut swift = PumaParams::unimation();
     swift.ranges.iter_mut().for_each(|range| range.speed *= 1e4);
     let profile = Profile {
-        char_time: Some(char_time(9600)),
+        baud: Some(9600),
         acceleration_time: Duration::from_millis(1),
         step_time: Duration::from_micros(100),
         ..Profile::val2()

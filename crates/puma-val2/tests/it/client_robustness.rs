@@ -200,7 +200,7 @@ fn everything<T: Transport>(mut client: Val2Client<T>, mut before: impl FnMut(&m
             drop(c.move_by(JointDelta::of(Joint::J1, -0.05)));
             drop(c.disarm_proximity());
         }),
-        ("panic_stop", |c| drop(c.panic_stop())),
+        ("stop", |c| drop(c.stop())),
         ("reconnect", |c| drop(c.reconnect())),
     ];
     for (name, call) in calls {

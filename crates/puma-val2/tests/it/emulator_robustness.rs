@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use proptest::prelude::*;
-use puma_val2::{Emulator, Location, Profile, PumaParams, ReplyReader};
+use puma_val2::{Emulator, Location, Profile, PumaParams};
 
 /// Pieces of VAL II in which chance finds more than in bytes.
 fn line() -> impl Strategy<Value = String> {
@@ -125,17 +125,6 @@ proptest! {
     fn texts_of_any_kind_are_refused_or_taken(text in "(\\.PROGRAM A\n|\\.END\n|\\.REALS\n|\\.LOCATIONS\n|P 1,2,3,4,5,6\n|N 3\n|[ -~]{0,20}\n){0,20}") {
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
         let _ = emulator.load_text(&text);
-    }
-
-    #[test]
-    fn the_reader_takes_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
-        let mut reader = ReplyReader::new(1000, '.', '*');
-        for chunk in bytes.chunks(11) {
-            reader.push(chunk);
-            let _ = reader.ending();
-            prop_assert!(reader.text().len() <= 1000 + 3 * 11);
-        }
-        let _ = Location::parse(reader.text());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use puma_val2::{
     BootQuestion, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, MemoryLine,
-    Message, Profile, PumaParams, StartPower, Val2Client, WhereLayout, char_time,
+    Message, Profile, PumaParams, StartPower, Val2Client,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
@@ -55,11 +55,7 @@ fn random_profile(random: &mut Xoshiro256PlusPlus) -> Profile {
         echo: yes(0.7),
         eol: if yes(0.8) { "\r\n" } else { "\n\r" },
         blank_lines: usize::from(yes(0.3)) + usize::from(yes(0.3)),
-        where_layout: if yes(0.7) {
-            WhereLayout::CartesianFirst
-        } else {
-            WhereLayout::JointsFirst
-        },
+        joints_first: !yes(0.7),
         joint_heading: if yes(0.7) { "JT" } else { "J" },
         hand_column: yes(0.3),
         change_text: ["Change?", "CHANGES?", "Change (Y/N)?"]
@@ -76,7 +72,7 @@ fn random_profile(random: &mut Xoshiro256PlusPlus) -> Profile {
         } else {
             StartPower::OnAtCalibration
         },
-        char_time: yes(0.4).then(|| char_time(9600)),
+        baud: yes(0.4).then_some(9600),
         line_time: if yes(0.4) {
             Duration::from_millis(40)
         } else {
@@ -96,14 +92,11 @@ fn a_session_with_three_hundred_controllers() {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let profile = random_profile(&mut random);
         let context = format!("seed {seed}: {profile:?}");
+        let echo = profile.echo;
         let line = MemoryLine::new(Emulator::new(PumaParams::unimation(), profile));
         let mut client = Val2Client::connect(line, ClientConfig::default())
             .unwrap_or_else(|e| panic!("{context}: {e}"));
-        assert_eq!(
-            client.echoes(),
-            client.line().emulator().profile().echo,
-            "{context}"
-        );
+        assert_eq!(client.echoes(), echo, "{context}");
         client
             .calibrate()
             .unwrap_or_else(|e| panic!("{context}: {e}"));

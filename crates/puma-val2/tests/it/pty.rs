@@ -1,7 +1,7 @@
-//! A real pseudo-terminal, opened through the `serialport` crate.
+//! A real pseudo-terminal, opened through the `serial2` crate.
 
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, Gripper, JointDelta, Manipulator, Profile, PtyServer,
+    ArmError, ClientConfig, Emulator, EmulatorServer, Gripper, JointDelta, Manipulator, Profile,
     PumaParams, SerialLine, ServeConfig, Val2Client,
 };
 
@@ -11,8 +11,8 @@ fn emulator() -> Emulator {
 
 #[test]
 fn a_session_over_a_pseudo_terminal_which_is_closed_and_reopened() {
-    let server = PtyServer::spawn(emulator(), ServeConfig::default()).unwrap();
-    let path = server.path().to_str().unwrap().to_owned();
+    let server = EmulatorServer::pty(emulator(), ServeConfig::default()).unwrap();
+    let path = server.address().to_owned();
     let connect = || {
         Val2Client::connect(
             SerialLine::open(&path, 9600).unwrap(),
@@ -26,7 +26,7 @@ fn a_session_over_a_pseudo_terminal_which_is_closed_and_reopened() {
         .move_by(JointDelta::from_degrees([10.0, 5.0, 5.0, 0.0, 0.0, 0.0]))
         .unwrap();
     assert!(
-        (server.joints() - joints)
+        (server.with_emulator(|e| e.joints()) - joints)
             .degrees()
             .iter()
             .all(|d| d.abs() < 1e-3)
@@ -41,7 +41,7 @@ fn a_session_over_a_pseudo_terminal_which_is_closed_and_reopened() {
             .all(|d| d.abs() < 1e-3)
     );
     client.set_gripper(Gripper::Closed).unwrap();
-    assert_eq!(server.gripper(), Gripper::Closed);
+    assert_eq!(server.with_emulator(|e| e.gripper()), Gripper::Closed);
     drop(server);
     assert!(matches!(client.joints(), Err(ArmError::Line { .. })));
 }
@@ -55,7 +55,7 @@ fn the_link_leads_to_the_terminal_and_goes_with_the_server() {
         link: Some(link.clone()),
         ..ServeConfig::default()
     };
-    let server = PtyServer::spawn(emulator(), config()).unwrap();
+    let server = EmulatorServer::pty(emulator(), config()).unwrap();
     let mut client = Val2Client::connect(
         SerialLine::open(link.to_str().unwrap(), 9600).unwrap(),
         ClientConfig::for_emulator(),
@@ -65,12 +65,12 @@ fn the_link_leads_to_the_terminal_and_goes_with_the_server() {
     drop(server);
     assert!(std::fs::symlink_metadata(&link).is_err());
     std::fs::write(&link, "something of value").unwrap();
-    assert!(PtyServer::spawn(emulator(), config()).is_err());
+    assert!(EmulatorServer::pty(emulator(), config()).is_err());
     let astray = ServeConfig {
         link: Some(folder.join("no such folder/arm")),
         ..ServeConfig::default()
     };
-    let problem = PtyServer::spawn(emulator(), astray)
+    let problem = EmulatorServer::pty(emulator(), astray)
         .unwrap_err()
         .to_string();
     assert!(
@@ -91,8 +91,9 @@ fn real_time_takes_the_time_of_the_motion() {
         start_power: puma_val2::StartPower::On,
         ..Profile::val2()
     };
-    let server = PtyServer::spawn(Emulator::new(PumaParams::unimation(), profile), config).unwrap();
-    let line = SerialLine::open(server.path().to_str().unwrap(), 9600).unwrap();
+    let server =
+        EmulatorServer::pty(Emulator::new(PumaParams::unimation(), profile), config).unwrap();
+    let line = SerialLine::open(server.address(), 9600).unwrap();
     let mut client = Val2Client::connect(line, ClientConfig::for_emulator()).unwrap();
     let begun = std::time::Instant::now();
     client

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use puma_val2::{Emulator, Profile, PtyServer, PumaParams, ServeConfig};
+use puma_val2::{Emulator, EmulatorServer, Profile, PumaParams, ServeConfig};
 
 /// A Python that has pyserial: the one named by `PUMA_VAL2_PYTHON`, or one on the path.
 fn python() -> Option<String> {
@@ -27,11 +27,11 @@ fn pyserial_holds_the_example_session_and_reopens_the_line() {
         return;
     };
     let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-    let server = PtyServer::spawn(emulator, ServeConfig::default()).unwrap();
+    let server = EmulatorServer::pty(emulator, ServeConfig::default()).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/session.py");
     let output = Command::new(python)
         .arg(script)
-        .arg(server.path())
+        .arg(server.address())
         .output()
         .unwrap();
     let screen = String::from_utf8_lossy(&output.stdout).replace("\r\n", "\n");

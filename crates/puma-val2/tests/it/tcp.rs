@@ -3,16 +3,16 @@
 use std::time::Duration;
 
 use puma_val2::{
-    ClientConfig, Emulator, JointDelta, Manipulator, Profile, PumaParams, ServeConfig, TcpLine,
-    TcpServer, Val2Client,
+    ClientConfig, Emulator, EmulatorServer, JointDelta, Manipulator, Profile, PumaParams,
+    ServeConfig, TcpLine, Val2Client,
 };
 
 #[test]
 fn a_session_over_tcp_with_one_terminal_after_the_other() {
     let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-    let server = TcpServer::spawn("127.0.0.1:0", emulator, ServeConfig::default()).unwrap();
+    let server = EmulatorServer::tcp("127.0.0.1:0", emulator, ServeConfig::default()).unwrap();
     let connect = || {
-        let line = TcpLine::connect(&server.address().to_string(), Duration::from_secs(5)).unwrap();
+        let line = TcpLine::connect(server.address(), Duration::from_secs(5)).unwrap();
         Val2Client::connect(line, ClientConfig::for_emulator()).unwrap()
     };
     let mut client = connect();

@@ -1,7 +1,7 @@
 //! Numbers and blocks as the controller prints them.
 
 use crate::emulator::language::place::Place;
-use crate::emulator::profile::{Profile, WhereLayout};
+use crate::emulator::profile::Profile;
 use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 use crate::manipulator::Gripper;
@@ -73,11 +73,10 @@ pub(crate) fn whereabouts(
         .concat();
     let [cartesian_heading, joint_heading] =
         [cartesian_heading, joint_heading].map(|h| h.trim_end().to_owned());
-    match profile.where_layout {
-        WhereLayout::CartesianFirst => {
-            vec![cartesian_heading, cartesian, joint_heading, joint_line]
-        }
-        WhereLayout::JointsFirst => vec![joint_heading, joint_line, cartesian_heading, cartesian],
+    if profile.joints_first {
+        vec![joint_heading, joint_line, cartesian_heading, cartesian]
+    } else {
+        vec![cartesian_heading, cartesian, joint_heading, joint_line]
     }
 }
 

@@ -79,7 +79,7 @@ impl Terminal {
             if self.arriving.len() >= INPUT_LIMIT {
                 return;
             }
-            let at = match profile.char_time {
+            let at = match profile.char_time() {
                 Some(time) => self.line_busy_until.max(now).saturating_add(time),
                 None => now,
             };
@@ -247,7 +247,7 @@ impl Terminal {
         let waits = !self.sending.is_empty() && !self.held;
         waits.then(|| {
             self.sent_at
-                .saturating_add(profile.char_time.unwrap_or_default())
+                .saturating_add(profile.char_time().unwrap_or_default())
         })
     }
 
@@ -256,7 +256,7 @@ impl Terminal {
         if self.held {
             return Vec::new();
         }
-        let Some(time) = profile.char_time.filter(|t| !t.is_zero()) else {
+        let Some(time) = profile.char_time().filter(|t| !t.is_zero()) else {
             return self.sending.drain(..).collect();
         };
         let due = now.saturating_sub(self.sent_at).as_nanos() / time.as_nanos();
