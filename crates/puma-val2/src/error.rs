@@ -1,70 +1,71 @@
-//! What can go wrong between a controller program and an arm.
+//! Errors between a program and an arm.
 
 use std::io;
 use std::time::Duration;
 
 use crate::joints::{Joint, Joints};
 
-/// Why an arm did not do what it was asked to.
+/// Error of an arm or of the line to it.
 ///
 /// `port` names the line as the caller gave it: a device path, a socket address, or a word for an
 /// arm in memory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArmError {
-    /// The device or socket could not be opened: no such port, no permission, held by another
-    /// program.
+    /// The device or socket cannot be opened: no such port, no permission, or another program holds
+    /// it.
     #[error("{port}: cannot be opened: {source}")]
     Open {
         /// The line.
         port: String,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// The line failed in use: unplugged, closed by the other side.
+    /// The line failed in use: unplugged, or closed by the other side.
     #[error("{port}: the line failed while {doing}: {source}")]
     Line {
         /// The line.
         port: String,
-        /// What was under way.
+        /// Action under way.
         doing: String,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// Nothing, or not enough, came back in time.
+    /// No complete answer came in time.
     #[error(
-        "{port}: no complete answer to `{sent}` within {waited:?}: expected {expected}, heard {heard:?}"
+        "{port}: no complete answer to `{sent}` within {waited:?}: expected {expected}, heard \
+         {heard:?}"
     )]
     Silence {
         /// The line.
         port: String,
-        /// What had been sent.
+        /// Line sent.
         sent: String,
-        /// What would have been a complete answer.
+        /// Description of a complete answer.
         expected: String,
-        /// What had come until then, shortened.
+        /// Text that had come, shortened.
         heard: String,
-        /// How long was waited.
+        /// Time waited.
         waited: Duration,
     },
-    /// Something came back that cannot be understood.
+    /// An answer cannot be understood.
     #[error("{port}: the answer to `{sent}` makes no sense: expected {expected}, heard {heard:?}")]
     Garbled {
         /// The line.
         port: String,
-        /// What had been sent.
+        /// Line sent.
         sent: String,
-        /// What would have made sense.
+        /// Description of a sound answer.
         expected: String,
-        /// What came instead, shortened.
+        /// Text that came instead, shortened.
         heard: String,
     },
-    /// The controller understood and refused, with its own message.
+    /// The controller refused a command with its own message.
     #[error("{port}: `{sent}` was refused by the controller: *{message}*")]
     Refused {
         /// The line.
         port: String,
-        /// What had been sent.
+        /// Line sent.
         sent: String,
         /// The controller's words, without the asterisks.
         message: String,
@@ -76,21 +77,22 @@ pub enum ArmError {
     NotReached {
         /// The line.
         port: String,
-        /// The joint that is furthest off.
+        /// Joint that is furthest off.
         joint: Joint,
-        /// Where it should be.
+        /// Goal.
         wanted_degrees: f64,
-        /// Where it says it is.
+        /// Reported angle.
         reported_degrees: f64,
     },
     /// A move would take a joint out of its limits; nothing was sent.
     #[error(
-        "{joint} cannot go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to {max_degrees:.1}"
+        "{joint} cannot go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to \
+         {max_degrees:.1}"
     )]
     JointLimit {
-        /// The joint.
+        /// Joint.
         joint: Joint,
-        /// Where it was to go.
+        /// Goal.
         wanted_degrees: f64,
         /// Lower limit.
         min_degrees: f64,
@@ -100,29 +102,29 @@ pub enum ArmError {
     /// An angle is NaN or infinite; nothing was sent.
     #[error("the angle asked of {joint} is not a finite number")]
     NotFinite {
-        /// The joint.
+        /// Joint.
         joint: Joint,
     },
-    /// The controller has been started again in mid-session: it asks its start-up questions. It
-    /// must be connected to and calibrated anew.
+    /// The controller has been started again in mid-session and asks its start-up questions.
+    /// Connect and calibrate again.
     #[error(
         "{port}: the controller has been restarted: it says {heard:?}; connect and calibrate again"
     )]
     Restarted {
         /// The line.
         port: String,
-        /// What it said.
+        /// Text of the controller, shortened.
         heard: String,
     },
-    /// A motion was commanded and it can no longer be found out where the arm is. The words that
+    /// A motion was commanded, and the arm's position cannot be read any more. The commands that
     /// stop it have been sent if the line took them.
     #[error("{port}: the outcome of a motion is not known: {cause}")]
     Unconfirmed {
         /// The line.
         port: String,
-        /// The joint angles that the arm last reported.
+        /// Joint angles that the arm last reported.
         last_known: Option<Joints>,
-        /// What kept the arm from reporting.
+        /// Error that kept the arm from reporting.
         cause: Box<ArmError>,
     },
     /// The proximity signal stopped the arm on its way.
@@ -130,19 +132,19 @@ pub enum ArmError {
     ProximityStop {
         /// The line.
         port: String,
-        /// The input that came on.
+        /// Input that came on.
         signal: u16,
-        /// Where the arm stands.
+        /// Joint angles at which the arm stands.
         joints: Joints,
     },
-    /// A setting that cannot be: a speed of zero, an empty name. Nothing was sent.
+    /// A setting is out of its range. Nothing was sent.
     #[error("{what} cannot be {value}: {allowed}")]
     Setting {
-        /// What was to be set.
+        /// Name of the setting.
         what: &'static str,
-        /// The value.
+        /// Rejected value.
         value: String,
-        /// What would do.
+        /// Values that are allowed.
         allowed: &'static str,
     },
 }

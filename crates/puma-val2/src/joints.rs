@@ -20,12 +20,12 @@ impl Joint {
     /// All joints, waist first.
     pub const ALL: [Self; 6] = [Self::J1, Self::J2, Self::J3, Self::J4, Self::J5, Self::J6];
 
-    /// Position in an array of six, 0 for `J1`.
+    /// Returns the position in an array of six, 0 for `J1`.
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// VAL's number, 1 for `J1`.
+    /// Returns VAL's number, 1 for `J1`.
     pub const fn number(self) -> usize {
         self as usize + 1
     }
@@ -37,8 +37,7 @@ impl fmt::Display for Joint {
     }
 }
 
-/// Six joint angles in radians, `JT1` first, in VAL's own convention (what `WHERE` prints, there in
-/// degrees).
+/// Six joint angles in radians, `JT1` first, in VAL's own convention, that of `WHERE`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Joints(pub [f64; 6]);
@@ -54,17 +53,17 @@ impl Joints {
         0.0,
     ]);
 
-    /// Joint angles from degrees, as VAL writes them.
+    /// Converts from degrees, VAL's unit.
     pub fn from_degrees(degrees: [f64; 6]) -> Self {
         Self(degrees.map(f64::to_radians))
     }
 
-    /// The angles in degrees, as VAL writes them.
+    /// Returns the angles in degrees, VAL's unit.
     pub fn degrees(&self) -> [f64; 6] {
         self.0.map(f64::to_degrees)
     }
 
-    /// The first joint whose angle is NaN or infinite, if any.
+    /// Returns the first joint whose angle is NaN or infinite, if any.
     pub fn non_finite(&self) -> Option<Joint> {
         Joint::ALL.into_iter().find(|j| !self[*j].is_finite())
     }
@@ -79,32 +78,32 @@ impl Index<Joint> for Joints {
 }
 
 impl fmt::Display for Joints {
-    /// The six angles in degrees, three decimals: `(0.000, -90.000, 90.000, 0.000, 0.000, 0.000)`.
+    /// Formats the six angles in degrees: `(0.000, -90.000, 90.000, 0.000, 0.000, 0.000)`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [a, b, c, d, e, g] = self.degrees();
         write!(f, "({a:.3}, {b:.3}, {c:.3}, {d:.3}, {e:.3}, {g:.3})")
     }
 }
 
-/// A relative move: by how many radians each joint turns, `JT1` first.
+/// Relative move: the turn of each joint in radians, `JT1` first.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct JointDelta(pub [f64; 6]);
 
 impl JointDelta {
-    /// A relative move from degrees.
+    /// Converts from degrees.
     pub fn from_degrees(degrees: [f64; 6]) -> Self {
         Self(degrees.map(f64::to_radians))
     }
 
-    /// A move of one joint alone, by `radians`.
+    /// Returns a move of one joint alone, by `radians`.
     pub fn of(joint: Joint, radians: f64) -> Self {
         let mut delta = [0.0; 6];
         delta[joint.index()] = radians;
         Self(delta)
     }
 
-    /// The move in degrees.
+    /// Returns the move in degrees.
     pub fn degrees(&self) -> [f64; 6] {
         self.0.map(f64::to_degrees)
     }
@@ -129,7 +128,7 @@ impl Add<JointDelta> for Joints {
 impl Sub for Joints {
     type Output = JointDelta;
 
-    /// The move that leads from `from` to `self`.
+    /// Returns the move that leads from `from` to `self`.
     fn sub(self, from: Joints) -> JointDelta {
         JointDelta(std::array::from_fn(|i| self.0[i] - from.0[i]))
     }

@@ -3,7 +3,7 @@
 use crate::error::ArmError;
 use crate::joints::{Joint, Joints};
 
-/// Where one joint may go and how fast.
+/// Range and speed of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct JointRange {
@@ -13,6 +13,15 @@ pub struct JointRange {
     pub max: f64,
     /// Greatest speed, radians per second.
     pub speed: f64,
+}
+
+impl JointRange {
+    /// Returns `true` for an angle that an emulated arm may turn to. Half an encoder count of slack
+    /// lets an arm that stands at its limit move away along it.
+    pub(crate) fn holds(&self, angle: f64) -> bool {
+        let slack = 1e-4;
+        (self.min - slack..=self.max + slack).contains(&angle)
+    }
 }
 
 /// Returns the classical ranges and speeds of the PUMA 560.
@@ -35,7 +44,7 @@ pub(crate) fn puma_560() -> [JointRange; 6] {
 /// Checks that every angle is finite and within its range.
 ///
 /// # Errors
-/// [`ArmError::NotFinite`] or [`ArmError::JointLimit`], naming the first joint that fails.
+/// [`ArmError::NotFinite`] or [`ArmError::JointLimit`] for the first joint that fails.
 pub(crate) fn check(ranges: &[JointRange; 6], joints: &Joints) -> Result<(), ArmError> {
     if let Some(joint) = joints.non_finite() {
         return Err(ArmError::NotFinite { joint });

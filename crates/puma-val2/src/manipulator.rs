@@ -1,64 +1,64 @@
-//! The doors of an arm: what a controller needs of it, whatever it is made of.
+//! Traits of an arm, and of its sensors.
 
 use crate::error::ArmError;
 use crate::joints::{JointDelta, Joints};
 
 /// An arm that moves by joint angles.
 ///
-/// Every call waits until the arm stands. A move either ends where it was asked to, as the arm
-/// itself reports, or is an error; after an error [`Manipulator::joints`] says where the arm
-/// stands. Only [`ArmError::Unconfirmed`] and [`ArmError::Line`] leave open whether it does: the
-/// arm has been told to stop, if it could still hear.
+/// Every call waits until the arm stands. A move ends at its goal, confirmed by the arm's own
+/// report, or is an error; after an error [`Manipulator::joints`] returns the arm's position. Only
+/// after [`ArmError::Unconfirmed`] and [`ArmError::Line`] the arm may still move: it has been told
+/// to stop, if it could hear.
 pub trait Manipulator {
-    /// The joint angles that the arm reports.
+    /// Returns the joint angles that the arm reports.
     ///
     /// # Errors
-    /// What kept the arm from answering.
+    /// Errors of the line or the controller.
     fn joints(&mut self) -> Result<Joints, ArmError>;
 
     /// Turns every joint by its part of `delta` and returns the joint angles that the arm reports
     /// afterwards.
     ///
     /// # Errors
-    /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] before anything moves; otherwise what
-    /// went wrong on the way.
+    /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] before anything moves; otherwise errors
+    /// of the line or the controller.
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError>;
 
     /// Turns the joints to `target` and returns the joint angles that the arm reports afterwards.
     ///
     /// # Errors
-    /// As for [`Manipulator::move_by`].
+    /// The errors of [`Manipulator::move_by`].
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError>;
 
     /// Opens or closes the gripper.
     ///
     /// # Errors
-    /// What kept the arm from doing so.
+    /// Errors of the line or the controller.
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError>;
 
     /// Stops the arm at once.
     ///
     /// # Errors
-    /// What kept the message from reaching the arm.
+    /// Errors of the line or the controller.
     fn stop(&mut self) -> Result<(), ArmError>;
 }
 
-/// The two states of the gripper.
+/// State of the gripper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Gripper {
     /// Jaws apart.
     Open,
-    /// Jaws together, or on what lies between them.
+    /// Jaws together, or on an object between them.
     Closed,
 }
 
-/// The pair of capacitive sensors on the hand (section 2 of the paper).
+/// Pair of capacitive sensors on the hand (section 2 of the paper).
 pub trait ProximitySensor {
-    /// Whether something is so near to the hand that the arm must not go on.
+    /// Returns `true` if something is so near to the hand that the arm must not go on.
     ///
     /// # Errors
-    /// What kept the sensor from being read.
+    /// Errors of the line or the controller.
     fn object_near(&mut self) -> Result<bool, ArmError>;
 }
 

@@ -38,7 +38,8 @@ def main(path):
         talk(port, "DO READY", PROMPT)
         talk(port, "CAL", QUESTION)
         talk(port, "Y", PROMPT)
-        for line in ("SPEED 50", "DO READY", "DO DRIVE 1,10,100", "DO DRIVE 2,5,100", "DO DRIVE 3,5,100", "WHERE"):
+        lines = ["SPEED 50", "DO READY", "DO DRIVE 1,10,100", "DO DRIVE 2,5,100"]
+        for line in (*lines, "DO DRIVE 3,5,100", "WHERE"):
             talk(port, line, PROMPT)
         talk(port, "DO DRIVE 1,200,100", PROMPT)
         talk(port, "HERE P1", QUESTION)

@@ -1,4 +1,4 @@
-//! What a client waits for, checks and prefers.
+//! Settings of the client.
 
 use std::time::Duration;
 
@@ -8,16 +8,15 @@ use crate::kinematics::params::PumaParams;
 /// USB serial adapter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClientConfig {
-    /// Silence after which a prompt counts as one (default: 30 ms). A USB adapter delivers in
-    /// bursts up to 16 ms apart: below that a `.` in mid-reply can be taken for the prompt; every
-    /// exchange waits this long, so an emulator is talked to faster with 1 to 2 ms.
+    /// Silence after which a prompt counts as one (default: 30 ms). Every exchange waits this long.
+    /// A USB adapter delivers in bursts up to 16 ms apart: with less than that, a `.` in mid-reply
+    /// can be taken for the prompt. 1 to 2 ms suit an emulator.
     pub quiet: Duration,
-    /// Silence after which a reply counts as missing (default: 1 s). The line is then asked for its
-    /// prompt; too small a value asks while the controller still thinks, which is harmless but
-    /// slow.
+    /// Silence after which a reply counts as missing and the prompt is asked for (default: 1 s). A
+    /// value that is too small slows the exchange but does no harm.
     pub reply_timeout: Duration,
-    /// Longest time for a motion, a calibration or anything else that moves the arm (default: 60
-    /// s). When it is over the arm is stopped.
+    /// Longest time of a motion, a calibration or anything else that moves the arm (default: 60 s).
+    /// The arm is stopped after it.
     pub motion_timeout: Duration,
     /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect)
     /// (default: 10 s); loading from a floppy takes longer.
@@ -25,28 +24,27 @@ pub struct ClientConfig {
     /// Monitor speed set by `connect`, percent (default: 50), above 0 to 327; `None` leaves it as
     /// it is.
     pub speed_percent: Option<f64>,
-    /// How far a joint may stand from where it was sent, radians (default: 0.05 degrees). A PUMA
-    /// 560 stands at encoder counts up to 0.009 degrees apart; less than 0.01 degrees makes good
-    /// moves fail.
+    /// Greatest distance of a joint from its goal that counts as reached, radians (default: 0.05
+    /// degrees). A PUMA 560 stands at encoder counts up to 0.009 degrees apart; less than 0.01
+    /// degrees makes good moves fail.
     pub tolerance: f64,
-    /// How often something is tried again when the line has failed it (default: 3). 0 reports the
-    /// first fault.
+    /// Number of repetitions after a fault of the line (default: 3). 0 reports the first fault.
     pub retries: usize,
-    /// Whether what is typed is compared with its echo before the line is ended, if the controller
-    /// echoes at all (default: yes). Costs one round trip; without it a character lost on the line
+    /// Compares what is typed with its echo before the line is ended, if the controller echoes at
+    /// all (default: yes). The check costs one round trip; without it a character lost on the line
     /// can change a command.
     pub check_echo: bool,
-    /// How a coordinated motion is commanded (default: automatic).
+    /// Command for coordinated motions (default: automatic).
     pub way: MoveWay,
     /// Answer to a start-up question that speaks of loading (default: yes).
     pub load_from_floppy: bool,
     /// Answer to a start-up question that speaks of initializing, which erases programs and
     /// locations (default: no).
     pub initialize: bool,
-    /// Whether a program found running is aborted by `connect` (default: yes); otherwise that is an
+    /// Makes `connect` abort a program that runs (default: yes); otherwise a running program is an
     /// error.
     pub abort_running_program: bool,
-    /// How often `calibrate` tries again while arm power is off (default: 0).
+    /// Number of further tries of `calibrate` while arm power is off (default: 0).
     pub power_retries: usize,
     /// Pause between these tries (default: 2 s).
     pub power_retry_delay: Duration,
@@ -61,8 +59,8 @@ pub struct ClientConfig {
     pub idle_prompt: char,
     /// Prompt of the monitor while a program runs (default: `*`).
     pub run_prompt: char,
-    /// Geometry and limits: moves out of the ranges are refused before anything is sent, and
-    /// `WHERE` is checked against its own two halves (default: [`PumaParams::unimation`]).
+    /// Geometry and limits (default: [`PumaParams::unimation`]). Moves out of the ranges are
+    /// refused before anything is sent, and the two halves of `WHERE` are compared.
     pub params: PumaParams,
 }
 
@@ -94,7 +92,7 @@ impl Default for ClientConfig {
 }
 
 impl ClientConfig {
-    /// For an emulator on the same machine: 2 ms of quiet.
+    /// Returns settings for an emulator on the same machine: 2 ms of quiet.
     pub fn for_emulator() -> Self {
         Self {
             quiet: Duration::from_millis(2),
@@ -102,18 +100,18 @@ impl ClientConfig {
         }
     }
 
-    /// Longest time for a reply that waits for no motion: a few of its silences.
+    /// Returns the longest time of a reply that waits for no motion.
     pub(super) fn patience(&self) -> Duration {
         self.reply_timeout.saturating_mul(4)
     }
 }
 
-/// How a motion of several joints is commanded.
+/// Command for a motion of several joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MoveWay {
-    /// A relative move of one joint by `DRIVE`; anything else by `#PPOINT` if the controller knows
-    /// it, by `POINT` otherwise. Without an echo to check, always by `POINT`, whose display shows
-    /// what has arrived.
+    /// `DRIVE` for a relative move of one joint, `#PPOINT` for other moves, `POINT` where the
+    /// controller does not know `#PPOINT` or echoes nothing. The display of `POINT` shows what has
+    /// arrived.
     Automatic,
     /// `DO DRIVE` for each joint, one after the other.
     Drive,

@@ -1,4 +1,4 @@
-//! Getting hold of the monitor, and calibrating the arm.
+//! Connection with the monitor, and calibration of the arm.
 
 use crate::client::config::ClientConfig;
 use crate::client::dialogue::{NUDGE, SPOIL, is_boot_question, last_question, shortened, way_out};
@@ -12,9 +12,8 @@ use crate::error::ArmError;
 use crate::transport::Transport;
 
 impl<T: Transport> Val2Client<T> {
-    /// Gets hold of the monitor: through the start-up dialogue of a controller just switched on,
-    /// out of any other dialogue, over a half-typed line (which is deleted, never carried out), or
-    /// at once. Sets the speed of `config`.
+    /// Connects to the monitor and sets the speed of `config`. A start-up dialogue is answered, any
+    /// other dialogue is left, and a half-typed line is deleted.
     ///
     /// # Errors
     /// [`ArmError::Silence`] or [`ArmError::Garbled`] within `config.connect_timeout` if there is
@@ -36,8 +35,8 @@ impl<T: Transport> Val2Client<T> {
         Ok(client)
     }
 
-    /// Goes through the start-up dialogue again, after [`ArmError::Restarted`] for instance. The
-    /// arm has to be calibrated anew.
+    /// Connects anew, after [`ArmError::Restarted`] for instance. The arm has to be calibrated
+    /// again.
     ///
     /// # Errors
     /// As for [`Val2Client::connect`].
@@ -119,8 +118,7 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Types a command that does no harm and listens whether it comes back before its line is
-    /// ended.
+    /// Types a command that does no harm and listens for its echo before the line is ended.
     fn find_echo(&mut self) -> Result<(), ArmError> {
         self.wire.echo = Some(false);
         for attempt in 0..=self.config.retries {
@@ -174,8 +172,7 @@ impl<T: Transport> Val2Client<T> {
             .garbled("WHERE", expected, "nothing of the kind, several times"))
     }
 
-    /// Lets the arm find its joint angles: `CALIBRATE`, the answer yes, and up to
-    /// `config.motion_timeout` for the small moves.
+    /// Calibrates the arm: `CALIBRATE`, the answer yes, and the small moves that follow.
     ///
     /// # Errors
     /// [`ArmError::Setting`] while a proximity guard is armed, which does not watch these moves;
@@ -223,7 +220,7 @@ impl<T: Transport> Val2Client<T> {
             .map_err(|failed| failed.error)
     }
 
-    /// Lets time pass on the line's own clock; what comes meanwhile is kept as notices.
+    /// Lets time pass on the line's own clock. Messages that come meanwhile become notices.
     pub(super) fn pause(&mut self, time: std::time::Duration) -> Result<(), ArmError> {
         let until = self.wire.line.clock().saturating_add(time);
         let mut heard = String::new();
@@ -251,7 +248,7 @@ impl<T: Transport> Val2Client<T> {
     }
 }
 
-/// Settings that would make the client send nonsense or wait for ever.
+/// Refuses settings that would make the client send nonsense or wait for ever.
 fn check(config: &ClientConfig) -> Result<(), ArmError> {
     if let Some(percent) = config.speed_percent {
         check_percent(percent)?;

@@ -1,7 +1,7 @@
 //! Questions of the controller, and the bytes that leave a dialogue or a half-typed line.
 
-/// Deletes a half-typed line, or spoils it where Ctrl-U is not known, so that it cannot be carried
-/// out. Ctrl-Q comes before it: a single flipped bit makes an `S` a Ctrl-S, which holds all output.
+/// Deletes a half-typed line, or spoils it where Ctrl-U is unknown, so that it cannot be carried
+/// out. Ctrl-Q comes first: a flipped bit can make a Ctrl-S, which holds all output.
 pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
 
 /// Asks for the prompt.
@@ -16,17 +16,16 @@ pub(super) const RESIDENT_QUESTION: &str = "GO? ";
 /// Line that ends the resident program.
 pub(super) const RESIDENT_LEAVE: &[u8] = b"914\r";
 
-/// Whether the last question of a text is one of the start-up dialogue.
+/// Returns `true` if the last question of a text belongs to the start-up dialogue.
 pub(super) fn is_boot_question(text: &str) -> bool {
     let question = last_question(text);
     question.contains("(Y/N)") && (question.contains("LOAD") || question.contains("INIT"))
 }
 
-/// What leaves a dialogue, tried in turn.
+/// Returns the bytes that leave a dialogue; attempts take turns.
 ///
-/// An empty line ends those that ask for changes or for yes and no. It is not the first thing that
-/// an unknown question is answered with: a program that asks for numbers would take it for zeros
-/// and go on with them.
+/// An empty line ends questions for changes and for yes and no. An unknown question may come from a
+/// program that would take an empty line for zeros, so it is cancelled first.
 pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     let question = last_line(text).to_ascii_uppercase();
     let words = question.trim_end_matches(['?', ' ']);
@@ -46,7 +45,7 @@ pub(super) fn way_out(text: &str, attempt: usize) -> &'static [u8] {
     }
 }
 
-/// The last question of a text, in upper case and without its mark. Where nothing is echoed one
+/// Returns the last question of a text, in upper case and without its mark. Without an echo one
 /// question can follow another on its line.
 pub(super) fn last_question(text: &str) -> String {
     let line = last_line(text).trim_end_matches(['?', ' ']);
@@ -63,7 +62,7 @@ fn last_line(text: &str) -> &str {
         .unwrap_or_default()
 }
 
-/// The end of a text, short enough for a message.
+/// Returns the end of a text, short enough for a message.
 pub(super) fn shortened(text: &str) -> String {
     let count = text.chars().count();
     if count <= 120 {

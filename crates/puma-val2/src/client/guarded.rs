@@ -1,4 +1,4 @@
-//! An arm that its controller stops when something comes too near to the hand.
+//! An arm whose controller stops it when something comes too near to the hand.
 
 use crate::client::val2_client::Val2Client;
 use crate::error::ArmError;
@@ -6,10 +6,11 @@ use crate::joints::{JointDelta, Joints};
 use crate::manipulator::{Gripper, Manipulator};
 use crate::transport::Transport;
 
-/// A [`Val2Client`] whose moves the controller itself watches ([`Val2Client::arm_proximity`]).
+/// A [`Val2Client`] whose moves are watched by the controller itself
+/// ([`Val2Client::arm_proximity`]).
 ///
-/// A stop ([`ArmError::ProximityStop`]) uses the guard up, so that the arm can be taken back the
-/// way it came; it is armed again as soon as a move has ended with nothing near.
+/// A stop ([`ArmError::ProximityStop`]) disarms the guard, so that the arm can go back the way it
+/// came. The guard is armed again after a move that has ended with nothing near.
 #[derive(Debug)]
 pub struct GuardedArm<T: Transport> {
     client: Val2Client<T>,
@@ -18,7 +19,7 @@ pub struct GuardedArm<T: Transport> {
 }
 
 impl<T: Transport> GuardedArm<T> {
-    /// Arms the guard on the input that `client` is set to for its sensors.
+    /// Arms the guard on [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
     ///
     /// # Errors
     /// As for [`Val2Client::arm_proximity`].

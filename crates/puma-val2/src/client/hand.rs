@@ -11,11 +11,11 @@ use crate::kinematics::xyzoat::Xyzoat;
 use crate::transport::Transport;
 
 impl<T: Transport> Val2Client<T> {
-    /// Moves the hand to a pose in the world frame by `DO MOVE TRANS(...)`, the joints
+    /// Moves the hand to a pose in the world frame, by `DO MOVE TRANS(...)` with the joints
     /// interpolated, or along a straight line.
     ///
-    /// Position within 0.1 mm and direction within 0.1 degrees are confirmed by `WHERE`. An armed
-    /// proximity guard watches this motion as any other.
+    /// `WHERE` confirms the position within 0.1 mm and the direction within 0.1 degrees. An armed
+    /// proximity guard watches this motion too.
     ///
     /// # Errors
     /// [`ArmError::Setting`] if a number of the pose is not finite; [`ArmError::Refused`] if the
@@ -53,8 +53,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Commands a motion of the hand: in one line where its echo is checked, as a point whose
-    /// display is checked otherwise.
+    /// Commands a motion of the hand: in one line where its echo is checked, otherwise as a point
+    /// whose display is checked.
     fn send_hand(&mut self, hand: &Xyzoat, word: &str) -> Result<(), Failed> {
         let move_to_pose = format!("{word} TRANS({})", hand.val().map(plain).join(","));
         if let Some(signal) = self.guard {
@@ -76,7 +76,7 @@ impl<T: Transport> Val2Client<T> {
     }
 }
 
-/// How far two poses are apart, metres and degrees.
+/// Returns the distance of two poses, metres and degrees.
 fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     let off = (a.translation.vector - b.translation.vector).norm();
     (off, a.rotation.angle_to(&b.rotation).to_degrees())

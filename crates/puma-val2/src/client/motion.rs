@@ -1,4 +1,4 @@
-//! Motions: commanded, and confirmed by `WHERE`.
+//! Motions of the joints, confirmed by `WHERE`.
 
 use std::time::Duration;
 
@@ -10,37 +10,38 @@ use crate::error::ArmError;
 use crate::joints::{Joint, JointDelta, Joints};
 use crate::transport::Transport;
 
-/// Less than VAL's smallest step of a joint, half a thousandth of a degree.
+/// Angle below which a joint counts as still: less than VAL's smallest step, half a thousandth of a
+/// degree.
 pub(super) const STILL: f64 = 0.0005 * std::f64::consts::PI / 180.0;
 
-/// An arm that shows its goal to within an encoder count and a display digit stands there. One that
-/// is a little further off may be about to arrive and is looked at again.
+/// Distance from the goal, an encoder count and a display digit, up to which an arm surely stands
+/// there. An arm a little further off may be about to arrive and is looked at again.
 pub(super) const AS_SENT: f64 = 0.012 * std::f64::consts::PI / 180.0;
 
-/// What is commanded to get from where the arm stands to a goal.
+/// Command that leads from the arm's position to a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Means {
     /// `DRIVE`, joint after joint, at this speed in percent.
     Drive(f64),
     Ppoint,
     Point,
-    /// `POINT`, then a stored program that watches a signal while it moves, at this speed in
-    /// percent if it is not the monitor's own.
+    /// `POINT`, then a stored program that watches a signal while it moves. The speed is in
+    /// percent; `None` keeps the monitor's own.
     Guarded(Option<f64>),
     Ready,
 }
 
-/// A motion of which it is not certain what the controller has understood.
+/// Doubt about what the controller has understood of a motion.
 #[derive(Debug)]
 pub(super) struct Doubt {
     pub(super) error: ArmError,
-    /// Whether the motion had all its time and was stopped.
+    /// The motion had all its time and was stopped.
     pub(super) overdue: bool,
 }
 
 impl<T: Transport> Val2Client<T> {
-    /// Turns one joint by `radians` at `speed` percent of the monitor's speed and returns the joint
-    /// angles afterwards.
+    /// Turns one joint by `radians` at `speed` percent of the monitor's speed, and returns the
+    /// joint angles afterwards.
     ///
     /// # Errors
     /// [`ArmError::JointLimit`], [`ArmError::NotFinite`] or [`ArmError::Setting`] before anything
@@ -54,7 +55,7 @@ impl<T: Transport> Val2Client<T> {
         self.relative(JointDelta::of(joint, radians), means)
     }
 
-    /// `READY`: the arm goes to its upright pose, and is confirmed there.
+    /// Moves the arm to its upright pose by `READY`, and returns the joint angles afterwards.
     ///
     /// # Errors
     /// As for [`Manipulator::move_to`](crate::Manipulator::move_to).
@@ -121,8 +122,7 @@ impl<T: Transport> Val2Client<T> {
         self.travel(start, target, means)
     }
 
-    /// Gets the arm from `start` to `target`. After doubt, what is missing is commanded from where
-    /// the arm is read to stand.
+    /// Moves the arm from `start` to `target`. After doubt, only the rest of the way is commanded.
     fn travel(
         &mut self,
         start: Joints,
@@ -168,15 +168,16 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Whether a motion was commanded in doubt. The monitor has its prompt again then, or the arm
-    /// has been told to stop.
+    /// Returns the doubt that a motion was commanded in, if any. Afterwards the monitor has its
+    /// prompt again, or the arm has been told to stop.
     pub(super) fn doubt(&mut self, outcome: Result<(), Failed>) -> Result<Option<Doubt>, ArmError> {
         let error = match outcome {
             Ok(()) => return Ok(None),
             Err(failed) if is_doubt(&failed.error) => failed.error,
             Err(failed) => return Err(self.given_up(failed)),
         };
-        let overdue = matches!(error, ArmError::Silence { waited, .. } if waited >= self.config.motion_timeout);
+        let limit = self.config.motion_timeout;
+        let overdue = matches!(error, ArmError::Silence { waited, .. } if waited >= limit);
         if overdue {
             let _ = self.panic_stop();
         } else {
@@ -187,7 +188,7 @@ impl<T: Transport> Val2Client<T> {
         Ok(Some(Doubt { error, overdue }))
     }
 
-    /// Commands the motion. `Ok`: the controller took it, in all its parts.
+    /// Commands the motion. `Ok` says that the controller took all its parts.
     fn set_off(&mut self, from: Joints, target: Joints, means: Means) -> Result<(), Failed> {
         let patience = self.config.motion_timeout;
         match means {
@@ -257,8 +258,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// The controller refused, or was restarted, or the line broke: where the arm stands is still
-    /// worth knowing.
+    /// Ends a move after a refusal, a restart or a broken line. The arm's position is still read if
+    /// that is possible.
     fn given_up(&mut self, failed: Failed) -> ArmError {
         match failed.error {
             error @ ArmError::Refused { .. } => {
@@ -273,14 +274,13 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Waits until the arm stands, wherever that is.
+    /// Waits until the arm stands anywhere.
     pub(super) fn stand_anywhere(&mut self) -> Result<Joints, ArmError> {
         let nowhere = Joints([f64::MAX; 6]);
         self.stand(nowhere)
     }
 
-    /// The arm's position cannot be read after a motion was commanded: it is told to stop, in case
-    /// it hears.
+    /// Tells an arm to stop whose position cannot be read after a motion was commanded.
     pub(super) fn lost(&mut self, cause: ArmError) -> ArmError {
         if matches!(cause, ArmError::Restarted { .. }) {
             // A controller that starts has no arm power.
@@ -297,7 +297,8 @@ impl<T: Transport> Val2Client<T> {
     }
 }
 
-/// Whether a refusal is about the words and not about the arm: the place is not understood.
+/// Returns `true` if a refusal is about the words and not about the arm: the place is not
+/// understood.
 fn names_no_place(error: &ArmError) -> bool {
     let ArmError::Refused { message, .. } = error else {
         return false;
@@ -315,7 +316,7 @@ fn names_no_place(error: &ArmError) -> bool {
     .any(|word| message.contains(word))
 }
 
-/// The joint that is furthest off, and by how many radians.
+/// Returns the joint that is furthest off, and its distance in radians.
 pub(super) fn furthest(a: &Joints, b: &Joints) -> (Joint, f64) {
     Joint::ALL
         .into_iter()

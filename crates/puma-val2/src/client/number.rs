@@ -1,4 +1,4 @@
-//! Numbers as they are typed and shown.
+//! Numbers in commands and messages.
 
 use crate::error::ArmError;
 use crate::joints::{Joint, Joints};
@@ -14,8 +14,8 @@ pub(super) fn check_percent(percent: f64) -> Result<(), ArmError> {
     })
 }
 
-/// A number with up to three decimals and no more characters than needed: every character is a
-/// millisecond on the line.
+/// Formats a number with up to three decimals and no more characters than needed: every character
+/// is a millisecond on the line.
 pub(super) fn plain(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -26,7 +26,7 @@ pub(super) fn plain(value: f64) -> String {
     }
 }
 
-/// A value in degrees for one joint, for a message.
+/// Returns the angle of one joint in degrees, for a message.
 pub(super) fn degrees(joints: &Joints, joint: Joint) -> f64 {
     joints[joint].to_degrees()
 }

@@ -1,4 +1,4 @@
-//! Points typed to the controller, and compared with what it shows of them.
+//! Points typed to the controller and compared with its display.
 
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
@@ -7,8 +7,7 @@ use crate::error::ArmError;
 use crate::joints::Joints;
 use crate::transport::Transport;
 
-/// Whether values displayed, each with what rounding can have changed of it, are those that were
-/// meant.
+/// Test of the values displayed, each with its error of rounding, against the values meant.
 pub(super) type Fits<'a> = &'a dyn Fn(&[(f64, f64); 6]) -> bool;
 
 impl<T: Transport> Val2Client<T> {
@@ -24,8 +23,7 @@ impl<T: Transport> Val2Client<T> {
         })
     }
 
-    /// `POINT name`, the values, an empty line; what the controller shows of it must be what was
-    /// meant.
+    /// Types `POINT name`, the values and an empty line, and compares the display with the values.
     pub(super) fn define_point(
         &mut self,
         name: &str,
@@ -87,8 +85,7 @@ pub(super) fn not_done(error: ArmError) -> Failed {
     }
 }
 
-/// The numbers of a line that holds exactly six, each with what rounding to its decimals can have
-/// changed.
+/// Returns the numbers of a line that holds exactly six, each with the greatest error of rounding.
 pub(super) fn shown_values(line: &str) -> Option<[(f64, f64); 6]> {
     let numbers: Vec<(f64, f64)> = line
         .split_whitespace()

@@ -1,4 +1,4 @@
-//! The proximity sensors: read, and set up to stop the arm.
+//! Proximity sensors: reading them, and stopping the arm by them.
 
 use crate::client::dialogue::{NUDGE, shortened};
 use crate::client::number::plain;
@@ -10,34 +10,32 @@ use crate::joints::Joints;
 use crate::manipulator::ProximitySensor;
 use crate::transport::Transport;
 
-/// The program in which the client's moves run under guard, one for a single move of another kind,
-/// and the one that the signal calls.
+/// Programs of the guard: one for moves of the joints, one for a single move of another kind, and
+/// the one that the signal calls.
 const RUN: &str = "PGRUN";
 const ONCE: &str = "PGONCE";
 const HIT: &str = "PGHIT";
 
-/// The variable in which the last of them keeps that it was called: a signal that has come and gone
-/// again leaves nothing else behind.
+/// Variable in which the called program notes that it ran. A signal that has come and gone leaves
+/// nothing else behind.
 const LATCH: &str = "PGH";
 
 impl<T: Transport> Val2Client<T> {
-    /// Lets the controller itself stop the next motions as soon as input `signal` comes on, without
-    /// waiting for us (`REACTI`).
+    /// Lets the controller itself stop the next motions when input `signal` comes on (`REACTI`).
     ///
-    /// A move during which the signal comes, be it for a moment only, ends in
-    /// [`ArmError::ProximityStop`] and uses the guard up: the way back is free until it is armed
-    /// again. Motions run inside small programs that are stored in the controller (`PGRUN`,
-    /// `PGONCE`, `PGHIT`; older ones of these names are replaced), for whether a monitor watches
-    /// signals while no program runs is not known.
+    /// A move during which the signal comes, even for a moment, ends in [`ArmError::ProximityStop`]
+    /// and disarms the guard: the way back is free until it is armed again. Motions run inside
+    /// small programs that are stored in the controller (`PGRUN`, `PGONCE`, `PGHIT`; older programs
+    /// of these names are replaced), because it is not known whether a monitor watches signals
+    /// while no program runs.
     ///
-    /// While armed, every motion that this client commands is guarded: moves of several joints are
-    /// always coordinated, and [`Val2Client::drive`], [`Val2Client::ready`] and
-    /// [`Val2Client::move_hand`] run inside a program as well. What cannot be guarded is refused
-    /// with [`ArmError::Setting`]: [`Val2Client::calibrate`], [`Val2Client::execute`] and
-    /// [`Val2Client::resident`].
+    /// While the guard is armed, moves of several joints are always coordinated, and
+    /// [`Val2Client::drive`], [`Val2Client::ready`] and [`Val2Client::move_hand`] run inside a
+    /// program as well. [`Val2Client::calibrate`], [`Val2Client::execute`] and
+    /// [`Val2Client::resident`] cannot be guarded and are refused with [`ArmError::Setting`].
     ///
     /// # Errors
-    /// What the line or the controller said, that there is no such signal for instance.
+    /// Errors of the line or the controller: there is no such signal, for instance.
     pub fn arm_proximity(&mut self, signal: u16) -> Result<(), ArmError> {
         self.signal(signal)?;
         self.store_program(HIT, &[format!("{LATCH} = -1"), "HALT".to_owned()])?;
@@ -60,7 +58,7 @@ impl<T: Transport> Val2Client<T> {
         Ok(())
     }
 
-    /// A motion to the point that has been defined, under guard.
+    /// Moves to the point that has been defined, under guard.
     pub(super) fn run_guarded(&mut self, speed: Option<f64>) -> Result<(), Failed> {
         match (speed, self.guard) {
             (Some(speed), Some(signal)) => {
@@ -71,8 +69,7 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// These steps, which move the arm to a place that does not depend on where it stands, under
-    /// guard.
+    /// Runs these steps under guard. Their goal must not depend on the arm's position.
     pub(super) fn run_guarded_once(
         &mut self,
         signal: u16,
@@ -86,9 +83,8 @@ impl<T: Transport> Val2Client<T> {
         self.run(&format!("EXECUTE {ONCE}")).map(drop)
     }
 
-    /// The arm stands after a motion: if that was under guard, whether the signal has come, even if
-    /// it has gone again. Where the program may still be running it is ended. Returns where the arm
-    /// stands then.
+    /// Ends a guarded motion: a program that may still run is ended, and a signal that has come is
+    /// reported, even if it has gone again. Returns the arm's position.
     pub(super) fn check_guard(
         &mut self,
         mut stands: Joints,
@@ -112,14 +108,13 @@ impl<T: Transport> Val2Client<T> {
         })
     }
 
-    /// Types a program into the controller's editor, replacing one of the same name, and compares
-    /// it with what the controller lists.
+    /// Types a program into the controller's editor, replaces one of the same name, and compares
+    /// the listing.
     ///
     /// # Errors
     /// [`ArmError::Setting`], before anything is sent, for a name or a step that is not one line of
-    /// printable characters: what comes after a line end would be a line of its own, and carried
-    /// out; otherwise what the line or the controller said; [`ArmError::Garbled`] if the listing
-    /// differs several times over.
+    /// printable characters; [`ArmError::Garbled`] if the listing differs several times over;
+    /// otherwise errors of the line or the controller.
     pub fn store_program(&mut self, name: &str, steps: &[String]) -> Result<(), ArmError> {
         check_line("the name of a program", name)?;
         for step in steps {
@@ -177,15 +172,14 @@ impl<T: Transport> Val2Client<T> {
             .map_err(|failed| failed.error)
     }
 
-    /// Runs a stored program to its end and returns what it printed. A program that asks for values
-    /// gets none: it is aborted, at once if what it asks ends with a question mark, else after
+    /// Runs a stored program to its end and returns its output. A program that asks for values is
+    /// aborted: at once if its question ends with a question mark, otherwise after
     /// `config.motion_timeout`.
     ///
     /// # Errors
     /// [`ArmError::Setting`] for a name that is not one line of printable characters, and while a
-    /// proximity guard is armed, which does not watch what other programs do; what the line or the
-    /// controller said, its messages in asterisks included; [`ArmError::Silence`] after
-    /// `config.motion_timeout`, the program aborted.
+    /// proximity guard is armed; [`ArmError::Silence`] after `config.motion_timeout`, the program
+    /// aborted; otherwise errors of the line or the controller.
     pub fn execute(&mut self, program: &str) -> Result<String, ArmError> {
         check_line("the name of a program", program)?;
         self.refuse_under_guard("a program")?;
@@ -204,10 +198,10 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Aborts the program that runs, if one does.
+    /// Aborts the program that runs, if any.
     ///
     /// # Errors
-    /// What the line said.
+    /// Errors of the line.
     pub fn abort(&mut self) -> Result<(), ArmError> {
         self.last_known = None;
         self.end_program()
@@ -236,7 +230,7 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Runs a program until it ends. One that asks for something leaves doubt.
+    /// Runs a program until it ends. A question of the program is an error.
     fn run(&mut self, line: &str) -> Result<String, Failed> {
         let patience = self.config.motion_timeout;
         let reply = self.wire.exchange_to_end(line, patience, &self.config)?;
@@ -254,7 +248,7 @@ impl<T: Transport> Val2Client<T> {
     }
 }
 
-/// Refuses what would not arrive as the one line that it is meant to be.
+/// Refuses text that would not arrive as one line.
 fn check_line(what: &'static str, text: &str) -> Result<(), ArmError> {
     if !text.trim().is_empty() && text.bytes().all(|b| matches!(b, 0x20..=0x7e)) {
         return Ok(());
@@ -266,8 +260,8 @@ fn check_line(what: &'static str, text: &str) -> Result<(), ArmError> {
     })
 }
 
-/// The steps of a program that moves the arm under guard. A signal that is on already lets it
-/// stand.
+/// Returns the steps of a program that moves the arm under guard. If the signal is on already, the
+/// arm stays.
 fn guarded_steps(signal: u16, motion: &[String]) -> Vec<String> {
     let before = [
         format!("REACTI {signal},{HIT}"),
@@ -279,7 +273,7 @@ fn guarded_steps(signal: u16, motion: &[String]) -> Vec<String> {
     before.iter().chain(motion).chain(&after).cloned().collect()
 }
 
-/// Whether a listing shows these steps, all of them, in their order, and no further one like them.
+/// Returns `true` if a listing shows exactly these steps in their order.
 fn holds(listing: &str, steps: &[String]) -> bool {
     let steps: Vec<String> = steps.iter().map(|step| step.to_ascii_uppercase()).collect();
     let shown: Vec<&str> = listing
@@ -298,8 +292,7 @@ fn holds(listing: &str, steps: &[String]) -> bool {
 }
 
 impl<T: Transport> ProximitySensor for Val2Client<T> {
-    /// Reads the input of
-    /// [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
+    /// Reads the input [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
     fn object_near(&mut self) -> Result<bool, ArmError> {
         self.signal(self.config.proximity_signal)
     }

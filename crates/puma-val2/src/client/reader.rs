@@ -1,6 +1,6 @@
 //! Replies of the controller: where they end and what they say.
 
-/// How a reply ended.
+/// End of a reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ending {
     /// With the idle monitor's prompt.
@@ -55,17 +55,17 @@ impl ReplyReader {
         }
     }
 
-    /// Whether more came than is kept.
+    /// Returns `true` if more has come than is kept.
     pub(crate) fn overflowed(&self) -> bool {
         self.overflowed
     }
 
-    /// What has come so far.
+    /// Returns the text that has come so far.
     pub(crate) fn text(&self) -> &str {
         &self.text
     }
 
-    /// How the reply ends, if nothing more comes.
+    /// Returns the end of the reply, if nothing more comes.
     pub(crate) fn ending(&self) -> Option<Ending> {
         let last_line = self
             .text

@@ -13,7 +13,7 @@ use crate::joints::{JointDelta, Joints};
 use crate::manipulator::{Gripper, Manipulator};
 use crate::transport::Transport;
 
-/// Its name.
+/// Name of the resident program.
 const NAME: &str = "PGLOOP";
 
 /// Keys of the program. A changed bit can make a carriage return of a character, and its line two:
@@ -25,8 +25,8 @@ const CLOSE: &str = "609";
 const WHERE: &str = "817";
 const END: &str = "914";
 
-/// It asks for a key, six angles and the key again. An empty, cut or damaged answer makes it ask
-/// anew.
+/// Steps of the program. It asks for a key, six angles and the key again. An empty, cut or damaged
+/// answer makes it ask anew.
 const STEPS: [&str; 17] = [
     "10 PROMPT \"GO? \",PGK,PGA,PGB,PGC,PGD,PGE,PGF,PGZ",
     "IF PGK == 914 GOTO 20",
@@ -232,7 +232,7 @@ impl<T: Transport> Resident<'_, T> {
         Err(self.client.wire.garbled(answer, "six joint angles", &heard))
     }
 
-    /// Where the arm stands: what the program shows twice in a row. The arm moves only while a line
+    /// Returns the angles that the program shows twice in a row. The arm moves only while a line
     /// that says so is answered.
     fn stands(&mut self, mut before: Option<Joints>) -> Result<Joints, ArmError> {
         for _ in 0..self.client.config.retries.saturating_add(3) {

@@ -16,41 +16,41 @@ use crate::transport::Transport;
 
 /// A client of a VAL II controller.
 ///
-/// Every call waits until the controller has answered and, where the arm moves, until `WHERE` shows
-/// that it stands where it was sent.
+/// Every call waits until the controller has answered. A call that moves the arm waits until
+/// `WHERE` shows it at its goal.
 ///
 /// **The rule for faults on the line.** A relative motion is never repeated blindly: after any
-/// doubt about what the controller has understood, the position is read, and only what is missing
-/// from there to the goal is commanded. A call therefore ends with the arm at its goal, or with a
-/// typed error, the arm stopped and its last known joint angles kept ([`Val2Client::last_known`]).
+/// doubt about an exchange, the client reads the position and commands only the rest of the way. A
+/// call ends with the arm at its goal, or with a typed error, the arm stopped and its last known
+/// joint angles kept ([`Val2Client::last_known`]).
 ///
 /// A move starts from the joint angles that the arm reported last, which saves a reply of a quarter
-/// of a second on a slow line. Whoever moves the arm by other means (the teach pendant, a program)
-/// calls [`Manipulator::joints`] before the next [`Manipulator::move_by`].
+/// of a second on a slow line. If the arm is moved by other means (the teach pendant, a program),
+/// call [`Manipulator::joints`] before the next [`Manipulator::move_by`].
 #[derive(Debug)]
 pub struct Val2Client<T: Transport> {
     pub(super) wire: Wire<T>,
     pub(super) config: ClientConfig,
     pub(super) last_known: Option<Joints>,
-    /// Whether the controller has turned out not to know `#PPOINT`.
+    /// The controller has turned out not to know `#PPOINT`.
     pub(super) lacks_ppoint: bool,
-    /// The signal that stops the next motions.
+    /// Signal that stops the next motions.
     pub(super) guard: Option<u16>,
 }
 
 impl<T: Transport> Val2Client<T> {
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &ClientConfig {
         &self.config
     }
 
-    /// The line.
+    /// Returns the line.
     pub fn line(&self) -> &T {
         &self.wire.line
     }
 
-    /// The line, to press the buttons of an emulator at its other end. Bytes read or written here
-    /// are missing in the client's dialogue.
+    /// Returns the line, to press the buttons of an emulator at its other end. The client misses
+    /// bytes that are read or written here.
     pub fn line_mut(&mut self) -> &mut T {
         &mut self.wire.line
     }
@@ -60,25 +60,25 @@ impl<T: Transport> Val2Client<T> {
         self.wire.line
     }
 
-    /// The joint angles that the arm reported last, without asking it; `None` if it may have moved
-    /// since, or the controller was started again.
+    /// Returns the joint angles that the arm reported last, without asking it. `None`: it may have
+    /// moved since, or the controller was started again.
     pub fn last_known(&self) -> Option<Joints> {
         self.last_known.filter(|_| !self.wire.restarted)
     }
 
-    /// Whether the controller echoes what is typed.
+    /// Returns `true` if the controller echoes what is typed.
     pub fn echoes(&self) -> bool {
         self.wire.echo == Some(true)
     }
 
-    /// Messages of the controller that belong to no command, oldest first, at most a hundred; taken
-    /// out.
+    /// Takes out the messages of the controller that belong to no command, oldest first, at most a
+    /// hundred.
     pub fn take_notices(&mut self) -> Vec<String> {
         std::mem::take(&mut self.wire.notices)
     }
 
-    /// Carries out one line that neither moves the arm nor opens a dialogue, trying again after
-    /// doubt, and returns the reply.
+    /// Carries out a line that neither moves the arm nor opens a dialogue, tries again after doubt,
+    /// and returns the reply.
     pub(super) fn command(&mut self, line: &str) -> Result<String, ArmError> {
         let mut tries = 0;
         loop {
@@ -93,8 +93,7 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Carries out one line, once. The reply must end with the monitor's prompt and hold no
-    /// message.
+    /// Carries out a line once. The reply must end with the monitor's prompt and hold no message.
     pub(super) fn command_once(&mut self, line: &str, timeout: Duration) -> Result<String, Failed> {
         let reply = self.wire.exchange(line, timeout, &self.config)?;
         self.without_message(line, &reply)?;
@@ -122,24 +121,23 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Sets the monitor's speed, percent of normal, above 0 to 327.
+    /// Sets the monitor's speed in percent, above 0 to 327.67.
     ///
     /// # Errors
-    /// [`ArmError::Setting`] before anything is sent; otherwise what the line or the controller
-    /// said.
+    /// [`ArmError::Setting`] before anything is sent; otherwise errors of the line or the
+    /// controller.
     pub fn set_speed(&mut self, percent: f64) -> Result<(), ArmError> {
         check_percent(percent)?;
         self.command(&format!("SPEED {}", plain(percent))).map(drop)
     }
 
-    /// Where the arm says it is.
+    /// Reads the arm's position.
     ///
-    /// The reply is believed when its joint angles and its hand pose belong together; with a tool
-    /// or base set in the controller they do not, and then two equal replies in a row are asked
-    /// for.
+    /// A reply is accepted if its joint angles and its hand pose belong together. With a tool or
+    /// base set in the controller they do not; then two equal replies in a row are required.
     ///
     /// # Errors
-    /// What kept the arm from answering, [`ArmError::Garbled`] if no two replies agree.
+    /// Errors of the line or the controller; [`ArmError::Garbled`] if no two replies agree.
     pub fn where_(&mut self) -> Result<Location, ArmError> {
         let mut before: Option<Location> = None;
         let mut last_error = None;
@@ -188,7 +186,7 @@ impl<T: Transport> Val2Client<T> {
     /// Opens or closes the hand and waits until that is done.
     ///
     /// # Errors
-    /// What the line or the controller said.
+    /// Errors of the line or the controller.
     fn set_hand(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         self.command(match gripper {
             Gripper::Open => "DO OPENI",
@@ -197,18 +195,18 @@ impl<T: Transport> Val2Client<T> {
         .map(drop)
     }
 
-    /// Whether a signal is on: 1 and up outputs, 1001 and up inputs.
+    /// Returns `true` if a signal is on: 1 and up are outputs, 1001 and up inputs.
     ///
     /// # Errors
-    /// What the line or the controller said; [`ArmError::Garbled`] if the answer is no number.
+    /// Errors of the line or the controller; [`ArmError::Garbled`] if the answer is no number.
     pub fn signal(&mut self, number: u16) -> Result<bool, ArmError> {
         self.truth(&format!("SIG({number})"))
     }
 
-    /// The value of a condition, -1 for true and 0 for false.
+    /// Returns the value of a condition, -1 for true and 0 for false.
     ///
-    /// No single character that changes, gets lost or comes twice makes one of the other. Whatever
-    /// else is shown counts when it is shown twice in a row.
+    /// No single character that changes, gets lost or comes twice turns one into the other. Any
+    /// other number must be shown twice in a row.
     pub(super) fn truth(&mut self, condition: &str) -> Result<bool, ArmError> {
         let line = format!("DO TYPE {condition}");
         let mut before = None;
@@ -228,7 +226,7 @@ impl<T: Transport> Val2Client<T> {
         Err(self.wire.garbled(&line, "-1 or 0", &shortened(&heard)))
     }
 
-    /// Refuses what would move the arm without the guard that is armed.
+    /// Refuses a motion that the armed guard would not watch.
     pub(super) fn refuse_under_guard(&self, what: &'static str) -> Result<(), ArmError> {
         match self.guard {
             None => Ok(()),
@@ -240,7 +238,7 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Stops the arm: `PANIC` and Ctrl-C, without waiting for a prompt before. The client can be
+    /// Stops the arm by `PANIC` and Ctrl-C, without waiting for a prompt first. The client can be
     /// used again afterwards.
     ///
     /// `PANIC` is sent twice: the first may end a half-typed line, which it spoils.

@@ -4,20 +4,20 @@ use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
 use crate::kinematics::xyzoat::Xyzoat;
 
-/// Where the arm says it is: its joints, and the hand in the world frame (with the controller's own
-/// tool and base).
+/// Position of the arm: its joints, and the hand in the world frame with the controller's own tool
+/// and base.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Location {
     /// Joint angles.
     pub joints: Joints,
-    /// The hand.
+    /// Pose of the hand.
     pub hand: Xyzoat,
 }
 
 impl Location {
-    /// Reads the reply to `WHERE`: by its headings in either order, or, where no headings are
-    /// found, by counting from the end (six joint angles, before them six numbers that belong to a
-    /// heading, before them X Y Z O A T). `None` if neither fits.
+    /// Parses the reply to `WHERE`: by its headings in either order, or, where none are found, by
+    /// counting from the end (six joint angles, before them six numbers of a heading, before them X
+    /// Y Z O A T). `None` if neither fits.
     pub fn parse(reply: &str) -> Option<Self> {
         Self::by_headings(reply).or_else(|| {
             let has_heading = reply
@@ -63,8 +63,8 @@ impl Location {
         })
     }
 
-    /// Whether the two halves belong together for an arm without tool and base shift: within 0.1 mm
-    /// and 0.01 degrees. A check against characters that changed on the line.
+    /// Returns `true` if the two halves belong together for an arm without tool and base shift,
+    /// within 0.1 mm and 0.01 degrees: a check against characters that changed on the line.
     pub(crate) fn agrees(&self, arm: &PumaParams) -> bool {
         let (by_joints, by_hand) = (arm.forward(&self.joints), self.hand.pose());
         let off = (by_joints.translation.vector - by_hand.translation.vector).norm();
@@ -72,7 +72,7 @@ impl Location {
     }
 }
 
-/// `JT1 JT2 .. JT6`, `J1 .. J6` and the like.
+/// Returns `true` for a heading of joints: `JT1 JT2 .. JT6`, `J1 .. J6` and the like.
 fn is_joint_heading(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
     words.len() >= 6
@@ -82,7 +82,8 @@ fn is_joint_heading(line: &str) -> bool {
         })
 }
 
-/// `X Y Z O A T`, possibly with units in brackets or more columns behind.
+/// Returns `true` for the heading `X Y Z O A T`, possibly with units in brackets or further
+/// columns.
 fn is_hand_heading(line: &str) -> bool {
     let mut words = line.split_whitespace();
     "XYZOAT".chars().all(|letter| {
@@ -96,13 +97,13 @@ fn is_hand_heading(line: &str) -> bool {
     })
 }
 
-/// The first six of a line that holds nothing but numbers.
+/// Returns the first six numbers of a line that holds nothing but numbers.
 fn six_numbers(line: &str) -> Option<[f64; 6]> {
     let numbers: Vec<f64> = line.split_whitespace().map(number).collect::<Option<_>>()?;
     numbers.get(..6)?.try_into().ok()
 }
 
-/// A number as controllers print them: no exponent, no words.
+/// Parses a number as controllers print it: no exponent, no words.
 fn number(word: &str) -> Option<f64> {
     let plain = word
         .bytes()
@@ -115,7 +116,12 @@ fn number(word: &str) -> Option<f64> {
 mod tests {
     use super::*;
 
-    const REPLY: &str = "WHERE\r\n     X        Y        Z        O        A        T\r\n   -20.32   149.09   921.12   90.000  -90.000    0.000\r\n    JT1      JT2      JT3      JT4      JT5      JT6\r\n    0.000  -90.000   90.000    0.000    0.000    0.000\r\n.";
+    const REPLY: &str = "WHERE\r
+     X        Y        Z        O        A        T\r
+   -20.32   149.09   921.12   90.000  -90.000    0.000\r
+    JT1      JT2      JT3      JT4      JT5      JT6\r
+    0.000  -90.000   90.000    0.000    0.000    0.000\r
+.";
 
     #[test]
     fn headings_lead_to_the_numbers_in_any_order() {
@@ -123,13 +129,16 @@ mod tests {
         assert_eq!(location.joints, Joints::READY);
         assert!((location.hand.x + 0.02032).abs() < 1e-12);
         assert!(location.agrees(&PumaParams::unimation()));
-        let swapped = "wh\r\n\r\n J1 J2 J3 J4 J5 J6\r\n\r\n 0 -90.0 90 0 0 0\r\n X[mm] Y[mm] Z[mm] O[deg] A[deg] T[deg] HAND\r\n -20.32 149.09 921.12 90 -90 0 50.00\r\n.";
+        let swapped = "wh\r\n\r\n J1 J2 J3 J4 J5 J6\r\n\r\n 0 -90.0 90 0 0 0\r\n \
+             X[mm] Y[mm] Z[mm] O[deg] A[deg] T[deg] HAND\r\n \
+             -20.32 149.09 921.12 90 -90 0 50.00\r\n.";
         assert_eq!(Location::parse(swapped), Some(location));
     }
 
     #[test]
     fn without_headings_the_end_counts() {
-        let reply = "-20.32 149.09 921.12 90.000 -90.000 0.000\r\n#1 #2 #3 #4 #5 #6\r\n0.000 -90.000 90.000 0.000 0.000 0.000\r\n.";
+        let reply = "-20.32 149.09 921.12 90.000 -90.000 0.000\r\n#1 #2 #3 #4 #5 #6\r\n\
+             0.000 -90.000 90.000 0.000 0.000 0.000\r\n.";
         assert_eq!(Location::parse(reply), Location::parse(REPLY));
     }
 

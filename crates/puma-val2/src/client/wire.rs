@@ -1,4 +1,4 @@
-//! Lines typed to the controller and replies read back.
+//! Exchanges with the controller: lines typed, replies read.
 
 use std::io;
 use std::time::Duration;
@@ -17,7 +17,7 @@ pub(super) struct Reply {
     pub(super) ending: Ending,
 }
 
-/// An exchange that failed, and whether what was typed may have taken effect.
+/// Failure of an exchange, with the possibility that the line has taken effect.
 #[derive(Debug)]
 pub(super) struct Failed {
     pub(super) error: ArmError,
@@ -40,27 +40,27 @@ impl Failed {
     }
 }
 
-/// What can be tried again: the line garbled something or swallowed it. The rest is for the caller.
+/// Returns `true` if an exchange can be tried again: the line garbled or swallowed something.
 pub(super) fn is_doubt(error: &ArmError) -> bool {
     matches!(error, ArmError::Silence { .. } | ArmError::Garbled { .. })
 }
 
-/// Most characters that mean nothing (NUL, bell) that an echo may be strewn with.
+/// Most characters without meaning (NUL, bell) in an echo.
 const FILLERS: usize = 256;
 
 #[derive(Debug)]
 pub(super) struct Wire<T> {
     pub(super) line: T,
-    /// Whether the controller echoes; `None` until found out.
+    /// The controller echoes; `None` until found out.
     pub(super) echo: Option<bool>,
-    /// Messages that came without having been asked for.
+    /// Messages that came unasked.
     pub(super) notices: Vec<String>,
-    /// Whether a line has been begun at the other end that was neither ended nor deleted.
+    /// A line has been begun that was neither ended nor deleted.
     pub(super) half_typed: bool,
-    /// What a reply that does not come is asked for with. A program of somebody else's may take an
+    /// Bytes that ask again for a reply that does not come. The program of another user may take an
     /// empty line for an answer.
     pub(super) nudge: &'static [u8],
-    /// Whether the start-up dialogue has been met since the monitor was last reached.
+    /// The start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
 }
 
@@ -96,13 +96,17 @@ impl<T: Transport> Wire<T> {
             .map_err(|source| self.broken(doing, source))
     }
 
-    /// What comes within `wait`, at least one byte, or nothing.
+    /// Returns what comes within `wait`, at least one byte, or nothing.
     fn receive(&mut self, wait: Duration, doing: &str) -> Result<Option<Vec<u8>>, ArmError> {
         let mut buffer = [0; 512];
         match self.line.receive(&mut buffer, wait) {
             Ok(Some(count)) => {
                 #[cfg(feature = "tracing")]
-                tracing::trace!(port = self.line.name(), bytes = %buffer[..count].escape_ascii(), "received");
+                tracing::trace!(
+                    port = self.line.name(),
+                    bytes = %buffer[..count].escape_ascii(),
+                    "received"
+                );
                 Ok(Some(buffer[..count].to_vec()))
             }
             Ok(None) => Ok(None),
@@ -118,7 +122,7 @@ impl<T: Transport> Wire<T> {
         )
     }
 
-    /// The controller asks its start-up questions in mid-session.
+    /// Returns the error of a controller that asks its start-up questions in mid-session.
     fn restart(&mut self, text: &str) -> ArmError {
         self.restarted = true;
         ArmError::Restarted {
@@ -127,8 +131,7 @@ impl<T: Transport> Wire<T> {
         }
     }
 
-    /// Types `line` at a prompt or question, ends it and reads the reply, waiting up to `timeout`
-    /// for it.
+    /// Types `line` at a prompt or question, ends it and reads the reply for up to `timeout`.
     pub(super) fn exchange(
         &mut self,
         line: &str,
@@ -166,7 +169,7 @@ impl<T: Transport> Wire<T> {
         Ok(reply)
     }
 
-    /// Reads away what has come since the last reply, keeping messages.
+    /// Reads away unasked output and keeps its messages.
     fn take_unasked(&mut self, config: &ClientConfig) -> Result<(), ArmError> {
         let mut reader = Self::reader(config);
         // A line that never falls silent is left to the echo check.
@@ -225,9 +228,9 @@ impl<T: Transport> Wire<T> {
 
     /// Reads until a prompt or question is followed by silence.
     ///
-    /// When nothing comes for `config.reply_timeout` an empty line is sent: if only the prompt was
-    /// lost this brings it back, and if the controller is still busy it is answered later. A line
-    /// that says more than a reply may be long, or something all the time, is given up.
+    /// After a silence of `config.reply_timeout` an empty line is sent. It brings back a lost
+    /// prompt, and a busy controller answers it later. A line that says too much, or never falls
+    /// silent, is given up.
     pub(super) fn read_reply(
         &mut self,
         sent: &str,
@@ -277,7 +280,7 @@ impl<T: Transport> Wire<T> {
         }
     }
 
-    /// As [`Wire::exchange`], for lines after which a program runs: until it ends or asks.
+    /// Carries out a line that starts a program, until the program ends or asks.
     pub(super) fn exchange_to_end(
         &mut self,
         line: &str,
@@ -303,7 +306,7 @@ impl<T: Transport> Wire<T> {
         Ok(reply)
     }
 
-    /// Makes a half-typed line harmless and reads what the controller says to it.
+    /// Makes a half-typed line harmless and reads the reply.
     pub(super) fn spoil(&mut self, config: &ClientConfig) -> Result<Reply, ArmError> {
         let doing = "clearing the line";
         let patience = config.patience();
@@ -326,8 +329,7 @@ impl<T: Transport> Wire<T> {
         Ok(reply)
     }
 
-    /// Gets back to the monitor's prompt from whatever dialogue the line is in, saying no to
-    /// everything.
+    /// Leaves whatever dialogue the line is in, and says no to everything.
     pub(super) fn settle(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
         let patience = config.patience();
         let mut reply = self.spoil(config)?;

@@ -19,7 +19,7 @@ use crate::joints::{Joint, Joints};
 use crate::kinematics::params::PumaParams;
 use crate::manipulator::Gripper;
 
-/// Something that happened in the controller or to the arm.
+/// Event in the controller or at the arm.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
@@ -39,9 +39,9 @@ pub enum Event {
     Gripper(Gripper),
     /// An output signal was set.
     Output {
-        /// Its number.
+        /// Number of the signal.
         signal: u16,
-        /// Its new state.
+        /// New state.
         on: bool,
     },
     /// A message went to the terminal in asterisks.
@@ -61,21 +61,20 @@ pub enum Event {
 /// Most events kept until they are taken; older ones are dropped.
 const EVENT_LIMIT: usize = 1024;
 
-/// Most steps of its own that the emulator takes in one call; [`Emulator::next_deadline`] then says
+/// Most steps of its own that the emulator takes in one call. [`Emulator::next_deadline`] then says
 /// that more is due.
 const STEPS_PER_CALL: usize = 20_000;
 
-/// What a sensor is connected to: a function of the arm's joint angles.
+/// A sensor: a function of the arm's joint angles.
 pub(super) type Sense = Box<dyn FnMut(&Joints) -> bool + Send>;
 
 /// An emulated VAL II controller with a PUMA 560.
 ///
-/// Bytes from the terminal go in through [`Emulator::feed`], bytes to the terminal come out of it
-/// and of [`Emulator::poll`]. The time is the caller's: a duration since an origin of the caller's
-/// choice, which never runs backwards (an earlier time counts as the latest seen).
-/// [`Emulator::next_deadline`] says when something will happen of itself. Whoever waits that long
-/// runs in real time, whoever calls [`Emulator::poll`] with that time at once runs as fast as the
-/// machine.
+/// [`Emulator::feed`] takes bytes from the terminal; it and [`Emulator::poll`] return bytes to the
+/// terminal. The caller gives the time, a duration since any origin, which never runs backwards (an
+/// earlier time counts as the latest seen). [`Emulator::next_deadline`] returns the time of the
+/// next thing that happens without input. Wait that long, and the emulator runs in real time; call
+/// [`Emulator::poll`] with that time at once, and it runs as fast as the machine.
 ///
 /// ```
 /// use puma_val2::{Emulator, Profile, PumaParams};
@@ -96,7 +95,7 @@ pub struct Emulator {
     pub(super) memory: Memory,
     pub(super) signals: Signals,
     pub(super) job: Option<Job>,
-    /// The job that `PROCEED` and `RETRY` go on with.
+    /// Job that `PROCEED` and `RETRY` continue.
     pub(super) paused: Option<Job>,
     pub(super) reactions: Vec<Reaction>,
     pub(super) sensors: Vec<(u16, Sense)>,
@@ -105,7 +104,7 @@ pub struct Emulator {
     pub(super) panel_used: bool,
     pub(super) executed_last: Option<String>,
     pub(super) edited_last: Option<String>,
-    /// Whether the last `TYPE` left its line open.
+    /// The last `TYPE` left its line open.
     pub(super) type_stays: bool,
     pub(super) switches: BTreeMap<String, bool>,
     pub(super) floppy: BTreeMap<String, String>,
@@ -124,8 +123,8 @@ impl fmt::Debug for Emulator {
 }
 
 impl Emulator {
-    /// A controller that has just been switched on: the first start-up question is ready to be
-    /// fetched with [`Emulator::poll`].
+    /// Creates a controller that has just been switched on. [`Emulator::poll`] returns its first
+    /// start-up question.
     pub fn new(params: PumaParams, profile: Profile) -> Self {
         let mut emulator = Self {
             arm: Arm::new(params, &profile),
@@ -168,18 +167,18 @@ impl Emulator {
         self.terminal.departed(self.now, &self.profile)
     }
 
-    /// The time at which something happens next without further input, if anything will.
+    /// Returns the time of the next thing that happens without further input, if any.
     pub fn next_deadline(&self) -> Option<Duration> {
         let out = self.terminal.next_departure(&self.profile);
         [self.next_step(), out].into_iter().flatten().min()
     }
 
-    /// The time up to which the controller has lived.
+    /// Returns the time up to which the controller has lived.
     pub fn now(&self) -> Duration {
         self.now
     }
 
-    /// Lets time pass, leaving the output where it is.
+    /// Lets time pass without taking output.
     pub(crate) fn advance(&mut self, now: Duration) {
         let now = now.max(self.now);
         for _ in 0..STEPS_PER_CALL {
@@ -197,7 +196,7 @@ impl Emulator {
         }
     }
 
-    /// When the controller or the arm has something to do, output aside.
+    /// Returns the time of the next thing to do, output aside.
     fn next_step(&self) -> Option<Duration> {
         let line = (self.terminal.has_line() && self.takes_lines()).then_some(self.monitor_ready);
         let tick = (self.arm.moving() && self.watches()).then_some(self.next_tick);
@@ -242,7 +241,7 @@ impl Emulator {
         self.run_job();
     }
 
-    /// Whether sensors or reactions have to be looked at while the arm moves.
+    /// Returns `true` if sensors or reactions have to be looked at while the arm moves.
     fn watches(&self) -> bool {
         !self.sensors.is_empty() || !self.reactions.is_empty()
     }
@@ -271,33 +270,33 @@ impl Emulator {
         self.events.push_back(event);
     }
 
-    /// What has happened since the last call, oldest first.
+    /// Returns the events since the last call, oldest first.
     pub fn take_events(&mut self) -> Vec<Event> {
         self.events.drain(..).collect()
     }
 
-    /// The arm's true joint angles at [`Emulator::now`].
+    /// Returns the arm's true joint angles at [`Emulator::now`].
     pub fn joints(&self) -> Joints {
         self.arm.joints()
     }
 
-    /// Whether the arm moves.
+    /// Returns `true` while the arm moves.
     pub fn moving(&self) -> bool {
         self.arm.moving()
     }
 
-    /// The hand.
+    /// Returns the state of the hand.
     pub fn gripper(&self) -> Gripper {
         self.arm.gripper
     }
 
-    /// The arm's geometry and limits.
+    /// Returns the arm's geometry and limits.
     pub fn params(&self) -> &PumaParams {
         &self.arm.params
     }
 
-    /// The ARM POWER button, or the emergency stop. Without power a motion stops at once and the
-    /// brakes hold the arm.
+    /// Presses the ARM POWER button, or the emergency stop. Without power a motion stops at once
+    /// and the brakes hold the arm.
     pub fn set_arm_power(&mut self, on: bool) {
         self.panel_used = true;
         self.switch_power(on);
@@ -314,16 +313,16 @@ impl Emulator {
         }
     }
 
-    /// A servo that cannot follow: the motion stops at once with an envelope error of `joint`, and
-    /// arm power goes off.
+    /// Lets the servo of `joint` fail: the motion stops at once with an envelope error, and arm
+    /// power goes off.
     pub fn envelope_error(&mut self, joint: Joint) {
         self.arm.break_off(self.now, Duration::ZERO);
         self.switch_power(false);
         self.fail_job(Fault::at(Message::EnvelopeError, joint));
     }
 
-    /// Switches the controller off and on again: the arm stands where it was, memory is kept,
-    /// calibration is lost and the start-up dialogue begins.
+    /// Switches the controller off and on again. The arm stays, memory is kept, calibration is
+    /// lost, and the start-up dialogue begins.
     pub fn restart(&mut self) {
         let (joints, gripper) = (self.arm.joints(), self.arm.gripper);
         self.arm = Arm::new(self.arm.params, &self.profile);
@@ -339,13 +338,13 @@ impl Emulator {
         self.note(Event::Started);
     }
 
-    /// Writes text to the terminal that nobody asked for, as a fault or a second operator would
-    /// cause it.
+    /// Writes text to the terminal unasked, as a fault or a second operator would.
     pub fn interject(&mut self, text: &str) {
         self.terminal.print(text, self.now);
     }
 
-    /// The state of a signal: 1 to 64 outputs, 1001 to 1064 inputs, 2001 to 2064 soft signals.
+    /// Returns the state of a signal: 1 to 64 outputs, 1001 to 1064 inputs, 2001 to 2064 soft
+    /// signals.
     ///
     /// # Errors
     /// [`Message::IllegalSignal`] for any other number.
@@ -363,9 +362,8 @@ impl Emulator {
         Ok(())
     }
 
-    /// Connects a sensor to an input: `sense` is asked every trajectory tick while the arm moves,
-    /// when it has come to a stand, and before a step of a program or a line of the monitor is
-    /// worked on.
+    /// Connects a sensor to an input. `sense` is called every trajectory tick while the arm moves,
+    /// when it has come to a stand, and before a step of a program or a line of the monitor.
     ///
     /// # Errors
     /// [`Message::IllegalSignal`] for a number that no signal has.
@@ -381,12 +379,12 @@ impl Emulator {
         Ok(())
     }
 
-    /// The value of a real variable.
+    /// Returns the value of a real variable.
     pub fn real(&self, name: &str) -> Option<f64> {
         self.memory.reals.get(name).copied()
     }
 
-    /// The value of a location; the name of a precision point begins with `#`.
+    /// Returns the value of a location. The name of a precision point begins with `#`.
     pub fn place(&self, name: &str) -> Option<Place> {
         self.memory.places.get(name).copied()
     }

@@ -1,23 +1,23 @@
-//! What the controller says when it will not, or when something has ended.
+//! Messages of the controller, for refusals and for what has ended.
 
 use std::fmt;
 
 use crate::joints::Joint;
 
-/// A message of the controller, by its meaning. The wording is the profile's: the classes are
+/// Message of the controller, by its meaning. The wording belongs to the profile: the classes are
 /// known, the texts mostly are not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Message {
     /// No such monitor command.
     IllegalCommand,
-    /// An instruction that may not stand here.
+    /// An instruction in the wrong place.
     IllegalInstruction,
     /// No such instruction.
     UnknownInstruction,
-    /// An argument that is missing, superfluous or makes no sense.
+    /// An argument that is missing, superfluous or meaningless.
     InvalidArgument,
-    /// An abbreviation that more than one word answers to.
+    /// An abbreviation of more than one word.
     AmbiguousName,
     /// A line longer than the controller's line buffer.
     LineTooLong,
@@ -25,9 +25,9 @@ pub enum Message {
     NameTooLong,
     /// A location or variable that has no value.
     UndefinedValue,
-    /// A program that does not exist.
+    /// A program that is missing.
     UndefinedProgram,
-    /// A label that no step bears.
+    /// A label without a step.
     UndefinedLabel,
     /// `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their ends do not match.
     ControlStructure,
@@ -35,7 +35,7 @@ pub enum Message {
     OutOfMemory,
     /// A number without a meaning: division by zero, root of a negative number.
     ArithmeticError,
-    /// A signal number that is not there, or an input that was to be set.
+    /// A signal number that is missing, or an input that was to be set.
     IllegalSignal,
     /// A place out of reach, or a joint out of its range.
     OutOfRange,
@@ -68,7 +68,7 @@ pub enum Message {
 }
 
 impl Message {
-    /// The wording of the standard profile.
+    /// Returns the wording of the standard profile.
     pub(crate) const fn default_text(self) -> &'static str {
         match self {
             Self::IllegalCommand => "Illegal monitor command",
@@ -103,17 +103,17 @@ impl Message {
     }
 }
 
-/// A message that ends what was asked for, with the joint it concerns if there is one.
+/// Refusal of a command or an instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What is wrong.
+    /// Meaning of the fault.
     pub message: Message,
-    /// The joint that it is about.
+    /// Joint that it concerns.
     pub joint: Option<Joint>,
 }
 
 impl Fault {
-    /// A fault that concerns `joint`.
+    /// Creates a fault that concerns `joint`.
     pub(super) fn at(message: Message, joint: Joint) -> Self {
         Self {
             message,

@@ -6,41 +6,42 @@ use std::time::Duration;
 use crate::emulator::message::{Fault, Message};
 use crate::joints::Joints;
 
-/// A question of the start-up dialogue.
+/// Question of the start-up dialogue.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BootQuestion {
-    /// The text, with its trailing blank.
+    /// Text with its trailing blank.
     pub text: String,
-    /// Whether `Y` erases programs, locations and variables and sets the speed to 100 %.
+    /// `Y` erases programs, locations and variables and sets the speed to 100 %.
     pub initializes: bool,
 }
 
-/// Where arm power stands when the controller starts.
+/// Arm power at the start of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StartPower {
     /// Off; [`Emulator::set_arm_power`](super::Emulator::set_arm_power) switches it on.
     Off,
     /// On.
     On,
-    /// Off until `CALIBRATE` is answered with yes, as if somebody stood at the panel and pressed
-    /// the button then. Once the panel has been used, power stays as it was set there.
+    /// Off until `CALIBRATE` is answered with yes, as if an operator pressed the button then. After
+    /// [`Emulator::set_arm_power`](super::Emulator::set_arm_power) power stays as it was set.
     OnAtCalibration,
 }
 
-/// What of an emulated controller may differ from one machine, release or source to another.
+/// Behaviour of an emulated controller that may differ from one machine, release or source to
+/// another.
 ///
-/// The wire protocol of VAL II is documented in fragments only. What two independent sources agree
-/// on is built in; everything else is here, so that a client can be tried against controllers that
-/// answer otherwise. Defaults are those of [`Profile::val2`].
+/// The wire protocol of VAL II is documented in fragments only. Facts that two independent sources
+/// agree on are built in; everything else is here, so that a client can be tried against
+/// controllers that answer otherwise. Defaults are those of [`Profile::val2`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
-    /// Name for messages and for choosing it on a command line.
+    /// Name, for messages and for a command line.
     pub name: &'static str,
     /// Questions at start-up, in order (default: load from floppy, initialize).
     pub boot: Vec<BootQuestion>,
     /// Line printed after them (default: `PUMA 560  VAL-II`); empty for none.
     pub banner: String,
-    /// Whether what is typed comes back (default: yes).
+    /// Sends back what is typed (default: yes).
     pub echo: bool,
     /// End of a line to the terminal (default: CR LF).
     pub eol: &'static str,
@@ -50,8 +51,8 @@ pub struct Profile {
     pub idle_prompt: char,
     /// Prompt while a program runs (default: `*`).
     pub run_prompt: char,
-    /// Prints the joints before X Y Z O A T in `WHERE`, in the manner of AS, the Japanese relative of
-    /// VAL (default: no).
+    /// Prints the joints before X Y Z O A T in `WHERE`, in the manner of AS, VAL's Japanese
+    /// relative (default: no).
     pub joints_first: bool,
     /// Width of a number column (default: 9 in `WHERE`; `HERE` and `POINT` add one).
     pub width: usize,
@@ -61,27 +62,26 @@ pub struct Profile {
     pub angle_decimals: usize,
     /// Words that head the joint columns of `WHERE` before their digit (default: `JT`).
     pub joint_heading: &'static str,
-    /// Whether `WHERE` shows a hand column at the end of the Cartesian line (default: no).
+    /// Shows a hand column at the end of the Cartesian line of `WHERE` (default: no).
     pub hand_column: bool,
-    /// What `HERE` and `POINT` ask (default: `Change?`); a line end follows.
+    /// Question of `HERE` and `POINT` (default: `Change?`); a line end follows.
     pub change_text: String,
-    /// Whether the prompt after `DO` waits for the end of the motion (default: yes).
+    /// Holds the prompt after `DO` back until the end of the motion (default: yes).
     pub do_blocks: bool,
-    /// Whether `PANIC` and `ABORT` are heard while `DO` blocks (default: yes).
+    /// Hears `PANIC` and `ABORT` while `DO` blocks (default: yes).
     pub stop_while_busy: bool,
-    /// Whether `#PPOINT(...)` is known (default: yes).
+    /// Knows `#PPOINT(...)` (default: yes).
     pub ppoint: bool,
-    /// Whether `DO REACTI` watches a signal without a program running (default: yes).
+    /// Lets `DO REACTI` watch a signal without a program running (default: yes).
     pub react_at_monitor: bool,
-    /// Largest value of the monitor's `SPEED`, percent (default: 200); larger ones are cut to it.
+    /// Largest value of the monitor's `SPEED`, percent (default: 200). Larger ones are cut to it.
     pub speed_max: f64,
-    /// Words that differ from [`Message::default_text`].
+    /// Messages with another wording than the default.
     pub messages: BTreeMap<Message, String>,
     /// Longest name of a program, location or variable (default: 15).
     pub max_name: usize,
-    /// Longest line (default: 128). Further characters are refused with a bell and the line with a
-    /// message, for its beginning alone may mean something else; a program's step in a file cannot
-    /// be longer either.
+    /// Longest line (default: 128), typed or in a file. Further characters are refused with a bell
+    /// and the line with a message, because its beginning alone may mean something else.
     pub max_line: usize,
     /// Most entries of each kind (programs, locations, variables) and most steps of a program
     /// (default: 1000).
@@ -92,21 +92,22 @@ pub struct Profile {
     /// in `input_buffer`.
     pub line_time: Duration,
     /// Characters that can wait behind a line that the monitor has not come to (default: 256),
-    /// those lines and their ends counted; further ones are lost.
+    /// those lines and their ends included. Further ones are lost.
     pub input_buffer: usize,
     /// Time one program step takes (default: 2 ms), at least 0.1 ms.
     pub step_time: Duration,
-    /// Whether Ctrl-C cancels a line or the running command, Ctrl-U deletes the line, DEL and BS a
-    /// character, Ctrl-S and Ctrl-Q hold and release the output, Ctrl-O drops it (default: yes).
+    /// Understands control characters (default: yes): Ctrl-C cancels a line or the running command,
+    /// Ctrl-U deletes the line, DEL and BS a character, Ctrl-S and Ctrl-Q hold and release the
+    /// output, Ctrl-O drops it.
     pub control_characters: bool,
     /// Arm power at start (default: on at calibration).
     pub start_power: StartPower,
-    /// Whether the arm already knows its joint angles at start (default: no).
+    /// Knows its joint angles at start (default: no).
     pub start_calibrated: bool,
     /// Joint angles at start (default: READY).
     pub start: Joints,
-    /// Where `NEST` goes. The real pose is not known; this is an assumption: the arm folded above
-    /// the shoulder.
+    /// Goal of `NEST`. The real pose is not known; the arm folded above the shoulder is an
+    /// assumption.
     pub nest: Joints,
     /// Time in which a joint reaches its full speed (default: 0.25 s).
     pub acceleration_time: Duration,
@@ -121,22 +122,22 @@ pub struct Profile {
     /// Period at which sensors and armed reactions are looked at during a motion (default: 28 ms,
     /// VAL's trajectory period).
     pub tick: Duration,
-    /// Whether the arm stands, and is shown, at whole encoder counts only (default: no).
+    /// Lets the arm stand, and shows it, at whole encoder counts only (default: no).
     pub encoder_counts: bool,
-    /// Whether a straight line is checked over its whole length before it starts (default: no: the
-    /// arm stops where the line leaves its reach).
+    /// Checks a straight line over its whole length before it starts (default: no, the arm stops
+    /// where the line leaves its reach).
     pub check_line_ahead: bool,
-    /// Whether a joint-interpolated move to a transformation is refused when the present posture
-    /// cannot reach it, though another could (default: no). From a pose between two postures, READY
-    /// for instance, the nearer one is taken in either case.
+    /// Refuses a joint-interpolated move to a transformation that the present posture cannot reach,
+    /// though another could (default: no). From a pose between two postures, READY for instance,
+    /// the nearer one is taken in either case.
     pub keeps_posture: bool,
-    /// Whether `DRIVE` ends a little short, by this many degrees (default: 0); a fault for trying
-    /// out clients.
+    /// Makes `DRIVE` end short by this many degrees (default: 0); a fault for trying out clients.
     pub drive_error_degrees: f64,
 }
 
 impl Profile {
-    /// What the sources agree on, with the plainest assumption where they are silent.
+    /// Returns the behaviour that the sources agree on, with the plainest assumption where they are
+    /// silent.
     pub fn val2() -> Self {
         Self {
             name: "val2",
@@ -194,10 +195,9 @@ impl Profile {
         }
     }
 
-    /// Only what a client for a real PUMA 260 controller has relied on: no `#PPOINT`, no control
-    /// characters, no reactions from the monitor, no ear for `PANIC` while `DO` blocks,
-    /// six-character names, at most 100 % speed. Arm power is on, as that client asks a person to
-    /// see to.
+    /// Returns only the abilities that a client for a real PUMA 260 controller relies on: no
+    /// `#PPOINT`, no control characters, no reactions from the monitor, `PANIC` unheard while `DO`
+    /// blocks, six-character names, at most 100 % speed. Arm power is on.
     pub fn val2_strict_miz() -> Self {
         Self {
             name: "val2_strict_miz",
@@ -212,8 +212,8 @@ impl Profile {
         }
     }
 
-    /// The wear of a real line and arm on top of [`Profile::val2`]: 9600 baud, a slow monitor with
-    /// a small input buffer, joint angles in whole encoder counts.
+    /// Returns [`Profile::val2`] with a real line and arm: 9600 baud, a slow monitor with a small
+    /// input buffer, joint angles in whole encoder counts.
     pub fn val2_hardware() -> Self {
         Self {
             name: "val2_hardware",
@@ -225,12 +225,12 @@ impl Profile {
         }
     }
 
-    /// The profiles that ship, for a command line.
+    /// Returns the profiles of this crate.
     pub fn all() -> [Self; 3] {
         [Self::val2(), Self::val2_strict_miz(), Self::val2_hardware()]
     }
 
-    /// The profile of this name.
+    /// Returns the profile of this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::all().into_iter().find(|p| p.name == name)
     }
@@ -248,7 +248,7 @@ impl Profile {
         Ok(())
     }
 
-    /// The wording of a message.
+    /// Returns the wording of a message.
     pub(crate) fn text(&self, message: Message) -> &str {
         self.messages
             .get(&message)

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::joints::Joints;
 
-/// How motor shafts turn into joint angles.
+/// Gears, encoders and wrist coupling: the way from motor shafts to joint angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriveTrain {
@@ -21,7 +21,7 @@ pub struct DriveTrain {
 }
 
 impl DriveTrain {
-    /// The PUMA 560.
+    /// Returns the drive train of the PUMA 560.
     ///
     /// Gears as in the Robotics Toolbox (Corke and Armstrong-Hélouvry), except joint 2, where the
     /// scale factors of a Trident Robotics controller and the comp.robotics FAQ agree on 107.36
@@ -38,13 +38,13 @@ impl DriveTrain {
         }
     }
 
-    /// Radians of the joint per encoder count, without coupling.
+    /// Returns the radians of the joint per encoder count, without coupling.
     pub(crate) fn radians_per_count(&self) -> [f64; 6] {
         std::array::from_fn(|i| TAU / (self.gear[i] * self.counts_per_motor_turn[i]))
     }
 
-    /// Encoder counts of the six motors for the given joint angles, coupling included. Zero at `JT`
-    /// = 0.
+    /// Returns the encoder counts of the six motors for these joint angles, coupling included. They
+    /// are zero at `JT` = 0.
     pub fn counts(&self, joints: &Joints) -> [f64; 6] {
         let [a, b, c, j4, j5, j6] = joints.0;
         let m5 = j5 - self.coupling_4_to_5 * j4;
@@ -54,7 +54,7 @@ impl DriveTrain {
         std::array::from_fn(|i| shafts[i] / scale[i])
     }
 
-    /// Joint angles for the given encoder counts; the inverse of [`DriveTrain::counts`].
+    /// Returns the joint angles for these encoder counts; the inverse of [`DriveTrain::counts`].
     pub fn joints(&self, counts: [f64; 6]) -> Joints {
         let scale = self.radians_per_count();
         let [a, b, c, j4, m5, m6] = std::array::from_fn(|i| counts[i] * scale[i]);
@@ -63,7 +63,7 @@ impl DriveTrain {
         Joints([a, b, c, j4, j5, j6])
     }
 
-    /// The joint angles at the nearest whole encoder counts: what an arm can stand at.
+    /// Returns the joint angles at the nearest whole encoder counts, where an arm can stand.
     pub fn quantized(&self, joints: &Joints) -> Joints {
         self.joints(self.counts(joints).map(f64::round))
     }

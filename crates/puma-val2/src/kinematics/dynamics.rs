@@ -26,7 +26,7 @@ pub struct LinkDynamics {
     pub gear: f64,
 }
 
-/// The dynamics of the arm.
+/// Dynamics of the arm.
 ///
 /// Link frames are those of the standard Denavit–Hartenberg description with rows (alpha, a, d) of
 /// (90, 0, base), (0, `a2`, 0), (-90, -`a3`, `d2`), (90, 0, `d4`), (-90, 0, 0), (0, 0, 0), whose
@@ -41,8 +41,8 @@ pub struct ArmDynamics {
 }
 
 impl ArmDynamics {
-    /// The values of Armstrong, Khatib and Burdick (1986) as edited by Corke and Armstrong-Hélouvry
-    /// (1994) for the Robotics Toolbox.
+    /// Returns the values of Armstrong, Khatib and Burdick (1986) as edited by Corke and
+    /// Armstrong-Hélouvry (1994) for the Robotics Toolbox.
     pub fn corke() -> Self {
         let link = |mass, centre, inertia, motor_inertia, viscous, coulomb, gear| LinkDynamics {
             mass,
@@ -114,13 +114,13 @@ impl ArmDynamics {
         }
     }
 
-    /// Torques (N m) that hold the arm still.
+    /// Returns the torques (N m) that hold the arm still.
     pub fn gravity_torques(&self, arm: &PumaParams, joints: &Joints) -> [f64; 6] {
         self.newton_euler(arm, joints, [0.0; 6], [0.0; 6], self.gravity)
     }
 
-    /// Torques (N m) at the joints for the given speeds (rad/s) and accelerations (rad/s²): links
-    /// and motors, without friction.
+    /// Returns the torques (N m) at the joints for these speeds (rad/s) and accelerations (rad/s²):
+    /// links and motors, without friction.
     pub fn inverse(
         &self,
         arm: &PumaParams,
@@ -136,8 +136,8 @@ impl ArmDynamics {
         torques
     }
 
-    /// Torques (N m) that friction takes at the joints at the given speeds (rad/s): viscous and
-    /// Coulomb. None at rest.
+    /// Returns the torques (N m) of viscous and Coulomb friction at the joints at these speeds
+    /// (rad/s). They are zero at rest.
     pub fn friction(&self, speeds: [f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| {
             let (link, speed) = (&self.links[i], speeds[i]);
@@ -153,7 +153,7 @@ impl ArmDynamics {
         })
     }
 
-    /// The joint-space inertia matrix (kg m²), motors included.
+    /// Returns the joint-space inertia matrix (kg m²), motors included.
     pub fn mass_matrix(&self, arm: &PumaParams, joints: &Joints) -> Matrix6<f64> {
         let mut matrix = Matrix6::zeros();
         for i in 0..6 {
@@ -166,7 +166,7 @@ impl ArmDynamics {
         matrix
     }
 
-    /// The recursive Newton–Euler formulation (Luh, Walker, Paul 1980) in link frames.
+    /// Evaluates the recursive Newton–Euler formulation (Luh, Walker, Paul 1980) in link frames.
     fn newton_euler(
         &self,
         arm: &PumaParams,

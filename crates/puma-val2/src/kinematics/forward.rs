@@ -6,7 +6,7 @@ use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
 
 impl PumaParams {
-    /// The pose of the flange in the world frame (metres) for the given joint angles.
+    /// Returns the pose of the flange in the world frame (metres).
     ///
     /// ```
     /// use puma_val2::{Joints, PumaParams};
@@ -19,8 +19,9 @@ impl PumaParams {
         self.wrist(joints) * Translation3::new(0.0, 0.0, self.d6)
     }
 
-    /// The pose of the hand frame at the wrist centre: the intersection of the axes of `JT4`, `JT5`
-    /// and `JT6`, z along the tool axis. [`PumaParams::forward`] lies `d6` further along z.
+    /// Returns the pose of the hand frame at the wrist centre: the intersection of the axes of
+    /// `JT4`, `JT5` and `JT6`, z along the tool axis. [`PumaParams::forward`] lies `d6` further
+    /// along z.
     pub fn wrist(&self, joints: &Joints) -> Isometry3<f64> {
         let (s, c) = (joints.0.map(f64::sin), joints.0.map(f64::cos));
         // Rz(theta) Tz(d) Tx(a) Rx(alpha) for each joint, with alpha a multiple of a quarter turn.

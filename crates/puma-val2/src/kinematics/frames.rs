@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
 
-/// Where the arm stands in the world, and what its flange holds: VAL's `BASE` and `TOOL`.
+/// Position of the arm in the world and tool at its flange: VAL's `BASE` and `TOOL`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frames {
@@ -26,13 +26,13 @@ impl Default for Frames {
 }
 
 impl Frames {
-    /// The hand in the world for the given joint angles.
+    /// Returns the hand in the world.
     pub fn hand(&self, arm: &PumaParams, joints: &Joints) -> Isometry3<f64> {
         self.base * arm.forward(joints) * self.tool
     }
 
-    /// The flange in the arm's own frame, for [`PumaParams::inverse`], when the hand is at `hand`
-    /// in the world.
+    /// Returns the flange in the arm's own frame when the hand is at `hand` in the world, for
+    /// [`PumaParams::inverse`].
     pub fn flange(&self, hand: &Isometry3<f64>) -> Isometry3<f64> {
         self.base.inverse() * hand * self.tool.inverse()
     }

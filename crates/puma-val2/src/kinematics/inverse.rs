@@ -38,7 +38,7 @@ pub enum Wrist {
     NoFlip,
 }
 
-/// Which of the eight postures that reach one pose.
+/// One of the eight postures that reach a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Configuration {
@@ -78,7 +78,7 @@ pub struct Solution {
     pub configuration: Configuration,
 }
 
-/// Why a pose cannot be taken up.
+/// Reason why a pose cannot be reached.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unreachable {
@@ -102,12 +102,13 @@ pub enum Unreachable {
     },
     /// Every posture that was allowed takes some joint out of its range.
     #[error(
-        "{joint} would have to go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to {max_degrees:.1}"
+        "{joint} would have to go to {wanted_degrees:.3} degrees: its range is {min_degrees:.1} to \
+         {max_degrees:.1}"
     )]
     Limit {
-        /// The joint that is out in the posture that comes nearest.
+        /// Joint that is out of range in the posture that comes nearest.
         joint: Joint,
-        /// Where it would have to go.
+        /// Angle that the posture needs.
         wanted_degrees: f64,
         /// Lower limit.
         min_degrees: f64,
@@ -117,11 +118,10 @@ pub enum Unreachable {
 }
 
 impl PumaParams {
-    /// All postures that put the flange at `flange` (world frame, metres): eight inside the working
-    /// space, none outside.
+    /// Returns the eight postures that put the flange at `flange` (world frame, metres).
     ///
-    /// At a wrist singularity (`JT5` = 0) the sum of `JT4` and `JT6` is all that counts: `JT4` is
-    /// given as 0 then. Joint ranges are not looked at; [`PumaParams::inverse_near`] does.
+    /// At a wrist singularity (`JT5` = 0) only the sum of `JT4` and `JT6` counts, and `JT4` is 0.
+    /// Joint ranges are not checked; [`PumaParams::inverse_near`] checks them.
     ///
     /// # Errors
     /// [`Unreachable`], never its `Limit`.
@@ -219,12 +219,11 @@ impl PumaParams {
         Ok(found)
     }
 
-    /// The posture that `joints` stand in.
+    /// Returns the posture of `joints`.
     pub fn configuration(&self, joints: &Joints) -> Configuration {
-        let [_, t2, t3, _, t5, _] = joints.0;
-        let reach = self.d4 * (t2 + t3).sin() + self.a3 * (t2 + t3).cos() + self.a2 * t2.cos();
-        let righty = reach <= 0.0;
-        let lever = self.d4 * t3.cos() - self.a3 * t3.sin();
+        let t5 = joints.0[4];
+        let righty = self.wrist_ahead(joints) <= 0.0;
+        let lever = self.elbow_lever(joints);
         Configuration {
             side: if righty {
                 ArmSide::Righty
@@ -244,16 +243,16 @@ impl PumaParams {
         }
     }
 
-    /// The joint angles within their ranges that reach `flange` and lie nearest to `near`, in the
-    /// posture `configuration` or, with `None`, in any.
+    /// Returns the joint angles within their ranges that reach `flange` and lie nearest to `near`,
+    /// in the posture `configuration` or, with `None`, in any.
     ///
-    /// Of the turns that a joint's range leaves open (`JT4` and `JT6` have more than one) the
-    /// nearest is taken. "Nearest" is the largest joint travel measured in time at full joint
-    /// speed.
+    /// The nearest angles are those with the shortest travel, measured by the joint that needs
+    /// longest at full speed. Of the turns that a range leaves open (`JT4` and `JT6` have more than
+    /// one) the nearest is taken.
     ///
     /// # Errors
-    /// [`Unreachable`] says what is missing; with several postures `Limit` names the joint of the
-    /// one that misses its range by least.
+    /// [`Unreachable`]. With several postures `Limit` names the joint of the one that misses its
+    /// range by least.
     pub fn inverse_near(
         &self,
         flange: &Isometry3<f64>,
@@ -265,7 +264,7 @@ impl PumaParams {
         })
     }
 
-    /// As [`PumaParams::inverse_near`], in any of the postures that `allowed` accepts.
+    /// Returns the nearest joint angles in any of the postures that `allowed` accepts.
     ///
     /// # Errors
     /// As for [`PumaParams::inverse_near`]; [`Unreachable::NotAllowed`] if no posture is accepted.
@@ -304,8 +303,8 @@ impl PumaParams {
         }
     }
 
-    /// The turns of `joints` that lie in range and nearest to `near`, or the joint that has none
-    /// and by how much it misses.
+    /// Returns the turns of `joints` that lie in range and nearest to `near`, or the joint without
+    /// one and its distance from the range.
     fn place_in_ranges(
         &self,
         joints: &Joints,
@@ -352,7 +351,7 @@ const EMPTY: Solution = Solution {
     },
 };
 
-/// An angle in [-pi, pi). What is reached here lies within three turns, so steps are cheaper than a
+/// Wraps an angle to [-pi, pi). Angles here lie within three turns, so steps are cheaper than a
 /// remainder.
 fn wrap(mut angle: f64) -> f64 {
     if !angle.is_finite() || angle.abs() > 100.0 {
@@ -393,9 +392,10 @@ mod tests {
     fn what_is_missing_is_named() {
         let arm = PumaParams::unimation();
         let at = |x, y, z| Isometry3::translation(x, y, z + arm.d6);
-        assert!(
-            matches!(arm.inverse(&at(0.0, 0.1, 0.3)), Err(Unreachable::TooClose { by }) if (by - 0.04909).abs() < 1e-12)
-        );
+        assert!(matches!(
+            arm.inverse(&at(0.0, 0.1, 0.3)),
+            Err(Unreachable::TooClose { by }) if (by - 0.04909).abs() < 1e-12
+        ));
         assert!(
             matches!(arm.inverse(&at(1.2, 0.0, 0.3)), Err(Unreachable::TooFar { by }) if by > 0.3)
         );

@@ -31,7 +31,7 @@ impl fmt::Display for Singularity {
 }
 
 impl PumaParams {
-    /// The 6 by 6 Jacobian of the flange in the world frame: rows vx vy vz (metres per radian) wx
+    /// Returns the Jacobian of the flange in the world frame: rows vx vy vz (metres per radian) wx
     /// wy wz, one column per joint.
     pub fn jacobian(&self, joints: &Joints) -> Matrix6<f64> {
         let [t1, t2, t3, t4, t5, _] = joints.0;
@@ -66,7 +66,7 @@ impl PumaParams {
         }))
     }
 
-    /// The Jacobian with speeds seen in the flange's own frame.
+    /// Returns the Jacobian with speeds in the flange's own frame.
     pub fn jacobian_tool(&self, joints: &Joints) -> Matrix6<f64> {
         let back = self.forward(joints).rotation.inverse().to_rotation_matrix();
         let mut jacobian = self.jacobian(joints);
@@ -79,17 +79,16 @@ impl PumaParams {
         jacobian
     }
 
-    /// The first singularity that the arm is nearer to than `margin`: the sine of `JT5`, the sine
-    /// of the elbow's angle away from straight, or the wrist's distance ahead of the shoulder in
-    /// units of the stretched arm. 0.02 is about a degree.
+    /// Returns the first singularity that the arm is nearer to than `margin`: the sine of `JT5`,
+    /// the sine of the elbow's angle away from straight, or the wrist's distance ahead of the
+    /// shoulder in units of the stretched arm. 0.02 is about a degree.
     ///
     /// READY is at the wrist's singularity and 2.7 degrees off the elbow's.
     pub fn singularity(&self, joints: &Joints, margin: f64) -> Option<Singularity> {
-        let [_, t2, t3, _, t5, _] = joints.0;
         let forearm = self.d4.hypot(self.a3);
-        let straight = (self.d4 * t3.cos() - self.a3 * t3.sin()) / forearm;
-        let ahead = self.d4 * (t2 + t3).sin() + self.a3 * (t2 + t3).cos() + self.a2 * t2.cos();
-        if t5.sin().abs() < margin {
+        let straight = self.elbow_lever(joints) / forearm;
+        let ahead = self.wrist_ahead(joints);
+        if joints.0[4].sin().abs() < margin {
             Some(Singularity::Wrist)
         } else if straight.abs() < margin {
             Some(Singularity::Elbow)

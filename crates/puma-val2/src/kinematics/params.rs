@@ -29,7 +29,7 @@ pub struct PumaParams {
 }
 
 impl PumaParams {
-    /// The lengths used with VAL itself (431.8, -20.32, 149.09, 433.07, 56.25 mm).
+    /// Returns the lengths used with VAL itself (431.8, -20.32, 149.09, 433.07, 56.25 mm).
     ///
     /// Joint ranges are the classical ones of Fu, Gonzalez, Lee (-160..160, -225..45, -45..225,
     /// -110..170, -100..100, -266..266 degrees); sources disagree about joints 2 to 4. The speeds
@@ -46,8 +46,8 @@ impl PumaParams {
         }
     }
 
-    /// The lengths of Corke and Armstrong-Hélouvry (431.8, -20.3, 150.05, 431.8 mm, no flange), as
-    /// used by the Robotics Toolbox.
+    /// Returns the lengths of Corke and Armstrong-Hélouvry (431.8, -20.3, 150.05, 431.8 mm, no
+    /// flange), which the Robotics Toolbox uses.
     pub fn corke() -> Self {
         Self {
             a2: 0.4318,
@@ -59,10 +59,24 @@ impl PumaParams {
         }
     }
 
+    /// Returns the distance of the wrist centre ahead of the shoulder in the arm's plane, metres.
+    /// It is negative for a right arm.
+    pub(crate) fn wrist_ahead(&self, joints: &Joints) -> f64 {
+        let [_, t2, t3, ..] = joints.0;
+        self.d4 * (t2 + t3).sin() + self.a3 * (t2 + t3).cos() + self.a2 * t2.cos()
+    }
+
+    /// Returns the lever of the forearm about the line of the upper arm, metres. It is zero for a
+    /// straight elbow.
+    pub(crate) fn elbow_lever(&self, joints: &Joints) -> f64 {
+        let t3 = joints.0[2];
+        self.d4 * t3.cos() - self.a3 * t3.sin()
+    }
+
     /// Checks that every angle is finite and within its range.
     ///
     /// # Errors
-    /// [`ArmError::NotFinite`] or [`ArmError::JointLimit`], naming the first joint that fails.
+    /// [`ArmError::NotFinite`] or [`ArmError::JointLimit`] for the first joint that fails.
     pub fn check(&self, joints: &Joints) -> Result<(), ArmError> {
         limits::check(&self.ranges, joints)
     }

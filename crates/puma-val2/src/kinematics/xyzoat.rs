@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 
-/// A hand pose as VAL writes it: a position and the angles O, A, T.
+/// Hand pose in VAL's six numbers: a position and the angles O, A, T.
 ///
 /// The rotation is `Rz(o) R0 Ry(a) Rz(t)` with `R0 = [[0,1,0],[0,0,-1],[-1,0,0]]` (Fu, Gonzalez,
 /// Lee, *Robotics*, 1987, chapter 2): with all three angles zero the tool axis points along -y and
@@ -28,7 +28,7 @@ pub struct Xyzoat {
 }
 
 impl Xyzoat {
-    /// From VAL's own units: millimetres and degrees.
+    /// Converts from VAL's own units, millimetres and degrees.
     pub fn from_val(values: [f64; 6]) -> Self {
         let [x, y, z, o, a, t] = values;
         Self {
@@ -41,7 +41,7 @@ impl Xyzoat {
         }
     }
 
-    /// In VAL's own units: millimetres and degrees, angles in (-180, 180].
+    /// Returns the numbers in VAL's own units: millimetres and degrees, angles in (-180, 180].
     pub fn val(&self) -> [f64; 6] {
         [
             self.x * 1000.0,
@@ -53,8 +53,7 @@ impl Xyzoat {
         ]
     }
 
-    /// The six numbers of a pose. Where the tool axis is vertical, O and T are not told apart: T is
-    /// 0 then.
+    /// Returns the six numbers of a pose. Where the tool axis is vertical, T is 0.
     pub fn from_pose(pose: &Isometry3<f64>) -> Self {
         let r = pose.rotation.to_rotation_matrix().into_inner();
         let (ax, ay, az) = (r[(0, 2)], r[(1, 2)], r[(2, 2)]);
@@ -75,7 +74,7 @@ impl Xyzoat {
         }
     }
 
-    /// The pose that the six numbers describe.
+    /// Returns the pose of the six numbers.
     pub fn pose(&self) -> Isometry3<f64> {
         let ((so, co), (sa, ca), (st, ct)) = (self.o.sin_cos(), self.a.sin_cos(), self.t.sin_cos());
         let rotation = Matrix3::new(
@@ -95,15 +94,15 @@ impl Xyzoat {
         )
     }
 
-    /// Whether all six numbers are finite.
+    /// Returns `true` if all six numbers are finite.
     pub(crate) fn is_finite(&self) -> bool {
         self.val().iter().all(|v| v.is_finite())
     }
 }
 
 impl fmt::Display for Xyzoat {
-    /// Millimetres with two decimals, degrees with three:
-    /// `X 75.14 Y 164.64 Z 915.57 O 100.000 A -80.000 T 0.000`.
+    /// Formats millimetres with two decimals, degrees with three: `X 75.14 Y 164.64 Z 915.57 O
+    /// 100.000 A -80.000 T 0.000`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z, o, a, t] = self.val();
         write!(f, "X {x:.2} Y {y:.2} Z {z:.2} O {o:.3} A {a:.3} T {t:.3}")

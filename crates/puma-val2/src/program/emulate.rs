@@ -28,7 +28,7 @@ pub(super) struct Options {
     /// Make this symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     link: Option<PathBuf>,
-    /// What the controller is like: val2, val2_strict_miz, val2_hardware.
+    /// Behaviour of the controller: val2, val2_strict_miz, val2_hardware.
     #[arg(long, value_name = "NAME", default_value = "val2")]
     profile: String,
     /// Let motions take their time. Otherwise the controller's clock jumps ahead whenever it waits

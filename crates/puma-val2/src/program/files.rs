@@ -4,8 +4,8 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-/// Writes a file beside its place and renames it into it. A device or a pipe is written to in place,
-/// and a link stays a link.
+/// Writes a file beside its place and renames it into it. A device or a pipe is written to in
+/// place, and a link stays a link.
 pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
     let failed = |error| format!("{}: cannot be written: {error}", path.display());
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

@@ -48,9 +48,9 @@ impl EmulatorServer {
         })
     }
 
-    /// Serves `emulator` at `addr`, one terminal at a time; the next one finds the controller in the
-    /// state that the last one left. `127.0.0.1:0` takes any free port of this machine alone;
-    /// `config.link` has no effect.
+    /// Serves `emulator` at `addr`, one terminal at a time. The next terminal finds the controller
+    /// in the state that the last one left. `127.0.0.1:0` takes any free port of this machine
+    /// alone; `config.link` has no effect.
     ///
     /// # Errors
     /// The address cannot be listened at.

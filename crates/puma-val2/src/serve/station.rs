@@ -36,12 +36,12 @@ impl State {
     }
 }
 
-/// What the serving thread does next.
+/// Output and next wait of the serving thread.
 #[derive(Debug)]
 pub(super) struct Turn {
     /// Bytes to write.
     pub(super) output: Vec<u8>,
-    /// How long to wait for input before the next turn; `None`: until some comes.
+    /// Time to wait for input before the next turn; `None` waits until some comes.
     pub(super) wait: Option<Duration>,
 }
 
@@ -64,8 +64,7 @@ impl Station {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Hands over input, which may be none, lets the emulator do what is due and says how long it
-    /// can wait then.
+    /// Hands over input, which may be none, and lets the emulator do its work.
     ///
     /// In virtual time a turn without input jumps to the next thing that happens, unless `blocked`:
     /// output still has to be fetched.

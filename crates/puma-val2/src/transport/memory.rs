@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::emulator::controller::Emulator;
 use crate::transport::Transport;
 
-/// An emulated controller as a line: no thread, no clock. Time passes only while the other side
+/// An emulated controller as a line, without thread or clock. Time passes only while the other side
 /// waits, and then as fast as the machine.
 #[derive(Debug)]
 pub struct MemoryLine {
@@ -18,7 +18,7 @@ pub struct MemoryLine {
 }
 
 impl MemoryLine {
-    /// A line to `emulator`.
+    /// Creates a line to `emulator`.
     pub fn new(emulator: Emulator) -> Self {
         let now = emulator.now();
         Self {
@@ -30,17 +30,17 @@ impl MemoryLine {
         }
     }
 
-    /// The controller at the other end.
+    /// Returns the controller at the other end.
     pub fn emulator(&self) -> &Emulator {
         &self.emulator
     }
 
-    /// The controller at the other end, to press its buttons.
+    /// Returns the controller at the other end, to press its buttons.
     pub fn emulator_mut(&mut self) -> &mut Emulator {
         &mut self.emulator
     }
 
-    /// Bytes that have gone to the controller and come from it so far.
+    /// Returns the numbers of bytes sent to the controller and received from it.
     pub fn traffic(&self) -> (u64, u64) {
         (self.sent, self.received)
     }

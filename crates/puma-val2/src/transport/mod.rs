@@ -16,7 +16,7 @@ pub use tcp::TcpLine;
 pub use transcript::Recorded;
 pub(crate) use transcript::Transcript;
 
-/// A line to a controller: bytes out, bytes in within a time, and the time itself.
+/// A line to a controller: bytes out, bytes in within a time, and a clock.
 pub trait Transport {
     /// Sends all of `bytes`.
     ///
@@ -24,18 +24,18 @@ pub trait Transport {
     /// The line is closed or broken.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits until something comes and puts it at the start of `buffer`: `Some(count)` with at
-    /// least one byte, or `None` if nothing came within `timeout`. With a timeout of zero only what
-    /// is already there is taken.
+    /// Waits until bytes come and puts them at the start of `buffer`: `Some(count)` with at least
+    /// one byte, or `None` if nothing came within `timeout`. A timeout of zero takes only what is
+    /// already there.
     ///
     /// # Errors
     /// The line is closed or broken; its end is [`io::ErrorKind::UnexpectedEof`].
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>>;
 
-    /// The time by this line's clock, since any fixed origin. It never runs backwards.
+    /// Returns the time by this line's clock, since any fixed origin. It never runs backwards.
     fn clock(&self) -> Duration;
 
-    /// What to call the line in messages: a device path, an address.
+    /// Returns the name of the line for messages: a device path, an address.
     fn name(&self) -> &str;
 }
 
@@ -57,7 +57,7 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
     }
 }
 
-/// What a read that was to wait for a while came to: bytes, nothing, or the end of the line.
+/// Turns the result of a read into bytes, nothing, or the end of the line.
 fn received(outcome: io::Result<usize>) -> io::Result<Option<usize>> {
     match outcome {
         Ok(0) => Err(io::Error::new(

@@ -1,4 +1,4 @@
-//! A TCP connection as a line: a terminal server, or an emulator that serves on a socket.
+//! A TCP connection as a line.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -16,8 +16,7 @@ pub struct TcpLine {
 }
 
 impl TcpLine {
-    /// Connects to `addr` (`host:port`), trying each address that the name stands for, each for up
-    /// to `timeout`.
+    /// Connects to `addr` (`host:port`). Each address of the name is tried for up to `timeout`.
     ///
     /// # Errors
     /// [`ArmError::Open`].

@@ -1,13 +1,12 @@
-//! What passes on a line, written down.
+//! Transcripts of a line.
 
 use std::io::{self, Write};
 use std::time::Duration;
 
 use crate::transport::Transport;
 
-/// Writes down what passes on a line: `< ` begins what went to the controller, `> ` what came from
-/// it. Line ends are shown by line ends, other control characters as `^C`, bytes beyond ASCII as
-/// `\xNN`.
+/// Writer of transcripts: `< ` begins bytes to the controller, `> ` bytes from it. Line ends are
+/// shown by line ends, other control characters as `^C`, bytes beyond ASCII as `\xNN`.
 #[derive(Debug)]
 pub(crate) struct Transcript<W> {
     out: W,
@@ -66,7 +65,7 @@ impl<W: Write> Transcript<W> {
     }
 }
 
-/// A line whose traffic is written down, in the form of the emulator's own transcripts.
+/// A line with a transcript of its traffic.
 #[derive(Debug)]
 pub struct Recorded<T, W> {
     line: T,
@@ -74,8 +73,8 @@ pub struct Recorded<T, W> {
 }
 
 impl<T: Transport, W: Write> Recorded<T, W> {
-    /// Writes what passes on `line` to `out`: `< ` begins what was sent, `> ` what was received;
-    /// control characters as `^C`.
+    /// Writes the traffic of `line` to `out`: `< ` begins bytes sent, `> ` bytes received, control
+    /// characters as `^C`.
     pub fn new(line: T, out: W) -> Self {
         Self {
             line,
@@ -83,17 +82,17 @@ impl<T: Transport, W: Write> Recorded<T, W> {
         }
     }
 
-    /// The line.
+    /// Returns the line.
     pub fn line(&self) -> &T {
         &self.line
     }
 
-    /// The line, to press the buttons of an emulator.
+    /// Returns the line, to press the buttons of an emulator.
     pub fn line_mut(&mut self) -> &mut T {
         &mut self.line
     }
 
-    /// What was written to.
+    /// Returns the receiver of the transcript.
     pub fn into_transcript(self) -> W {
         self.transcript.out
     }

@@ -109,9 +109,10 @@ fn arm_power_off_is_reported_and_waited_for_if_so_configured() {
         MemoryLine::new(emulator)
     };
     let mut client = Val2Client::connect(line(), ClientConfig::default()).unwrap();
-    assert!(
-        matches!(client.calibrate(), Err(ArmError::Refused { message, .. }) if message == "Arm power off")
-    );
+    assert!(matches!(
+    client.calibrate(),
+    Err(ArmError::Refused { message, .. }) if message == "Arm power off"
+    ));
     let patient = ClientConfig {
         power_retries: 2,
         power_retry_delay: Duration::from_secs(5),
@@ -172,7 +173,11 @@ fn silence_and_garbage_are_told_apart_in_time() {
     }
     let silent = Val2Client::connect(Dead(Duration::ZERO, b""), ClientConfig::default()).map(drop);
     assert!(
-        matches!(&silent, Err(ArmError::Silence { port, waited, .. }) if port == "/dev/nothing" && waited.as_secs() == 10),
+        matches!(
+            &silent,
+            Err(ArmError::Silence { port, waited, .. })
+                if port == "/dev/nothing" && waited.as_secs() == 10
+        ),
         "{silent:?}"
     );
     for noise in [&b"\xff\x00\x81"[..], b"login: ", b"42 "] {
@@ -186,7 +191,7 @@ fn silence_and_garbage_are_told_apart_in_time() {
 }
 
 #[test]
-fn the_hand_is_moved_by_its_pose_joints_interpolated_or_straight() {
+fn the_hand_moves_to_its_pose_interpolated_or_straight() {
     let mut client = client(Profile::val2());
     client
         .move_to(Joints::from_degrees([0.0, -45.0, 180.0, 0.0, 45.0, 0.0]))
@@ -202,9 +207,10 @@ fn the_hand_is_moved_by_its_pose_joints_interpolated_or_straight() {
     }
     let mut far = start.hand;
     far.x = 3.0;
-    assert!(
-        matches!(client.move_hand(&far, false), Err(ArmError::Refused { message, .. }) if message == "Location out of range")
-    );
+    assert!(matches!(
+    client.move_hand(&far, false),
+    Err(ArmError::Refused { message, .. }) if message == "Location out of range"
+    ));
     far.x = f64::NAN;
     assert!(matches!(
         client.move_hand(&far, false),
@@ -213,7 +219,7 @@ fn the_hand_is_moved_by_its_pose_joints_interpolated_or_straight() {
 }
 
 #[test]
-fn with_a_tool_the_position_is_read_twice_and_moves_are_made_as_ever() {
+fn a_tool_makes_the_position_be_read_twice() {
     let mut client = client(Profile::val2());
     client
         .line_mut()
@@ -386,7 +392,7 @@ fn a_step_that_is_refused_leaves_the_editor() {
 
 /// A line end inside a name or a step would make a command of what comes after it.
 #[test]
-fn names_and_steps_of_more_than_one_line_are_refused_before_anything_is_sent() {
+fn names_and_steps_of_several_lines_are_refused_unsent() {
     let mut client = client(Profile::val2());
     let before = client.line().traffic();
     for bad in ["", " ", "A\rDO DRIVE 1,10,100", "A\nB", "A\u{3}", "\u{c9}"] {

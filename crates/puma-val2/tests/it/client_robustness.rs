@@ -117,8 +117,8 @@ impl Transport for Noisy {
     }
 
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
-        let room = buffer.len() / 8;
-        let Some(count) = self.inner.receive(&mut buffer[..room], timeout)? else {
+        let count = buffer.len() / 8;
+        let Some(count) = self.inner.receive(&mut buffer[..count], timeout)? else {
             return Ok(None);
         };
         let bytes = self.damaged(&buffer[..count]);
@@ -257,7 +257,11 @@ fn piece() -> impl Strategy<Value = Vec<u8>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 192,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn the_client_takes_any_replies(
@@ -295,7 +299,9 @@ proptest! {
         chance in prop::sample::select(vec![0.001, 0.01, 0.05, 0.3]),
         echo in any::<bool>(),
         control_characters in any::<bool>(),
-        way in prop::sample::select(vec![MoveWay::Automatic, MoveWay::Drive, MoveWay::Ppoint, MoveWay::Point]),
+        way in prop::sample::select(vec![
+            MoveWay::Automatic, MoveWay::Drive, MoveWay::Ppoint, MoveWay::Point,
+        ]),
     ) {
         let profile = Profile { echo, control_characters, ..Profile::val2() };
         let line = |chance| Noisy {

@@ -85,10 +85,17 @@ fn line() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 256,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
-    fn the_controller_takes_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..2000), step in 0_u64..5000) {
+    fn the_controller_takes_any_bytes(
+        bytes in prop::collection::vec(any::<u8>(), 0..2000),
+        step in 0_u64..5000,
+    ) {
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
         let mut now = Duration::ZERO;
         for chunk in bytes.chunks(37) {
@@ -99,7 +106,10 @@ proptest! {
     }
 
     #[test]
-    fn the_controller_takes_any_lines(lines in prop::collection::vec(line(), 0..60), step in 0_u64..5000) {
+    fn the_controller_takes_any_lines(
+        lines in prop::collection::vec(line(), 0..60),
+        step in 0_u64..5000,
+    ) {
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
         let mut now = Duration::ZERO;
         emulator.feed(b"N\rN\rCAL\rY\r", now);
@@ -122,16 +132,24 @@ proptest! {
     }
 
     #[test]
-    fn texts_of_any_kind_are_refused_or_taken(text in "(\\.PROGRAM A\n|\\.END\n|\\.REALS\n|\\.LOCATIONS\n|P 1,2,3,4,5,6\n|N 3\n|[ -~]{0,20}\n){0,20}") {
+    fn texts_of_any_kind_are_refused_or_taken(
+        text in "(\\.PROGRAM A\n|\\.END\n|\\.REALS\n|\\.LOCATIONS\n|P 1,2,3,4,5,6\n|N 3\n|\
+            [ -~]{0,20}\n){0,20}",
+    ) {
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
         let _ = emulator.load_text(&text);
     }
 
     #[test]
-    fn where_is_read_from_any_numbers(values in prop::array::uniform12(-1000.0_f64..1000.0), width in 0_usize..12) {
+    fn where_is_read_from_any_numbers(
+        values in prop::array::uniform12(-1000.0_f64..1000.0),
+        width in 0_usize..12,
+    ) {
         let show = |v: &[f64]| v.iter().map(|x| format!(" {x:>width$.3}")).collect::<String>();
         let reply = format!(
-            "WHERE\r\nX Y Z O A T\r\n{}\r\nJT1 JT2 JT3 JT4 JT5 JT6\r\n{}\r\n.", show(&values[..6]), show(&values[6..])
+            "WHERE\r\nX Y Z O A T\r\n{}\r\nJT1 JT2 JT3 JT4 JT5 JT6\r\n{}\r\n.",
+            show(&values[..6]),
+            show(&values[6..])
         );
         let location = Location::parse(&reply).expect("a sound reply");
         for (read, sent) in location.joints.degrees().iter().zip(&values[6..]) {

@@ -1,5 +1,11 @@
 //! Tests of the crate through its public interface.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)] // Functions that serve tests may fail as tests do.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::needless_pass_by_value,
+    reason = "functions that serve tests may fail and print"
+)]
 
 mod budget;
 mod client;

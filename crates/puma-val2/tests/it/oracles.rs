@@ -185,7 +185,8 @@ fn torques_agree_with_the_toolbox() {
         );
     }
     println!(
-        "dynamics: {} rows, greatest difference gravity {:.1e}, free {:.1e}, with friction {:.1e} N m, mass matrix {:.1e}",
+        "dynamics: {} rows, greatest difference gravity {:.1e}, free {:.1e}, with friction {:.1e} \
+         N m, mass matrix {:.1e}",
         rows.len(),
         worst[0],
         worst[1],
@@ -228,7 +229,8 @@ fn oat_angles_agree_with_the_table() {
         worst = greater(worst, again.rotation.angle_to(&rotation));
     }
     println!(
-        "O A T: {} rows, greatest difference {worst:.1e} rad; positions within {table_error:.1e} mm",
+        "O A T: {} rows, greatest difference {worst:.1e} rad; positions within {table_error:.1e} \
+         mm",
         rows.len()
     );
     assert!(rows.len() > 100 && worst < 1e-9);
@@ -285,7 +287,8 @@ fn an_independent_inverse_finds_the_same_solutions() {
         worst = greater(worst, own);
     }
     println!(
-        "rs-opw-kinematics: {compared} poses, greatest difference {worst:.1e} rad, {lost} with another count"
+        "rs-opw-kinematics: {compared} poses, greatest difference {worst:.1e} rad, {lost} with \
+         another count"
     );
     assert!(worst < 1e-9, "{worst}");
     assert_eq!(lost, 0);

@@ -10,7 +10,7 @@ fn emulator() -> Emulator {
 }
 
 #[test]
-fn a_session_over_a_pseudo_terminal_which_is_closed_and_reopened() {
+fn a_pseudo_terminal_can_be_closed_and_opened_again() {
     let server = EmulatorServer::pty(emulator(), ServeConfig::default()).unwrap();
     let path = server.address().to_owned();
     let connect = || {

@@ -1,4 +1,4 @@
-//! What the next line from the terminal is for.
+//! Dialogues at the terminal: start-up, questions, changes of a location, answers to programs.
 
 use crate::emulator::console::display;
 use crate::emulator::console::mode::{Confirm, Kind, Mode};
@@ -18,7 +18,7 @@ impl Emulator {
         self.terminal.print(text, self.now);
     }
 
-    /// Prints a whole line, starting a new one if need be.
+    /// Prints a whole line, on a new one if need be.
     pub(crate) fn print_line(&mut self, text: &str) {
         self.terminal.fresh_line(&self.profile, self.now);
         self.print(text);
@@ -36,7 +36,7 @@ impl Emulator {
         self.note(Event::Refused(fault));
     }
 
-    /// Back to the monitor, with its prompt.
+    /// Returns to the monitor and prints its prompt.
     pub(crate) fn prompt(&mut self) {
         self.mode = Mode::Monitor;
         self.terminal.resume();
@@ -68,7 +68,7 @@ impl Emulator {
         }
     }
 
-    /// Whether a complete line would be worked on now.
+    /// Returns `true` if a complete line would be worked on now.
     pub(crate) fn takes_lines(&self) -> bool {
         !matches!(self.mode, Mode::Busy)
     }
@@ -95,8 +95,8 @@ impl Emulator {
         !matches!(self.mode, Mode::Monitor | Mode::Busy | Mode::Answer(_))
     }
 
-    /// A line has just been completed. While `DO` blocks only the words that stop the arm are
-    /// heard.
+    /// Looks at a line that has just been completed. While `DO` blocks, only the words that stop
+    /// the arm are heard.
     pub(crate) fn line_complete(&mut self) {
         if self.takes_lines() || !self.profile.stop_while_busy {
             return;
@@ -113,7 +113,7 @@ impl Emulator {
         }
     }
 
-    /// Ctrl-C.
+    /// Handles Ctrl-C.
     pub(crate) fn cancel(&mut self) {
         match self.mode {
             Mode::Busy => self.stop_job(Message::Aborted),
@@ -122,7 +122,7 @@ impl Emulator {
         }
     }
 
-    /// Ctrl-Z.
+    /// Handles Ctrl-Z.
     pub(crate) fn end_of_input(&mut self) {
         match &self.mode {
             Mode::Editor(_) => self.leave_editor(),
@@ -131,7 +131,7 @@ impl Emulator {
         }
     }
 
-    /// Works on a line.
+    /// Carries out a line in the present dialogue.
     pub(crate) fn line(&mut self, line: &Line) {
         self.sense();
         for _ in 0..self.profile.blank_lines.min(8) {
@@ -153,7 +153,7 @@ impl Emulator {
         }
     }
 
-    /// A line of which the end is missing is not worked on: its beginning may mean something else.
+    /// Refuses a line without its end: the beginning may mean something else.
     fn line_too_long(&mut self, mode: Mode) {
         self.refuse(Message::LineTooLong.into());
         match mode {
@@ -260,8 +260,8 @@ impl Emulator {
         self.mode = Mode::Change { key, place };
     }
 
-    /// Elements between commas replace those of the location; an empty line, or one that changes
-    /// nothing, ends the dialogue.
+    /// Replaces elements of the location by those between commas. An empty line, or one that
+    /// changes nothing, ends the dialogue.
     fn change(&mut self, key: String, place: Place, line: &str) {
         match changed(&place, line) {
             Ok(None) => self.prompt(),
@@ -279,7 +279,7 @@ impl Emulator {
         }
     }
 
-    /// The values typed to a program's `PROMPT`.
+    /// Stores the values typed to a program's `PROMPT`.
     fn answer_prompt(&mut self, variables: Vec<Variable>, line: &str) {
         match numbers(line) {
             Ok(values) => {
@@ -318,19 +318,19 @@ impl Emulator {
         self.start_calibration_job();
     }
 
-    /// The true joint angles are taken over: what the arm shows from now on.
+    /// Takes over the true joint angles after a calibration.
     pub(crate) fn calibration_done(&mut self) {
         self.arm.calibrated = true;
         self.note(Event::Calibrated);
     }
 
-    /// Puts the arm somewhere, as if it had been pushed there by hand. A motion under way is over.
+    /// Puts the arm somewhere, as if it had been pushed there by hand, and ends its motion.
     pub fn place_arm(&mut self, joints: Joints) {
         self.arm.put(joints);
     }
 }
 
-/// Yes, no (also for an empty line), or neither.
+/// Returns yes, no (also for an empty line), or neither.
 fn yes_or_no(line: &str) -> Option<bool> {
     match line.trim().to_ascii_uppercase().as_str() {
         "Y" | "YES" => Some(true),
@@ -339,7 +339,7 @@ fn yes_or_no(line: &str) -> Option<bool> {
     }
 }
 
-/// Numbers between commas; `None` where one is left out.
+/// Parses numbers between commas; `None` where one is left out.
 fn numbers(line: &str) -> Result<Vec<Option<f64>>, Fault> {
     let tokens = tokens(line)?;
     let mut cursor = Cursor::new(&tokens);

@@ -6,7 +6,7 @@ use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 use crate::manipulator::Gripper;
 
-/// A fixed-point number, right-aligned, never `-0.000`.
+/// Formats a fixed-point number, right-aligned, never `-0.000`.
 pub(crate) fn number(value: f64, width: usize, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.starts_with('-') && text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
@@ -19,8 +19,7 @@ pub(crate) fn number(value: f64, width: usize, decimals: usize) -> String {
     }
 }
 
-/// A real as `TYPE` and `LISTR` show it by default: whole numbers plain, others with up to four
-/// decimals.
+/// Formats a real for `TYPE` and `LISTR`: whole numbers plain, others with up to four decimals.
 pub(crate) fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -31,14 +30,14 @@ pub(crate) fn plain(value: f64) -> String {
     }
 }
 
-/// A word over the middle of a column of numbers.
+/// Places a word over the middle of a column of numbers.
 fn above(word: &str, width: usize) -> String {
     let before = (width.saturating_sub(word.len()) + 2) / 2;
     let text = format!(" {:>1$}{word}", "", before.saturating_sub(1));
     format!("{text:<width$}")
 }
 
-/// The two blocks of `WHERE`, each a heading and a line of values.
+/// Returns the two blocks of `WHERE`, each a heading and a line of values.
 pub(crate) fn whereabouts(
     joints: &Joints,
     hand: &Xyzoat,
@@ -80,7 +79,7 @@ pub(crate) fn whereabouts(
     }
 }
 
-/// The heading that `HERE`, `POINT` and `LISTL` put above locations of either kind.
+/// Returns the heading of `HERE`, `POINT` and `LISTL` for locations of either kind.
 pub(crate) fn place_heading(profile: &Profile) -> String {
     let width = profile.width + 1;
     ["X/JT1", "Y/JT2", "Z/JT3", "O/JT4", "A/JT5", "T/JT6"]
@@ -88,7 +87,7 @@ pub(crate) fn place_heading(profile: &Profile) -> String {
         .concat()
 }
 
-/// The six values of a location below that heading.
+/// Returns the six values of a location below that heading.
 pub(crate) fn place_values(place: &Place, profile: &Profile) -> String {
     let values = place.val();
     let lengths = matches!(place, Place::Transformation(_));

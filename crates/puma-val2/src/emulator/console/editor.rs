@@ -7,13 +7,13 @@ use crate::emulator::language::lexer::{Cursor, Token};
 use crate::emulator::language::program::{Program, Step};
 use crate::emulator::message::{Fault, Message};
 
-/// A step as it is listed.
+/// Formats a step for a listing.
 pub(crate) fn numbered(index: usize, text: &str) -> String {
     format!("{:>3}.  {text}", index + 1)
 }
 
 impl Emulator {
-    /// `EDIT program[,step]`.
+    /// Carries out `EDIT program[,step]`.
     pub(crate) fn edit(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let name = match cursor.peek() {
             None => self.edited_last.clone().ok_or(Message::UndefinedProgram)?,
@@ -63,7 +63,7 @@ impl Emulator {
         self.mode = Mode::Editor(editing);
     }
 
-    /// Ends editing; the program is kept as it is then.
+    /// Ends editing and keeps the program.
     pub(crate) fn leave_editor(&mut self) {
         if let Mode::Editor(editing) = std::mem::replace(&mut self.mode, Mode::Monitor) {
             self.keep(editing);
@@ -78,7 +78,7 @@ impl Emulator {
         }
     }
 
-    /// A line typed to the editor: one of its own commands, or a step.
+    /// Handles a line typed to the editor: one of its own commands, or a step.
     ///
     /// `E` ends; an empty line goes to the next step; `S n` to step n, `P n` prints n steps, `L`
     /// goes one step back, `D n` deletes n steps, `I` inserts until an empty line.

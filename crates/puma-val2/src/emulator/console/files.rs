@@ -28,47 +28,45 @@ use crate::emulator::profile::Profile;
 use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 
-/// Why a text is not one of programs, locations and variables.
+/// Error in a text of programs, locations and variables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {fault}: {text}")]
 pub struct TextError {
-    /// The line, from 1.
+    /// Number of the line, from 1.
     pub line: usize,
-    /// What is wrong with it.
+    /// Fault of the line.
     pub fault: Fault,
-    /// The line itself.
+    /// Text of the line.
     pub text: String,
 }
 
 impl Emulator {
-    /// All programs, locations and real variables as text, which [`Emulator::load_text`] takes
-    /// back.
+    /// Returns all programs, locations and real variables as text for [`Emulator::load_text`].
     pub fn text(&self) -> String {
         text_of(&self.memory, |_, _| true)
     }
 
-    /// Adds the programs, locations and variables of a text to the memory, replacing those of the
-    /// same names. Nothing is changed if any line is wrong.
+    /// Adds the programs, locations and variables of a text to the memory and replaces those of the
+    /// same names. If any line is wrong, nothing is changed.
     ///
     /// # Errors
-    /// The first line that does not fit.
+    /// The first line that cannot be read.
     pub fn load_text(&mut self, text: &str) -> Result<(), TextError> {
         self.memory = parsed(text, None, self.memory.clone(), &self.profile)?;
         Ok(())
     }
 
-    /// The files on the floppy disk, by name.
+    /// Returns the files on the floppy disk, by name.
     pub fn floppy(&self) -> &BTreeMap<String, String> {
         &self.floppy
     }
 
-    /// Puts a file on the floppy disk, as `STORE` does. The name is kept in upper case.
+    /// Puts a file on the floppy disk. The name is kept in upper case.
     pub fn insert_file(&mut self, name: &str, text: String) {
         self.floppy.insert(name.to_ascii_uppercase(), text);
     }
 
-    /// `STORE file[=name,...]`: everything, or only programs, locations or variables, or only those
-    /// named.
+    /// Carries out `STORE file[=name,...]`: everything, one kind, or only the names given.
     pub(crate) fn store(
         &mut self,
         kind: Option<Kind>,
@@ -109,7 +107,7 @@ impl Emulator {
         PlaceName::parse(cursor)?.key(&self.scope())
     }
 
-    /// `LOAD file`: everything in it, or only its programs, locations or variables.
+    /// Carries out `LOAD file`: everything in it, or one kind.
     pub(crate) fn load(
         &mut self,
         kind: Option<Kind>,
@@ -172,8 +170,8 @@ enum Section {
     Reals,
 }
 
-/// `memory` with what a text holds added: all of it, or what is of one kind. The rest of the text
-/// must be sound all the same.
+/// Returns `memory` with the contents of a text, all or one kind. The rest of the text must be
+/// sound too.
 fn parsed(
     text: &str,
     kind: Option<Kind>,
@@ -200,7 +198,7 @@ fn parsed(
     }
 }
 
-/// Longest line that is no step of a program; six numbers with names need less.
+/// Longest line outside a program; six numbers with names need less.
 const DATA_LINE: usize = 512;
 
 fn take_line(
@@ -273,7 +271,7 @@ fn take_line(
     Ok(())
 }
 
-/// A number as it is written into files: no words for what is none.
+/// Parses a number of a file. Words such as `inf` are refused.
 fn number(text: &str) -> Result<f64, Fault> {
     let plain = text
         .bytes()
@@ -284,7 +282,7 @@ fn number(text: &str) -> Result<f64, Fault> {
         .ok_or(Message::InvalidArgument.into())
 }
 
-/// A name as it is kept, possibly with an index.
+/// Checks a name, possibly with an index.
 fn sound_name(name: &str, profile: &Profile) -> Result<String, Fault> {
     let plain = match name.split_once('[') {
         Some((plain, index))

@@ -4,18 +4,18 @@ use crate::emulator::language::expr::Variable;
 use crate::emulator::language::place::Place;
 use crate::emulator::language::program::Program;
 
-/// The dialogue that the next line from the terminal belongs to.
+/// Dialogue that the next line from the terminal belongs to.
 #[derive(Debug)]
 pub(crate) enum Mode {
-    /// The answer to the start-up question of this number.
+    /// Answer to the start-up question of this number.
     Boot(usize),
-    /// A command.
+    /// Command.
     Monitor,
-    /// The answer to "are you sure?".
+    /// Answer to "are you sure?".
     Confirm(Confirm),
     /// New values for a location, or nothing to keep what it has.
     Change { key: String, place: Place },
-    /// A line for the editor.
+    /// Line for the editor.
     Editor(Editing),
     /// Values for a program's `PROMPT`.
     Answer(Vec<Variable>),
@@ -23,7 +23,7 @@ pub(crate) enum Mode {
     Busy,
 }
 
-/// What is done when the answer is yes.
+/// Action that follows the answer yes.
 #[derive(Debug)]
 pub(crate) enum Confirm {
     Calibrate,
@@ -32,7 +32,7 @@ pub(crate) enum Confirm {
     Format,
 }
 
-/// A kind of thing that has a name.
+/// Kind of a named thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Program,
@@ -41,13 +41,13 @@ pub(crate) enum Kind {
     File,
 }
 
-/// A program in the editor.
+/// Program in the editor.
 #[derive(Debug)]
 pub(crate) struct Editing {
     pub(crate) name: String,
     pub(crate) program: Program,
-    /// The step that the next line is for, from 0.
+    /// Index of the step that the next line is for.
     pub(crate) at: usize,
-    /// Whether lines are inserted before the step instead of replacing it.
+    /// Lines are inserted before the step instead of replacing it.
     pub(crate) inserting: bool,
 }

@@ -53,7 +53,7 @@ pub(crate) enum Command {
     Zero,
 }
 
-/// The commands, and whether each may be given while a program runs.
+/// Commands; `true` for those that may be given while a program runs.
 const COMMANDS: [(&str, (Command, bool)); 43] = [
     ("ABORT", (Command::Abort, true)),
     ("BASE", (Command::Base, false)),
@@ -266,7 +266,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// `POINT name [= expression]`: a new location starts as zero.
+    /// Carries out `POINT name [= expression]`. A new location starts as zero.
     fn point(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let name = PlaceName::parse(cursor)?;
         let to = if cursor.sign("=") {
@@ -293,8 +293,8 @@ impl Emulator {
         Ok(())
     }
 
-    /// `EXECUTE [program][,cycles][,step]`; negative cycles run for ever, no name the program
-    /// executed last.
+    /// Carries out `EXECUTE [program][,cycles][,step]`. Negative cycles run for ever; no name means
+    /// the program executed last.
     fn execute(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let name = match cursor.peek() {
             Some(Token::Name(_)) => cursor.name()?,
@@ -325,7 +325,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// `ABORT` slows the arm down, `PANIC` stops it at once; both end the program.
+    /// Carries out `ABORT`, which slows the arm down, or `PANIC`, which stops it at once.
     fn abort(&mut self, at_once: bool) -> Result<(), Fault> {
         if at_once && self.arm.moving() {
             self.arm.break_off(self.now, self.profile.stop_time / 4);
@@ -344,7 +344,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// `DELETE` takes programs with nothing else; the letter forms take their kind.
+    /// Carries out `DELETE` and its letter forms, which take one kind.
     fn delete(&mut self, kind: Option<Kind>, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let mut found = Vec::new();
         loop {
@@ -370,7 +370,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// `RENAME new = old` and `COPY new = old`, programs; a comma serves for the equals sign.
+    /// Carries out `RENAME new = old` and `COPY new = old`. A comma serves for the equals sign.
     fn rename(&mut self, cursor: &mut Cursor<'_>, keep: bool) -> Result<(), Fault> {
         let new = cursor.name()?;
         if !cursor.sign("=") {

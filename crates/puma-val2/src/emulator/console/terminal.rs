@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::emulator::profile::Profile;
 
-/// What a character that came in amounts to.
+/// Effect of a character that came in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Typed {
     /// Nothing to act on yet.
@@ -17,14 +17,14 @@ pub(crate) enum Typed {
     Cancel,
     /// Ctrl-Z.
     EndOfInput,
-    /// The character found no room.
+    /// The character was lost: the input buffer is full.
     Lost,
 }
 
-/// Most characters that may wait to be sent; a reply that is never read does not grow beyond it.
+/// Most characters that wait to be sent.
 const OUTPUT_LIMIT: usize = 1 << 20;
 
-/// Most characters on their way in; what is sent faster than the line takes it is lost beyond it.
+/// Most characters on their way in; further ones are lost.
 const INPUT_LIMIT: usize = 1 << 16;
 
 /// Longest line whatever the profile allows.
@@ -33,11 +33,11 @@ const LONGEST_LINE: usize = 4096;
 /// Most complete lines that wait, whatever their length.
 const LINE_LIMIT: usize = 64;
 
-/// A complete line.
+/// Complete line.
 #[derive(Clone, Debug)]
 pub(crate) struct Line {
     pub(crate) text: String,
-    /// Whether more of it was typed than the line buffer holds.
+    /// More was typed than the line buffer holds.
     pub(crate) too_long: bool,
 }
 
@@ -46,9 +46,9 @@ pub(crate) struct Terminal {
     arriving: VecDeque<(Duration, u8)>,
     line_busy_until: Duration,
     typed: String,
-    /// Whether what is being typed has outgrown the line buffer.
+    /// The line being typed has outgrown the line buffer.
     too_long: bool,
-    /// Complete lines, in the order they came.
+    /// Complete lines, oldest first.
     lines: VecDeque<Line>,
     sending: VecDeque<u8>,
     sent_at: Duration,
@@ -73,7 +73,7 @@ impl Terminal {
         }
     }
 
-    /// Takes bytes off the wire; each is complete a character's time after the one before.
+    /// Takes bytes off the wire. Each is complete a character's time after the one before.
     pub(crate) fn arrive(&mut self, bytes: &[u8], now: Duration, profile: &Profile) {
         for &byte in bytes {
             if self.arriving.len() >= INPUT_LIMIT {
@@ -88,7 +88,7 @@ impl Terminal {
         }
     }
 
-    /// When the next character is complete.
+    /// Returns the time at which the next character is complete.
     pub(crate) fn next_arrival(&self) -> Option<Duration> {
         self.arriving.front().map(|(at, _)| *at)
     }
@@ -163,7 +163,7 @@ impl Terminal {
             b'\t' => self.character(b' ', now, profile),
             0x20..=0x7e => {
                 self.too_long |= self.typed.len() >= profile.max_line.min(LONGEST_LINE);
-                if !self.too_long && self.has_room(profile) {
+                if !self.too_long && self.can_wait(profile) {
                     self.typed.push(byte as char);
                     let mut text = [0; 4];
                     self.echo((byte as char).encode_utf8(&mut text), now, profile);
@@ -183,29 +183,29 @@ impl Terminal {
         self.too_long = false;
     }
 
-    /// Whether a further character can wait behind the lines that do, each of which takes its
-    /// characters and its end.
-    fn has_room(&self, profile: &Profile) -> bool {
+    /// Returns `true` if a further character can wait behind the waiting lines, each of which takes
+    /// its characters and its end.
+    fn can_wait(&self, profile: &Profile) -> bool {
         let waiting: usize = self.lines.iter().map(|line| line.text.len() + 1).sum();
         self.lines.is_empty() || waiting + self.typed.len() < profile.input_buffer
     }
 
-    /// The oldest complete line that has not been worked on.
+    /// Takes the oldest complete line.
     pub(crate) fn next_line(&mut self) -> Option<Line> {
         self.lines.pop_front()
     }
 
-    /// The newest complete line, without taking it.
+    /// Returns the newest complete line without taking it.
     pub(crate) fn newest_line(&self) -> Option<&str> {
         self.lines.back().map(|line| line.text.as_str())
     }
 
-    /// Whether complete lines wait.
+    /// Returns `true` if complete lines wait.
     pub(crate) fn has_line(&self) -> bool {
         !self.lines.is_empty()
     }
 
-    /// Drops the lines typed ahead.
+    /// Drops complete lines.
     pub(crate) fn forget_lines(&mut self) {
         self.lines.clear();
     }
@@ -230,19 +230,19 @@ impl Terminal {
         }
     }
 
-    /// Ends the line that output stands in, unless it stands at the start of one.
+    /// Ends the line of the output, unless it is at the start of one.
     pub(crate) fn fresh_line(&mut self, profile: &Profile, now: Duration) {
         if !self.at_line_start {
             self.print(profile.eol, now);
         }
     }
 
-    /// Output that Ctrl-O has suppressed resumes with the next prompt or question.
+    /// Resumes output that Ctrl-O has suppressed.
     pub(crate) fn resume(&mut self) {
         self.dropped = false;
     }
 
-    /// When the next character goes out, if output waits.
+    /// Returns the time at which the next character goes out, if output waits.
     pub(crate) fn next_departure(&self, profile: &Profile) -> Option<Duration> {
         let waits = !self.sending.is_empty() && !self.held;
         waits.then(|| {
@@ -251,7 +251,7 @@ impl Terminal {
         })
     }
 
-    /// What has gone out by `now`.
+    /// Returns the characters that have gone out by `now`.
     pub(crate) fn departed(&mut self, now: Duration, profile: &Profile) -> Vec<u8> {
         if self.held {
             return Vec::new();

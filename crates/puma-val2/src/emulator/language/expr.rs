@@ -16,7 +16,7 @@ pub(crate) enum Expr {
     OfPlaces(PlaceFunction, Vec<PlaceExpr>),
 }
 
-/// A real variable, possibly an element of an array.
+/// Real variable, possibly an element of an array.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Variable {
     pub(crate) name: String,
@@ -89,7 +89,7 @@ const PLACE_FUNCTIONS: [(&str, PlaceFunction); 4] = [
     ("DZ", PlaceFunction::Dz),
 ];
 
-/// The binary operators with how tightly they bind, loosest first.
+/// Binary operators and their binding strengths, loosest first.
 const OPERATORS: [(&str, Operator, u8); 24] = [
     ("OR", Operator::Or, 1),
     ("XOR", Operator::Xor, 1),
@@ -117,7 +117,7 @@ const OPERATORS: [(&str, Operator, u8); 24] = [
     ("^", Operator::Power, 8),
 ];
 
-/// How tightly `NOT` and the sign bind.
+/// Binding strengths of `NOT` and of the sign.
 const NOT_BINDS: u8 = 3;
 const SIGN_BINDS: u8 = 7;
 
@@ -126,7 +126,7 @@ impl Expr {
         Self::parse_from(cursor, 0)
     }
 
-    /// An expression, unless its place is left empty: before a comma, a closing sign or the end.
+    /// Parses an expression, or nothing before a comma, a closing sign or the end.
     pub(crate) fn parse_optional(cursor: &mut Cursor<'_>) -> Result<Option<Self>, Fault> {
         match cursor.peek() {
             None | Some(Token::Sign("," | ")")) => Ok(None),
@@ -253,7 +253,7 @@ impl Expr {
     }
 }
 
-/// An index in brackets, if one follows.
+/// Parses an index in brackets, if one follows.
 pub(crate) fn parse_index(cursor: &mut Cursor<'_>) -> Result<Option<Box<Expr>>, Fault> {
     if !cursor.sign("[") {
         return Ok(None);
@@ -270,13 +270,13 @@ impl Variable {
         Ok(Self { name, index })
     }
 
-    /// The name under which the value is kept: `A`, or `A[3]`.
+    /// Returns the name under which the value is kept: `A`, or `A[3]`.
     pub(crate) fn key(&self, scope: &dyn Scope) -> Result<String, Fault> {
         key(&self.name, self.index.as_deref(), scope)
     }
 }
 
-/// The name under which a value is kept: `A`, or `A[3]`.
+/// Returns the name under which a value is kept: `A`, or `A[3]`.
 pub(crate) fn key(name: &str, index: Option<&Expr>, scope: &dyn Scope) -> Result<String, Fault> {
     scope.check_name(name)?;
     match index {
@@ -285,7 +285,7 @@ pub(crate) fn key(name: &str, index: Option<&Expr>, scope: &dyn Scope) -> Result
     }
 }
 
-/// A whole number within bounds.
+/// Converts to a whole number within bounds.
 pub(crate) fn whole(value: f64, min: i32, max: i32) -> Result<i32, Fault> {
     let rounded = value.trunc();
     if rounded >= f64::from(min) && rounded <= f64::from(max) {

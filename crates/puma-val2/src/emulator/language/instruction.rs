@@ -103,7 +103,7 @@ pub(crate) enum SpeedUnit {
     InchesPerSecond,
 }
 
-/// A part of what `TYPE` prints.
+/// Part of the output of `TYPE`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Item {
     Text(String),
@@ -221,7 +221,7 @@ const WORDS: [(&str, Word); 64] = [
 ];
 
 impl Instruction {
-    /// Parses a whole instruction; a label before it is not part of it.
+    /// Parses a whole instruction without its label.
     pub(crate) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         let Some(first) = cursor.peek() else {
             return Ok(Self::Remark);
@@ -244,7 +244,7 @@ impl Instruction {
         Ok(instruction)
     }
 
-    /// Whether the instruction makes sense only among the steps of a program.
+    /// Returns `true` if the instruction makes sense only among the steps of a program.
     pub(crate) fn needs_program(&self) -> bool {
         matches!(
             self,

@@ -4,7 +4,7 @@ use crate::emulator::message::{Fault, Message};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Token {
-    /// A name or keyword, upper case.
+    /// Name or keyword, upper case.
     Name(String),
     Number(f64),
     Text(String),
@@ -16,7 +16,7 @@ const SIGNS: [&str; 20] = [
     ":", ",",
 ];
 
-/// Cuts a line into tokens; a comment after `;` is dropped.
+/// Cuts a line into tokens and drops a comment after `;`.
 pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
     let mut found = Vec::new();
     let mut rest = line.trim_start();
@@ -67,7 +67,7 @@ pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
     Ok(found)
 }
 
-/// A reader over the tokens of a line.
+/// Reader over the tokens of a line.
 #[derive(Debug)]
 pub(crate) struct Cursor<'a> {
     tokens: &'a [Token],
@@ -75,7 +75,7 @@ pub(crate) struct Cursor<'a> {
     operators: usize,
 }
 
-/// Deepest nesting of brackets, signs and indices. No line of sense reaches it.
+/// Deepest nesting of brackets, signs and indices; no sensible line reaches it.
 const DEPTH: usize = 24;
 
 /// Most operators of a line. A chain of them is as deep as it is long.
@@ -181,7 +181,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// The one entry of `words` that `typed` names: itself, or the only one that it abbreviates.
+/// Returns the only entry of `words` that `typed` names or abbreviates.
 pub(crate) fn keyword<T: Copy>(
     typed: &str,
     words: &[(&str, T)],

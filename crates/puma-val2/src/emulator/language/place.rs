@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 
-/// A location's value.
+/// Value of a location.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {
     /// A hand pose in the world frame (or relative to another one), metres.
@@ -15,7 +15,8 @@ pub enum Place {
 }
 
 impl Place {
-    /// The six numbers that VAL shows: millimetres and degrees, or six joint angles in degrees.
+    /// Returns the six numbers that VAL shows: millimetres and degrees, or six joint angles in
+    /// degrees.
     pub fn val(&self) -> [f64; 6] {
         match self {
             Self::Transformation(pose) => Xyzoat::from_pose(pose).val(),
@@ -23,7 +24,7 @@ impl Place {
         }
     }
 
-    /// The value with its six numbers replaced; of the same kind.
+    /// Returns a value of the same kind with these six numbers.
     pub(crate) fn with_val(&self, values: [f64; 6]) -> Self {
         match self {
             Self::Transformation(_) => Self::Transformation(Xyzoat::from_val(values).pose()),

@@ -11,7 +11,7 @@ use crate::emulator::message::{Fault, Message};
 use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 
-/// The name of a location: `P1`, `#P1`, `P[3]`.
+/// Name of a location: `P1`, `#P1`, `P[3]`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PlaceName {
     pub(crate) precision: bool,
@@ -31,7 +31,7 @@ impl PlaceName {
         })
     }
 
-    /// The name under which the value is kept; that of a precision point begins with `#`.
+    /// Returns the name under which the value is kept; that of a precision point begins with `#`.
     pub(crate) fn key(&self, scope: &dyn Scope) -> Result<String, Fault> {
         let key = expr::key(&self.name, self.index.as_deref(), scope)?;
         Ok(if self.precision {
@@ -42,7 +42,7 @@ impl PlaceName {
     }
 }
 
-/// A location expression: terms joined by `:`.
+/// Location expression: terms joined by `:`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PlaceExpr(Vec<Term>);
 
@@ -70,7 +70,7 @@ impl PlaceExpr {
         Ok(Self(terms))
     }
 
-    /// The value. A precision point stands alone: it cannot be part of a compound.
+    /// Returns the value. A precision point stands alone: it cannot be part of a compound.
     pub(crate) fn place(&self, scope: &dyn Scope) -> Result<Place, Fault> {
         let (first, rest) = self.0.split_first().ok_or(Message::InvalidArgument)?;
         let first = first.place(scope)?;
@@ -84,7 +84,7 @@ impl PlaceExpr {
         Ok(Place::Transformation(pose))
     }
 
-    /// The value, which must be a transformation.
+    /// Returns the value, which must be a transformation.
     pub(crate) fn transformation(&self, scope: &dyn Scope) -> Result<Isometry3<f64>, Fault> {
         transformation(self.place(scope)?)
     }
@@ -179,7 +179,7 @@ impl Term {
     }
 }
 
-/// Up to `N` arguments between commas; what is left out is zero.
+/// Parses up to `N` arguments between commas; those left out are zero.
 pub(crate) fn arguments<const N: usize>(
     cursor: &mut Cursor<'_>,
 ) -> Result<[Option<Expr>; N], Fault> {
@@ -193,7 +193,7 @@ pub(crate) fn arguments<const N: usize>(
     Ok(found)
 }
 
-/// The values of arguments, zero for those left out.
+/// Returns the values of arguments, zero for those left out.
 pub(crate) fn values<const N: usize>(
     arguments: &[Option<Expr>; N],
     scope: &dyn Scope,
@@ -207,8 +207,8 @@ pub(crate) fn values<const N: usize>(
     Ok(found)
 }
 
-/// A frame with its x axis from `a` to `b`, its xy plane through `c` (on the side of positive y)
-/// and its origin at `d`.
+/// Returns a frame with its x axis from `a` to `b`, its xy plane through `c` (at positive y) and
+/// its origin at `d`.
 fn frame(
     a: Vector3<f64>,
     b: Vector3<f64>,

@@ -4,17 +4,17 @@ use crate::emulator::language::instruction::Instruction;
 use crate::emulator::language::lexer::{Cursor, Token, tokens};
 use crate::emulator::message::{Fault, Message};
 
-/// A stored program.
+/// Stored program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Program {
     pub(crate) steps: Vec<Step>,
 }
 
-/// One line of a program.
+/// Line of a program.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Step {
     pub(crate) label: Option<u32>,
-    /// The line as it is listed.
+    /// Text in listings.
     pub(crate) text: String,
     pub(crate) instruction: Instruction,
 }
@@ -40,7 +40,7 @@ impl Step {
     }
 }
 
-/// Upper case, as the controller stores what is typed, but for texts in quotes and comments.
+/// Converts to upper case, except texts in quotes and comments.
 fn upper_case(line: &str) -> String {
     let mut quoted = false;
     let mut comment = false;
@@ -58,7 +58,7 @@ fn upper_case(line: &str) -> String {
 }
 
 impl Program {
-    /// The step that bears the label.
+    /// Returns the step with the label.
     pub(crate) fn labelled(&self, label: u32) -> Result<usize, Fault> {
         self.steps
             .iter()
@@ -66,9 +66,9 @@ impl Program {
             .ok_or(Message::UndefinedLabel.into())
     }
 
-    /// The control word that belongs to the one at `step` and comes next at its level: from `IF`
-    /// the `ELSE` or `END`, from `CASE` or `VALUE` the next `VALUE`, `ANY` or `END`, from `DO` the
-    /// `UNTIL`, from the others the `END`.
+    /// Returns the next control word at the level of the one at `step`: from `IF` the `ELSE` or
+    /// `END`, from `CASE` or `VALUE` the next `VALUE`, `ANY` or `END`, from `DO` the `UNTIL`, from
+    /// the others the `END`.
     pub(crate) fn next_part(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, later) in self.steps.iter().enumerate().skip(step + 1) {
@@ -93,7 +93,7 @@ impl Program {
         Err(Message::ControlStructure.into())
     }
 
-    /// The `END` or `UNTIL` of the structure that `step` is part of the head or a branch of.
+    /// Returns the `END` or `UNTIL` of the structure of `step`.
     pub(crate) fn end_of(&self, step: usize) -> Result<usize, Fault> {
         let mut at = self.next_part(step)?;
         while !matches!(
@@ -105,7 +105,7 @@ impl Program {
         Ok(at)
     }
 
-    /// The head (`IF`, `FOR`, `WHILE`, `DO`, `CASE`) of the structure that ends at `step`.
+    /// Returns the head (`IF`, `FOR`, `WHILE`, `DO`, `CASE`) of the structure that ends at `step`.
     pub(crate) fn head_of(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, earlier) in self.steps.iter().enumerate().take(step).rev() {
@@ -127,7 +127,8 @@ impl Program {
         Err(Message::ControlStructure.into())
     }
 
-    /// Whether the words of every structure match; the first step that does not fit otherwise.
+    /// Checks that the words of every structure match. The error is the first step that does not
+    /// fit.
     pub(crate) fn check(&self) -> Result<(), usize> {
         let mut open: Vec<&Instruction> = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {

@@ -61,8 +61,8 @@ impl Speed {
         }
     }
 
-    /// Fraction of full speed, `line_speed` metres per second being full for a speed in units of
-    /// length.
+    /// Returns the fraction of full speed. `line_speed`, metres per second, is full for a speed in
+    /// units of length.
     fn fraction(self, line_speed: f64) -> f64 {
         match self.unit {
             SpeedUnit::Percent => self.value / 100.0,
@@ -71,7 +71,7 @@ impl Speed {
         }
     }
 
-    /// The number as the controller shows it.
+    /// Returns the number that the controller shows.
     pub(crate) fn shown(self) -> f64 {
         self.value
     }
@@ -105,25 +105,25 @@ impl Arm {
         self.joints = self.shown();
     }
 
-    /// Joint angles at the time of the last [`Arm::advance`].
+    /// Returns the joint angles at the time of the last [`Arm::advance`].
     pub(crate) fn joints(&self) -> Joints {
         self.joints
     }
 
-    /// Joint angles as the encoders give them.
+    /// Returns the joint angles that the encoders give.
     pub(crate) fn shown(&self) -> Joints {
         self.drives
             .map_or(self.joints, |d| d.quantized(&self.joints))
     }
 
-    /// Where the present motion ends, or where the arm stands.
+    /// Returns the end of the present motion, or the position of a standing arm.
     pub(crate) fn destination(&self) -> Joints {
         self.motion
             .as_ref()
             .map_or_else(|| self.shown(), Motion::target)
     }
 
-    /// The hand in the world frame.
+    /// Returns the hand in the world frame.
     pub(crate) fn hand(&self, joints: &Joints) -> Isometry3<f64> {
         self.frames.hand(&self.params, joints)
     }
@@ -136,8 +136,8 @@ impl Arm {
         self.motion.as_ref().map(Motion::end)
     }
 
-    /// Follows the motion to `now`. If it has ended, says how: with the fault that the path ended
-    /// in, if any.
+    /// Follows the motion to `now`. Returns the outcome of a motion that has ended, the fault at
+    /// the end of its path included.
     pub(crate) fn advance(&mut self, now: Duration) -> Option<Result<(), Fault>> {
         let motion = self.motion.as_ref()?;
         self.joints = motion.at(now);
@@ -159,7 +159,7 @@ impl Arm {
         }
     }
 
-    /// What is asked of the next motion by words that come before it is forgotten.
+    /// Forgets the words that apply to the next motion.
     pub(crate) fn forget_words(&mut self) {
         self.gripper_next = None;
         self.postures_next.clear();
@@ -180,7 +180,7 @@ impl Arm {
         self.next_speed = Some(speed);
     }
 
-    /// Whether the arm may be moved at all.
+    /// Checks that the arm may be moved at all.
     pub(crate) fn check_ready(&self) -> Result<(), Fault> {
         if !self.power {
             return Err(Message::ArmPowerOff.into());
@@ -192,15 +192,11 @@ impl Arm {
     }
 
     fn check_limits(&self, joints: &Joints) -> Result<(), Fault> {
-        // Half a count of slack, so that an arm standing at its limit can move away along it.
-        let slack = 1e-4;
-        for joint in Joint::ALL {
-            let range = self.params.ranges[joint.index()];
-            if !(range.min - slack..=range.max + slack).contains(&joints[joint]) {
-                return Err(Fault::at(Message::OutOfRange, joint));
-            }
+        let out = |joint: &Joint| !self.params.ranges[joint.index()].holds(joints[*joint]);
+        match Joint::ALL.into_iter().find(out) {
+            Some(joint) => Err(Fault::at(Message::OutOfRange, joint)),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn pace(&mut self, profile: &Profile, speed: Option<Speed>) -> Pace {
@@ -238,7 +234,7 @@ impl Arm {
         Ok(())
     }
 
-    /// The joint angles that reach a location, in the posture asked for or else the present one.
+    /// Returns the joint angles that reach a location, in the posture asked for or the present one.
     pub(crate) fn resolve(&self, place: &Place) -> Result<Joints, Fault> {
         let pose = match place {
             Place::PrecisionPoint(joints) => return Ok(*joints),
@@ -273,13 +269,15 @@ impl Arm {
         })
     }
 
-    /// Whether the arm stands so near to the border between two postures that it is in neither: the
-    /// upright arm between left and right, the straight wrist between flip and no flip.
+    /// Returns `true` for side and wrist if the arm stands so near to the border between two
+    /// postures that it is in neither: the upright arm between left and right, the straight wrist
+    /// between flip and no flip.
     fn between_postures(&self) -> [bool; 2] {
-        let [_, t2, t3, _, t5, _] = self.joints.0;
-        let p = &self.params;
-        let ahead = p.d4 * (t2 + t3).sin() + p.a3 * (t2 + t3).cos() + p.a2 * t2.cos();
-        [ahead.abs() < 0.03, t5.abs() < 0.1_f64.to_radians()]
+        let ahead = self.params.wrist_ahead(&self.joints);
+        [
+            ahead.abs() < 0.03,
+            self.joints.0[4].abs() < 0.1_f64.to_radians(),
+        ]
     }
 
     fn reach(
@@ -353,7 +351,7 @@ impl Arm {
         Ok(())
     }
 
-    /// `place` moved by `distance` metres back along its own tool axis.
+    /// Returns `place` moved by `distance` metres back along its own tool axis.
     pub(crate) fn approach(&self, place: &Place, distance: f64) -> Place {
         let pose = match place {
             Place::Transformation(pose) => *pose,
@@ -362,7 +360,7 @@ impl Arm {
         Place::Transformation(pose * Translation3::new(0.0, 0.0, -distance))
     }
 
-    /// The present pose with the tool axis turned to the nearest axis of the world.
+    /// Returns the present pose with the tool axis turned to the nearest axis of the world.
     pub(crate) fn aligned(&self) -> Place {
         let hand = self.hand(&self.destination());
         let axis = hand * Vector3::z();
@@ -385,7 +383,7 @@ impl Arm {
         ))
     }
 
-    /// Every joint by a degree and a half and back, which passes an index pulse of each encoder.
+    /// Turns every joint by a degree and a half and back, past an index pulse of each encoder.
     pub(crate) fn start_calibration(&mut self, now: Duration, profile: &Profile) {
         let pace = Pace {
             fraction: 0.05,

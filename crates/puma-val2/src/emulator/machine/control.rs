@@ -11,8 +11,8 @@ use crate::emulator::machine::job::{Flow, Job, Loop};
 use crate::emulator::message::{Fault, Message};
 
 impl Emulator {
-    /// `GOTO`, `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their parts. The frame's step already points
-    /// behind the instruction.
+    /// Carries out `GOTO`, `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their parts. The frame's step
+    /// already points behind the instruction.
     pub(crate) fn control(
         &mut self,
         instruction: &Instruction,
@@ -120,7 +120,7 @@ impl Emulator {
         })
     }
 
-    /// The step of a `CASE` to go on with: behind the first `VALUE` that fits, behind `ANY`, or
+    /// Returns the next step of a `CASE`: behind the first `VALUE` that fits, behind `ANY`, or
     /// behind the `END`.
     #[allow(clippy::float_cmp)] // `VALUE` compares as the controller does.
     fn branch(&self, program: &Program, case: usize, of: f64) -> Result<usize, Fault> {

@@ -224,8 +224,7 @@ impl Emulator {
         let mut to = self.arm.joints();
         to.0[joint.index()] += change.to_radians();
         self.arm.check_ready()?;
-        let range = self.arm.params.ranges[joint.index()];
-        if to[joint] < range.min - 1e-4 || to[joint] > range.max + 1e-4 {
+        if !self.arm.params.ranges[joint.index()].holds(to[joint]) {
             return Err(Fault::at(Message::OutOfRange, joint));
         }
         to.0[joint.index()] -= short.to_radians();
@@ -269,7 +268,7 @@ impl Emulator {
     }
 }
 
-/// Motions wait for the one before, and so does what has to happen at its end.
+/// Returns `true` for motions and other instructions that wait for the end of a motion.
 fn needs_standing_arm(instruction: &Instruction) -> bool {
     matches!(
         instruction,

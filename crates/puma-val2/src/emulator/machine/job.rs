@@ -1,4 +1,4 @@
-//! What is being carried out: a program step by step, one instruction for `DO`, or a calibration.
+//! Jobs: a program step by step, one instruction for `DO`, or a calibration.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,19 +13,19 @@ use crate::emulator::message::{Fault, Message};
 /// Deepest nesting of `CALL`.
 pub(crate) const CALL_DEPTH: usize = 16;
 
-/// Something that is being carried out.
+/// Job that is being carried out.
 #[derive(Debug)]
 pub(crate) struct Job {
     pub(crate) kind: JobKind,
-    /// The program and those that called it, innermost last. Empty for `DO`.
+    /// Program and its callers, innermost last. Empty for `DO`.
     pub(crate) frames: Vec<Frame>,
     pub(crate) wait: Wait,
     pub(crate) next_step: Duration,
     /// Cycles left after this one; `None` for ever.
     pub(crate) cycles_left: Option<u32>,
-    /// How it ends as soon as the arm stands.
+    /// End that comes as soon as the arm stands.
     pub(crate) ending: Option<Message>,
-    /// What `DO` carries out as soon as the motion before it has ended.
+    /// Instruction of `DO` that waits for the end of the motion before it.
     pub(crate) pending: Option<Instruction>,
     /// Stop after one step, for `NEXT`.
     pub(crate) single: bool,
@@ -46,7 +46,7 @@ pub(crate) struct Frame {
     pub(crate) loops: Vec<Loop>,
 }
 
-/// A `FOR` under way.
+/// `FOR` under way.
 #[derive(Debug)]
 pub(crate) struct Loop {
     pub(crate) head: usize,
@@ -66,11 +66,11 @@ pub(crate) enum Wait {
     Answer,
 }
 
-/// What carrying out an instruction leads to.
+/// Consequence of an instruction.
 pub(crate) enum Flow {
     /// On to the next step.
     Next,
-    /// The same step again when the arm stands.
+    /// Repeat this step when the arm stands.
     WhenStanding,
     /// To this step.
     Jump(usize),
@@ -103,7 +103,7 @@ impl Job {
         self.kind == JobKind::Program
     }
 
-    /// Name and step (from 1) of the innermost program.
+    /// Returns the name and step (from 1) of the innermost program.
     pub(crate) fn at(&self) -> Option<(&str, usize)> {
         self.frames.last().map(|f| (f.name.as_str(), f.step + 1))
     }
@@ -112,7 +112,7 @@ impl Job {
         self.cycles_left
     }
 
-    /// The signal that a `WAIT` waits for may come; show what it waits for.
+    /// Returns `true` while a `WAIT` or `PROMPT` waits.
     pub(crate) fn waits(&self) -> bool {
         matches!(self.wait, Wait::Condition(_) | Wait::Answer)
     }
@@ -123,7 +123,7 @@ impl Emulator {
         self.profile.step_time.max(Duration::from_micros(100))
     }
 
-    /// When the job goes on of itself.
+    /// Returns the time at which the job goes on of itself.
     pub(crate) fn job_due(&self, job: &Job) -> Option<Duration> {
         if job.ending.is_some() {
             return (!self.arm.moving()).then_some(self.now);
@@ -181,7 +181,7 @@ impl Emulator {
         })
     }
 
-    /// Goes on with a program that was paused, aborted or refused, at its next step or (`again`) at
+    /// Continues a program that was paused, aborted or refused, at its next step or (`again`) at
     /// the one it stopped in.
     pub(crate) fn resume_program(&mut self, again: bool, single: bool) -> Result<(), Fault> {
         let mut job = self.paused.take().ok_or(Message::NotRunning)?;
@@ -241,7 +241,7 @@ impl Emulator {
         self.hold_terminal();
     }
 
-    /// The arm has come to a stand.
+    /// Handles the end of a motion.
     pub(crate) fn motion_ended(&mut self, outcome: Result<(), Fault>) {
         self.sense();
         self.note(Event::MotionEnded);
@@ -261,7 +261,7 @@ impl Emulator {
         }
     }
 
-    /// Ends the job with a message in asterisks; without a job the message comes unasked.
+    /// Ends the job with a message in asterisks. Without a job the message comes unasked.
     pub(crate) fn fail_job(&mut self, fault: Fault) {
         let job = self.job.take();
         self.refuse(fault);
@@ -275,7 +275,7 @@ impl Emulator {
         }
     }
 
-    /// The terminal has answered a `PROMPT`.
+    /// Continues after the answer to a `PROMPT`.
     pub(crate) fn answered(&mut self) {
         match self.job.as_mut() {
             Some(job) => {
@@ -289,7 +289,7 @@ impl Emulator {
         }
     }
 
-    /// Lets the job go on if it can.
+    /// Lets the job continue if it can.
     pub(crate) fn run_job(&mut self) {
         let due = |emulator: &Self| emulator.job.as_ref().and_then(|job| emulator.job_due(job));
         if due(self).is_none_or(|at| at > self.now) {
@@ -371,7 +371,7 @@ impl Emulator {
         self.prompt();
     }
 
-    /// One step of a program. `Some` says how the program ends.
+    /// Carries out one step of a program. `Some` is the end of the program.
     fn program_step(&mut self, job: &mut Job) -> Result<Option<Message>, Fault> {
         let Some(frame) = job.frames.last_mut() else {
             return Ok(Some(Message::Completed));

@@ -1,4 +1,4 @@
-//! What the controller remembers: programs, locations, real variables.
+//! Memory of the controller: programs, locations, real variables.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

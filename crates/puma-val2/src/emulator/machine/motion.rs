@@ -6,34 +6,33 @@ use crate::emulator::message::Fault;
 use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
 
-/// A path from knot to knot, evenly spaced, travelled from rest to rest.
+/// Path from knot to knot, evenly spaced, travelled from rest to rest.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     knots: Vec<Joints>,
     start: Duration,
-    /// Greatest speed and acceleration along the path, whose length is 1; per second, per second
-    /// squared.
+    /// Greatest speed and acceleration along the path, whose length is 1.
     speed: f64,
     acceleration: f64,
-    /// How it comes to a stand before its end.
+    /// Way of coming to a stand before the end.
     stop: Option<Stop>,
-    /// What is wrong with the place where the path ends.
+    /// Fault of the place where the path ends.
     pub(crate) failure: Option<Fault>,
 }
 
-/// A motion that is broken off travels its path ever more slowly.
+/// Deceleration of a motion that is broken off.
 #[derive(Clone, Copy, Debug)]
 struct Stop {
     at: Duration,
-    /// How long coming to a stand takes.
+    /// Time of coming to a stand.
     time: Duration,
-    /// Seconds of undisturbed travel used up until then.
+    /// Seconds of undisturbed travel used up by then.
     travelled: f64,
-    /// How fast the path was travelled then, as a fraction of the undisturbed motion.
+    /// Speed on the path then, as a fraction of the undisturbed motion.
     pace: f64,
 }
 
-/// How fast joints may turn.
+/// Speed and acceleration of the joints.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     /// Fraction of full joint speed.
@@ -43,8 +42,7 @@ pub(crate) struct Pace {
 }
 
 impl Motion {
-    /// All joints start together, stop together, and none exceeds its limits; the joint that needs
-    /// longest sets the pace.
+    /// Creates a motion in which all joints start and stop together and none exceeds its limits.
     pub(crate) fn joint_interpolated(
         from: Joints,
         to: Joints,
@@ -57,7 +55,7 @@ impl Motion {
         motion
     }
 
-    /// Along the knots, at most `path_speed` (path lengths per second).
+    /// Creates a motion along the knots, at most `path_speed` (path lengths per second).
     pub(crate) fn along(
         knots: Vec<Joints>,
         start: Duration,
@@ -88,7 +86,7 @@ impl Motion {
         }
     }
 
-    /// The last knot.
+    /// Returns the last knot.
     pub(crate) fn target(&self) -> Joints {
         self.knots[self.knots.len() - 1]
     }
@@ -98,13 +96,13 @@ impl Motion {
         (peak, peak / self.acceleration)
     }
 
-    /// Seconds from start to rest when nothing breaks it off.
+    /// Returns the seconds from start to rest of an undisturbed motion.
     fn undisturbed(&self) -> f64 {
         let (peak, ramp) = self.ramp();
         1.0 / peak + ramp
     }
 
-    /// When the arm stands.
+    /// Returns the time at which the arm stands.
     pub(crate) fn end(&self) -> Duration {
         let end = self
             .start
@@ -115,13 +113,13 @@ impl Motion {
         }
     }
 
-    /// Whether it was broken off before its end.
+    /// Returns `true` if the motion was broken off before its end.
     pub(crate) fn is_broken_off(&self) -> bool {
         self.stop.is_some()
     }
 
-    /// Brings the arm to a stand within `time`, on the path. One that is slowing down already does
-    /// so more sharply, if that is sooner.
+    /// Brings the arm to a stand within `time`, on the path. A motion that is slowing down does so
+    /// more sharply, if that is sooner.
     pub(crate) fn break_off(&mut self, now: Duration, time: Duration) {
         let end = now.saturating_add(time);
         if self
@@ -141,7 +139,7 @@ impl Motion {
         });
     }
 
-    /// Seconds of undisturbed travel that have been used up at `now`.
+    /// Returns the seconds of undisturbed travel used up at `now`.
     fn travelled(&self, now: Duration) -> f64 {
         match self.stop {
             Some(stop) if now > stop.at && !stop.time.is_zero() => {
@@ -154,7 +152,7 @@ impl Motion {
         }
     }
 
-    /// The joint angles at `now`.
+    /// Returns the joint angles at `now`.
     pub(crate) fn at(&self, now: Duration) -> Joints {
         let (peak, ramp) = self.ramp();
         let whole = self.undisturbed();
@@ -178,7 +176,7 @@ impl Motion {
 }
 
 impl Stop {
-    /// Seconds since the stop began, at most those it takes.
+    /// Returns the seconds since the stop began, at most those it takes.
     fn passed(&self, now: Duration) -> f64 {
         now.saturating_sub(self.at).min(self.time).as_secs_f64()
     }
@@ -240,7 +238,7 @@ mod tests {
         assert_eq!(motion.at(at + Duration::from_secs(9)), stands);
     }
     #[test]
-    fn a_motion_that_is_stopping_can_be_stopped_more_sharply_but_not_less() {
+    fn a_stopping_motion_can_be_stopped_more_sharply_but_not_less() {
         let mut motion = motion();
         let at = Duration::from_millis(5500);
         motion.break_off(at, Duration::from_millis(600));

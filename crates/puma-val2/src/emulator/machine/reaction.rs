@@ -5,7 +5,7 @@ use crate::emulator::language::scope::Scope;
 use crate::emulator::machine::job::{CALL_DEPTH, JobKind, Wait};
 use crate::emulator::message::Message;
 
-/// An armed `REACT` or `REACTI`.
+/// Armed `REACT` or `REACTI`.
 #[derive(Clone, Debug)]
 pub(crate) struct Reaction {
     /// Negative: reacts when the signal is off.
@@ -15,7 +15,7 @@ pub(crate) struct Reaction {
 }
 
 impl Emulator {
-    /// Looks whether a signal has come that somebody waits for.
+    /// Carries out the reaction to a signal that has come.
     pub(crate) fn check_reactions(&mut self) {
         let due = |r: &Reaction| self.scope().signal(r.signal).unwrap_or(false);
         let Some(index) = self.reactions.iter().position(due) else {

@@ -11,7 +11,7 @@ use crate::emulator::machine::signals::Signals;
 use crate::emulator::message::{Fault, Message};
 use crate::emulator::profile::Profile;
 
-/// A view of memory, signals and arm.
+/// View of memory, signals and arm.
 #[derive(Debug)]
 pub(crate) struct View<'a> {
     pub(crate) memory: &'a Memory,

@@ -2,7 +2,7 @@
 
 use crate::emulator::message::{Fault, Message};
 
-/// Signals of each kind.
+/// Number of signals of each kind.
 const COUNT: u16 = 64;
 
 /// First number of the outputs, the inputs and the soft signals.
@@ -27,7 +27,7 @@ impl Signals {
         Ok(self.banks[bank] & bit != 0)
     }
 
-    /// Sets any signal, as the wiring does.
+    /// Sets any signal, inputs included.
     pub(crate) fn set(&mut self, number: u16, on: bool) -> Result<(), Fault> {
         let (bank, bit) = Self::locate(number)?;
         if on {
@@ -38,7 +38,7 @@ impl Signals {
         Ok(())
     }
 
-    /// Sets an output or a soft signal, as a program does: negative is off, inputs cannot be set.
+    /// Sets an output or a soft signal; a negative number switches it off.
     pub(crate) fn command(&mut self, number: i32) -> Result<(), Fault> {
         let magnitude = u16::try_from(number.unsigned_abs()).map_err(|_| Message::IllegalSignal)?;
         if (BANKS[1]..BANKS[1] + COUNT).contains(&magnitude) {
@@ -47,12 +47,12 @@ impl Signals {
         self.set(magnitude, number > 0)
     }
 
-    /// All outputs off.
+    /// Switches all outputs off.
     pub(crate) fn reset_outputs(&mut self) {
         self.banks[0] = 0;
     }
 
-    /// The states of the first `count` signals of a bank.
+    /// Returns the states of the first `count` signals of a bank.
     pub(crate) fn bank(&self, bank: usize, count: usize) -> impl Iterator<Item = bool> + '_ {
         (0..count).map(move |i| self.banks[bank] >> i & 1 != 0)
     }

@@ -30,7 +30,10 @@ fn arm_power_lost_in_mid_move() {
     for way in WAYS {
         let (client, outcome) = disturbed(way, |emulator| emulator.set_arm_power(false));
         assert!(
-            matches!(&outcome, Err(ArmError::Refused { message, .. }) if message == "Arm power off"),
+            matches!(
+            &outcome,
+            Err(ArmError::Refused { message, .. }) if message == "Arm power off"
+            ),
             "{outcome:?}"
         );
         assert_knows_where(&client);
@@ -42,7 +45,10 @@ fn envelope_error_in_mid_move() {
     for way in WAYS {
         let (client, outcome) = disturbed(way, |emulator| emulator.envelope_error(Joint::J2));
         assert!(
-            matches!(&outcome, Err(ArmError::Refused { message, .. }) if message == "Envelope error Jt 2"),
+            matches!(
+            &outcome,
+            Err(ArmError::Refused { message, .. }) if message == "Envelope error Jt 2"
+            ),
             "{outcome:?}"
         );
         assert_knows_where(&client);
@@ -125,7 +131,10 @@ fn limits_of_the_controller_that_are_narrower_than_ours() {
         let start = client.joints().unwrap();
         let outcome = client.move_by(STEP);
         assert!(
-            matches!(&outcome, Err(ArmError::Refused { message, .. }) if message == "Location out of range Jt 2"),
+            matches!(
+            &outcome,
+            Err(ArmError::Refused { message, .. }) if message == "Location out of range Jt 2"
+            ),
             "{outcome:?}"
         );
         judge(&mut client, start, &outcome, "narrow");

@@ -205,9 +205,10 @@ fn what_cannot_be_guarded_is_refused_and_nothing_is_sent() {
 #[test]
 fn a_signal_that_there_is_not_is_refused_at_once() {
     let mut client = client(Profile::val2(), MoveWay::Automatic);
-    assert!(
-        matches!(client.arm_proximity(5000), Err(ArmError::Refused { message, .. }) if message == "Illegal signal number")
-    );
+    assert!(matches!(
+    client.arm_proximity(5000),
+    Err(ArmError::Refused { message, .. }) if message == "Illegal signal number"
+    ));
     client.move_by(STEP).unwrap();
 }
 

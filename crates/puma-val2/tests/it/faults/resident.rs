@@ -111,7 +111,10 @@ fn limits_of_the_controller_that_are_narrower_than_ours() {
     let mut resident = client.resident().unwrap();
     let outcome = resident.move_by(STEP);
     assert!(
-        matches!(&outcome, Err(ArmError::Refused { message, .. }) if message == "Location out of range Jt 2"),
+        matches!(
+        &outcome,
+        Err(ArmError::Refused { message, .. }) if message == "Location out of range Jt 2"
+        ),
         "{outcome:?}"
     );
     drop(resident);

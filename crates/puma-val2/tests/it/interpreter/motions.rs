@@ -117,7 +117,7 @@ fn a_straight_line_is_straight_and_keeps_its_direction() {
 }
 
 #[test]
-fn a_straight_line_that_leaves_the_reach_stops_there_or_does_not_start() {
+fn a_straight_line_that_leaves_the_reach_stops_or_never_starts() {
     // Straight through the column: both ends are reachable, the middle is not.
     let steps = "DO MOVE TRANS(500,50,300,90,90,0)\nDO MOVES TRANS(-500,50,300,90,90,0)";
     let mut console = Console::ready();

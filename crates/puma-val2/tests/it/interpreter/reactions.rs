@@ -32,7 +32,10 @@ fn react_waits_for_the_step_and_reacti_stops_the_motion() {
         console.program("HIT", "TYPE \"hit\"\nRETURN");
         console.program(
             "GO",
-            &format!("{word} 1001,HIT\nMOVE #PPOINT(80,-90,90)\nDELAY 3\nTYPE \"goes on\"\nMOVE #PPOINT(-20,-90,90)"),
+            &format!(
+                "{word} 1001,HIT\nMOVE #PPOINT(80,-90,90)\nDELAY 3\nTYPE \"goes on\"\n\
+                 MOVE #PPOINT(-20,-90,90)"
+            ),
         );
         console.line_now("EXECUTE GO");
         console.wait(Duration::from_millis(600));
@@ -129,7 +132,7 @@ fn a_reaction_while_values_are_asked_for_does_not_skip_them() {
 }
 
 #[test]
-fn output_that_control_o_has_dropped_comes_back_with_the_next_question() {
+fn output_dropped_by_control_o_returns_with_a_question() {
     let mut console = Console::ready();
     for (begin, line, question) in [
         ("EDIT P", "TYPE 1", " 2.? "),
