@@ -23,7 +23,7 @@ impl Emulator {
         if cursor.sign(",") {
             match cursor.next() {
                 Some(Token::Number(step)) if *step >= 1.0 && *step <= 32767.0 => {
-                    at = *step as usize - 1
+                    at = *step as usize - 1;
                 }
                 _ => return Err(Message::InvalidArgument.into()),
             }
@@ -98,7 +98,7 @@ impl Emulator {
                 return self.prompt();
             }
             ("S", Some(number)) => {
-                editing.at = number.saturating_sub(1).min(editing.program.steps.len())
+                editing.at = number.saturating_sub(1).min(editing.program.steps.len());
             }
             ("L", Some(number)) => editing.at = editing.at.saturating_sub(number),
             ("P", Some(number)) => {

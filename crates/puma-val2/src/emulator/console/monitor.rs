@@ -211,7 +211,7 @@ impl Emulator {
                 self.signals.reset_outputs();
             }
             Command::Enable | Command::Disable => {
-                self.set_switch(cursor, command == Command::Enable)?
+                self.set_switch(cursor, command == Command::Enable)?;
             }
             Command::Execute => return self.execute(cursor),
             Command::Abort | Command::Panic => {

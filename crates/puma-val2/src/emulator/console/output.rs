@@ -19,7 +19,7 @@ impl Emulator {
                     let value = value.value(&self.scope())?;
                     match format {
                         Some((width, decimals)) => {
-                            text.push_str(&display::number(value, width, decimals))
+                            text.push_str(&display::number(value, width, decimals));
                         }
                         None => text.push_str(&format!(" {}", display::plain(value))),
                     }

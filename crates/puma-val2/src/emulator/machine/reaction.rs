@@ -65,7 +65,7 @@ impl Emulator {
                 job.next_step = self.now;
             }
             (Some(job), Ok(_)) if job.kind == JobKind::Program => {
-                self.fail_job(Message::OutOfMemory.into())
+                self.fail_job(Message::OutOfMemory.into());
             }
             (Some(_), Ok(_)) => {}
             (None, Ok(_)) => {}

@@ -162,7 +162,7 @@ fn unasked_messages_between_and_during_its_moves() {
         resident.line_mut().inner.emulator_mut().interject(text);
         resident.joints().unwrap();
         resident.line_mut().disturb = Some(Box::new(move |emulator: &mut Emulator| {
-            emulator.interject(text)
+            emulator.interject(text);
         }));
         let outcome = resident.move_by(STEP);
         drop(resident);
