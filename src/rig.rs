@@ -10,8 +10,8 @@ use pipeline_sim::{Ball, Cell, CellCamera, Contacts, Renderer, Scene, SharedCell
 #[cfg(feature = "serial")]
 use puma_val2::SerialLine;
 use puma_val2::{
-    ArmError, ClientConfig, Emulator, EmulatorServer, Gripper, GuardedArm, Joints, Manipulator, Profile,
-    ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
+    ArmError, ClientConfig, Emulator, EmulatorServer, Gripper, GuardedArm, Joints, Manipulator,
+    Profile, ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
 /// An arm behind a VAL II controller, calibrated, in a simulated cell: a ball to place, a camera on
