@@ -59,7 +59,8 @@ pub enum QuantityError {
     /// A lens distortion that folds the image over inside the frame: two directions would meet in
     /// one pixel.
     #[error(
-        "the lens distortion folds the image over {radius_px:.0} px from the principal point, inside the frame"
+        "the lens distortion folds the image over {radius_px:.0} px from the principal point, \
+         inside the frame"
     )]
     Folds {
         /// Distance from the principal point at which the image turns back, pixels.
@@ -113,7 +114,8 @@ pub enum SightError {
     CentreNotFinite,
     /// A camera whose centre of projection lies inside the ball.
     #[error(
-        "the camera is inside the ball: its centre is {distance:.4} m away, its radius is {radius:.4} m"
+        "the camera is inside the ball: its centre is {distance:.4} m away, its radius is \
+         {radius:.4} m"
     )]
     Inside {
         /// Distance of the ball's centre, metres.
@@ -123,7 +125,8 @@ pub enum SightError {
     },
     /// A ball behind the camera, or reaching behind it, so that its outline is no ellipse.
     #[error(
-        "the ball is behind the camera or reaches behind it: depth {depth:.4} m, radius {radius:.4} m"
+        "the ball is behind the camera or reaches behind it: depth {depth:.4} m, radius \
+         {radius:.4} m"
     )]
     Behind {
         /// Depth of the ball's centre along the optical axis, metres.
@@ -134,7 +137,8 @@ pub enum SightError {
     /// A ball that lies, wholly or in part, beyond the direction at which the lens folds the image
     /// over.
     #[error(
-        "the ball is beyond what the lens shows: its centre is {:.1} degrees off the optical axis, and the distortion folds the image over nearer to it",
+        "the ball is beyond what the lens shows: its centre is {:.1} degrees off the optical \
+         axis, and the distortion folds the image over nearer to it",
         angle.to_degrees()
     )]
     BeyondLens {
@@ -143,7 +147,8 @@ pub enum SightError {
     },
     /// An outline that does not fit into the frame, wherever it lies.
     #[error(
-        "the ball is larger than the view: its outline is {width_px:.0} x {height_px:.0} px in a frame of {frame_width} x {frame_height} px"
+        "the ball is larger than the view: its outline is {width_px:.0} x {height_px:.0} px in a \
+         frame of {frame_width} x {frame_height} px"
     )]
     LargerThanView {
         /// Width of the outline, pixels.
@@ -157,7 +162,8 @@ pub enum SightError {
     },
     /// A radius in the image out of the range in which a ball counts as seen.
     #[error(
-        "the ball's radius of {r:.2} units is out of the range {least}..{greatest} in which it counts as seen"
+        "the ball's radius of {r:.2} units is out of the range {least}..{greatest} in which it \
+         counts as seen"
     )]
     Radius {
         /// Radius, feature units.
@@ -176,7 +182,10 @@ pub enum SightError {
         y: f64,
     },
     /// An outline with too large a part outside the frame.
-    #[error("only {:.0} % of the ball's outline is inside the frame, at least {:.0} % must be", 100.0 * share, 100.0 * least)]
+    #[error(
+        "only {:.0} % of the ball's outline is inside the frame, at least {:.0} % must be",
+        100.0 * share, 100.0 * least
+    )]
     CutOff {
         /// Fraction of the outline inside the frame, 0..=1.
         share: f64,
@@ -208,7 +217,8 @@ pub enum ReachError {
     NoView,
     /// A ball nearer to the waist's axis than the plane in which the arm moves.
     #[error(
-        "the ball is {distance:.3} m from the waist's axis; the arm moves in a plane {offset:.3} m beside it"
+        "the ball is {distance:.3} m from the waist's axis; the arm moves in a plane {offset:.3} \
+         m beside it"
     )]
     BesideWaist {
         /// Distance from the axis, metres.
@@ -218,7 +228,8 @@ pub enum ReachError {
     },
     /// A ball too near to the shoulder, or too far from it.
     #[error(
-        "the ball is {distance:.3} m from the shoulder, in the arm's plane; the arm reaches {least:.3}..{greatest:.3} m"
+        "the ball is {distance:.3} m from the shoulder, in the arm's plane; the arm reaches \
+         {least:.3}..{greatest:.3} m"
     )]
     OutOfReach {
         /// Distance from the shoulder, metres.
@@ -260,7 +271,8 @@ pub enum FitError {
     /// Samples that do not tell all coefficients apart: moves all along one line, or a single elbow
     /// angle.
     #[error(
-        "{place}: the samples determine only {rank} of {terms} coefficients; vary the moves and the poses more"
+        "{place}: the samples determine only {rank} of {terms} coefficients; vary the moves and \
+         the poses more"
     )]
     RankDeficient {
         /// Part of the model.

@@ -1,22 +1,22 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # How the parts meet
+//! # How the types meet
 //!
-//! A [`Cell`] is pure geometry: from the joint angles it tells what the camera would see
-//! ([`Cell::features`]), where the fingers are ([`Cell::grip_miss`]) and whether they are about to
-//! touch something ([`Cell::proximity`]). A [`Renderer`] draws the frame that belongs to it.
-//! [`CellCamera`] and [`SimulatedArm`] put a [`SharedCell`] behind the doors of `hough-heuristic`
-//! and `puma-val2` ([`FrameSource`](hough_heuristic::FrameSource),
-//! [`Manipulator`](puma_val2::Manipulator), [`ProximitySensor`](puma_val2::ProximitySensor)).
-//! [`sample_moves`] draws samples of moves, and [`ReachModel`] and [`CentreModel`] fit the paper's
-//! regression simulator, and better ones, to them.
+//! A [`Cell`] is pure geometry: from the joint angles it computes the ball's image features
+//! ([`Cell::features`]), the distance of the fingers from the ball ([`Cell::grip_miss`]) and the
+//! proximity sensors ([`Cell::proximity`]). A [`Renderer`] draws the frame that belongs to it.
+//! [`CellCamera`] and [`SimulatedArm`] work on a [`SharedCell`] and implement the traits of
+//! `hough-heuristic` ([`FrameSource`](hough_heuristic::FrameSource)) and `puma-val2`
+//! ([`Manipulator`](puma_val2::Manipulator), [`ProximitySensor`](puma_val2::ProximitySensor)).
+//! [`Cell::sample_moves`] draws the samples to which [`ReachModel`] and [`CentreModel`] are fitted.
 //!
 //! # Conventions
 //!
-//! Metres and radians, VAL's world frame (origin at the shoulder, z up); names ending in `degrees`,
-//! and the moves `d1`, `d2`, `d3` of samples and models, are degrees of VAL's joints. Pixels have
-//! (0, 0) at the centre of the top-left pixel; *units* are the paper's 192x144
-//! ([`hough_heuristic::Features`]). Whatever is random takes the caller's generator or a seed.
+//! Metres and radians, VAL's world frame (origin at the shoulder, z up). Names ending in `degrees`,
+//! and the moves `d1`, `d2`, `d3` of samples and models, are degrees of VAL's joints. Pixel (0, 0)
+//! is the centre of the top-left pixel; *units* are the paper's 192x144
+//! ([`Features`](hough_heuristic::Features)). Everything random takes the caller's generator or a
+//! seed.
 
 mod cell;
 #[cfg(feature = "datasets")]

@@ -4,8 +4,8 @@ use std::io::{self, Write};
 
 use image::GrayImage;
 
-/// Writes monochrome frames as a YUV4MPEG2 (Y4M) stream (`Cmono`: eight bits of luma, nothing else),
-/// which [`FrameStream`](crate::FrameStream) reads.
+/// Writes monochrome frames as a YUV4MPEG2 (Y4M) stream of eight bits of luma (`Cmono`), which
+/// [`FrameStream`](crate::FrameStream) reads.
 ///
 /// ```
 /// use hough_heuristic::image::GrayImage;
@@ -46,8 +46,8 @@ impl<W: Write> Y4mWriter<W> {
         })
     }
 
-    /// Declares in the header that every frame consists of two fields, the even rows (the top field)
-    /// taken first. Without it the stream is progressive.
+    /// Declares in the header that every frame consists of two fields, the even rows (top field)
+    /// first. Without it the stream is progressive.
     #[must_use]
     pub fn interlaced(mut self) -> Self {
         self.interlaced = true;

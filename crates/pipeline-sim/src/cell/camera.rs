@@ -24,8 +24,9 @@ impl Camera {
     /// Greatest width and height of a frame, pixels.
     pub const LARGEST_SIDE: u32 = 16_384;
 
-    /// Returns the paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a 2/3"
-    /// CCD, whose image is 8.8 mm wide; principal point in the middle of the frame, no distortion.
+    /// Returns the paper's camera: an 11.5 mm lens and a frame of 768x576 pixels (section 2), on a
+    /// 2/3" CCD, whose image is 8.8 mm wide; principal point in the middle of the frame, no
+    /// distortion.
     ///
     /// ```
     /// let camera = pipeline_sim::Camera::paper();
@@ -42,8 +43,9 @@ impl Camera {
         }
     }
 
-    /// Creates a pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width` metres wide
-    /// and a frame of `width` x `height` pixels, principal point in the middle of the frame.
+    /// Creates a pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width`
+    /// metres wide and a frame of `width` x `height` pixels, principal point in the middle of the
+    /// frame.
     ///
     /// # Errors
     /// [`QuantityError::NotPositive`] names the quantity that is not above zero;
@@ -85,8 +87,8 @@ impl Camera {
     /// Multiplies the focal length by `factor`.
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] if the factor is not above zero; [`QuantityError::Folds`] if a
-    /// distorted image would fold.
+    /// [`QuantityError::NotPositive`] if the factor is not above zero; [`QuantityError::Folds`] if
+    /// a distorted image would fold.
     pub fn with_focal_factor(self, factor: f64) -> Result<Self, QuantityError> {
         positive("focal factor", factor)?;
         let focal_px = self.focal_px * factor;
@@ -108,8 +110,9 @@ impl Camera {
     /// frame of another shape shows more on two sides.
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] for a frame without pixels; [`QuantityError::TooLarge`] for more
-    /// than [`Camera::LARGEST_SIDE`]; [`QuantityError::Folds`] if a distorted image would fold.
+    /// [`QuantityError::NotPositive`] for a frame without pixels; [`QuantityError::TooLarge`] for
+    /// more than [`Camera::LARGEST_SIDE`]; [`QuantityError::Folds`] if a distorted image would
+    /// fold.
     pub fn resized(self, width: u32, height: u32) -> Result<Self, QuantityError> {
         frame_size(width, height)?;
         let scale = (f64::from(width) / f64::from(self.width))
@@ -130,7 +133,8 @@ impl Camera {
     /// Replaces the lens distortion.
     ///
     /// # Errors
-    /// [`QuantityError::NotFinite`]; [`QuantityError::Folds`] if the image folds over within the frame.
+    /// [`QuantityError::NotFinite`]; [`QuantityError::Folds`] if the image folds over within the
+    /// frame.
     pub fn with_distortion(self, distortion: Distortion) -> Result<Self, QuantityError> {
         let Distortion { k1, k2, k3, p1, p2 } = distortion;
         for (name, value) in [("k1", k1), ("k2", k2), ("k3", k3), ("p1", p1), ("p2", p2)] {
@@ -219,8 +223,8 @@ impl Camera {
     /// [`Camera::project_sphere`] has the mean circle `circle`. Exact without distortion; otherwise
     /// the distortion at the circle's centre is undone.
     ///
-    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at the
-    /// circle's centre, or the circle is too large for double precision.
+    /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at
+    /// the circle's centre, or the circle is too large for double precision.
     pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
         let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
             && [circle.radius, radius]
@@ -308,11 +312,11 @@ impl Camera {
     }
 }
 
-/// Returns the minor semi-axis b of a sphere's outline on the plane at unit depth, from the distance
-/// `m` of its centre from the axis and the mean `r` of both semi-axes.
+/// Returns the minor semi-axis b of a sphere's outline on the plane at unit depth, from the
+/// distance `m` of its centre from the axis and the mean `r` of both semi-axes.
 ///
-/// It is the root of b (1 + sqrt(1 + m² / (1 + b²))) = 2 r, whose left side rises with b, by Newton's
-/// method, with bisection where a step leaves the bracket.
+/// It is the root of b (1 + sqrt(1 + m² / (1 + b²))) = 2 r, whose left side rises with b, by
+/// Newton's method, with bisection where a step leaves the bracket.
 fn minor_axis(m: f64, r: f64) -> f64 {
     let (mut low, mut high) = (2.0 * r / (1.0 + 1.0_f64.hypot(m)), r);
     let mut b = low;

@@ -101,8 +101,8 @@ impl ProjectedEllipse {
         (1.0 - outside / TAU).clamp(0.0, 1.0)
     }
 
-    /// Returns the ellipse with the area and second moments of a closed outline, given as a function
-    /// of an angle 0..2 pi; `None` if a point of it has no pixel.
+    /// Returns the ellipse with the area and second moments of a closed outline, given as a
+    /// function of an angle 0..2 pi; `None` if a point of it has no pixel.
     pub(crate) fn of_outline(point: impl Fn(f64) -> Option<Point2<f64>>) -> Option<Self> {
         let mut points = [Point2::origin(); OUTLINE];
         for (i, place) in points.iter_mut().enumerate() {

@@ -11,7 +11,7 @@ use crate::cell::ball::Holder;
 use crate::cell::geometry::Cell;
 use crate::error::{QuantityError, finite, positive};
 
-/// The ways in which a real cell differs from the nominal one.
+/// Differences of a real cell from the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Errors {

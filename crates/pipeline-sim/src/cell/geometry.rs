@@ -13,16 +13,16 @@ use crate::error::{ReachError, SightError};
 
 /// Arm, camera on the hand, ball on its holder, table.
 ///
-/// Everything is in VAL's world frame: metres, origin at the shoulder, z up. The methods are pure
-/// geometry: equal joints give equal answers.
+/// Lengths and places are in VAL's world frame: metres, origin at the shoulder, z up. The methods
+/// are pure geometry: equal joints give equal answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Link lengths and joint ranges.
     pub params: PumaParams,
     /// Camera on the hand.
     pub camera: Camera,
-    /// Pose of the camera frame (see [`Camera`]) in the hand frame, whose origin is the wrist centre
-    /// and whose z axis is the tool axis ([`PumaParams::wrist`]).
+    /// Pose of the camera frame (see [`Camera`]) in the hand frame, whose origin is the wrist
+    /// centre and whose z axis is the tool axis ([`PumaParams::wrist`]).
     pub mount: Isometry3<f64>,
     /// Gripper and camera as bodies.
     pub hand: HandShape,
@@ -57,11 +57,11 @@ impl Cell {
     /// Returns the paper's cell with `ball` on a holder, above a table 300 mm below the shoulder.
     ///
     /// The camera sits 60 mm off the tool axis on the outer (upper) side of the hand, 4.5 mm to its
-    /// left and 20 mm past the wrist centre, its optical axis parallel to the tool axis, image right
-    /// along -y and image down along +x. With `JT5` held at 45 degrees the ball then shows at the
-    /// paper's goal exactly where turning `JT5` alone brings the gripper to it. The working limits
-    /// are `JT1` -160..160, `JT2` -150..-20, `JT3` 120..215 degrees and the arm's own ranges for the
-    /// wrist.
+    /// left and 20 mm past the wrist centre, its optical axis parallel to the tool axis, image
+    /// right along -y and image down along +x. With `JT5` held at 45 degrees the ball then shows at
+    /// the paper's goal exactly where turning `JT5` alone brings the gripper to it. The working
+    /// limits are `JT1` -160..160, `JT2` -150..-20, `JT3` 120..215 degrees and the arm's own ranges
+    /// for the wrist.
     pub fn paper(ball: Ball) -> Self {
         let axes = Matrix3::new(
             0.0, 1.0, 0.0, //
@@ -173,8 +173,8 @@ impl Cell {
         (self.tool_point(joints) - self.ball.centre).norm()
     }
 
-    /// Returns the angle of `JT5`, radians, that brings the tool point nearest to the ball while all
-    /// other joints stay.
+    /// Returns the angle of `JT5`, radians, that brings the tool point nearest to the ball while
+    /// all other joints stay.
     pub fn grip_angle(&self, joints: &Joints) -> f64 {
         // Frame that JT5 turns in: the hand frame turned back by JT5 about the wrist's bending
         // axis. At JT5 = 0 the tool axis is the forearm's axis, and +JT5 turns z toward +x of the

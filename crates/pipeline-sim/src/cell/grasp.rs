@@ -89,9 +89,9 @@ impl Cell {
         }
     }
 
-    /// Moves the ball with the hand, now at `joints`, and returns the distance it was pushed: a held
-    /// ball moves along; one that finger, palm or camera overlap is pushed aside with its holder
-    /// until they only touch.
+    /// Moves the ball with the hand, now at `joints`, and returns the distance it was pushed: a
+    /// held ball moves along; one that finger, palm or camera overlap is pushed aside with its
+    /// holder until they only touch.
     fn follow(&mut self, joints: &Joints) -> f64 {
         if let Some(place) = self.held {
             self.ball.centre = self.params.wrist(joints) * place;
@@ -206,9 +206,9 @@ impl Cell {
     }
 }
 
-/// Returns the horizontal direction in which a ball leaves the pads, and the distance to go until it
-/// is `reach` away from their middle; `across` is its offset from there in the hand frame, without
-/// the part along the jaws.
+/// Returns the horizontal direction in which a ball leaves the pads, and the distance to go until
+/// it is `reach` away from their middle; `across` is its offset from there in the hand frame,
+/// without the part along the jaws.
 fn way_out(
     wrist: &Isometry3<f64>,
     across: &Vector3<f64>,

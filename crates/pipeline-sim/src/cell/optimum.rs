@@ -21,9 +21,9 @@ enum Place {
 
 impl Cell {
     /// Returns the fewest of the given moves that lead from `start` to a pose for which `reached`
-    /// returns `true`, by breadth-first search; 0 if `start` is one. The ball stays in sight and the
-    /// arm within its working limits after every move. Moves are rounded to a tenth of a degree and
-    /// may turn one or two joints.
+    /// returns `true`, by breadth-first search; 0 if `start` is one. The ball stays in sight and
+    /// the arm within its working limits after every move. Moves are rounded to a tenth of a degree
+    /// and may turn one or two joints.
     ///
     /// `None` if the ball is out of sight at `start` or the arm out of its limits, if there is no
     /// way to the goal, or if it takes more than `most` moves.

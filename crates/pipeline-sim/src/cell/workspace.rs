@@ -27,9 +27,9 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Returns the workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70 degrees, 200
-    /// mm below to 50 mm above the shoulder; search poses (p, -110, 210, 0, 45, 0) with p from -75
-    /// to 50 in steps of 25 degrees.
+    /// Returns the workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70
+    /// degrees, 200 mm below to 50 mm above the shoulder; search poses (p, -110, 210, 0, 45, 0)
+    /// with p from -75 to 50 in steps of 25 degrees.
     pub fn paper() -> Self {
         Self {
             rho: (0.500, 0.800),
@@ -75,8 +75,8 @@ impl Workspace {
         }
     }
 
-    /// Draws a ball in the workspace, uniform in volume. Its coordinates are NaN in a workspace that
-    /// [`Workspace::check`] refuses.
+    /// Draws a ball in the workspace, uniform in volume. Its coordinates are NaN in a workspace
+    /// that [`Workspace::check`] refuses.
     pub fn sample_ball<R: Rng + ?Sized>(&self, rng: &mut R) -> Ball {
         if self.check().is_err() {
             return Ball::at(f64::NAN, f64::NAN, f64::NAN);

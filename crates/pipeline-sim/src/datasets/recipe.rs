@@ -14,10 +14,10 @@ use crate::render::shot::Shot;
 
 /// A recipe for labelled frames of one kind of difficulty.
 ///
-/// The recipes of [`Recipe::cell`] show the arm at work: a random ball, a pose on the way to it, and
-/// a scene that several frames can share. Those of [`Recipe::benchmark`] isolate one difficulty for
-/// a circle detector: the camera looks down on balls on a table whose radii are log-uniform over
-/// 12..145 pixels of a frame of 768x576, and everything else has straight edges.
+/// The recipes of [`Recipe::cell`] show the arm at work: a random ball, a pose on the way to it,
+/// and a scene that several frames can share. Those of [`Recipe::benchmark`] isolate one difficulty
+/// for a circle detector: the camera looks down on balls on a table whose radii are log-uniform
+/// over 12..145 pixels of a frame of 768x576, and everything else has straight edges.
 ///
 /// ```
 /// use pipeline_sim::Recipe;

@@ -240,8 +240,8 @@ impl Stage {
         })
     }
 
-    /// Draws joint speeds, radians per second, at which the first ball moves by `pixels` (of 768) during
-    /// `exposure` seconds.
+    /// Draws joint speeds, radians per second, at which the first ball moves by `pixels` (of 768)
+    /// during `exposure` seconds.
     pub(super) fn speed(&self, pixels: f64, exposure: f64, rng: &mut dyn Rng) -> JointDelta {
         let mut speed = JointDelta::default();
         for i in 0..3 {

@@ -2,7 +2,7 @@
 
 use crate::error::QuantityError;
 
-/// How well a model reproduces one output.
+/// The accuracy with which a model reproduces one output.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Quality {

@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 
-/// Which terms a [`ReachModel`](crate::ReachModel) is made of.
+/// The terms of a [`ReachModel`](crate::ReachModel).
 ///
 /// With d2, d3 the moves in degrees, a = d2 / 20, b = d3 / 16, Z = 33 / r, V = (y - 72) / r, E =
 /// (`JT3` - 140) / 40 before the move. In the arm's plane (Z, V) is, up to a scale, the ball's
@@ -13,8 +13,7 @@ use hough_heuristic::Features;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ReachForm {
-    /// Changes of y and r on 1, d2, d3: the paper's own reading of linear regression, per elbow
-    /// interval.
+    /// Changes of y and r on 1, d2, d3: the paper's linear regression, per elbow interval.
     Linear,
     /// Changes of Z and V on 1, a, b, Za, Zb, Va, Vb, Ea.
     Rigid8,
@@ -23,12 +22,12 @@ pub enum ReachForm {
     /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists
     /// of: with c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`: (c23 -
     /// 1) and s23 times Z and V; (c3 - c23) and (s3 - s23) times 1, cos e, sin e; 1 - c3; s3. No
-    /// further terms exist: what is left is the outline's slight ellipticity.
+    /// further terms exist: the residual is the outline's slight ellipticity.
     RigidBody,
 }
 
 impl ReachForm {
-    /// Number of terms.
+    /// Returns the number of terms.
     pub fn terms(self) -> usize {
         match self {
             Self::Linear => 3,
@@ -38,7 +37,7 @@ impl ReachForm {
         }
     }
 
-    /// What the terms are, in the order of [`ReachForm::fill`].
+    /// Returns the names of the terms, in the order of [`ReachForm::fill`].
     pub(crate) fn term_names(self) -> &'static [&'static str] {
         match self {
             Self::Linear => &["the constant term", "the term d2", "the term d3"],
@@ -93,7 +92,7 @@ impl ReachForm {
         }
     }
 
-    /// What the two fitted quantities are.
+    /// Returns the names of the two fitted quantities.
     pub(crate) fn output_names(self) -> [&'static str; 2] {
         match self {
             Self::Linear => ["the change of y", "the change of r"],
@@ -155,7 +154,7 @@ impl ReachForm {
         &buffer[..self.terms()]
     }
 
-    /// The two quantities that are fitted, from image features: (y, r), or (Z, V).
+    /// Returns the two quantities that are fitted, from image features: (y, r), or (Z, V).
     pub(crate) fn outputs(self, features: &Features) -> [f64; 2] {
         match self {
             Self::Linear => [features.y, features.r],
@@ -163,7 +162,7 @@ impl ReachForm {
         }
     }
 
-    /// (y, r) from the fitted quantities; `None` where they belong to no ball in front of the
+    /// Returns (y, r) from the fitted quantities; `None` if they belong to no ball in front of the
     /// camera.
     pub(crate) fn image(self, outputs: [f64; 2]) -> Option<(f64, f64)> {
         match self {

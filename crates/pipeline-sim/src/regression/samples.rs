@@ -107,9 +107,9 @@ impl Cell {
         })
     }
 
-    /// Draws `count` samples of each kind, each from a [`Cell::exploring_start`] of its own and with
-    /// a random move of the paper's lists; kept if the arm stays within its working limits and the
-    /// ball in sight.
+    /// Draws `count` samples of each kind, each from a [`Cell::exploring_start`] of its own and
+    /// with a random move of the paper's lists; kept if the arm stays within its working limits and
+    /// the ball in sight.
     ///
     /// Features carry normal noise of standard deviation `noise` units. In a cell in which nothing
     /// can be seen or reached the lists are short. 100 000 samples of each kind take about a second

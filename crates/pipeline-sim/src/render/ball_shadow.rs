@@ -1,4 +1,4 @@
-//! Shadows of ball and holder on the table, worked out for every frame.
+//! Shadows of ball and holder on the table, computed for every frame.
 
 use nalgebra::Vector3;
 
@@ -17,11 +17,11 @@ pub(super) struct BallShadow {
 
 #[derive(Clone, Debug)]
 struct Lamp {
-    /// Toward it.
+    /// Direction toward the lamp.
     axis: Vector3<f64>,
     /// Radius of its disc at unit distance.
     reach: f64,
-    /// Of the light on the table.
+    /// Fraction of the light on the table.
     share: f64,
     /// Box on the table that holds both shadows: least and greatest x, least and greatest y.
     bounds: [f64; 4],
@@ -146,7 +146,7 @@ impl BallShadow {
         let steep = lamp.axis.z.max(0.05);
         let (dx, dy) = ((lamp.axis.x / steep) as f32, (lamp.axis.y / steep) as f32);
         let slope2 = dx * dx + dy * dy;
-        // Of a lamp right above, no ray comes nearer to the axis than at its foot.
+        // Rays to a lamp right above come nearest to the axis at their foot.
         let inverse = if slope2 > 1e-9 { 1.0 / slope2 } else { 0.0 };
         let (fx, fy) = (holder.foot.x as f32, holder.foot.y as f32);
         let top = (holder.top - self.table).max(0.0) as f32;
@@ -161,11 +161,11 @@ impl BallShadow {
     }
 }
 
-/// How far from its axis the holder hides part of the sky, metres.
+/// Distance from its axis within which the holder hides part of the sky, metres.
 const NEAR: f32 = 0.1;
 
-/// Share of a lamp's disc of radius `lamp` hidden by a body of radius `body`, `across2` being the
-/// squared distance between their middles.
+/// Returns the fraction of a lamp's disc of radius `lamp` hidden by a body of radius `body`,
+/// `across2` being the squared distance between their middles.
 #[inline(always)]
 fn overlap(body: f32, lamp: f32, across2: f32) -> f32 {
     let lamp = lamp.max(1e-4);
@@ -174,7 +174,7 @@ fn overlap(body: f32, lamp: f32, across2: f32) -> f32 {
     t * t * (3.0 - 2.0 * t) * depth * depth.sqrt()
 }
 
-/// exp(-t) for t from 0 on, within 3e-5.
+/// Returns exp(-t) for t from 0 on, within 3e-5.
 #[inline(always)]
 fn fading(t: f32) -> f32 {
     // A sixteenth of the way by the first terms of the series, then to the 16th power.

@@ -8,7 +8,7 @@ use crate::render::scene::{Appearance, Occluder, Scene, Shape, Thing};
 use crate::render::texture::Texture;
 use crate::render::view::View;
 
-/// Everything a body's shading depends on.
+/// The inputs of a body's shading.
 pub(super) struct Studio<'a> {
     pub(super) view: &'a View,
     pub(super) scene: &'a Scene,
@@ -17,7 +17,7 @@ pub(super) struct Studio<'a> {
     pub(super) lamps: Vec<(Vector3<f64>, f64)>,
     /// Height of the table.
     pub(super) table: f64,
-    /// Light that the table throws back.
+    /// Light reflected by the table.
     pub(super) bounce: f64,
 }
 
@@ -39,7 +39,7 @@ pub(super) fn plane_row(
     });
 }
 
-/// The work of [`plane_row`].
+/// Arguments of [`plane_row`].
 struct PlaneRow<'a> {
     plane: &'a Matrix3<f64>,
     texture: &'a Texture,
@@ -79,7 +79,7 @@ impl Vectorized for PlaneRow<'_> {
 }
 
 impl Studio<'_> {
-    /// Light that a surface with this normal receives, world frame.
+    /// Returns the light that a surface with this normal receives, world frame.
     pub(super) fn irradiance(&self, normal: &Vector3<f64>) -> f64 {
         let up = 0.5 + 0.5 * normal.z;
         let lamps: f64 = self
@@ -124,7 +124,7 @@ impl Studio<'_> {
                     (y - self.view.principal.y) / self.view.focal,
                     1.0,
                 );
-            // Where the ray meets the wall, seen from above.
+            // Intersection of the ray with the wall, seen from above.
             let dd = (d.x * d.x + d.y * d.y).max(1e-12);
             let b = d.x * axis.x + d.y * axis.y;
             let disc = b * b - dd * (axis.coords.norm_squared() - radius * radius);
@@ -334,7 +334,7 @@ impl Studio<'_> {
         if !drawable {
             return;
         }
-        // A fixed, scrambled sequence decides the letters: print looks the same in every frame.
+        // A fixed, scrambled sequence of letters, equal in every frame.
         let mut state =
             (thing.x.to_bits() ^ thing.y.to_bits()).wrapping_mul(0x2545_f491_4f6c_dd1d) | 1;
         let mut next = |n: u64| {

@@ -11,10 +11,10 @@ pub(super) struct Canvas {
     pub(super) light: Vec<f32>,
     coverage: Vec<f32>,
     shade: Vec<f32>,
-    /// Edges of the present polygon that begin below the present row, the next one last; level ones
-    /// are left out.
+    /// Edges of the polygon that begin below the present row, the next one last, without level
+    /// ones.
     edges: Vec<Edge>,
-    /// Those that the present row may touch.
+    /// Edges that the present row may touch.
     active: Vec<Edge>,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct Canvas {
 struct Edge {
     top: f64,
     bottom: f64,
-    /// At the upper end.
+    /// Column of the upper end.
     x: f64,
     /// Change of x for each row.
     slope: f64,
@@ -112,7 +112,7 @@ impl Canvas {
         }
     }
 
-    /// Lists the edges of a polygon and tells the rows that it may touch.
+    /// Lists the edges of a polygon and returns the rows that it may touch.
     #[inline(always)]
     fn rows_of(&mut self, polygon: &[Point2<f64>]) -> Option<std::ops::Range<usize>> {
         if polygon.len() < 3 {
@@ -155,8 +155,8 @@ impl Canvas {
         Some(first as usize..last as usize + 1)
     }
 
-    /// Coverage of one row, after those above it: the touched pixels start..end, and whether all of
-    /// them are covered wholly.
+    /// Computes the coverage of one row, after those above it. Returns the touched pixels
+    /// start..end, and `true` if all of them are covered wholly.
     #[inline(always)]
     fn cover_row(&mut self, y: usize) -> Option<(usize, usize, bool)> {
         let (above, below) = (y as f64 - 0.5, y as f64 + 0.5);
@@ -198,7 +198,6 @@ impl Canvas {
         if least >= greatest {
             return None;
         }
-        // None is negative, so that a cast rounds down.
         let up = |x: f64| x as usize + usize::from((x as usize as f64) < x);
         let (start, end) = (least as usize, up(greatest).min(self.width));
         let (from, to) = (up(inner_left), inner_right as usize);
@@ -223,7 +222,7 @@ impl Canvas {
     }
 }
 
-/// The work of [`Canvas::fill`].
+/// Arguments of [`Canvas::fill`].
 struct Filling<'a, S> {
     canvas: &'a mut Canvas,
     polygon: &'a [Point2<f64>],
@@ -244,7 +243,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_covered_area_is_the_polygons_area() {
+    fn covered_area_is_the_polygons_area() {
         let mut canvas = Canvas::new(40, 30);
         let polygon =
             [(3.2, 2.1), (30.7, 5.9), (25.3, 24.4), (6.6, 20.2)].map(|(x, y)| Point2::new(x, y));
@@ -262,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_the_frame_is_cut() {
+    fn polygons_are_cut_at_the_frame() {
         let mut canvas = Canvas::new(8, 8);
         let polygon =
             [(-1e6, -1e6), (1e6, -1e6), (1e6, 1e6), (-1e6, 1e6)].map(|(x, y)| Point2::new(x, y));

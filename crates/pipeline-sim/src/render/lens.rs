@@ -1,4 +1,4 @@
-//! What the lens does to the light: distortion and defocus.
+//! Distortion and defocus of the lens.
 
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Point2, Vector2};
@@ -9,7 +9,7 @@ use crate::render::canvas::Canvas;
 /// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts
 /// of the focal length.
 const STEP: (f64, f64) = (16.0, 1.0 / 60.0);
-/// The same for places between which pixels of a row are taken from a straight line.
+/// Greatest distance of places between which pixels of a row are interpolated linearly.
 const RUN: (f64, f64) = (WHOLE_RUN as f64, 1.0 / 250.0);
 const WHOLE_RUN: usize = 4;
 
@@ -26,15 +26,15 @@ pub(super) struct Warp {
     pub(super) ideal: Camera,
     /// Pixels from one of the sources to the next.
     run: usize,
-    /// Row after row, where pixels 0, `run`, ... and the last are taken from.
+    /// Source places of pixels 0, `run`, ... and the last, row after row.
     sources: Vec<[f32; 2]>,
-    /// Of them in a row.
+    /// Number of sources in a row.
     columns: usize,
 }
 
 impl Warp {
-    /// `None` for a camera without distortion. For any other the ideal frame is larger, but not
-    /// endless: a radial distortion of three terms that does not fold squeezes by less than three.
+    /// Returns `None` for a camera without distortion. Otherwise the ideal frame is larger, by less
+    /// than a factor of three for a radial distortion that does not fold.
     pub(super) fn new(camera: &Camera) -> Option<Self> {
         if camera.distortion().is_none() {
             return None;
@@ -47,8 +47,7 @@ impl Warp {
             Nodes::new(width as usize, step),
             Nodes::new(height as usize, step),
         );
-        // From place to place the answer changes little: the last one is where to look for the
-        // next.
+        // The last answer is the start for the next.
         let mut last = (Point2::origin(), Point2::origin());
         let mut exact = |x: f64, y: f64| {
             let shown = Point2::from((Point2::new(x, y) - principal) / focal);
@@ -60,7 +59,6 @@ impl Warp {
             .flat_map(|j| (0..across.count).map(move |i| (i, j)))
             .map(|(i, j)| exact(across.place(i), down.place(j)))
             .collect();
-        // The border bulges between two of its places by a small part of a pixel only.
         let low = grid
             .iter()
             .fold(Vector2::zeros(), |a: Vector2<f64>, p| a.inf(p));
@@ -101,7 +99,7 @@ impl Warp {
         })
     }
 
-    /// Whether this warp belongs to a camera.
+    /// Returns `true` if this warp belongs to a camera.
     pub(super) fn is_for(&self, camera: &Camera) -> bool {
         self.camera == *camera
     }
@@ -174,7 +172,7 @@ impl Warp {
     }
 }
 
-/// The work of [`Warp::apply`].
+/// Arguments of [`Warp::apply`].
 struct Applying<'a> {
     warp: &'a Warp,
     ideal: &'a Canvas,
@@ -192,9 +190,9 @@ impl Vectorized for Applying<'_> {
 
 /// Writes the places that pixels of a row are taken from.
 struct Sources<'a> {
-    /// At the nodes of the row.
+    /// Places at the nodes of the row.
     row: &'a [[f64; 2]],
-    /// For each place the first of four nodes, and their shares.
+    /// First of four nodes for each place, and their weights.
     shares: &'a [(usize, [f64; 4])],
     sources: &'a mut [[f32; 2]],
 }
@@ -218,13 +216,13 @@ impl Vectorized for Sources<'_> {
 
 /// Evenly spaced places from the first to the last of a number of pixels.
 struct Nodes {
-    /// At least four.
+    /// Number of nodes, at least four.
     count: usize,
     spacing: f64,
 }
 
 impl Nodes {
-    /// At most `step` apart, but for a frame of one pixel.
+    /// Creates nodes at most `step` apart.
     fn new(length: usize, step: f64) -> Self {
         let last = length.saturating_sub(1);
         let count = ((last as f64 / step).ceil() as usize).max(3) + 1;
@@ -238,8 +236,8 @@ impl Nodes {
         node as f64 * self.spacing
     }
 
-    /// The first of the four places next to a pixel, and their shares in the value of the cubic
-    /// through all four there.
+    /// Returns the first of the four nodes next to a pixel, and their weights in the cubic through
+    /// them.
     fn shares(&self, pixel: usize) -> (usize, [f64; 4]) {
         if self.spacing <= 0.0 {
             return (0, [1.0, 0.0, 0.0, 0.0]);
@@ -278,7 +276,7 @@ pub(super) fn soften(values: &mut [f32], width: usize, sigma: f64, spare: &mut V
     });
 }
 
-/// The work of [`soften`].
+/// Arguments of [`soften`].
 struct Softening<'a> {
     values: &'a mut [f32],
     width: usize,
@@ -318,8 +316,8 @@ impl Vectorized for Softening<'_> {
     }
 }
 
-/// Side and middle weight of the three-tap kernel whose variance is sigma², up to the widest that
-/// three taps give.
+/// Returns side and middle weight of the three-tap kernel of variance sigma², or the widest kernel
+/// of three taps.
 pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
     let side = (0.5 * sigma * sigma).clamp(0.0, 0.333) as f32;
     (side, 1.0 - 2.0 * side)
@@ -367,12 +365,12 @@ pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
     }
 }
 
-/// The sum of pairs of rows, each with its weight.
+/// Computes the sum of pairs of rows, each with its weight.
 fn weigh<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
     widest(Weighing { pairs, out });
 }
 
-/// The work of [`weigh`].
+/// Arguments of [`weigh`].
 struct Weighing<'a, P> {
     pairs: &'a P,
     out: &'a mut [f32],
@@ -423,7 +421,7 @@ mod tests {
     use super::*;
     use crate::cell::distortion::Distortion;
 
-    /// How far pixels are taken from where the lens has them, at most.
+    /// Returns the greatest error of the places that pixels are taken from.
     fn worst(camera: &Camera) -> f64 {
         let warp = Warp::new(camera).expect("distorts");
         let (width, height) = camera.size();

@@ -1,20 +1,20 @@
-//! Slowly varying light on the table, worked out at few pixels and interpolated between them.
+//! Slowly varying light on the table, computed at few pixels and interpolated between them.
 
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::render::view::View;
 
-/// Pixels, along both axes, between two at which the light is worked out.
+/// Distance of the nodes along both axes, pixels.
 const STEP: usize = 4;
 
-/// Share of their sum by which two nodes may differ to be taken as alike.
+/// Greatest difference of two nodes that count as alike, relative to their sum.
 const ALIKE: f32 = 0.01;
 
-/// Something that tells the light on a plane.
+/// A source of light on a plane.
 pub(super) trait Lighting {
-    /// Writes the light at places of the plane; `spare` holds twice as many numbers. To be
-    /// inlined always.
+    /// Writes the light at places of the plane; `spare` holds twice as many numbers.
+    /// Implementations are `#[inline(always)]`.
     fn shed(&self, x: &[f32], y: &[f32], light: &mut [f32], spare: &mut [f32]);
 }
 
@@ -26,13 +26,13 @@ pub(super) struct LightGrid {
     row: Row,
 }
 
-/// Nodes of a row at which the light is to be worked out.
+/// Nodes of a row at which the light is computed.
 #[derive(Clone, Debug, Default)]
 struct Row {
-    /// Their columns.
+    /// Columns of the nodes.
     wanted: Vec<u32>,
-    /// Where they are on the plane, whether they are at all (1 or 0), the light there, and room to
-    /// work it out.
+    /// Their places on the plane, 1 or 0 if the ray meets the plane or not, the light there, and
+    /// scratch space.
     x: Vec<f32>,
     y: Vec<f32>,
     met: Vec<f32>,
@@ -41,7 +41,7 @@ struct Row {
 }
 
 impl Row {
-    /// Works out the light at the wanted nodes, pixels `step` apart from `start` on, and writes it
+    /// Computes the light at the wanted nodes, pixels `step` apart from `start` on, and writes it
     /// to their places in `values`.
     #[inline(always)]
     fn work_out(
@@ -70,8 +70,8 @@ impl Row {
 }
 
 impl LightGrid {
-    /// Works out the light where the rays of the grid's pixels meet the plane; where they do not,
-    /// it is dark. Between every second node along both axes that is done only where these differ.
+    /// Computes the light at the nodes whose rays meet the plane; the others are dark. Every second
+    /// node along both axes is interpolated where its neighbours are alike.
     pub(super) fn lay(&mut self, view: &View, plane: &Matrix3<f64>, lighting: &impl Lighting) {
         widest(Laying {
             grid: self,
@@ -159,7 +159,6 @@ impl LightGrid {
         };
         let at = |i: usize| upper[i] + (lower[i] - upper[i]) * fy;
         let (first, ahead) = (x0 / STEP, x0 % STEP);
-        // Up to the first column of the grid, then from one to the next.
         let (before, rest) = row.split_at_mut(((STEP - ahead) % STEP).min(row.len()));
         let whole = first + usize::from(ahead > 0);
         let slope = |i: usize| (at(i + 1) - at(i)) / STEP as f32;
@@ -185,7 +184,7 @@ impl LightGrid {
     }
 }
 
-/// The work of [`LightGrid::lay`].
+/// Arguments of [`LightGrid::lay`].
 struct Laying<'a, L> {
     grid: &'a mut LightGrid,
     size: (usize, usize),
@@ -202,7 +201,7 @@ impl<L: Lighting> Vectorized for Laying<'_, L> {
     }
 }
 
-/// The work of [`LightGrid::shine`].
+/// Arguments of [`LightGrid::shine`].
 struct Shining<'a> {
     light: &'a LightGrid,
     start: (usize, usize),

@@ -1,4 +1,4 @@
-//! What a frame shows, part by part: background, table, and what lies and stands on it.
+//! The parts of a frame: background, table, and the things on it.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -16,11 +16,11 @@ use crate::render::view::View;
 const TABLE: (f64, f64, f64) = (-0.45, 1.30, 1.15);
 /// Depth of the floor below the shoulder, metres.
 const FLOOR: f64 = -1.05;
-/// How far the walls are, metres.
+/// Distance of the walls, metres.
 const WALLS: f64 = 3.2;
 
 impl Renderer {
-    /// Draws all of it.
+    /// Draws the whole frame.
     pub(super) fn draw(&mut self, canvas: &mut Canvas, cell: &Cell, view: &View) {
         self.lay_light(view, cell);
         let studio = self.studio(cell, view);
@@ -33,7 +33,7 @@ impl Renderer {
         }
     }
 
-    /// Works out the light on the table, with the shadows of ball and holder.
+    /// Computes the light on the table, with the shadows of ball and holder.
     fn lay_light(&mut self, view: &View, cell: &Cell) {
         let things = self.scene.things.iter().enumerate();
         let gone = things.filter(|(_, t)| in_the_way(t, cell));
@@ -52,7 +52,7 @@ impl Renderer {
             .lay(view, &table_plane(view, cell.table), &lighting);
     }
 
-    /// What shading depends on.
+    /// Returns the inputs of shading.
     fn studio<'a>(&'a self, cell: &Cell, view: &'a View) -> Studio<'a> {
         let (total, _) = table_light(&self.scene);
         Studio {
@@ -86,13 +86,13 @@ impl Renderer {
         });
     }
 
-    /// All that is drawn over the table, in the order of drawing.
+    /// Returns the items over the table in the order of drawing.
     ///
-    /// What lies flat comes first; then what stands, far things before near ones; occluders, which
-    /// are before the lens, last. Circles that do not overlap are in the right order when sorted by
-    /// power (squared distance less squared radius): their radical axes separate them. A ball above
-    /// a thing, or on its holder, overlaps it as seen from above: a level plane separates the two,
-    /// and the one on the far side of it comes first.
+    /// Flat things come first, then standing ones, far before near, and occluders last. Circles
+    /// that do not overlap are in the right order when sorted by power (squared distance less
+    /// squared radius): their radical axes separate them. A ball above a thing, or on its holder,
+    /// overlaps it as seen from above: a level plane separates the two, and the one on the far side
+    /// of it comes first.
     pub(super) fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
         let (eye, ball) = (view.eye(), cell.ball.centre);
         let overlaps =
@@ -103,7 +103,7 @@ impl Renderer {
             .filter(|(_, t)| t.shape.is_flat())
             .map(|(i, _)| Item::Thing(i))
             .collect();
-        // Each with its power, its top, and whether the ball is above it.
+        // Power, top, `true` if the ball is above, item.
         let mut standing: Vec<(f64, f64, bool, Item)> = things()
             .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t, cell))
             .map(|(i, t)| {
@@ -126,8 +126,8 @@ impl Renderer {
             )
         }));
         standing.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Where the ball goes among them: by power, but after what it is above, and before what it
-        // is above as seen from below.
+        // The ball comes by power, but after the things it is above (before them if seen from
+        // below).
         let of_ball = power(ball.x, ball.y, cell.ball.radius);
         let by_power = standing
             .iter()
@@ -176,7 +176,7 @@ impl Renderer {
         }
     }
 
-    /// Draws floor and walls of the room.
+    /// Draws floor and walls.
     fn draw_backdrop(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
         canvas.light.fill(0.30);
         let mut polygon = Vec::with_capacity(8);
@@ -213,7 +213,7 @@ impl Renderer {
 
 /// The light on the table.
 struct TableLight<'a> {
-    /// Where nothing hides the lamps.
+    /// Light where nothing hides the lamps.
     light: f32,
     things: &'a ThingShadows,
     ball: BallShadow,
@@ -231,8 +231,7 @@ impl Lighting for TableLight<'_> {
     }
 }
 
-/// Whether a thing is left out: one that stands where the holder stands, or in a ball that lies or
-/// is carried low.
+/// Returns `true` if a thing is left out because it overlaps the holder or a low ball.
 fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
     let ball = cell.ball.centre;
     let foot = thing.shape.footprint();
@@ -245,19 +244,19 @@ fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
             || (ball.z - cell.ball.radius < cell.table + thing.shape.height() && in_ball()))
 }
 
-/// How the holder looks.
+/// Appearance of the holder.
 const ROD: Appearance = Appearance {
     albedo: 0.35,
     texture: 0.0,
     gloss: 0.3,
 };
 
-/// Something drawn over the table.
+/// An item drawn over the table.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Item {
     /// The ball.
     Ball,
-    /// What it stands on, or stood on.
+    /// The holder of the ball.
     Holder,
     /// A thing of the scene.
     Thing(usize),
@@ -265,12 +264,12 @@ pub(super) enum Item {
     Occluder(usize),
 }
 
-/// The map from pixels to homogeneous coordinates on the table, metres along x and y.
+/// Returns the map from pixels to homogeneous coordinates on the table, metres along x and y.
 fn table_plane(view: &View, table: f64) -> Matrix3<f64> {
     view.plane(&Point3::new(0.0, 0.0, table), &Vector3::x(), &Vector3::y())
 }
 
-/// Whether every ray of the frame meets the table.
+/// Returns `true` if every ray of the frame meets the table.
 fn fills_frame(view: &View, cell: &Cell) -> bool {
     let (near, far, half) = TABLE;
     if view.eye().z <= cell.table {

@@ -17,9 +17,9 @@ use crate::render::view::View;
 
 /// Draws frames of a cell.
 ///
-/// Owns its buffers: after the first frame nothing is allocated but small lists of corners. The
-/// scene's textures are made once, from the seed; the sensor's noise depends on the seed and on how
-/// many frames have been drawn, on nothing else.
+/// Owns its buffers: after the first frame only small lists of corners are allocated. The scene's
+/// textures are made once, from the seed; the sensor's noise depends only on the seed and the
+/// number of frames drawn.
 ///
 /// ```
 /// use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
@@ -54,7 +54,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// A renderer for a scene.
+    /// Creates a renderer for a scene.
     pub fn new(scene: &Scene, seed: u64) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let wood = Texture::wood(0.60, &mut rng);
@@ -92,7 +92,7 @@ impl Renderer {
         &self.image
     }
 
-    /// Draws what the camera of `cell` sees with the arm at `joints`.
+    /// Draws the view of the camera of `cell` with the arm at `joints`.
     ///
     /// Joints or places that are not finite give a frame of noise without content.
     pub fn render(&mut self, cell: &Cell, joints: &Joints) -> &GrayImage {
@@ -101,7 +101,7 @@ impl Renderer {
         self.develop(cell)
     }
 
-    /// The light that reaches the sensor.
+    /// Computes the light that reaches the sensor.
     pub(super) fn illuminate(&mut self, cell: &Cell, joints: &Joints) {
         let pose = cell.camera_pose(joints);
         let numbers = pose

@@ -8,7 +8,8 @@ use nalgebra::{Point2, Vector3};
 pub struct Light {
     /// Direction *toward* the lamp, world frame; its length does not matter. Must point upward.
     pub toward: Vector3<f64>,
-    /// Irradiance on a surface that faces the lamp; 1 makes a white surface just white in the image.
+    /// Irradiance on a surface that faces the lamp; 1 makes a white surface just white in the
+    /// image.
     pub intensity: f64,
     /// Half the angle that the lamp subtends, radians: the softness of its shadows.
     pub half_angle: f64,
@@ -125,7 +126,8 @@ pub struct Thing {
     pub appearance: Appearance,
 }
 
-/// A strip right before the lens, such as a cable or the edge of a finger. Lengths in feature units.
+/// A strip right before the lens, such as a cable or the edge of a finger. Lengths in feature
+/// units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Occluder {
@@ -177,7 +179,7 @@ impl Default for Sensor {
     }
 }
 
-/// Everything that a frame shows besides the ball, its holder and the table's place.
+/// The content of a frame besides the ball, its holder and the table's height.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scene {
@@ -189,8 +191,8 @@ pub struct Scene {
     pub table: Appearance,
     /// Surface of the ball.
     pub ball: Appearance,
-    /// Things on the table. Standing things must not overlap; one in the place of the holder or of a
-    /// low ball is left out.
+    /// Things on the table. Standing things must not overlap; one in the place of the holder or of
+    /// a low ball is left out.
     pub things: Vec<Thing>,
     /// Strips before the lens.
     pub occluders: Vec<Occluder>,
@@ -224,8 +226,8 @@ impl Scene {
         }
     }
 
-    /// Returns the scene used throughout: a wooden table under two lamps, with boxes, cylinders, discs,
-    /// another ball, print and tape.
+    /// Returns the scene used throughout: a wooden table under two lamps, with boxes, cylinders,
+    /// discs, another ball, print and tape.
     pub fn laboratory() -> Self {
         /// Shape, x and y (m), turn (degrees), reflectance, texture.
         type Row = (Shape, f64, f64, f64, f64, f64);

@@ -5,8 +5,8 @@ use crate::render::scene::{Appearance, Scene, Sensor, Shape};
 use crate::render::shot::Shot;
 
 impl Scene {
-    /// Checks every quantity. [`Renderer`](crate::Renderer) does not: it draws the usable parts of a
-    /// scene and replaces a gamma that is not above zero by 1.
+    /// Checks every quantity. [`Renderer`](crate::Renderer) does not: it draws the usable parts of
+    /// a scene and replaces a gamma that is not above zero by 1.
     ///
     /// # Errors
     /// [`QuantityError`] names the first quantity that is not finite, below zero, or, for gamma and

@@ -1,4 +1,4 @@
-//! From light to grey levels: blur, vignetting, noise, gamma, eight bits.
+//! From light to gray levels: blur, vignetting, noise, gamma, eight bits.
 
 use hough_heuristic::{Vectorized, widest};
 use rand::rngs::Xoshiro256PlusPlus;
@@ -19,24 +19,22 @@ const WHOLE: f32 = 8_388_608.0;
 #[derive(Clone, Debug)]
 pub(super) struct Exposure {
     sensor: Sensor,
-    /// Whether the light comes already blurred.
+    /// Set if the light is blurred already.
     pub(super) blurred: bool,
     /// Standard normal numbers; every row of every frame starts at another place.
     noise: Vec<f32>,
-    /// Grey level of a linear value, in steps of 1 / 4095.
+    /// Gray level of a linear value, in steps of 1 / 4095.
     curve: Box<[u8; LEVELS]>,
     mixed: Vec<f32>,
     row: Vec<f32>,
     /// Squared tangent of the angle to the axis, column by column.
     columns: Vec<f32>,
-    /// Share of the light that the pixels of the present row count, and by how much it changes to
-    /// the next row.
+    /// Vignetting factor of the pixels of the present row, and its change to the next row.
     gains: Vec<f32>,
     changes: Vec<f32>,
 }
 
-/// Rows from one at which the share of light is worked out to the next; between them it changes
-/// evenly.
+/// Rows between two with exact vignetting factors; those between are interpolated.
 const GAIN_ROWS: usize = 8;
 
 impl Exposure {
@@ -64,7 +62,7 @@ impl Exposure {
         }
     }
 
-    /// Turns the light of `canvas` into the grey levels of `out`; `frame` numbers the frame and
+    /// Turns the light of `canvas` into the gray levels of `out`; `frame` numbers the frame and
     /// with it the noise.
     pub(super) fn expose(
         &mut self,
@@ -110,7 +108,7 @@ impl Exposure {
             let cos2 = 1.0 / (fall + tan2);
             exposure * (1.0 - bend * (1.0 - cos2 * cos2))
         };
-        // With no gamma to speak of a grey level is found without its table.
+        // Without gamma, gray levels need no table.
         let straight = s.gamma.to_bits() == 1.0_f64.to_bits();
         // A frame wider than the table of noise repeats it along the row.
         let run = width.min(NOISES / 2);
@@ -158,24 +156,24 @@ impl Exposure {
                     *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + WHOLE;
                 }
             }
-            let greys = out[y * width..(y + 1) * width].iter_mut().zip(&self.row);
+            let grays = out[y * width..(y + 1) * width].iter_mut().zip(&self.row);
             if straight {
-                // As in the table: no level of it lies half way between two greys.
-                for (grey, value) in greys {
-                    *grey =
+                // Rounded like the table.
+                for (gray, value) in grays {
+                    *gray =
                         ((value - WHOLE) * (255.0 / (LEVELS - 1) as f32) + WHOLE).to_bits() as u8;
                 }
             } else {
                 let curve = &self.curve;
-                for (grey, value) in greys {
-                    *grey = curve[value.to_bits() as usize & (LEVELS - 1)];
+                for (gray, value) in grays {
+                    *gray = curve[value.to_bits() as usize & (LEVELS - 1)];
                 }
             }
         }
     }
 }
 
-/// The work of [`Exposure::expose`].
+/// Arguments of [`Exposure::expose`].
 struct Exposing<'a> {
     exposure: &'a mut Exposure,
     canvas: &'a Canvas,
@@ -199,7 +197,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_gamma_grey_levels_are_those_of_the_table() {
+    fn without_gamma_gray_levels_are_those_of_the_table() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let sensor = Sensor {
             gamma: 1.0,
@@ -216,13 +214,13 @@ mod tests {
         for (k, light) in canvas.light.iter_mut().enumerate() {
             *light = k as f32 / (LEVELS - 1) as f32;
         }
-        let mut greys = vec![0; LEVELS];
-        exposure.expose(&canvas, &camera, 5, 0, &mut greys);
-        assert_eq!(greys, *exposure.curve);
+        let mut grays = vec![0; LEVELS];
+        exposure.expose(&canvas, &camera, 5, 0, &mut grays);
+        assert_eq!(grays, *exposure.curve);
     }
 
     #[test]
-    fn wide_vectors_give_the_same_grey_levels() {
+    fn wide_vectors_give_the_same_gray_levels() {
         let camera = Camera::paper().resized(203, 31).expect("a size");
         let mut canvas = Canvas::new(203, 31);
         for (k, light) in canvas.light.iter_mut().enumerate() {

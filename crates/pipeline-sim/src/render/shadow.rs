@@ -7,10 +7,10 @@ use nalgebra::{Point3, Vector3};
 use crate::render::scene::{Light, Scene, Shape, Thing};
 use crate::render::texture::CoarseMap;
 
-/// Directions toward points of a lamp's disc.
+/// Number of points of a lamp's disc.
 const LAMP_POINTS: usize = 24;
 
-/// Light on a horizontal surface: everything, and each lamp's share of it.
+/// Returns the light on a horizontal surface, and the fraction of it from each lamp.
 pub(super) fn table_light(scene: &Scene) -> (f64, Vec<f64>) {
     let lamps: Vec<f64> = scene
         .lights
@@ -22,18 +22,18 @@ pub(super) fn table_light(scene: &Scene) -> (f64, Vec<f64>) {
     (total, shares)
 }
 
-/// Unit vector toward a lamp.
+/// Returns the unit vector toward a lamp.
 pub(super) fn toward(light: &Light) -> Vector3<f64> {
     light.toward.try_normalize(1e-12).unwrap_or_else(Vector3::z)
 }
 
-/// Direction toward each lamp of a scene, and its light.
+/// Returns the direction toward each lamp of a scene, and its light.
 pub(super) fn lamps(scene: &Scene) -> Vec<(Vector3<f64>, f64)> {
     let lamp = |l: &Light| (toward(l), l.intensity.max(0.0));
     scene.lights.iter().map(lamp).collect()
 }
 
-/// What one thing takes from the light on the table: factors for a part of a map.
+/// The shadow of one thing: factors for a part of a map.
 #[derive(Clone, Debug)]
 struct Cast {
     columns: Range<usize>,
@@ -41,17 +41,16 @@ struct Cast {
     factors: Vec<f32>,
 }
 
-/// The light on the table apart from ball and holder: stains, and the shadows of the things that
-/// stand there.
+/// The light on the table without ball and holder: stains, and the shadows of things.
 #[derive(Clone, Debug)]
 pub(super) struct ThingShadows {
-    /// Without the things.
+    /// Map without the things.
     bare: Vec<f32>,
-    /// With them.
+    /// Map with them.
     map: CoarseMap,
-    /// Of each thing; `None` for what lies flat, or off the map.
+    /// Shadow of each thing; `None` for flat things and those off the map.
     casts: Vec<Option<Cast>>,
-    /// Things that are not there at present.
+    /// Things that are left out at present.
     left_out: Vec<usize>,
 }
 
@@ -82,8 +81,7 @@ impl ThingShadows {
         self.map.at(x, y, factors);
     }
 
-    /// Takes away the shadows of these things, in ascending order, and brings back those of all
-    /// others.
+    /// Leaves out these things, in ascending order, and restores all others.
     pub(super) fn leave_out(&mut self, things: Vec<usize>) {
         if things == self.left_out {
             return;
@@ -97,7 +95,7 @@ impl ThingShadows {
         }
     }
 
-    /// Works the light out anew where a thing throws its shadow.
+    /// Recomputes the light in the shadow of a thing.
     fn darken(&mut self, thing: usize) {
         let Some(Some(Cast { columns, rows, .. })) = self.casts.get(thing) else {
             return;
@@ -130,7 +128,7 @@ impl ThingShadows {
     }
 }
 
-/// The shadow of a thing on a map; `None` if there is none.
+/// Returns the shadow of a thing on a map; `None` if there is none.
 fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
     if thing.shape.is_flat() {
         return None;
@@ -143,7 +141,7 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
         .zip(&shares)
         .map(|(light, share)| (*share, lamp_points(light, thing.turn)))
         .collect();
-    // The longest shadow that any point of a lamp throws.
+    // Longest shadow for any point of a lamp.
     let slope = |d: &Vector3<f64>| d.x.hypot(d.y) / d.z.max(1e-3);
     let longest = lamps
         .iter()
@@ -155,8 +153,7 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
     if columns.is_empty() || rows.is_empty() {
         return None;
     }
-    // Each point of a lamp looks at another place of the map's cell, so that edges of shadows are
-    // as soft as the map can show them.
+    // Each point of a lamp samples another place of the map's cell, which softens the edges.
     let cell = map.size / (map.side - 1) as f64;
     let within = |k: usize, step: f64| cell * ((k as f64 * step).fract() - 0.5);
     let aside: [Vector3<f64>; LAMP_POINTS] =
@@ -192,7 +189,7 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
     })
 }
 
-/// Distance from a point of the table to the foot of a shape that stands at the origin; 0 under it.
+/// Returns the distance from a point of the table to the foot of a shape at the origin; 0 under it.
 fn gap(shape: &Shape, from: &Point3<f64>) -> f64 {
     match *shape {
         Shape::Box { length, width, .. } => {

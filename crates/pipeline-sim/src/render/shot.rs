@@ -1,4 +1,4 @@
-//! Frames that take time: motion during the exposure, and the two fields of an interlaced frame.
+//! Exposures that take time, of one field or two.
 
 use hough_heuristic::image::GrayImage;
 use puma_val2::Joints;
@@ -7,7 +7,7 @@ use crate::cell::geometry::Cell;
 use crate::render::lens::soften;
 use crate::render::renderer::Renderer;
 
-/// How a frame is taken while things move.
+/// The exposure of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Shot {
@@ -17,19 +17,19 @@ pub struct Shot {
     /// freezes all motion. One for every two pixels of motion is enough, and each costs a frame's
     /// time. 1 to [`Shot::MOST_MOMENTS`]; [`Renderer::take`] clamps it to that range.
     pub moments: usize,
-    /// `Some(seconds)`: interlaced, the odd rows taken that much after the even ones, at most
+    /// Delay of the odd rows of an interlaced frame after the even ones, seconds, at most
     /// [`Shot::LONGEST`].
     pub interlace: Option<f64>,
 }
 
 impl Shot {
-    /// The most moments of a field.
+    /// Greatest number of moments of a field.
     pub const MOST_MOMENTS: usize = 64;
 
-    /// The longest exposure, and the longest time between two fields, seconds.
+    /// Longest exposure, and longest time between two fields, seconds.
     pub const LONGEST: f64 = 60.0;
 
-    /// All at once.
+    /// Returns an instantaneous frame.
     pub fn still() -> Self {
         Self {
             exposure: 0.0,
@@ -38,8 +38,8 @@ impl Shot {
         }
     }
 
-    /// The two fields of PAL, 20 ms apart (the paper's grabber delivers 768x576 pixels at 50 Hz,
-    /// which are fields), each exposed for `exposure` seconds.
+    /// Returns the two fields of PAL, 20 ms apart (the paper's grabber delivers 768x576 pixels at
+    /// 50 Hz, which are fields), each exposed for `exposure` seconds.
     pub fn pal(exposure: f64, moments: usize) -> Self {
         Self {
             exposure,

@@ -65,7 +65,7 @@ impl Studio<'_> {
         }
     }
 
-    /// Rows and columns that a sphere of radius 1 may touch.
+    /// Returns rows and columns that a sphere of radius 1 may touch.
     fn sphere_bounds(
         &self,
         canvas: &Canvas,
@@ -100,12 +100,12 @@ struct SphereRow<'a> {
     yn: f32,
     first: f32,
     step: f32,
-    /// Toward the zenith.
+    /// Direction toward the zenith.
     up: Vector3<f32>,
-    /// Light from sky and table on an upright surface, and what its tilt adds.
+    /// Light from sky and table on an upright surface, and its change with the tilt.
     even: f32,
     steep: f32,
-    /// Toward each lamp, half way between this and the camera, and its light.
+    /// Direction toward each lamp, the half vector toward the camera, and its light.
     lamps: &'a [(Vector3<f32>, Vector3<f32>, f32)],
     albedo: f32,
     gloss: f32,
@@ -117,11 +117,11 @@ impl Vectorized for SphereRow<'_> {
 
     #[inline(always)]
     fn run(self) {
-        /// Pixels that are worked on at once.
+        /// Pixels per vector.
         const LANES: usize = 8;
         let [cx, cy, cz] = self.centre;
         let (yn, k, up) = (self.yn, self.k, self.up);
-        // Added on top of the reflectance, hence divided by it here.
+        // Divided by the reflectance, which multiplies all light below.
         let shine = self.gloss / self.albedo.max(0.05);
         for (chunk, light) in self.light.chunks_mut(LANES).enumerate() {
             let ahead = chunk * LANES;

@@ -4,7 +4,7 @@ use rand::{Rng, RngExt};
 
 /// A square repeating texture with coarser copies of itself, values 0..=255 with mean 128.
 ///
-/// One byte a value: how much memory a frame touches counts as much as what is worked out.
+/// One byte a value, because memory traffic costs as much time as arithmetic.
 #[derive(Clone, Debug)]
 pub(super) struct Texture {
     /// Texels per metre of the finest level.
@@ -16,17 +16,16 @@ pub(super) struct Texture {
 struct Level {
     /// Logarithm of the side in texels.
     bits: u32,
-    /// Strips of 64 columns, one after another, of rows that are a little longer: the first columns
-    /// of the next strip are there as well, and the first row once more below the last. A place and
-    /// what is around it are then a row apart, and a walk in any direction meets few pages of
-    /// memory.
+    /// Strips of 64 columns. Each row also holds the first columns of the next strip, and the first
+    /// row is repeated below the last, so that the neighbours of a texel lie at fixed offsets and a
+    /// walk in any direction touches few pages of memory.
     values: Vec<u8>,
 }
 
-/// Texels of a strip's row, and what it takes in memory.
+/// Texels of a strip's row, and its length in memory.
 const STRIP: u32 = 64;
 const PITCH: u32 = STRIP + 8;
-/// Set in a place that is half a texel further along u, along v.
+/// Flags of a place that is half a texel further along u, along v.
 const HALF_U: u32 = 1 << 31;
 const HALF_V: u32 = 1 << 30;
 
@@ -39,7 +38,6 @@ impl Level {
         for left in (0..n).step_by(strip) {
             for v in 0..=n {
                 let row = &values[v % n * n..][..n];
-                // The sums are positive: adding a half and cutting off rounds.
                 bytes.extend((left..left + pitch).map(|u| (row[u % n] + 0.5) as u8));
             }
         }
@@ -49,7 +47,7 @@ impl Level {
         }
     }
 
-    /// Where the half texel nearest below (u, v), in 2^32ths of the side, has its texel; with
+    /// Returns the index of the texel of the half texel below (u, v), in 2^32ths of the side, with
     /// [`HALF_U`] and [`HALF_V`].
     #[inline(always)]
     fn place(u: u32, v: u32, bits: u32) -> u32 {
@@ -59,8 +57,8 @@ impl Level {
         (row * PITCH + (column & (STRIP - 1)) + (column / STRIP) * size) | halves
     }
 
-    /// The texel at a place, and the next along u, along v, and along both: a byte each, the lowest
-    /// first.
+    /// Returns the texel at a place, and the next along u, along v, and along both: a byte each,
+    /// the lowest first.
     #[inline(always)]
     fn four(values: &[u8], place: u32) -> u32 {
         const AROUND: usize = PITCH as usize + 2;
@@ -73,7 +71,7 @@ impl Level {
     }
 }
 
-/// Four times the value at a place between the texels that [`Level::four`] gives.
+/// Returns four times the value at a place between the texels of [`Level::four`].
 #[inline(always)]
 fn sum(four: u32, place: u32) -> u32 {
     let (left, right) = (four & 0x00ff_00ff, four >> 8 & 0x00ff_00ff);
@@ -86,7 +84,8 @@ const FINEST_BITS: u32 = 10;
 const COARSEST_BITS: u32 = 5;
 
 impl Texture {
-    /// A wooden surface: grain along u, pores, specks and a few scratches. `size` metres repeat.
+    /// Creates a wooden surface: grain along u, pores, specks and a few scratches. `size` metres
+    /// repeat.
     pub(super) fn wood<R: Rng + ?Sized>(size: f64, rng: &mut R) -> Self {
         let n = 1_usize << FINEST_BITS;
         let mut values = vec![0.0_f32; n * n];
@@ -151,7 +150,7 @@ impl Texture {
         Self { per_metre, levels }
     }
 
-    /// The level whose texels are about as large as the pixels' footprint of `metres`.
+    /// Returns the level whose texels are about as large as the pixels' footprint of `metres`.
     pub(super) fn level(&self, metres: f64) -> usize {
         let texels = (metres * self.per_metre).max(1e-6);
         // Half a level sharper than one texel per pixel: bilinear sampling blurs enough.
@@ -164,13 +163,12 @@ impl Texture {
     }
 
     /// Samples along an image row from column `x0` on, one for each entry of `row`, scaled so that
-    /// the mean is 1 and one standard deviation about `strength` / 3.2. `place` tells where on the
-    /// surface a column lies (metres); it is asked at multiples of [`STRIDE`], with straight lines
-    /// between, so that what lies between is the same in all rows.
+    /// the mean is 1 and one standard deviation about `strength` / 3.2. `place` returns the place
+    /// of a column on the surface (metres); it is called at multiples of [`STRIDE`] and
+    /// interpolated linearly between.
     ///
     /// A sample is the nearest of the level's values, at most a quarter of a texel away along
-    /// either axis. Every odd column is the mean of its neighbours: with the level chosen for the
-    /// pixels' size nothing visible is lost.
+    /// either axis. Every odd column is the mean of its neighbours.
     #[inline(always)]
     pub(super) fn walk(
         &self,
@@ -182,13 +180,12 @@ impl Texture {
     ) {
         let Level { bits, values } = &self.levels[index];
         let bits = *bits;
-        // A side is 2^32; the texture repeats, so the wrap does no harm.
+        // A side is 2^32, so that wrapping repeats the texture.
         let scale = self.per_metre / f64::from(1 << FINEST_BITS) * TURN;
-        // To the nearest half texel is down from a quarter of one further.
+        // Rounds to the nearest half texel.
         let quarter = 1_u32 << (30 - bits);
         let (gain, base) = (strength / 512.0, 1.0 - strength);
-        // Places of a stretch first, then its values, then their means: each can be done to several
-        // at once, or, the values, be waited for several at once.
+        // Places, then values, then means, so that each loop vectorizes and loads overlap.
         let mut places = [0_u32; STRETCH / 2 + STRIDE / 2];
         let mut fours = [0_u32; STRETCH / 2 + STRIDE / 2];
         let mut found = [0.0_f32; STRETCH / 2 + STRIDE / 2];
@@ -200,7 +197,6 @@ impl Texture {
                 let (u, v) = place_of(left + k * STRIDE);
                 (u * scale, v * scale)
             };
-            // The last stride is that of the first column behind the last.
             let (first, last) = (from / STRIDE, to / STRIDE);
             let mut here = node(first);
             let strides = places.as_chunks_mut::<{ STRIDE / 2 }>().0;
@@ -247,10 +243,10 @@ impl Texture {
 /// 2^32.
 const TURN: f64 = 4_294_967_296.0;
 
-/// The nearest whole number, modulo 2^32.
+/// Returns the nearest whole number, modulo 2^32.
 #[inline(always)]
 fn fixed(value: f64) -> u32 {
-    // Whole numbers have their place at the low end of a number that is this large.
+    // Adding 2^52 leaves the whole number in the low bits.
     const LARGE: f64 = 6_755_399_441_055_744.0;
     (value + LARGE).to_bits() as u32
 }
@@ -289,8 +285,7 @@ fn add_noise<R: Rng + ?Sized>(
     }
 }
 
-/// A coarse map of factors over a square part of the table, for what changes slowly: stains, light,
-/// shadows of things.
+/// A coarse map of factors over a square part of the table: stains, light, shadows of things.
 #[derive(Clone, Debug)]
 pub(super) struct CoarseMap {
     pub(super) side: usize,
@@ -300,7 +295,7 @@ pub(super) struct CoarseMap {
 }
 
 impl CoarseMap {
-    /// Slow stains of the given strength around 1.
+    /// Creates slow stains of the given strength around 1.
     pub(super) fn stains<R: Rng + ?Sized>(
         side: usize,
         corner: (f64, f64),
@@ -320,7 +315,7 @@ impl CoarseMap {
         }
     }
 
-    /// Place of entry (i, j), metres.
+    /// Returns the place of entry (i, j), metres.
     pub(super) fn place(&self, i: usize, j: usize) -> (f64, f64) {
         let step = self.size / (self.side - 1) as f64;
         (
@@ -329,7 +324,7 @@ impl CoarseMap {
         )
     }
 
-    /// Columns and rows of the entries within `reach` of (x, y) along each axis.
+    /// Returns columns and rows of the entries within `reach` of (x, y) along each axis.
     pub(super) fn range(
         &self,
         x: f64,
@@ -352,7 +347,7 @@ impl CoarseMap {
         let (left, top) = (self.corner.0 as f32, self.corner.1 as f32);
         let limit = (self.side - 1) as f32 - 1e-3;
         for ((value, x), y) in values.iter_mut().zip(x).zip(y) {
-            // In this order what is no number is on the border as well.
+            // In this order NaN is on the border as well.
             let (x, y) = (
                 ((x - left) * scale).max(0.0).min(limit),
                 ((y - top) * scale).max(0.0).min(limit),
@@ -385,8 +380,7 @@ mod tests {
         let texels: Vec<f32> = (0..n * n)
             .map(|_| rng.random_range(0_u8..=255).into())
             .collect();
-        // A texel is a metre, and a half texel one step; the walk goes round the texture's border
-        // along both axes.
+        // A texel is a metre, a half texel one step; the walk crosses the border along both axes.
         let texture = Texture::from_values(texels.clone(), 1.0);
         let texel = |u: i64, v: i64| {
             let wrap = |k: i64| k.rem_euclid(n as i64) as usize;
@@ -398,7 +392,6 @@ mod tests {
             ((3.0, -9.0), (0.0, 0.25)),
             ((-5.0, -9.0), (0.25, 0.25)),
         ] {
-            // Not quite there: what is met is the nearest.
             let place = |x: usize| {
                 (
                     start.0 - 0.2 + step.0 * x as f64,
@@ -406,7 +399,7 @@ mod tests {
                 )
             };
             texture.walk(0, place, 1.0, 0, &mut row);
-            // A walk that begins elsewhere meets the same.
+            // A walk that begins elsewhere gives equal values.
             for x0 in [1, 7, 16, 130, 3990] {
                 let mut later = vec![0.0_f32; 4001 - x0];
                 texture.walk(0, place, 1.0, x0, &mut later);

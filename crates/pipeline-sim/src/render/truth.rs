@@ -1,4 +1,4 @@
-//! What a frame really shows: every round outline, and how much of it can be seen.
+//! The truth of a frame: every round outline and its visible fraction.
 
 use nalgebra::{Point2, Point3, Vector3};
 use puma_val2::Joints;
@@ -14,7 +14,7 @@ use crate::render::scene::{Scene, Shape};
 use crate::render::shadow::lamps;
 use crate::render::view::View;
 
-/// What a round outline belongs to.
+/// The kind of body that a round outline belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Round {
@@ -32,24 +32,23 @@ pub enum Round {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoundOutline {
-    /// What it belongs to.
+    /// Kind of body.
     pub what: Round,
-    /// The exact outline ([`ProjectedEllipse::circle`] is the circle of equal mean radius), pixels.
+    /// Exact outline ([`ProjectedEllipse::circle`] is the circle of equal mean radius), pixels.
     pub ellipse: ProjectedEllipse,
-    /// Share of the outlined area that the frame shows, 0..=1: the rest is hidden behind nearer
-    /// things or cut off by the frame.
+    /// Fraction of the outlined area that the frame shows, 0..=1. The rest is hidden behind nearer
+    /// things or outside the frame.
     pub visible: f64,
 }
 
-/// Pixels along the longer side of what is looked at to see what hides an outline, however small or
-/// large it is in the frame.
+/// Pixels along the longer side of the close-up in which hidden parts of an outline are counted.
 const CLOSE_UP: f64 = 96.0;
 
-/// Points of an outline.
+/// Number of points of an outline.
 const OUTLINE: i32 = 96;
 
-/// A round outline: what it is, the exact ellipse in the frame, and the outline in directions (x,
-/// y, 1) of the camera frame.
+/// A round outline: its kind, the exact ellipse in the frame, and its points as directions (x, y,
+/// 1) of the camera frame.
 struct Outline {
     what: Round,
     ellipse: ProjectedEllipse,
@@ -57,16 +56,16 @@ struct Outline {
 }
 
 impl Renderer {
-    /// Every round outline that the frame of `cell` with the arm at `joints` shows, the ball's
-    /// first; outlines of which nothing is visible, or that reach beyond what the lens shows, are
-    /// left out. Exact but for [`RoundOutline::visible`], which is good to about a hundredth.
+    /// Returns every round outline that the frame of `cell` with the arm at `joints` shows, the
+    /// ball's first. Outlines without a visible part, or beyond the fold of the lens, are left out.
+    /// All is exact but [`RoundOutline::visible`], which is accurate to about 0.01.
     pub fn truth(&self, cell: &Cell, joints: &Joints) -> Vec<RoundOutline> {
         let pose = cell.camera_pose(joints);
         if pose.translation.vector.iter().any(|v| !v.is_finite()) {
             return Vec::new();
         }
         let view = View::new(&cell.camera, pose);
-        // With all lamps off, whatever is drawn is black: it hides what was white before.
+        // With all lamps off, nearer things are black and hide the white outline.
         let dark = Scene {
             lights: Vec::new(),
             ambient: 0.0,
@@ -90,8 +89,8 @@ impl Renderer {
         found
     }
 
-    /// The share of the outlined area that is inside the frame and that none of the `nearer` things
-    /// hides.
+    /// Returns the fraction of the outlined area that is inside the frame and not hidden by the
+    /// `nearer` things.
     fn visible(
         &self,
         cell: &Cell,
@@ -103,7 +102,7 @@ impl Renderer {
         let spots: Vec<Point2<f64>> = outline.iter().map(|p| view.spot(p)).collect();
         let least = spots.iter().fold(spots[0], |a, b| a.inf(b));
         let most = spots.iter().fold(spots[0], |a, b| a.sup(b));
-        // Without distortion, what is outside the frame need not be looked at.
+        // Without distortion, the close-up is limited to the frame.
         let straight = cell.camera.distortion().is_none();
         let (frame_width, frame_height) = (view.width as f64, view.height as f64);
         let (least, most) = if straight {
@@ -139,8 +138,8 @@ impl Renderer {
         for item in nearer {
             self.draw_item(&mut canvas, &studio, cell, item);
         }
-        // A pixel that reaches beyond the border of the frame by rounding is worth what is inside;
-        // a distorted frame's border is bent.
+        // Pixels on the border of the frame count by their part inside; with distortion the border
+        // is bent.
         let worth = |k: usize| {
             let (x, y) = ((k % size.0) as f64, (k / size.0) as f64);
             if straight {
@@ -164,7 +163,7 @@ impl Renderer {
         (seen / area(&polygon)).min(1.0)
     }
 
-    /// The round outlines of one item.
+    /// Returns the round outlines of one item.
     fn rounds(&self, cell: &Cell, view: &View, item: &Item) -> Vec<Outline> {
         let around = |points: &dyn Fn(f64) -> Point2<f64>| -> Vec<Point2<f64>> {
             (0..OUTLINE)

@@ -16,11 +16,11 @@ pub(super) struct View {
     pub(super) height: usize,
     /// Pixels of this view for a feature unit of the camera's frame.
     pub(super) unit: f64,
-    /// Where this view has the upper left corner of the camera's frame, pixels.
+    /// Upper left corner of the camera's frame in this view, pixels.
     pub(super) corner: Vector2<f64>,
 }
 
-/// Nothing nearer than this to the camera's plane is drawn, metres.
+/// Least depth that is drawn, metres.
 const NEAR: f64 = 0.004;
 
 impl View {
@@ -37,7 +37,7 @@ impl View {
         }
     }
 
-    /// A part of the view, drawn larger by `scale`: `size` pixels wide and high, with its upper
+    /// Returns a part of the view, enlarged by `scale`: `size` pixels wide and high, with its upper
     /// left corner at `corner` (pixels of this view).
     pub(super) fn part(&self, corner: Vector2<f64>, scale: f64, size: (usize, usize)) -> Self {
         let there = |p: Vector2<f64>| (p - corner) * scale - Vector2::new(0.5, 0.5);
@@ -52,27 +52,27 @@ impl View {
         }
     }
 
-    /// Where this view has what lies in the direction (p, 1) of the camera frame.
+    /// Returns the pixel of the direction (p, 1) of the camera frame.
     pub(super) fn spot(&self, p: &Point2<f64>) -> Point2<f64> {
         self.principal + p.coords * self.focal
     }
 
-    /// A world point in the camera frame.
+    /// Returns a world point in the camera frame.
     pub(super) fn seen(&self, point: &Point3<f64>) -> Point3<f64> {
         self.pose.inverse_transform_point(point)
     }
 
-    /// A world direction in the camera frame.
+    /// Returns a world direction in the camera frame.
     pub(super) fn turned(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         self.pose.inverse_transform_vector(direction)
     }
 
-    /// Where the camera is.
+    /// Returns the camera's centre of projection.
     pub(super) fn eye(&self) -> Point3<f64> {
         Point3::from(self.pose.translation.vector)
     }
 
-    /// Whether no part of a sphere, given in the world, can be in the frame.
+    /// Returns `true` if no part of a sphere, given in the world, can be in the frame.
     pub(super) fn misses(&self, centre: &Point3<f64>, radius: f64) -> bool {
         let c = self.seen(centre);
         let (left, top) = (self.principal.x + 1.0, self.principal.y + 1.0);
@@ -80,7 +80,7 @@ impl View {
             self.width as f64 - self.principal.x,
             self.height as f64 - self.principal.y,
         );
-        // How far the centre lies beyond the plane through the eye and one border of the frame.
+        // Distance of the centre beyond the plane through the eye and one border of the frame.
         let beyond = |across: f64, border: f64| {
             (across * self.focal - border * c.z) / self.focal.hypot(border)
         };
@@ -116,8 +116,8 @@ impl View {
         self.principal + Vector2::new(p.x, p.y) * (self.focal / p.z)
     }
 
-    /// The matrix that takes a pixel (x, y, 1) to homogeneous coordinates on the plane through
-    /// `origin` spanned by `u` and `v` (world frame): the third divides the first two.
+    /// Returns the matrix that takes a pixel (x, y, 1) to homogeneous coordinates on the plane
+    /// through `origin` spanned by `u` and `v` (world frame): the third divides the first two.
     pub(super) fn plane(
         &self,
         origin: &Point3<f64>,

@@ -294,8 +294,9 @@ fn unreachable_goals_are_refused_with_the_reason() {
     };
     let at =
         |x: f64, y: f64, z: f64| refused(&|cell| cell.ball.centre = nalgebra::Point3::new(x, y, z));
+    let far = at(3.0, 0.0, 0.0);
     assert!(
-        matches!(at(3.0, 0.0, 0.0), ReachError::OutOfReach { distance, greatest, .. } if distance > greatest)
+        matches!(far, ReachError::OutOfReach { distance, greatest, .. } if distance > greatest)
     );
     assert!(matches!(at(0.1, 0.0, 0.0), ReachError::BesideWaist { .. }));
     let back = at(-0.6, 0.0, -0.1);
@@ -335,7 +336,7 @@ fn measures_that_are_not_finite_are_named() {
     mount.mount.translation.vector.x = f64::NAN;
     arm.params.a2 = f64::NAN;
     rule.sight.min_share = f64::NAN;
-    for (wrong, named) in [(mount, "mount"), (arm, "a2"), (rule, "share")] {
+    for (wrong, named) in [(mount, "mount"), (arm, "a2"), (rule, "fraction")] {
         let error = wrong.features(&pose).expect_err("no number").to_string();
         assert!(error.contains(named), "{error}");
     }
