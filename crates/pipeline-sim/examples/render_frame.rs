@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frame = renderer.render(&cell, &pose);
     if let Some(path) = std::env::args().nth(1) {
         let mut file = std::fs::File::create(&path)?;
-        write!(file, "P5 {} {} 255\n", frame.width(), frame.height())?;
+        writeln!(file, "P5 {} {} 255", frame.width(), frame.height())?;
         file.write_all(frame.as_raw())?;
         println!("frame written to {path}");
     }

@@ -58,7 +58,7 @@ struct CellRecipe {
 }
 
 /// Balls on a table under the camera.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 struct BenchmarkRecipe {
     balls: usize,
     /// Least and greatest radius of the balls, pixels of a frame of 768x576.

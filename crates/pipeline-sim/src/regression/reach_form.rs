@@ -19,10 +19,10 @@ pub enum ReachForm {
     Rigid8,
     /// Changes of Z and V on 1, and a, b, a², ab, b² each times 1, Z, V, E, and E²a.
     Rigid22,
-    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists
-    /// of: with c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`: (c23 -
-    /// 1) and s23 times Z and V; (c3 - c23) and (s3 - s23) times 1, cos e, sin e; 1 - c3; s3. No
-    /// further terms exist: the residual is the outline's slight ellipticity.
+    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists of.
+    /// With c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`, they are
+    /// (c23 minus 1) and s23 times Z and V; (c3 minus c23) and (s3 minus s23) times 1, cos e, sin e;
+    /// 1 minus c3; s3. No further terms exist: the residual is the outline's slight ellipticity.
     RigidBody,
 }
 
@@ -118,7 +118,7 @@ impl ReachForm {
         match self {
             Self::Linear => buffer[..3].copy_from_slice(&[1.0, d2, d3]),
             Self::Rigid8 => {
-                buffer[..8].copy_from_slice(&[1.0, a, b, z * a, z * b, v * a, v * b, e * a])
+                buffer[..8].copy_from_slice(&[1.0, a, b, z * a, z * b, v * a, v * b, e * a]);
             }
             Self::Rigid22 => {
                 buffer[0] = 1.0;

@@ -392,7 +392,7 @@ fn each_error_of_the_mount_is_named() {
         ("along its x axis", |e| e.camera_shift[0] = f64::NAN),
         ("along its y axis", |e| e.camera_shift[1] = f64::NAN),
         ("along its z axis", |e| {
-            e.camera_shift[2] = f64::NEG_INFINITY
+            e.camera_shift[2] = f64::NEG_INFINITY;
         }),
     ];
     for (named, spoil) in spoil {
