@@ -25,14 +25,13 @@ use puma_grasp::{BallDetector, Simulator};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
+use example_support::comparison::{self, Row, Tally};
 use example_support::files::{writable_folder, write_whole};
 use example_support::learning::{ACTIONS, TRIALS};
 use example_support::plane::{ExactPlane, search_percepts};
 use example_support::program::ended;
-use table::{Row, Tally};
 use world::World;
 
-mod table;
 mod world;
 
 /// Compares controllers on randomly drawn errors of arm and camera and randomly drawn balls, the
@@ -209,11 +208,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     write_whole(
         &options.out.join("comparison.csv"),
-        table::csv(&rows).as_bytes(),
+        comparison::csv(&rows).as_bytes(),
     )?;
     write_whole(
         &options.out.join("comparison.svg"),
-        table::plot(
+        comparison::plot(
             &rows,
             if options.grip {
                 "grasped"
@@ -420,42 +419,4 @@ fn seed_of(seed: u64, uses: &[u64]) -> u64 {
             .wrapping_mul(0xd134_2543_de82_ef95)
             .rotate_left(29)
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use grasp_agent::Replayed;
-
-    #[test]
-    fn every_run_that_is_kept_is_made_again_and_comes_out_the_same() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let out = folder.path().to_string_lossy().into_owned();
-        let one = [
-            "compare", "--draws", "1", "--starts", "1", "--moves", "60", "--levels", "extreme",
-        ];
-        let kept = ["--grip", "--logs", "--out", &out];
-        let names = [
-            "position-based, gain 1",
-            "goal J, gain 0.5",
-            "current J, gain 1",
-            "fuzzy, gain 0.7",
-        ];
-        for only in names.into_iter().chain(["look-ahead", "hybrid, untaught"]) {
-            let arguments = one.into_iter().chain(kept).chain(["--only", only]);
-            run(&Options::parse_from(arguments)).expect("a comparison");
-        }
-        // None of them grasps with such a camera.
-        let files = std::fs::read_dir(folder.path().join("failures")).expect("they failed");
-        let replayed = files.map(|file| {
-            let text = std::fs::read_to_string(file.expect("a file").path()).expect("text");
-            SavedRun::from_json(&text).expect("a saved run").replay()
-        });
-        let replayed: Vec<_> = replayed.map(|end| end.expect("sound settings")).collect();
-        assert_eq!(replayed.len(), 6);
-        assert!(
-            replayed.iter().all(|end| matches!(end, Replayed::Same(_))),
-            "{replayed:?}"
-        );
-    }
 }

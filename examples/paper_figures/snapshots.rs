@@ -2,7 +2,6 @@
 
 use std::error::Error;
 
-use embedded_graphics::pixelcolor::Rgb888;
 use grasp_agent::{Agent, AgentConfig, CameraModel, EventKind, Learned, Sighting};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, EdgeDetector};
@@ -15,7 +14,7 @@ use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::overlay::{CAPTION, Overlay};
+use example_support::overlay::{CAPTION, Overlay, Rgb888};
 
 /// Size of each picture, below its caption.
 const TILE: (u32, u32) = (384, 288);

@@ -17,6 +17,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use example_support::ball_tally::{Counted, Tally};
 use example_support::files::{animated, keep_run, writable_folder, write_whole};
 use example_support::program::{at_least_one, ended};
 use example_support::stages::{Stages, Timed};
@@ -34,10 +35,8 @@ use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use tally::{Counted, Tally};
 use world::{Fate, World};
 
-mod tally;
 mod world;
 
 /// Tracks, reaches and grasps a ball that is moved, with the self-calibrating hybrid controller.
@@ -331,24 +330,4 @@ fn on_shortcut(
         seen |= cell.features(joints).is_ok();
     };
     cell.run(agent, seed, &mut go_on, &mut |event| saved.note(event))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_belief_that_is_none_leaves_the_results_of_an_earlier_run() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let out = folder.path().to_string_lossy().into_owned();
-        let earlier = folder.path().join("track.csv");
-        std::fs::write(&earlier, "an earlier run").expect("a file");
-        let options = Options::parse_from(["track", "--belief", "no-such-belief", "--out", &out]);
-        let error = run(&options)
-            .expect_err("there is no such file")
-            .to_string();
-        assert!(error.contains("no-such-belief"), "{error}");
-        let left = std::fs::read_to_string(&earlier).expect("still there");
-        assert_eq!(left, "an earlier run");
-    }
 }

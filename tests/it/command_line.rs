@@ -56,7 +56,7 @@ fn grasp_names_a_port_that_does_not_exist() {
 }
 
 #[test]
-fn grasp_keeps_what_an_earlier_run_left_when_it_cannot_begin() {
+fn grasp_that_cannot_begin_keeps_earlier_results() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let kept = folder.path().join("out/failures/run001.json");
     std::fs::create_dir_all(folder.path().join("out/failures")).expect("a folder");
@@ -139,7 +139,7 @@ fn blank_policy(pair: BehaviourPair) -> String {
 }
 
 #[test]
-fn grasp_refuses_policies_that_it_cannot_run_and_says_why() {
+fn grasp_refuses_policies_it_cannot_run_and_says_why() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("policy.json");
     let argument = path.to_str().expect("a plain path").to_owned();
@@ -506,5 +506,71 @@ fn pictures_are_written_for_a_reader_who_has_left() {
         "run.y4m",
     ] {
         assert!(folder.path().join(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn track_keeps_earlier_results_when_the_belief_is_missing() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let earlier = folder.path().join("track.csv");
+    std::fs::write(&earlier, "an earlier run").expect("a file");
+    let Some(mut track) = example("track") else {
+        return;
+    };
+    track.args(["--belief", "no-such-belief", "--out"]);
+    let (output, errors) = output(track.arg(folder.path()));
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("no-such-belief"), "{errors}");
+    let left = std::fs::read_to_string(&earlier).expect("still there");
+    assert_eq!(left, "an earlier run");
+}
+
+#[test]
+fn kept_runs_of_every_controller_replay_the_same() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let names = [
+        "position-based, gain 1",
+        "goal J, gain 0.5",
+        "current J, gain 1",
+        "fuzzy, gain 0.7",
+        "look-ahead",
+        "hybrid, untaught",
+    ];
+    for only in names {
+        let Some(mut compare) = example("compare_controllers") else {
+            return;
+        };
+        compare
+            .args(["--draws", "1", "--starts", "1", "--levels", "extreme"])
+            .args(["--grip", "--logs", "--only", only, "--out"]);
+        let (output, errors) = output(compare.arg(folder.path()));
+        assert!(output.status.success(), "{errors}");
+    }
+    // None of them grasps with such a camera.
+    let failures = std::fs::read_dir(folder.path().join("failures")).expect("they failed");
+    let files: Vec<PathBuf> = failures.map(|file| file.expect("a file").path()).collect();
+    assert_eq!(files.len(), names.len());
+    let (again, errors) = output(example("replay").expect("built too").args(&files));
+    assert!(again.status.success(), "{errors}");
+}
+
+#[test]
+fn render_dataset_refuses_shares_sizes_and_kinds_without_sense() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for [option, value, said] in [
+        ["--visible", "1.01", "1.01"],
+        ["--visible", "nan", "nan"],
+        ["--size", "768x", "768x"],
+        ["--size", "100x8193", "100x8193"],
+        ["--kinds", "cell,plain", "plain"],
+        ["--kinds", "round", "benchmark:"],
+    ] {
+        let Some(mut render) = example("render_dataset") else {
+            return;
+        };
+        let out = folder.path().join("out");
+        let (output, errors) = output(render.args([option, value, "--out"]).arg(&out));
+        assert_eq!(output.status.code(), Some(2), "{value}: {errors}");
+        assert!(errors.contains(said) && !out.exists(), "{value}: {errors}");
     }
 }

@@ -4,24 +4,11 @@
 
 use std::process::Command;
 
-use example_support::learning::learn_both;
 use example_support::trial::TrialCell;
-use grasp_agent::{Agent, AgentConfig, BehaviourPair, JointLimits, Learned};
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, Workspace};
-use puma_grasp::Simulator;
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+use grasp_agent::{Agent, AgentConfig, JointLimits};
+use pipeline_sim::{ErrorLevel, Workspace};
 
-/// Both behaviours, learned for a short time.
-fn learned() -> Learned {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let (centring, reaching) = cell.sample_moves(2_500, 0.5, &mut rng).expect("samples");
-    let simulator =
-        Simulator::fit(&centring, &reaching, ReachForm::Rigid22).expect("enough samples");
-    let pair = BehaviourPair::paper_mended();
-    learn_both(&simulator, pair, 1, &mut rng).expect("learns")
-}
+use crate::learned;
 
 /// Balls reached, and moves on average, as the script says: "reached 198 of 200 balls, in 9.71
 /// moves on average".
@@ -55,7 +42,7 @@ fn by_the_script(policy: &str) -> Option<(usize, f64)> {
 
 #[test]
 fn another_program_reaches_the_balls_with_an_exported_policy() {
-    let learned = learned();
+    let learned = learned().clone();
     let policy = learned.to_json(&JointLimits::paper());
     let Some((reached, moves)) = by_the_script(&policy) else {
         return;

@@ -135,7 +135,7 @@ fn failure(end: Result<RunOutcome, AgentError>, log: &EventLog, rig: &Rig) -> Ag
 }
 
 #[test]
-fn a_camera_that_delivers_nothing_more_ends_the_run_and_leaves_what_was_learned() {
+fn a_camera_that_ends_ends_the_run_and_keeps_the_belief() {
     let (mut rig, mut agent) = (rig(IN_VIEW), agent());
     let mut frames = 0;
     let mut between = Between::nothing();
@@ -158,7 +158,7 @@ fn a_camera_that_delivers_nothing_more_ends_the_run_and_leaves_what_was_learned(
 }
 
 #[test]
-fn a_frozen_camera_is_told_by_its_frames_with_and_without_a_ball_in_them() {
+fn a_frozen_camera_is_recognised_with_and_without_a_ball() {
     for (ball, good) in [(BEHIND_THE_ARM, 1), (IN_VIEW, 2)] {
         let (mut rig, mut agent) = (rig(ball), agent());
         let (mut frames, mut last) = (0, None);
@@ -182,7 +182,7 @@ fn a_frozen_camera_is_told_by_its_frames_with_and_without_a_ball_in_them() {
 }
 
 #[test]
-fn a_camera_that_froze_with_the_ball_at_the_goal_brings_about_no_grip_in_the_next_run() {
+fn a_camera_frozen_at_the_goal_causes_no_grip_in_the_next_run() {
     let (mut rig, mut agent) = (rig(IN_VIEW), agent());
     let (last, frozen) = (std::cell::RefCell::new(None), std::cell::Cell::new(false));
     let mut between = Between::nothing();
@@ -222,7 +222,7 @@ fn a_camera_that_froze_with_the_ball_at_the_goal_brings_about_no_grip_in_the_nex
 }
 
 #[test]
-fn garbage_in_the_place_of_frames_is_no_ball_for_any_detector() {
+fn garbage_frames_show_no_ball_to_any_detector() {
     let sizes = [(0, 0), (1, 1), (768, 1), (1, 576), (40, 30), (192, 144)];
     for kind in [BallDetector::AContrario, BallDetector::Heuristic] {
         let (mut rig, mut agent) = (rig(IN_VIEW), agent());
@@ -277,7 +277,7 @@ impl CircleDetector for Liar {
 }
 
 #[test]
-fn circles_where_none_are_end_the_run_within_its_limits_and_without_a_ball() {
+fn false_circles_never_cause_a_grip() {
     for seed in 0..3 {
         let (mut rig, mut agent) = (rig(BEHIND_THE_ARM), agent());
         let mut between = Between::nothing();
@@ -330,7 +330,7 @@ fn an_arm_that_does_not_go_where_it_is_sent_ends_the_run() {
 
 #[cfg(all(unix, feature = "serial"))]
 #[test]
-fn a_line_that_dies_in_mid_run_ends_it_and_leaves_what_was_learned() {
+fn a_line_that_dies_ends_the_run_and_keeps_the_belief() {
     use puma_val2::{Emulator, EmulatorServer, Profile, PumaParams, ServeConfig};
     // When the controller goes: before anything moves, and in the middle.
     for after in [0, 2] {

@@ -30,7 +30,7 @@ fn ball_and_goal() -> (Ball, Joints, Joints) {
 }
 
 #[test]
-fn the_controller_stops_the_arm_before_a_ball_in_its_way_and_the_guard_is_armed_again() {
+fn the_controller_stops_before_a_ball_and_is_armed_again() {
     let (ball, goal, grip) = ball_and_goal();
     let mut rig = rig();
     rig.place(&ball).expect("away from the hand");
@@ -134,7 +134,7 @@ fn words(log: &EventLog) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
+fn a_stopped_run_goes_back_and_on_to_the_grip() {
     let mut rig = rig();
     let config = AgentConfig::paper(Workspace::paper().search_poses());
     let mut agent = Agent::with_controller(config, Clumsy::default()).expect("valid settings");
@@ -176,7 +176,7 @@ fn a_run_in_which_the_controller_stops_the_arm_goes_back_and_on_to_the_grip() {
 }
 
 #[test]
-fn in_the_cell_without_a_controller_a_run_onto_the_ball_goes_back_and_on_to_the_grip_as_well() {
+fn a_stopped_run_without_a_controller_reaches_the_grip_too() {
     let cell = TrialCell::draw(ErrorLevel::None, 1).expect("a cell");
     let mut agent =
         Agent::with_controller(cell.agent_config(), Clumsy::default()).expect("valid settings");

@@ -7,6 +7,7 @@
 use example_support::plane::ExactPlane;
 use grasp_agent::{BehaviourPair, BehaviourSpec, Percept, Reward};
 use hough_heuristic::Features;
+use puma_val2::JointDelta;
 use qtable::{Action, Model, ModelEnvironment, ModelEstimate, Outcome, State, Status, Step};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -89,9 +90,11 @@ fn equation_5_cycles_and_mended_it_centres() {
 /// Approaching as a decision process on its 90 states, estimated from moves tried in the arm's
 /// plane under `reward`, and what the best policy in it comes to: how often it arrives within 60
 /// steps, and how many rewards were infinite with whole pixels.
-fn best_approaching(reward: &Reward) -> (f64, f64, usize) {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
-    let plane = ExactPlane::new(20_000, &mut rng);
+fn best_approaching(
+    plane: &ExactPlane,
+    mut rng: Xoshiro256PlusPlus,
+    reward: &Reward,
+) -> (f64, f64, usize) {
     let spec = BehaviourPair::paper_mended().approaching;
     let mut estimate = ModelEstimate::new(spec.states(), spec.actions()).expect("a small model");
     let mut infinite = 0;
@@ -152,15 +155,18 @@ fn best_approaching(reward: &Reward) -> (f64, f64, usize) {
 }
 
 #[test]
-fn equation_6_divides_by_zero_then_cycles_and_with_both_mends_approaches() {
+fn equation_6_divides_by_zero_and_mended_it_approaches() {
     let literal = Reward::approaching_literal();
     let floored = Reward {
         floor: 1.0,
         ..literal.clone()
     };
-    let (_, _, infinite) = best_approaching(&literal);
-    let (cycling, worth, none) = best_approaching(&floored);
-    let (arriving, kept, _) = best_approaching(&literal.mended());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let plane = ExactPlane::new(20_000, &mut rng);
+    let best = |reward: &Reward| best_approaching(&plane, rng.clone(), reward);
+    let (_, _, infinite) = best(&literal);
+    let (cycling, worth, none) = best(&floored);
+    let (arriving, kept, _) = best(&literal.mended());
     println!(
         "Eq. 6: of 400000 moves between whole pixels {infinite} pay infinitely much; floored, the best policy arrives from {:.0} % and \
          is worth {worth:.0} (arriving: 100); mended, it arrives from {:.0} % and is worth {kept:.0}",
@@ -170,4 +176,18 @@ fn equation_6_divides_by_zero_then_cycles_and_with_both_mends_approaches() {
     assert!(infinite > 100 && none == 0, "{infinite} {none}");
     assert!(cycling < 0.5 && worth > 150.0, "{cycling} {worth}");
     assert!(arriving > 0.9, "{arriving}");
+}
+
+#[test]
+fn without_drawn_starts_there_is_one_to_learn_from() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let plane = ExactPlane::new(0, &mut rng);
+    let start = plane.start(&mut rng);
+    assert!(plane.after(&start, &JointDelta::default()).is_some());
+    let spec = BehaviourSpec::approaching();
+    let lesson = plane
+        .learn(spec, &[], 2_000, &mut rng, &mut |_| ())
+        .expect("learns");
+    let last = lesson.curve.last();
+    assert!(last.is_some_and(|record| record.episodes > 0));
 }

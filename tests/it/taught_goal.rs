@@ -37,7 +37,7 @@ fn a_cell_without_errors_shows_the_papers_goal() {
 }
 
 #[test]
-fn servoing_grasps_with_a_wrong_camera_once_it_was_shown_the_goal() {
+fn servoing_with_a_wrong_camera_grasps_once_shown_the_goal() {
     let (mut with, mut without) = (0, 0);
     for seed in 0..4 {
         let (cell, goal) = taught(ErrorLevel::Moderate, seed).expect("in view");

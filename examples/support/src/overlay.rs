@@ -2,7 +2,8 @@
 
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::iso_8859_1::FONT_10X20;
-use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
+pub use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::pixelcolor::RgbColor;
 use embedded_graphics::prelude::*;
 use embedded_graphics::primitives::{Circle as Ring, Line, PrimitiveStyle, Rectangle};
 use embedded_graphics::text::{Baseline, Text};

@@ -205,26 +205,3 @@ fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> 
     let fewest = cell.fewest_moves(joints, &moves, reached, MOST_STEPS as u32);
     Some(fewest.ok()?? as usize)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn without_drawn_starts_there_is_one_to_learn_from() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-        let plane = ExactPlane::new(0, &mut rng);
-        let start = plane.start(&mut rng);
-        assert!(plane.after(&start, &JointDelta::default()).is_some());
-        let spec = BehaviourSpec::approaching();
-        let lesson = plane
-            .learn(spec, &[], 2_000, &mut rng, &mut |_| ())
-            .expect("learns");
-        assert!(
-            lesson
-                .curve
-                .last()
-                .is_some_and(|record| record.episodes > 0)
-        );
-    }
-}

@@ -7,25 +7,27 @@ use grasp_agent::RunOutcome;
 use pipeline_sim::ErrorLevel;
 use plotters::prelude::*;
 
-use example_support::wilson::wilson;
+use crate::wilson::wilson;
 
 /// The runs of one controller at one level of errors.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tally {
+pub struct Tally {
     /// Successes and runs of each drawn cell.
-    draws: Vec<(usize, usize)>,
+    pub draws: Vec<(usize, usize)>,
     cycles: usize,
     losses: usize,
     /// Collisions of the hand; counted through the full chain only.
-    pub(crate) collisions: Option<usize>,
+    pub collisions: Option<usize>,
 }
 
 impl Tally {
-    pub(crate) fn begin_draw(&mut self) {
+    /// Begins the runs of another cell.
+    pub fn begin_draw(&mut self) {
         self.draws.push((0, 0));
     }
 
-    pub(crate) fn add(&mut self, success: bool, outcome: &RunOutcome) {
+    /// Adds a run.
+    pub fn add(&mut self, success: bool, outcome: &RunOutcome) {
         if let Some((successes, runs)) = self.draws.last_mut() {
             *successes += usize::from(success);
             *runs += 1;
@@ -35,7 +37,7 @@ impl Tally {
     }
 
     /// Adds a run that was broken off.
-    pub(crate) fn add_broken_off(&mut self) {
+    pub fn add_broken_off(&mut self) {
         if let Some((_, runs)) = self.draws.last_mut() {
             *runs += 1;
         }
@@ -67,7 +69,8 @@ impl Tally {
 }
 
 /// A row of the table.
-pub(crate) struct Row {
+#[derive(Clone, Debug)]
+pub struct Row {
     level: ErrorLevel,
     name: String,
     success: f64,
@@ -81,9 +84,11 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(crate) const HEADER: &str = "level     controller                       success %  95 % interval  cells without failure  cycles  losses/run  collisions  runs";
+    /// Names of the columns.
+    pub const HEADER: &str = "level     controller                       success %  95 % interval  cells without failure  cycles  losses/run  collisions  runs";
 
-    pub(crate) fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
+    /// Makes the row of controller `name` at a level of errors.
+    pub fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
         let count =
             |part: fn(&(usize, usize)) -> usize| tally.draws.iter().map(part).sum::<usize>();
         let (successes, runs) = (count(|draw| draw.0), count(|draw| draw.1));
@@ -138,7 +143,8 @@ fn number(value: f64, words: impl FnOnce(f64) -> String) -> String {
     }
 }
 
-pub(crate) fn csv(rows: &[Row]) -> String {
+/// Returns the rows as CSV.
+pub fn csv(rows: &[Row]) -> String {
     let mut csv = String::from(
         "level,controller,success_percent,low,high,cells_without_failure,cells,cycles,losses_per_run,collisions,runs\n",
     );
@@ -167,7 +173,7 @@ pub(crate) fn csv(rows: &[Row]) -> String {
 
 /// Draws a bar per controller and level: the share of success, which `success` names, its interval
 /// as a line, and the mean number of moves in words.
-pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>> {
+pub fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>> {
     const NAMES: i32 = 210;
     const COLUMN: i32 = 190;
     const BAR: i32 = 100;
@@ -241,42 +247,4 @@ pub(crate) fn plot(rows: &[Row], success: &str) -> Result<String, Box<dyn Error>
         root.present()?;
     }
     Ok(svg)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn tally(draws: &[(usize, usize)]) -> Tally {
-        Tally {
-            draws: draws.into(),
-            ..Tally::default()
-        }
-    }
-
-    #[test]
-    fn an_interval_never_says_that_nothing_is_left_to_chance() {
-        let all = tally(&[(30, 30); 16]);
-        let [low, high] = all.interval();
-        assert!((low - 80.6).abs() < 0.1 && high > 99.999, "{low}..{high}");
-        assert!(all.success() > 99.999 && all.whole_cells() == 16);
-        let [low, high] = tally(&[(0, 30); 16]).interval();
-        assert!(low < 1e-9 && (high - 19.4).abs() < 0.1, "{low}..{high}");
-        // More runs in as many cells do not narrow the interval; a cell without runs does not
-        // count.
-        assert!((tally(&[(300, 300); 16]).interval()[0] - all.interval()[0]).abs() < 1e-9);
-        assert!((tally(&[(3, 6), (0, 0), (6, 6)]).success() - 75.0).abs() < 1e-9);
-        assert!(tally(&[]).interval()[0].is_nan());
-    }
-
-    #[test]
-    fn rows_and_file_say_the_interval_and_the_plot_what_success_is() {
-        let row = Row::new(ErrorLevel::Heavy, "hybrid", &tally(&[(30, 30); 16]));
-        assert!(row.to_string().contains("80.6..100.0"), "{row}");
-        assert!(row.to_string().contains("16 of 16"), "{row}");
-        let file = csv(std::slice::from_ref(&row));
-        assert!(file.contains("100.000,80.639,100.000,16,16"), "{file}");
-        let plot = plot(&[row], "grasped").expect("draws");
-        assert!(plot.contains("% grasped / moves"));
-    }
 }

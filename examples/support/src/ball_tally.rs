@@ -2,19 +2,21 @@
 
 use std::fmt;
 
-use example_support::wilson::wilson;
+use crate::wilson::wilson;
 
 /// A run that counts.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Counted {
+pub struct Counted {
     /// Set if all that was due has happened to the ball.
-    pub(crate) happened: bool,
-    pub(crate) success: bool,
-    pub(crate) moves: usize,
+    pub happened: bool,
+    /// Set if the ball was grasped.
+    pub success: bool,
+    /// Moves of the arm.
+    pub moves: usize,
     /// Stops by the proximity sensors.
-    pub(crate) near: usize,
-    /// `None` where they are not counted.
-    pub(crate) collisions: Option<usize>,
+    pub near: usize,
+    /// Collisions of the hand; `None` where they are not counted.
+    pub collisions: Option<usize>,
 }
 
 impl Counted {
@@ -27,16 +29,18 @@ impl Counted {
 
 /// Runs by cell.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tally {
+pub struct Tally {
     cells: Vec<Vec<Counted>>,
 }
 
 impl Tally {
-    pub(crate) fn begin_cell(&mut self) {
+    /// Begins the runs in another cell.
+    pub fn begin_cell(&mut self) {
         self.cells.push(Vec::new());
     }
 
-    pub(crate) fn add(&mut self, run: Counted) {
+    /// Adds a run.
+    pub fn add(&mut self, run: Counted) {
         if self.cells.is_empty() {
             self.begin_cell();
         }
@@ -45,7 +49,8 @@ impl Tally {
         }
     }
 
-    pub(crate) fn runs(&self) -> usize {
+    /// Returns the number of runs.
+    pub fn runs(&self) -> usize {
         self.cells.iter().map(Vec::len).sum()
     }
 }
@@ -91,40 +96,5 @@ impl fmt::Display for Tally {
             )?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn told(runs: &[(bool, bool)], collisions: Option<usize>) -> String {
-        let mut tally = Tally::default();
-        for (happened, success) in runs {
-            tally.add(Counted {
-                happened: *happened,
-                success: *success,
-                moves: 2,
-                near: 0,
-                collisions,
-            });
-        }
-        tally.to_string()
-    }
-
-    #[test]
-    fn a_failure_counts_whether_anything_had_happened_or_not() {
-        let told = told(&[(true, true), (false, false), (false, true)], Some(1));
-        assert!(told.starts_with("1 of 2 grasped (50.0 %"), "{told}");
-        assert!(told.contains("3 collisions"), "{told}");
-        assert!(told.ends_with("not counted: 1 grasps before anything happened to the ball"));
-    }
-
-    #[test]
-    fn what_is_not_there_is_not_told() {
-        assert_eq!(told(&[], None), "no run to count");
-        let none = told(&[(true, false); 20], None);
-        assert!(none.contains("interval 0.0..16.1)"), "{none}");
-        assert!(!none.contains("collisions"), "{none}");
     }
 }
