@@ -400,7 +400,7 @@ fn taught_hybrid(
         }
         let mut saved = SavedRun::before(&agent);
         match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| {
-            saved.note(event)
+            saved.note(event);
         }) {
             Ok(trial) => made += trial.map_or(0, |(trial, _)| trial.outcome.cycles),
             Err(error) => {

@@ -12,6 +12,9 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use crate::Options;
 
+/// A run and its collisions, which only the full chain counts.
+pub(crate) type Run = (Trial, Option<usize>);
+
 /// A cell with drawn errors.
 pub(crate) enum World {
     /// Features straight from the geometry, an arm that moves at once.
@@ -67,7 +70,7 @@ impl World {
         agent: &mut Agent<C>,
         seed: u64,
         observe: &mut dyn FnMut(&RunEvent<'_>),
-    ) -> Result<Option<(Trial, Option<usize>)>, Box<dyn Error>> {
+    ) -> Result<Option<Run>, Box<dyn Error>> {
         let (rig, detector) = match self {
             Self::Shortcut(cell) => {
                 let trial = cell.run(agent, seed, &mut |_, _| (), observe)?;

@@ -72,7 +72,7 @@ impl Between<'_> {
         };
         let mut eye = CameraEye::new(&mut camera, &mut *self.detector);
         let end = agent.run_and_learn(&mut eye, &mut arm, &mut *sensor, &mut |event| {
-            log.note(event)
+            log.note(event);
         });
         (end, log)
     }

@@ -184,7 +184,7 @@ fn a_stopped_run_without_a_controller_reaches_the_grip_too() {
         let mut log = EventLog::default();
         let result = cell
             .run(&mut agent, seed, &mut |_, _| (), &mut |event| {
-                log.note(event)
+                log.note(event);
             })
             .expect("nothing fails")
             .expect("a ball in view");

@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 /// Returns the exit code of a program, after printing the error if there is one.
+#[allow(clippy::print_stderr, reason = "the error of a program")]
 pub fn ended(done: Result<(), Box<dyn Error>>) -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,

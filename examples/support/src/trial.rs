@@ -300,7 +300,7 @@ struct Sensor(Option<SimulatedArm>);
 
 impl ProximitySensor for Sensor {
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        self.0.as_mut().map_or(Ok(false), |arm| arm.object_near())
+        self.0.as_mut().map_or(Ok(false), SimulatedArm::object_near)
     }
 }
 
