@@ -40,7 +40,7 @@ pub struct Holder {
 
 impl Holder {
     /// Returns the holder that carries `ball`: a rod of 8 mm radius that ends where the ball rests.
-    pub fn under(ball: &Ball) -> Self {
+    pub(crate) fn under(ball: &Ball) -> Self {
         let radius = 0.008_f64.min(0.8 * ball.radius);
         // The ball sinks a little into the open end of the rod.
         let top = ball.centre.z

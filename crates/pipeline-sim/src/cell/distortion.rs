@@ -24,12 +24,12 @@ pub struct Distortion {
 
 impl Distortion {
     /// Returns `true` for the ideal pinhole.
-    pub fn is_none(&self) -> bool {
+    pub(crate) fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
     /// Returns the place at which the lens shows the point that a pinhole shows at `p`.
-    pub fn distort(&self, p: Point2<f64>) -> Point2<f64> {
+    pub(crate) fn distort(&self, p: Point2<f64>) -> Point2<f64> {
         let (x, y) = (p.x, p.y);
         let s = x * x + y * y;
         let radial = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
@@ -44,7 +44,7 @@ impl Distortion {
     /// Newton's method; where it does not converge, it is continued outward from the axis in
     /// stages, which finds the answer before the fold of the lens. `None` if there is none, or `p`
     /// is not finite.
-    pub fn undistort(&self, p: Point2<f64>) -> Option<Point2<f64>> {
+    pub(crate) fn undistort(&self, p: Point2<f64>) -> Option<Point2<f64>> {
         if self.is_none() {
             return Some(p);
         }

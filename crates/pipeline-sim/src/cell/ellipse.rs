@@ -44,7 +44,7 @@ impl ProjectedEllipse {
     }
 
     /// Returns half the width and half the height of the upright box around the ellipse.
-    pub fn half_extent(&self) -> (f64, f64) {
+    pub(crate) fn half_extent(&self) -> (f64, f64) {
         let (sin, cos) = self.angle.sin_cos();
         (
             (self.major * cos).hypot(self.minor * sin),

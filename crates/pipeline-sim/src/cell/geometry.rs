@@ -296,7 +296,7 @@ impl Cell {
 
     /// Returns `true` if [`Cell::goal_pose`] exists for the hand's angle while reaching
     /// ([`Cell::REACHING_JT5_DEGREES`]).
-    pub fn reachable(&self) -> bool {
+    pub(crate) fn reachable(&self) -> bool {
         self.goal_pose(Self::REACHING_JT5_DEGREES).is_ok()
     }
 

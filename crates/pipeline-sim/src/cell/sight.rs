@@ -37,7 +37,11 @@ impl SightRule {
     /// [`SightError::LargerThanView`], [`SightError::Radius`], [`SightError::CentreOutside`] or
     /// [`SightError::CutOff`] names the condition that fails; [`SightError::NotFinite`] is for a
     /// rule that holds a NaN.
-    pub fn check(&self, outline: &ProjectedEllipse, size: (u32, u32)) -> Result<(), SightError> {
+    pub(crate) fn check(
+        &self,
+        outline: &ProjectedEllipse,
+        size: (u32, u32),
+    ) -> Result<(), SightError> {
         for (quantity, value) in [
             ("the smallest radius seen (units)", self.min_radius),
             ("the greatest radius seen (units)", self.max_radius),

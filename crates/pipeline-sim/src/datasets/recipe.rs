@@ -3,14 +3,12 @@
 use nalgebra::Vector3;
 use rand::{Rng, RngExt};
 
-use crate::cell::camera::Camera;
+use crate::datasets::draw::{BenchmarkRecipe, CellRecipe};
 use crate::datasets::snapshot::{Exposure, Snapshot, View};
-use crate::datasets::stage::{Stage, other_than};
-use crate::datasets::things::{cables, lamps, things};
+use crate::datasets::stage::other_than;
+use crate::datasets::things::cables;
 use crate::error::QuantityError;
 use crate::render::renderer::Renderer;
-use crate::render::scene::{Appearance, Scene, Sensor};
-use crate::render::shot::Shot;
 
 /// A recipe for labelled frames of one kind of difficulty.
 ///
@@ -43,38 +41,6 @@ pub struct Recipe {
 enum Kind {
     Cell(CellRecipe),
     Benchmark(BenchmarkRecipe),
-}
-
-/// The arm at work.
-#[derive(Debug)]
-struct CellRecipe {
-    /// Greatest number of things on the table.
-    things: usize,
-    /// Taller cylinders.
-    tall: bool,
-    /// Change of the scene.
-    change: fn(&mut Scene, &mut dyn Rng),
-    view: View,
-}
-
-/// Balls on a table under the camera.
-#[derive(Clone, Copy, Debug)]
-struct BenchmarkRecipe {
-    balls: usize,
-    /// Least and greatest radius of the balls, pixels of a frame of 768x576.
-    radii: (f64, f64),
-    /// Number of things with straight edges.
-    distractors: usize,
-    /// Range of the grain of the table.
-    grain: (f64, f64),
-    /// Reflectance of the first ball, from that of the table.
-    albedo: fn(f64, &mut dyn Rng) -> f64,
-    /// Range of the noise, gray levels; `None` for the sensor's own.
-    noise: Option<(f64, f64)>,
-    /// Fraction of the first ball's outline that is hidden.
-    hidden: f64,
-    /// Range of the motion during the exposure, pixels of 768.
-    motion: Option<(f64, f64)>,
 }
 
 const CELL: CellRecipe = CellRecipe {
@@ -386,7 +352,8 @@ impl Recipe {
     /// Draws a scene and the snapshot to be taken of it, `size` pixels wide and high.
     ///
     /// # Errors
-    /// [`QuantityError`] for a frame without pixels, or one larger than [`Camera::LARGEST_SIDE`].
+    /// [`QuantityError`] for a frame without pixels, or one larger than
+    /// [`Camera::LARGEST_SIDE`](crate::Camera::LARGEST_SIDE).
     pub fn draw(
         &self,
         size: (u32, u32),
@@ -419,103 +386,5 @@ impl Recipe {
             Kind::Cell(recipe) => recipe.view.snapshot(size, rng).map(Some),
             Kind::Benchmark(_) => Ok(None),
         }
-    }
-}
-
-impl CellRecipe {
-    /// Draws a scene: lamps, table, ball's surface, things all over the workspace.
-    fn scene(&self, rng: &mut dyn Rng) -> Scene {
-        let mut scene = Scene {
-            lights: lamps(1.1, rng),
-            ambient: rng.random_range(0.15..0.30),
-            table: Appearance {
-                albedo: rng.random_range(0.25..0.50),
-                texture: rng.random_range(0.35..0.7),
-                gloss: 0.0,
-            },
-            ball: Appearance {
-                albedo: rng.random_range(0.70..0.90),
-                texture: 0.0,
-                gloss: rng.random_range(0.05..0.4),
-            },
-            things: Vec::new(),
-            occluders: Vec::new(),
-            sensor: Sensor {
-                gamma: if rng.random_bool(0.3) { 2.2 } else { 1.0 },
-                ..Sensor::default()
-            },
-        };
-        scene.things = things(self.things, self.tall, rng);
-        (self.change)(&mut scene, rng);
-        scene
-    }
-}
-
-impl BenchmarkRecipe {
-    fn draw(
-        &self,
-        size: (u32, u32),
-        rng: &mut dyn Rng,
-    ) -> Result<(Scene, Snapshot), QuantityError> {
-        let mut stage = Stage::new(Camera::paper().resized(size.0, size.1)?, rng);
-        stage.put_balls(self.balls, self.radii, rng);
-        let mut scene = self.surfaces(rng);
-        scene.things = stage.other_balls(scene.table.albedo, rng);
-        stage.put_distractors(self.distractors, &mut scene.things, rng);
-        if self.hidden > 0.0 {
-            scene.occluders.extend(stage.cover(self.hidden, rng));
-        }
-        let (mut speed, mut shot) = (Default::default(), Shot::still());
-        if let Some((least, most)) = self.motion {
-            shot = Shot {
-                exposure: 0.010,
-                moments: 8,
-                interlace: None,
-            };
-            speed = stage.speed(rng.random_range(least..most), shot.exposure, rng);
-        }
-        let snapshot = Snapshot {
-            cell: stage.cell,
-            joints: stage.joints,
-            speed,
-            shot,
-        };
-        Ok((scene, snapshot))
-    }
-
-    /// Draws lamps, table, the ball's surface and the sensor.
-    fn surfaces(&self, rng: &mut dyn Rng) -> Scene {
-        let table = Appearance {
-            albedo: rng.random_range(0.30..0.50),
-            texture: drawn(self.grain, rng),
-            gloss: 0.0,
-        };
-        let albedo = (self.albedo)(table.albedo, rng);
-        let mut sensor = Sensor::default();
-        if let Some(noise) = self.noise {
-            (sensor.read_noise, sensor.shot_noise) = (drawn(noise, rng), 0.0);
-        }
-        Scene {
-            lights: lamps(0.6, rng),
-            ambient: rng.random_range(0.20..0.30),
-            table,
-            ball: Appearance {
-                albedo,
-                texture: 0.0,
-                gloss: rng.random_range(0.05..0.3),
-            },
-            things: Vec::new(),
-            occluders: Vec::new(),
-            sensor,
-        }
-    }
-}
-
-/// Draws from a range; one without width draws nothing.
-fn drawn((least, most): (f64, f64), rng: &mut dyn Rng) -> f64 {
-    if least < most {
-        rng.random_range(least..most)
-    } else {
-        least
     }
 }

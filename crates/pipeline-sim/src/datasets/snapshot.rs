@@ -1,6 +1,5 @@
 //! A frame to be taken.
 
-use hough_heuristic::Features;
 use hough_heuristic::image::GrayImage;
 use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
@@ -47,12 +46,6 @@ impl Snapshot {
     pub fn truth(&self, renderer: &Renderer) -> Vec<RoundOutline> {
         let (cell, joints) = self.middle();
         renderer.truth(&cell, &joints)
-    }
-
-    /// Returns the ball's features in the middle of the exposure; `None` if it counts as lost.
-    pub fn features(&self) -> Option<Features> {
-        let (cell, joints) = self.middle();
-        cell.features(&joints).ok()
     }
 
     fn middle(&self) -> (Cell, Joints) {

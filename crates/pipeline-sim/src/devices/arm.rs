@@ -51,11 +51,6 @@ impl SimulatedArm {
         let drive = Arc::clone(&self.drive);
         move || locked(&drive).links()
     }
-
-    /// Returns the cell the arm stands in.
-    pub fn cell(&self) -> &SharedCell {
-        &self.cell
-    }
 }
 
 /// Locks plain data, which stays valid when a thread panics.

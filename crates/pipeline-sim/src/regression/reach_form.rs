@@ -28,7 +28,7 @@ pub enum ReachForm {
 
 impl ReachForm {
     /// Returns the number of terms.
-    pub fn terms(self) -> usize {
+    pub(super) fn terms(self) -> usize {
         match self {
             Self::Linear => 3,
             Self::Rigid8 => 8,

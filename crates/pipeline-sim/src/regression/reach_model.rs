@@ -188,11 +188,6 @@ impl ReachModel {
         Ok(())
     }
 
-    /// Form of the model.
-    pub fn form(&self) -> ReachForm {
-        self.0.form
-    }
-
     /// Predicts the features after `JT2` and `JT3` turned by `d2` and `d3` degrees; x stays. `None`
     /// if the ball is lost ([`SightRule::sees_features`]) or an argument is not finite.
     pub fn predict(

@@ -1,4 +1,4 @@
-//! Distortion and defocus of the lens.
+//! Distortion of the lens.
 
 use hough_heuristic::{Vectorized, widest};
 use nalgebra::{Point2, Vector2};
@@ -258,164 +258,6 @@ impl Nodes {
     }
 }
 
-/// Blurs `values`, rows of `width` pixels, with the sensor's three taps along each axis
-/// ([`Sensor::blur`](crate::render::scene::Sensor::blur)). The fields of an interlaced frame are
-/// blurred before they are woven.
-pub(super) fn soften(values: &mut [f32], width: usize, sigma: f64, spare: &mut Vec<f32>) {
-    let taps = three_taps(sigma);
-    if values.is_empty() || taps.0 <= 0.0 {
-        return;
-    }
-    // Two rows as they were, and a row with a pixel more at either end.
-    spare.resize(spare.len().max(3 * width + 2), 0.0);
-    widest(Softening {
-        values,
-        width,
-        taps,
-        spare,
-    });
-}
-
-/// Arguments of [`soften`].
-struct Softening<'a> {
-    values: &'a mut [f32],
-    width: usize,
-    taps: (f32, f32),
-    spare: &'a mut [f32],
-}
-
-impl Vectorized for Softening<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { values, width, .. } = self;
-        let (side, middle) = self.taps;
-        let height = values.len() / width;
-        let (mut above, rest) = self.spare.split_at_mut(width);
-        let (mut here, mixed) = rest.split_at_mut(width);
-        let mixed = &mut mixed[..width + 2];
-        here.copy_from_slice(&values[..width]);
-        above.copy_from_slice(here);
-        for y in 0..height {
-            let below = &values[(y + 1).min(height - 1) * width..][..width];
-            let rows = above.iter().zip(&*here).zip(below);
-            for (m, ((a, c), b)) in mixed[1..=width].iter_mut().zip(rows) {
-                *m = middle * c + side * (a + b);
-            }
-            std::mem::swap(&mut above, &mut here);
-            here.copy_from_slice(below);
-            mixed[0] = mixed[1];
-            mixed[width + 1] = mixed[width];
-            let sides = mixed.iter().zip(&mixed[2..]);
-            let out = &mut values[y * width..][..width];
-            for ((o, c), (l, r)) in out.iter_mut().zip(&mixed[1..]).zip(sides) {
-                *o = middle * c + side * (l + r);
-            }
-        }
-    }
-}
-
-/// Returns side and middle weight of the three-tap kernel of variance sigma², or the widest kernel
-/// of three taps.
-pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
-    let side = (0.5 * sigma * sigma).clamp(0.0, 0.333) as f32;
-    (side, 1.0 - 2.0 * side)
-}
-
-/// Pixels that are blurred at a time, so that their sums stay in registers.
-const BLOCK: usize = 32;
-
-/// Blurs the whole canvas by a Gaussian of standard deviation `sigma` pixels.
-pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
-    let reach = (2.5 * sigma).ceil().min(40.0) as usize;
-    if sigma.is_nan() || sigma <= 0.0 || reach == 0 || canvas.light.is_empty() {
-        return;
-    }
-    let mut kernel: Vec<f32> = (0..=reach)
-        .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32)
-        .collect();
-    let sum = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
-    kernel.iter_mut().for_each(|k| *k /= sum);
-    kernel[0] *= 0.5;
-    let (w, h) = (canvas.width, canvas.height);
-    let needed = w * h + w + 2 * reach;
-    if spare.len() < needed {
-        spare.resize(needed, 0.0);
-    }
-    let (mixed, padded) = spare[..needed].split_at_mut(w * h);
-    for y in 0..h {
-        let pairs = kernel.iter().enumerate().map(|(i, k)| {
-            let (above, below) = (y.saturating_sub(i), (y + i).min(h - 1));
-            (
-                *k,
-                &canvas.light[above * w..][..w],
-                &canvas.light[below * w..][..w],
-            )
-        });
-        weigh(&pairs, &mut mixed[y * w..][..w]);
-    }
-    for (row, out) in mixed.chunks_exact(w).zip(canvas.light.chunks_exact_mut(w)) {
-        padded[..reach].fill(row[0]);
-        padded[reach..reach + w].copy_from_slice(row);
-        padded[reach + w..].fill(row[w - 1]);
-        let pairs = kernel.iter().enumerate();
-        let pairs = pairs.map(|(i, k)| (*k, &padded[reach - i..][..w], &padded[reach + i..][..w]));
-        weigh(&pairs, out);
-    }
-}
-
-/// Computes the sum of pairs of rows, each with its weight.
-fn weigh<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
-    widest(Weighing { pairs, out });
-}
-
-/// Arguments of [`weigh`].
-struct Weighing<'a, P> {
-    pairs: &'a P,
-    out: &'a mut [f32],
-}
-
-impl<'a, P: Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone> Vectorized for Weighing<'_, P> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        weigh_blocks(self.pairs, self.out);
-    }
-}
-
-#[inline(always)]
-fn weigh_blocks<'a>(
-    pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone),
-    out: &mut [f32],
-) {
-    let mut at = 0;
-    let mut blocks = out.chunks_exact_mut(BLOCK);
-    for block in &mut blocks {
-        let mut sums = [0.0_f32; BLOCK];
-        for (k, a, b) in pairs.clone() {
-            let (Some(a), Some(b)) = (
-                a[at..].first_chunk::<BLOCK>(),
-                b[at..].first_chunk::<BLOCK>(),
-            ) else {
-                continue;
-            };
-            for i in 0..BLOCK {
-                sums[i] += k * (a[i] + b[i]);
-            }
-        }
-        block.copy_from_slice(&sums);
-        at += BLOCK;
-    }
-    for (i, value) in blocks.into_remainder().iter_mut().enumerate() {
-        *value = pairs
-            .clone()
-            .map(|(k, a, b)| k * (a[at + i] + b[at + i]))
-            .sum();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -449,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn every_pixel_is_taken_from_where_the_lens_has_it() {
+    fn pixels_are_taken_from_their_exact_places() {
         for (k1, k2) in [(-0.35, 0.08), (-0.1, 0.0), (0.6, 0.0)] {
             let lens = Distortion {
                 k1,
@@ -474,43 +316,6 @@ mod tests {
                 assert!(
                     out.light.iter().all(|v| (v - 0.5).abs() < 1e-6),
                     "{width}x{height}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn defocus_is_a_gaussian_cut_off_at_two_and_a_half_deviations() {
-        // Neither side is a multiple of a block; the border is continued.
-        let (w, h) = (53_usize, 41_usize);
-        let mut state = 1_u32;
-        let light: Vec<f32> = (0..w * h)
-            .map(|_| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                (state >> 8) as f32 / 16_777_216.0
-            })
-            .collect();
-        for sigma in [0.6, 1.0, 2.3, 3.5] {
-            let mut canvas = Canvas::new(w, h);
-            canvas.light.copy_from_slice(&light);
-            defocus(&mut canvas, sigma, &mut Vec::new());
-            let reach = (2.5 * sigma).ceil() as i64;
-            let weight = |d: i64| (-0.5 * (d as f64 / sigma).powi(2)).exp();
-            let sum: f64 = (-reach..=reach).map(weight).sum();
-            for (x, y) in [(0_i64, 0_i64), (26, 20), (52, 40), (50, 3), (15, 40)] {
-                let at = |x: i64, y: i64| {
-                    let (x, y) = (x.clamp(0, w as i64 - 1), y.clamp(0, h as i64 - 1));
-                    f64::from(light[y as usize * w + x as usize])
-                };
-                let exact: f64 = (-reach..=reach)
-                    .flat_map(|j| (-reach..=reach).map(move |i| (i, j)))
-                    .map(|(i, j)| weight(i) * weight(j) * at(x + i, y + j))
-                    .sum::<f64>()
-                    / (sum * sum);
-                let blurred = f64::from(canvas.light[y as usize * w + x as usize]);
-                assert!(
-                    (blurred - exact).abs() < 1e-5,
-                    "{sigma} {x} {y}: {blurred} {exact}"
                 );
             }
         }

@@ -1,6 +1,7 @@
 //! Frames of the cell: table, things, holder and ball as the camera on the hand sees them.
 
 pub(crate) mod ball_shadow;
+pub(crate) mod blur;
 pub(crate) mod bodies;
 pub(crate) mod canvas;
 pub(crate) mod lens;

@@ -6,8 +6,9 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use crate::cell::geometry::Cell;
+use crate::render::blur::defocus;
 use crate::render::canvas::Canvas;
-use crate::render::lens::{Warp, defocus};
+use crate::render::lens::Warp;
 use crate::render::light_grid::LightGrid;
 use crate::render::scene::Scene;
 use crate::render::sensor::Exposure;

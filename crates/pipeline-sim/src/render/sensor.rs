@@ -6,8 +6,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::cell::camera::Camera;
+use crate::render::blur::three_taps;
 use crate::render::canvas::Canvas;
-use crate::render::lens::three_taps;
 use crate::render::scene::Sensor;
 
 const NOISES: usize = 1 << 16;

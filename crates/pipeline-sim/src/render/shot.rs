@@ -4,7 +4,7 @@ use hough_heuristic::image::GrayImage;
 use puma_val2::Joints;
 
 use crate::cell::geometry::Cell;
-use crate::render::lens::soften;
+use crate::render::blur::soften;
 use crate::render::renderer::Renderer;
 
 /// The exposure of a frame.

@@ -47,8 +47,9 @@ fn frames_follow_the_arm_and_repeat_with_the_seed() {
 
 #[test]
 fn impossible_moves_are_refused_without_a_motion() {
-    let mut arm =
-        SimulatedArm::new(cell(), Workspace::paper().search_poses()[3]).expect("a search pose");
+    let cell = cell();
+    let start = Workspace::paper().search_poses()[3];
+    let mut arm = SimulatedArm::new(cell.clone(), start).expect("a search pose");
     let before = arm.joints().expect("always");
     let too_far = JointDelta::from_degrees([0.0, 0.0, 30.0, 0.0, 0.0, 0.0]);
     assert!(matches!(
@@ -63,9 +64,9 @@ fn impossible_moves_are_refused_without_a_motion() {
     ));
     assert_eq!(arm.joints().expect("always"), before);
     arm.set_gripper(Gripper::Closed).expect("always");
-    assert_eq!(arm.cell().get().jaws, Gripper::Closed);
+    assert_eq!(cell.get().jaws, Gripper::Closed);
     assert!(!arm.object_near().expect("always"));
-    let mut lost = CellCamera::new(cell(), Renderer::new(&Scene::plain(), 1), || {
+    let mut lost = CellCamera::new(cell, Renderer::new(&Scene::plain(), 1), || {
         Joints([f64::NAN; 6])
     });
     assert!(matches!(

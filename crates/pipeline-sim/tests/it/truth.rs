@@ -231,7 +231,7 @@ fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
         cell.holder = None;
         let (width, height) = (f64::from(camera.size().0), f64::from(camera.size().1));
         // What is large and bent is no ellipse any more.
-        let most = if camera.distortion().is_none() {
+        let most = if *camera.distortion() == Distortion::default() {
             0.2
         } else {
             0.06
