@@ -20,8 +20,8 @@ use puma_val2::{
 ///
 /// [`Rig::emulated`] starts an emulated controller. Camera, sensors and ball then follow the
 /// emulated arm during its moves too, and the sensors are wired to the controller, which stops the
-/// arm. [`Rig::on_port`] and [`Rig::on_socket`] connect to another controller. The cell then follows
-/// the pose that it reports at the end of each move, and its own sensors guard the moves.
+/// arm. [`Rig::on_port`] and [`Rig::on_socket`] connect to another controller. The cell then
+/// follows the pose that it reports at the end of each move, and its own sensors guard the moves.
 pub struct Rig {
     name: String,
     arm: Box<dyn Manipulator>,
@@ -151,7 +151,7 @@ impl Rig {
     ///
     /// # Errors
     /// [`PlaceError::InHand`] if ball or holder would still stand in the hand, which leaves the
-    /// cell unchanged, and what kept the arm from making room.
+    /// cell unchanged, and what kept the arm from moving away.
     pub fn place(&mut self, ball: &Ball) -> Result<(), PlaceError> {
         if !self.put(ball) {
             self.clear_for(Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]))?;

@@ -29,12 +29,12 @@ impl Simulator {
     /// # Errors
     /// Too few samples, or samples that do not determine the model.
     pub fn fit(
-        centring: &[CentreSample],
+        centering: &[CentreSample],
         reaching: &[ReachSample],
         form: ReachForm,
     ) -> Result<Self, FitError> {
         Ok(Self {
-            centre: CentreModel::fit(centring)?,
+            centre: CentreModel::fit(centering)?,
             reach: ReachModel::fit(reaching, form, &ELBOW_EDGES)?,
             starts: reaching
                 .iter()
@@ -54,7 +54,7 @@ impl Simulator {
         all
     }
 
-    /// Draws the start of an episode from those of the samples, which were in view and within reach.
+    /// Draws the start of an episode from those of the samples, which were in view and in reach.
     pub fn start(&self, rng: &mut dyn Rng) -> Percept {
         self.starts[rng.random_range(0..self.starts.len())]
     }

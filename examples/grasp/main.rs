@@ -224,13 +224,13 @@ impl Taught {
         rng: &mut dyn Rng,
     ) -> Result<Self, Box<dyn Error>> {
         say(options, &format!("sampling {SAMPLES} moves in the cell"));
-        let (centring, reaching) = cell.sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
+        let (centering, reaching) = cell.sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
         let form = match options.simulator.unwrap_or(FormName::Rigid22) {
             FormName::Linear => ReachForm::Linear,
             FormName::Rigid8 => ReachForm::Rigid8,
             FormName::Rigid22 => ReachForm::Rigid22,
         };
-        let simulator = Simulator::fit(&centring, &reaching, form)?;
+        let simulator = Simulator::fit(&centering, &reaching, form)?;
         let mut r2 = BTreeMap::new();
         for quality in simulator.quality() {
             say(

@@ -100,8 +100,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
     let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
     let inside = |circle: &Circle| {
-        let room = circle.radius + 5.0;
-        (room..768.0 - room).contains(&circle.x) && (room..576.0 - room).contains(&circle.y)
+        let margin = circle.radius + 5.0;
+        (margin..768.0 - margin).contains(&circle.x) && (margin..576.0 - margin).contains(&circle.y)
     };
     let poses = Workspace::paper().search_poses();
     let pose = poses

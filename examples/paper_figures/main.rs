@@ -117,9 +117,9 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let plane = ExactPlane::new(20_000, &mut rng);
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-        let (centring, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
-        let rigid = Simulator::fit(&centring, &reaching, ReachForm::Rigid22)?;
-        let linear = Simulator::fit(&centring, &reaching, ReachForm::Linear)?;
+        let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
+        let rigid = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
+        let linear = Simulator::fit(&centering, &reaching, ReachForm::Linear)?;
         let (literal, mended) = (
             BehaviourPair::paper_literal(),
             BehaviourPair::paper_mended(),

@@ -105,9 +105,9 @@ fn one_arm(
     seed: u64,
 ) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (centring, reaching) =
+    let (centering, reaching) =
         Cell::paper(Ball::at(0.6, 0.0, -0.1)).sample_moves(2_500, 0.5, &mut rng)?;
-    let simulator = Simulator::fit(&centring, &reaching, form)?;
+    let simulator = Simulator::fit(&centering, &reaching, form)?;
     let pair = BehaviourPair::paper_mended();
     let only_x = pair.centering.goal.clone();
     let learned = learn_both(&simulator, pair, 1_000 + seed, &mut rng)?;

@@ -83,7 +83,7 @@ fn the_ball_goes_with_the_jaws_and_is_pushed_by_fingers() {
 }
 
 #[test]
-fn the_arm_makes_room_for_a_ball_placed_in_the_hand() {
+fn the_arm_moves_away_for_a_ball_placed_in_the_hand() {
     let (ball, _, grip) = ball_and_goal();
     let mut rig = rig();
     rig.place(&Ball::at(-0.6, 0.0, -0.1))
@@ -91,7 +91,7 @@ fn the_arm_makes_room_for_a_ball_placed_in_the_hand() {
     rig.parts().arm.move_to(grip).expect("free");
     // With the hand a finger's width to the side.
     let aside = Ball::at(ball.centre.x, ball.centre.y + 0.04, ball.centre.z);
-    rig.place(&aside).expect("the arm makes room");
+    rig.place(&aside).expect("the arm moves away");
     assert!((rig.cell().get().ball.centre - aside.centre).norm() < 1e-9);
     let (joints, cell) = (rig.pose()(), rig.cell().get());
     assert!(!cell.collides(&joints));

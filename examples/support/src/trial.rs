@@ -195,8 +195,8 @@ impl TrialCell {
         Ok(None)
     }
 
-    /// Returns the mean features seen from `from` of a ball that is between the jaws after `grip`;
-    /// `None` if it is not well in view.
+    /// Returns the mean features, seen from `from`, of a ball that is between the jaws after
+    /// `grip`; `None` if it is not well in view.
     fn seen_after_taking_back(
         &self,
         grip: &JointDelta,

@@ -1,7 +1,7 @@
 //! Confidence interval of a share.
 
-/// Returns Wilson's 95 % interval, percent, of a share (0..=1) of `n` trials. It is meaningful where
-/// all trials succeed, or none, and NaN without trials.
+/// Returns Wilson's 95 % interval, percent, of a share (0..=1) of `n` trials. It has a width even
+/// where all trials succeed, or none; it is NaN without trials.
 pub fn wilson(share: f64, n: f64) -> [f64; 2] {
     const Z: f64 = 1.96;
     let middle = share + 0.5 * Z * Z / n;
