@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_under_a_lamp_throws_a_shadow_with_a_penumbra() {
+    fn ball_under_a_lamp_throws_a_penumbra() {
         let lamp = Light {
             toward: Vector3::z(),
             intensity: 0.6,
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sky_is_darker_at_the_foot_of_the_holder() {
+    fn sky_is_darker_at_the_foot_of_the_holder() {
         let scene = Scene {
             lights: Vec::new(),
             ..Scene::plain()

@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_shadow_has_straight_edges() {
+    fn thin_shadow_has_straight_edges() {
         // Half a metre above the table, looking down, rolled by 25 degrees.
         let down =
             UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 25.0_f64.to_radians());

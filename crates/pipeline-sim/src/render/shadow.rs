@@ -274,7 +274,7 @@ mod tests {
     use crate::render::scene::Appearance;
 
     #[test]
-    fn the_gloom_at_the_foot_of_a_box_has_the_shape_of_the_box() {
+    fn gloom_at_the_foot_of_a_box_has_its_shape() {
         let appearance = Appearance {
             albedo: 0.5,
             texture: 0.0,
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_throws_no_shadow_and_all_comes_back_with_it() {
+    fn things_left_out_throw_no_shadow() {
         let scene = Scene::laboratory();
         let stains = CoarseMap {
             side: 601,

@@ -374,7 +374,7 @@ mod tests {
     use rand::rngs::Xoshiro256PlusPlus;
 
     #[test]
-    fn a_walk_meets_each_texel_and_the_means_between_them() {
+    fn walk_meets_each_texel_and_the_means_between() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let n = 1_usize << FINEST_BITS;
         let texels: Vec<f32> = (0..n * n)

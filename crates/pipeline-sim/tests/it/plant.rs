@@ -382,7 +382,7 @@ fn feature_camera_adds_noise_to_the_cells_features() {
 }
 
 #[test]
-fn each_error_of_the_mount_is_named() {
+fn errors_of_the_mount_are_named() {
     type Spoil = fn(&mut Errors);
     let (cell, _) = at_goal();
     let spoil: [(&str, Spoil); 6] = [

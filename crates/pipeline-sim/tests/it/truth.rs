@@ -50,9 +50,11 @@ fn truth_knows_what_hides_the_ball() {
     // Half out of the frame.
     let mut cut = goal;
     let mut share = 1.0;
+    let renderer = Renderer::new(&Scene::plain(), 1);
     while share > 0.6 {
         cut = cut + JointDelta::from_degrees([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        share = Renderer::truth(&Renderer::new(&Scene::plain(), 1), &cell, &cut)
+        share = renderer
+            .truth(&cell, &cut)
             .first()
             .map_or(0.0, |s| s.visible);
     }
@@ -136,7 +138,7 @@ fn with_thing(shape: Shape, x: f64, y: f64) -> Scene {
 }
 
 #[test]
-fn a_ball_carried_over_a_box_hides_the_box_and_one_behind_it_is_hidden() {
+fn ball_over_a_box_hides_it_and_behind_it_is_hidden() {
     let (mut cell, goal) = cell_at_goal();
     cell.holder = None;
     let shape = Shape::Box {
@@ -174,7 +176,7 @@ fn a_ball_carried_over_a_box_hides_the_box_and_one_behind_it_is_hidden() {
 }
 
 #[test]
-fn a_holder_without_its_ball_stands_where_it_stands() {
+fn holder_without_its_ball_keeps_its_place() {
     // The ball has been put down near the camera; between its holder and the camera stands a
     // cylinder.
     let pose = Workspace::paper().search_poses()[3];
@@ -215,7 +217,7 @@ fn a_holder_without_its_ball_stands_where_it_stands() {
 }
 
 #[test]
-fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
+fn visible_share_is_the_counted_one_at_bent_borders() {
     let lens = Distortion {
         k1: -0.30,
         k2: 0.06,
@@ -225,6 +227,7 @@ fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
     let bent = paper.with_distortion(lens).expect("does not fold");
     let small = paper.resized(192, 144).expect("a usable size");
     let (cell, goal) = cell_at_goal();
+    let renderer = Renderer::new(&Scene::plain(), 1);
     for camera in [paper, small, bent] {
         let mut cell = cell;
         cell.camera = camera;
@@ -252,7 +255,7 @@ fn the_visible_share_is_the_counted_one_for_small_balls_and_bent_borders() {
                     .sphere_of_circle(&circle, cell.ball.radius)
                     .expect("some place shows it");
                 cell.ball.centre = cell.camera_pose(&goal) * place;
-                let truth = Renderer::new(&Scene::plain(), 1).truth(&cell, &goal);
+                let truth = renderer.truth(&cell, &goal);
                 let outline = truth[0].ellipse;
                 // Points spread evenly over the outlined area.
                 let n = 4000;
@@ -279,11 +282,11 @@ fn truth_of_distorted_frames_agrees_with_their_rays() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     let recipe = Recipe::named("distorted").expect("a recipe");
     let mut rows = 0;
-    for _ in 0..16 {
+    for _ in 0..4 {
         let drawn = recipe.draw((768, 576), &mut rng);
         let (renderer, _) = drawn.expect("a frame of pixels");
         let scene = renderer.scene();
-        for _ in 0..5 {
+        for _ in 0..12 {
             let drawn = recipe.draw_again((768, 576), &mut rng).expect("a frame");
             let snapshot = drawn.expect("scenes are shared");
             let cell = &snapshot.cell;
