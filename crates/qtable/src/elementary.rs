@@ -1,6 +1,7 @@
-//! Exponential and logarithm from IEEE additions, multiplications and divisions alone, so that a
-//! learning run has the same bits on every platform (the ones of the standard library are the
-//! platform's), and so that the compiler can vectorise a row of them.
+//! Exponential and logarithm from IEEE additions, multiplications and divisions alone.
+//!
+//! The functions of the standard library are the platform's: their last bits differ between
+//! platforms. These give the same bits everywhere, and the compiler can vectorise a row of them.
 
 use std::f64::consts::{LN_2, LOG2_E, SQRT_2};
 
@@ -12,7 +13,7 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the largest
+/// Returns `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the largest
 /// number infinite.
 pub(crate) fn exp(x: f64) -> f64 {
     match x {
@@ -28,7 +29,7 @@ pub(crate) fn exp(x: f64) -> f64 {
 const LEAST: f64 = -708.0;
 const MOST: f64 = 709.0;
 
-/// `e^x` to 2 units in the last place for `x` in -708..=709, without a branch.
+/// Returns `e^x` to 2 units in the last place for `x` in -708..=709, without a branch.
 #[inline(always)]
 pub(crate) const fn exp_within(x: f64) -> f64 {
     // x = r + n ln 2 with |r| <= ln(2)/2.
@@ -67,8 +68,8 @@ pub(crate) const fn exp_within(x: f64) -> f64 {
 pub(crate) const PARTS: usize = 1 << PART_BITS;
 const PART_BITS: u32 = 7;
 
-/// `2^(x / PARTS)` to a part in 10^8, without a branch: as much as an `f32` holds. 0 if that is
-/// below `2^-1022`; whatever if it is above `2^1023`.
+/// Returns `2^(x / PARTS)` to a part in 10^8, as much as an `f32` holds, without a branch: 0 below
+/// `2^-1022`, any number above `2^1023`.
 #[inline(always)]
 pub(crate) fn exp2_parts(x: f64) -> f32 {
     const LEAST: f64 = -1022.0 * PARTS as f64;
@@ -93,7 +94,7 @@ static POWERS: [u64; PARTS] = {
     powers
 };
 
-/// Natural logarithm of a positive, finite, normal `x`, to 2 units in the last place.
+/// Returns the natural logarithm of a positive, finite, normal `x`, to 2 units in the last place.
 pub(crate) fn ln(x: f64) -> f64 {
     let bits = x.to_bits();
     let mut exponent = ((bits >> 52) & 0x7ff) as i64 - 1023;

@@ -76,8 +76,8 @@ pub enum Error {
         /// The action.
         action: Action,
     },
-    /// A state in which the mask allows nothing.
-    #[error("state {} allows no action: a mask must leave at least one", state.0)]
+    /// A state without actions in which an episode goes on.
+    #[error("state {} offers no action, but the episode goes on there", state.0)]
     NoActionAllowed {
         /// The state.
         state: State,

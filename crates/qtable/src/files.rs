@@ -209,11 +209,14 @@ fn read<T: DeserializeOwned>(file: &mut (impl Read + Seek), kind: &str) -> Resul
     }
     let length = end.saturating_sub(file.stream_position()?);
     let mut payload = file.take(length);
-    let value = match length {
-        0..=SMALL => decode_within::<T, { widest(SMALL) }>(&mut payload),
-        0..=MEDIUM => decode_within::<T, { widest(MEDIUM) }>(&mut payload),
-        0..=LARGE => decode_within::<T, { widest(LARGE) }>(&mut payload),
-        _ => decode_within::<T, { widest(HUGE) }>(&mut payload),
+    let value = if length <= SMALL {
+        decode_within::<T, { widest(SMALL) }>(&mut payload)
+    } else if length <= MEDIUM {
+        decode_within::<T, { widest(MEDIUM) }>(&mut payload)
+    } else if length <= LARGE {
+        decode_within::<T, { widest(LARGE) }>(&mut payload)
+    } else {
+        decode_within::<T, { widest(HUGE) }>(&mut payload)
     }?;
     match payload.limit() {
         0 => Ok(value),

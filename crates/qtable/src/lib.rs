@@ -20,8 +20,8 @@
 //! * A table never holds a value that is not finite. A reward of NaN or a state out of range is
 //!   refused with an [`Error`] that says what and where. Methods that return no `Result` panic
 //!   outside a table, like an index into a slice.
-//! * Of equally good actions the one with the lowest index is taken, unless a policy was told to
-//!   draw ([`Ties`]).
+//! * Of equally good actions a policy that explores draws one ([`Ties`]); [`QTable::best`] and
+//!   [`Greedy`] take the one with the lowest index.
 //!
 //! # An environment of your own
 //!

@@ -59,6 +59,10 @@ enum Shape {
         start: f64,
         scale: f64,
     },
+    VisitsPower {
+        start: f64,
+        exponent: f64,
+    },
     Piecewise(Vec<(u64, f64)>),
     #[cfg_attr(feature = "serde", serde(skip))]
     Custom(Custom),
@@ -122,6 +126,18 @@ impl Schedule {
         Self::of(Shape::InverseVisits { start, scale })
     }
 
+    /// Creates the schedule `start / n^exponent` at the n-th visit of each state-action pair, with an
+    /// exponent in `0.5..=1` (above 0.5 the conditions of Robbins and Monro hold).
+    ///
+    /// An exponent of 0.6 to 0.8 learns faster than `1/n`, which weighs the first, wrong targets
+    /// like the last ones (Even-Dar and Mansour 2003).
+    ///
+    /// # Errors
+    /// A start that is not finite, or an exponent outside `0.5..=1`.
+    pub fn visits_power(start: f64, exponent: f64) -> Result<Self, Error> {
+        Self::of(Shape::VisitsPower { start, exponent })
+    }
+
     /// Creates straight lines between `(step, value)` points; the schedule is constant before the
     /// first and after the last.
     ///
@@ -164,6 +180,10 @@ impl Schedule {
             }
             Shape::Exponential { end, .. } => *end,
             Shape::InverseVisits { start, scale } => start / (1.0 + step as f64 / scale),
+            Shape::VisitsPower { start, exponent } => {
+                let count = step.saturating_add(1) as f64;
+                start * exp(-exponent * ln(count))
+            }
             Shape::Piecewise(points) => along(points, step),
             Shape::Custom(Custom { range, value }) => {
                 let value = value(step);
@@ -183,7 +203,7 @@ impl Schedule {
             Shape::Linear { start, end, .. } | Shape::Exponential { start, end, .. } => {
                 (*start, *end)
             }
-            Shape::InverseVisits { start, .. } => (0.0, *start),
+            Shape::InverseVisits { start, .. } | Shape::VisitsPower { start, .. } => (0.0, *start),
             Shape::Piecewise(points) => points.iter().fold(
                 (f64::INFINITY, f64::NEG_INFINITY),
                 |(low, high), &(_, value)| (value.min(low), value.max(high)),
@@ -195,7 +215,10 @@ impl Schedule {
 
     /// Returns `true` for a schedule that counts the visits of each pair.
     pub fn is_by_visits(&self) -> bool {
-        matches!(self.shape, Shape::InverseVisits { .. })
+        matches!(
+            self.shape,
+            Shape::InverseVisits { .. } | Shape::VisitsPower { .. }
+        )
     }
 
     /// Returns the value now for a pair with a number of visits before.
@@ -270,6 +293,11 @@ impl Schedule {
                 finite(*start)?;
                 let valid = scale.is_finite() && *scale > 0.0;
                 check_setting("the scale of a schedule", *scale, valid, "positive")?;
+            }
+            Shape::VisitsPower { start, exponent } => {
+                finite(*start)?;
+                let valid = (0.5..=1.0).contains(exponent);
+                check_setting("the exponent of a schedule", *exponent, valid, "in 0.5..=1")?;
             }
             Shape::Piecewise(points) => {
                 let valid = !points.is_empty();

@@ -1,12 +1,12 @@
-//! Room to work in.
+//! A buffer that is reused.
 
-/// A buffer kept between calls so that they allocate nothing. What is in it is no part of its
-/// owner's state: it is not saved, and two of them are always equal.
+/// A buffer kept between calls so that they allocate nothing. It is no part of its owner's state:
+/// it is not saved, and two buffers are always equal.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch(Vec<f64>);
 
 impl Scratch {
-    /// The buffer with a length, holding whatever it held.
+    /// Returns the buffer with a length, with its old contents.
     pub(crate) fn of_length(&mut self, length: usize) -> &mut [f64] {
         self.0.resize(length, 0.0);
         &mut self.0

@@ -8,10 +8,12 @@
 //! ```
 //! use qtable::toys;
 //!
-//! let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true)?;
-//! let plan = lake.model().value_iteration(0.99, 1e-12)?;
-//! assert!((plan.table.max(qtable::State(0)) - 0.5420).abs() < 1e-4);
-//! # Ok::<(), qtable::Error>(())
+//! fn main() -> Result<(), qtable::Error> {
+//!     let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true)?;
+//!     let plan = lake.model().value_iteration(0.99, 1e-12)?;
+//!     assert!((plan.table.max(qtable::State(0)) - 0.5420).abs() < 1e-4);
+//!     Ok(())
+//! }
 //! ```
 //!
 //! A time limit is not part of the dynamics; Gymnasium sets 100 steps for the 4x4 lake, 200 for the
@@ -22,4 +24,4 @@ mod grids;
 mod taxi;
 
 pub use grids::{FROZEN_LAKE_4X4, FROZEN_LAKE_8X8, chain, cliff_walking, frozen_lake};
-pub use taxi::{TAXI_STANDS, taxi, taxi_state};
+pub use taxi::taxi;

@@ -117,4 +117,9 @@ where
             status,
         })
     }
+
+    /// A success is the goal: a lost ball pays nothing positive.
+    fn succeeded(&self, last: &Step) -> Option<bool> {
+        Some(last.status == Status::Terminated && last.reward > 0.0)
+    }
 }

@@ -1,32 +1,43 @@
 //! Dyna-Q: learning from remembered experience between real steps.
 
-use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
+use rand::{Rng, RngExt};
 
-use crate::error::Error;
+use crate::error::{Error, check_setting};
 use crate::learner::one_step::QLearning;
-use crate::learner::rule::{Experience, Learner};
+use crate::learner::rule::{Experience, Learner, check};
 use crate::model::ModelEstimate;
 use crate::policy::Policy;
 use crate::schedule::Schedule;
+use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
+use crate::validated::validated;
 
-/// Dyna-Q (Sutton 1990): one-step Q-learning on each real step, then on k steps drawn from a model:
-/// a pair tried before, each as likely as the other, and one of its outcomes, as often as it was
-/// seen.
-///
-/// Imagined steps use the α of the present, and count neither as visits nor for the schedule.
-/// Default: k = 5.
-///
-/// A learner belongs to the table it was made for; another table is refused with
-/// [`Error::OtherTable`].
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-pub struct DynaQ {
-    real: QLearning,
-    planning_steps: u32,
-    model: ModelEstimate,
+validated! {
+    /// Dyna-Q (Sutton 1990; Sutton and Barto, section 8.2): one-step Q-learning on each real step,
+    /// then on k steps drawn from a model: a pair tried before, each with the same probability, and
+    /// one of the outcomes seen, by their counts.
+    ///
+    /// The book keeps the last outcome only ([`with_last_outcome`](DynaQ::with_last_outcome)), which
+    /// notices sooner that a deterministic world has changed, and is wrong in a stochastic one.
+    /// [`with_bonus`](DynaQ::with_bonus) is Dyna-Q+. Imagined steps use the α of the present, and
+    /// count neither as visits nor for the schedule. Default: k = 5.
+    ///
+    /// A learner belongs to the table it was made for; another table is refused with
+    /// [`Error::OtherTable`].
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct DynaQ {
+        real: QLearning,
+        planning_steps: u32,
+        last_only: bool,
+        bonus: f64,
+        model: ModelEstimate,
+        /// Real steps so far, and the number of the step at which each pair was tried last; empty
+        /// without bonus.
+        steps: u64,
+        last_tried: Vec<u64>,
+        /// States met, in order; empty without bonus.
+        met: Vec<State>,
+    }
 }
 
 impl DynaQ {
@@ -39,7 +50,12 @@ impl DynaQ {
         Ok(Self {
             real: QLearning::new(alpha, gamma)?,
             planning_steps: 5,
+            last_only: false,
+            bonus: 0.0,
             model: ModelEstimate::new(table.states(), table.actions())?,
+            steps: 0,
+            last_tried: Vec::new(),
+            met: Vec::new(),
         })
     }
 
@@ -52,9 +68,82 @@ impl DynaQ {
         }
     }
 
+    /// Keeps only the last outcome of each pair, for deterministic worlds that change.
+    #[must_use]
+    pub fn with_last_outcome(self) -> Self {
+        let last_only = true;
+        Self { last_only, ..self }
+    }
+
+    /// Makes it Dyna-Q+ (Sutton and Barto, section 8.3): an imagined reward grows by `κ sqrt(τ)` with
+    /// the steps τ since the pair was tried last, so that the learner looks again at what may have
+    /// changed. All actions of the states met are imagined; one never tried leads back to its state.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if κ is negative or not finite.
+    pub fn with_bonus(self, kappa: f64) -> Result<Self, Error> {
+        let bonus = kappa;
+        let entries = self.model.states() * self.model.actions();
+        let last_tried = vec![0; entries];
+        Self {
+            bonus,
+            last_tried,
+            ..self
+        }
+        .restore()
+    }
+
     /// Returns the model learned so far.
     pub fn model(&self) -> &ModelEstimate {
         &self.model
+    }
+
+    /// Draws an imagined step.
+    fn imagine(&self, table: &QTable, rng: &mut dyn Rng) -> Option<(State, Action, Step)> {
+        if self.last_tried.is_empty() {
+            return self.model.draw(rng);
+        }
+        let state = self.met[rng.random_range(0..self.met.len())];
+        let offered = table.offered(state).count();
+        let drawn = rng.random_range(0..offered.max(1));
+        let action = table.offered(state).nth(drawn)?;
+        let tried_last = self.last_tried[state.0 * table.actions() + action.0];
+        let untried = Step {
+            observation: state,
+            reward: 0.0,
+            status: Status::Continuing,
+        };
+        let mut step = self
+            .model
+            .draw_outcome(state, action, rng)
+            .unwrap_or(untried);
+        step.reward += self.bonus * ((self.steps - tried_last) as f64).sqrt();
+        Some((state, action, step))
+    }
+
+    fn restore(self) -> Result<Self, Error> {
+        let valid = self.bonus.is_finite() && self.bonus >= 0.0;
+        check_setting("kappa", self.bonus, valid, "finite and not negative")?;
+        let (states, needed) = (
+            self.model.states(),
+            self.model.states() * self.model.actions(),
+        );
+        let found = self.last_tried.len();
+        if found != 0 && found != needed {
+            let what = "the list of trials";
+            return Err(Error::WrongLength {
+                what,
+                needed,
+                found,
+            });
+        }
+        if let Some(&state) = self.met.iter().find(|state| state.0 >= states) {
+            return Err(Error::StateOutOfRange { state, states });
+        }
+        let latest = self.last_tried.iter().copied().max().unwrap_or(0);
+        let valid = latest <= self.steps;
+        check_setting("the step of a trial", latest as f64, valid, "a past step")?;
+        Ok(self)
     }
 }
 
@@ -71,11 +160,27 @@ impl Learner for DynaQ {
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
         let (state, action, step) = (experience.state, experience.action, &experience.step);
+        check(table, state, action, step)?;
         self.model.check_table(table)?;
         let error = self.real.update(table, state, action, step)?;
-        self.model.observe(state, action, step)?;
+        if self.last_only {
+            self.model.replace(state, action, step)?;
+        } else {
+            self.model.observe(state, action, step)?;
+        }
+        if !self.last_tried.is_empty() {
+            let row = state.0 * table.actions();
+            if self.last_tried[row..][..table.actions()]
+                .iter()
+                .all(|&at| at == 0)
+            {
+                self.met.push(state);
+            }
+            self.steps = self.steps.saturating_add(1);
+            self.last_tried[row + action.0] = self.steps;
+        }
         for _ in 0..self.planning_steps {
-            if let Some((state, action, step)) = self.model.draw(rng) {
+            if let Some((state, action, step)) = self.imagine(table, rng) {
                 self.real.update_imagined(table, state, action, &step)?;
             }
         }

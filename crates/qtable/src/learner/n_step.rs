@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 
 use rand::Rng;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, check_setting};
 use crate::learner::rule::{Experience, Learner, Rates, check, constructor, is_greedy};
@@ -20,15 +22,27 @@ validated! {
     /// exploratory action: what comes after it is not what the greedy policy would have met.
     /// [`uncut`](NStepQ::uncut) lets the return run on (as in Mnih and others 2016), which is
     /// quicker while much is explored and biased as long as it is. Default: n = 4, cut. A pair is
-    /// updated up to n steps after its visit.
+    /// updated up to n steps after its visit; the visit is counted at once.
     #[derive(Clone, Debug, PartialEq)]
     pub struct NStepQ {
         rates: Rates,
         n: usize,
         cut: bool,
-        /// Pairs not yet updated, each with the reward that followed it; oldest first.
-        pending: VecDeque<(State, Action, f64)>,
+        /// Pairs not yet updated, oldest first.
+        pending: VecDeque<Pending>,
     }
+}
+
+/// A visit whose update is still to come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+struct Pending {
+    state: State,
+    action: Action,
+    /// The reward that followed.
+    reward: f64,
+    /// Visits of the pair before this one.
+    visits: u32,
 }
 
 impl NStepQ {
@@ -56,23 +70,24 @@ impl NStepQ {
     /// Updates the oldest pending pair with its rewards and the value of what follows the last of
     /// them.
     fn close_oldest(&mut self, table: &mut QTable, following: f64) -> Result<(), Error> {
-        let target = self
-            .pending
-            .iter()
-            .rev()
-            .fold(following, |rest, &(.., reward)| {
-                reward + self.rates.gamma * rest
-            });
-        if let Some((state, action, _)) = self.pending.pop_front() {
+        let rewards = self.pending.iter().rev();
+        let target = rewards.fold(following, |rest, visit| {
+            visit.reward + self.rates.gamma * rest
+        });
+        if let Some(visit) = self.pending.pop_front() {
+            let (state, action) = (visit.state, visit.action);
             table.check(state, action)?;
-            self.rates.learn(table, state, action, target)?;
+            let alpha = self.rates.alpha.now(&self.rates.clock, visit.visits);
+            let old = table.value(state, action);
+            table.store(state, action, old + alpha * (target - old))?;
+            self.rates.clock.tick();
         }
         Ok(())
     }
 
     fn close_all(&mut self, table: &mut QTable, end: Option<State>) -> Result<(), Error> {
         while !self.pending.is_empty() {
-            // Asked anew each time: the update before may have changed it.
+            // Asked again each time: the update before may have changed it.
             self.close_oldest(table, end.map_or(0.0, |state| table.max(state)))?;
         }
         Ok(())
@@ -99,7 +114,13 @@ impl Learner for NStepQ {
         }
         let target = self.rates.greedy_target(table, step);
         let error = target - table.value(state, action);
-        self.pending.push_back((state, action, step.reward));
+        self.pending.push_back(Pending {
+            state,
+            action,
+            reward: step.reward,
+            visits: table.visits(state, action),
+        });
+        table.visit(state, action)?;
         match step.status {
             Status::Terminated => self.close_all(table, None)?,
             Status::Truncated => self.close_all(table, Some(step.observation))?,

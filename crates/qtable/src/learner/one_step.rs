@@ -122,6 +122,8 @@ impl Learner for QLearning {
 /// action `a'` that the policy takes next.
 ///
 /// It learns the value of the policy that acts, exploration included, and so keeps away from cliffs.
+/// The action after a truncated step is chosen for the update only: it advances a policy's schedule
+/// by one choice more than with Q-learning.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Sarsa {

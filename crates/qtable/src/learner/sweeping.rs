@@ -20,8 +20,7 @@ validated! {
     /// under the model, `Q(s,a) <- Σ p(s'|s,a) (r + γ max over b of Q(s',b))`. The pairs that lead
     /// to a changed state are queued in turn.
     ///
-    /// There is no α: the model's counts do the averaging. Default: k = 5, changes below 1e-4 are
-    /// not queued.
+    /// There is no α: the model's counts do the averaging. Default: k = 5, every change is queued.
     ///
     /// A learner belongs to the table it was made for; another table is refused with
     /// [`Error::OtherTable`].
@@ -44,7 +43,7 @@ impl PrioritizedSweeping {
         Self {
             gamma,
             backups: 5,
-            threshold: 1e-4,
+            threshold: 0.0,
             model: ModelEstimate::new(table.states(), table.actions())?,
             queue: Queue::default(),
         }
@@ -59,7 +58,7 @@ impl PrioritizedSweeping {
         Self { backups, ..self }.restore()
     }
 
-    /// Sets the smallest change that is queued, in units of the values, positive.
+    /// Sets the change up to which a pair is not queued, in units of the values.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -97,8 +96,13 @@ impl PrioritizedSweeping {
             self.backups > 0,
             "at least 1",
         )?;
-        let positive = self.threshold.is_finite() && self.threshold > 0.0;
-        check_setting("threshold", self.threshold, positive, "positive and finite")?;
+        let valid = self.threshold.is_finite() && self.threshold >= 0.0;
+        check_setting(
+            "threshold",
+            self.threshold,
+            valid,
+            "finite and not negative",
+        )?;
         let needed = self.model.states() * self.model.actions();
         let found = self.queue.priorities.len();
         if found != 0 && found != needed {
@@ -150,7 +154,7 @@ impl Learner for PrioritizedSweeping {
             if let Some(value) = self.backup(table, state, action) {
                 table.store(state, action, value)?;
             }
-            if table.max(state) == before {
+            if table.max(state).to_bits() == before.to_bits() {
                 continue;
             }
             for place in 0..self.model.predecessors(state).len() {

@@ -59,7 +59,7 @@ impl ModelEnvironment {
                     sums.value += share * discount * outcome.reward;
                     if !outcome.terminated {
                         next[outcome.next.0] += share;
-                    } else if self.succeeded(&outcome.step()) {
+                    } else if self.succeeded(&outcome.step()) == Some(true) {
                         sums.success += share;
                         steps_of_successes += share * taken as f64;
                     }
@@ -89,7 +89,7 @@ impl ModelEnvironment {
 }
 
 impl Model {
-    /// The probability of each state from a list of first states.
+    /// Returns the probability of each state from a list of first states.
     pub(super) fn spread_start(&self, start: &[(State, f64)]) -> Result<Vec<f64>, Error> {
         let mut spread = vec![0.0; self.states];
         for &(state, probability) in start {

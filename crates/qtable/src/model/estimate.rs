@@ -55,7 +55,7 @@ impl ModelEstimate {
         })
     }
 
-    /// Counts a step. A truncated one is as good as any: it tells where the action leads.
+    /// Counts a step, also a truncated one: it tells where the action leads.
     ///
     /// # Errors
     /// A state or action out of range, or a reward that is not finite.
@@ -95,6 +95,36 @@ impl ModelEstimate {
             if !terminated {
                 note_source(&mut self.sources[step.observation.0], pair);
             }
+        }
+        Ok(())
+    }
+
+    /// Keeps a step as the only outcome of its pair, for worlds that change.
+    pub(crate) fn replace(
+        &mut self,
+        state: State,
+        action: Action,
+        step: &Step,
+    ) -> Result<(), Error> {
+        check_reward(state, action, step.reward)?;
+        let trials = self.trials(state, action).saturating_add(1);
+        let pair = state.0 * self.actions + action.0;
+        for seen in std::mem::take(&mut self.seen[pair]) {
+            self.sources[seen.next.0].retain(|&source| source != pair);
+        }
+        let next = step.observation;
+        let terminated = step.status == Status::Terminated;
+        if trials == 1 {
+            self.tried.push(pair);
+        }
+        self.seen[pair].push(Seen {
+            next,
+            terminated,
+            count: u32::try_from(trials).unwrap_or(u32::MAX),
+            mean_reward: step.reward,
+        });
+        if !terminated {
+            note_source(&mut self.sources[next.0], pair);
         }
         Ok(())
     }
@@ -155,16 +185,27 @@ impl ModelEstimate {
         (State(index / self.actions), Action(index % self.actions))
     }
 
-    /// A pair tried before, each as likely as the other, and one of its outcomes, as often as it
-    /// was seen.
+    /// Draws a pair tried before, each with the same probability, and one of its outcomes by the
+    /// counts.
     pub(crate) fn draw(&self, rng: &mut dyn Rng) -> Option<(State, Action, Step)> {
         if self.tried.is_empty() {
             return None;
         }
         let (state, action) = self.pair(self.tried[rng.random_range(0..self.tried.len())]);
+        let step = self.draw_outcome(state, action, rng)?;
+        Some((state, action, step))
+    }
+
+    /// Draws one of the outcomes of a pair by their counts; `None` for a pair never tried.
+    pub(crate) fn draw_outcome(
+        &self,
+        state: State,
+        action: Action,
+        rng: &mut dyn Rng,
+    ) -> Option<Step> {
         let outcomes = self.outcomes(state, action);
         let mut rest = match outcomes.len() {
-            1 => 0,
+            0 | 1 => 0,
             _ => rng.random_range(0..self.trials(state, action)),
         };
         let drawn = outcomes.iter().find(|seen| {
@@ -177,18 +218,14 @@ impl ModelEstimate {
         } else {
             Status::Continuing
         };
-        Some((
-            state,
-            action,
-            Step {
-                observation: drawn.next,
-                reward: drawn.mean_reward,
-                status,
-            },
-        ))
+        Some(Step {
+            observation: drawn.next,
+            reward: drawn.mean_reward,
+            status,
+        })
     }
 
-    /// The expected `r + γ value(s')` of a pair, or `None` if it was never tried.
+    /// Returns the expected `r + γ value(s')` of a pair, or `None` if it was never tried.
     pub(crate) fn backup(
         &self,
         state: State,
@@ -280,7 +317,7 @@ impl ModelEstimate {
     }
 }
 
-/// Keeps the list sorted, so that it is the same whatever the order in which pairs were met.
+/// Keeps the list sorted, so that it does not depend on the order in which pairs were met.
 fn note_source(sources: &mut Vec<usize>, pair: usize) {
     if let Err(place) = sources.binary_search(&pair) {
         sources.insert(place, pair);

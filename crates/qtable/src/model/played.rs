@@ -1,4 +1,4 @@
-//! A known model, played.
+//! An environment that draws from a known model.
 
 use rand::{Rng, RngExt};
 
@@ -17,13 +17,13 @@ validated! {
     pub struct ModelEnvironment {
         model: Model,
         start: Vec<(State, f64)>,
-        any_termination_succeeds: bool,
+        only_reward_succeeds: bool,
         state: State,
     }
 }
 
 impl ModelEnvironment {
-    /// With the probability of each first state.
+    /// Creates the environment with the probability of each first state.
     ///
     /// # Errors
     /// A first state out of range, or probabilities that do not sum to 1.
@@ -32,32 +32,33 @@ impl ModelEnvironment {
         Self {
             model,
             start: start.to_vec(),
-            any_termination_succeeds: false,
+            only_reward_succeeds: false,
             state,
         }
         .restore()
     }
 
-    /// Counts every termination as a success, for problems that end in success only but pay nothing
-    /// for it.
-    pub fn with_success_at_any_termination(self) -> Self {
+    /// Counts a termination as a success only if its reward is positive. By default every
+    /// termination is one.
+    #[must_use]
+    pub fn with_success_by_reward(self) -> Self {
         Self {
-            any_termination_succeeds: true,
+            only_reward_succeeds: true,
             ..self
         }
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The probability of each first state.
+    /// Returns the probability of each first state.
     pub fn start(&self) -> &[(State, f64)] {
         &self.start
     }
 
-    /// The present state.
+    /// Returns the present state.
     pub fn state(&self) -> State {
         self.state
     }
@@ -90,7 +91,7 @@ impl Environment for ModelEnvironment {
     }
 
     /// # Panics
-    /// As a slice does if the action is out of range.
+    /// If the action is out of range.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error> {
         let outcomes = self.model.outcomes(self.state, action);
         let step = match draw(
@@ -110,19 +111,20 @@ impl Environment for ModelEnvironment {
         Ok(step)
     }
 
-    /// False outside the model.
+    /// Returns `false` outside the model.
     fn allows(&self, state: State, action: Action) -> bool {
         let inside = state.0 < self.model.states() && action.0 < self.model.actions();
         inside && !self.model.outcomes(state, action).is_empty()
     }
 
-    fn succeeded(&self, last: &Step) -> bool {
-        last.status == Status::Terminated && (self.any_termination_succeeds || last.reward > 0.0)
+    fn succeeded(&self, last: &Step) -> Option<bool> {
+        let paid = last.reward > 0.0 || !self.only_reward_succeeds;
+        Some(last.status == Status::Terminated && paid)
     }
 }
 
-/// One of several things by their probabilities, which sum to 1; the last one if rounding leaves a
-/// crumb. A single thing takes nothing from the generator.
+/// Draws one of several choices by their probabilities, which sum to 1; the last one if rounding
+/// leaves a crumb. A single choice takes nothing from the generator.
 fn draw<T: Copy>(choices: impl ExactSizeIterator<Item = (T, f64)>, rng: &mut dyn Rng) -> Option<T> {
     let mut rest = if choices.len() > 1 { rng.random() } else { 0.0 };
     let mut drawn = None;

@@ -29,15 +29,13 @@ validated! {
 
 impl Boltzmann {
     /// Lowest temperature allowed.
-    pub const COLDEST: f64 = 1e-6;
-    /// Highest temperature allowed.
-    pub const HOTTEST: f64 = 1e6;
+    pub(crate) const COLDEST: f64 = 1e-6;
 
     /// Creates the policy with a schedule of the temperature over its choices, or over episodes, in
     /// units of the values.
     ///
     /// # Errors
-    /// [`Error::ScheduleRange`] if the temperature leaves `1e-6..=1e6`.
+    /// [`Error::ScheduleRange`] if the temperature falls below 1e-6.
     pub fn new(temperature: Schedule) -> Result<Self, Error> {
         Self {
             temperature,
@@ -60,9 +58,9 @@ impl Boltzmann {
     }
 
     fn restore(self) -> Result<Self, Error> {
-        let (low, high) = (Self::COLDEST, Self::HOTTEST);
+        let (low, high) = (Self::COLDEST, f64::MAX);
         self.temperature
-            .check("the temperature", low, high, "in 1e-6..=1e6")?;
+            .check("the temperature", low, high, "at least 1e-6")?;
         Ok(self)
     }
 }

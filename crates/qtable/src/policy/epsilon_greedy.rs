@@ -11,8 +11,8 @@ use crate::validated::validated;
 
 validated! {
     /// The policy that takes a random offered action with probability ε and the best one otherwise.
-    /// Of several best ones it takes the lowest index, unless
-    /// [`with_ties`](EpsilonGreedy::with_ties) says otherwise.
+    /// Of several best ones it draws one, unless [`with_ties`](EpsilonGreedy::with_ties) says
+    /// otherwise.
     #[derive(Clone, Debug, PartialEq)]
     pub struct EpsilonGreedy {
         epsilon: Schedule,
@@ -70,10 +70,8 @@ impl Policy for EpsilonGreedy {
             return Action(rng.random_range(0..table.actions()));
         };
         let offered = mask.row(state).iter().filter(|&&offered| offered).count();
-        table
-            .offered(state)
-            .nth(rng.random_range(0..offered))
-            .unwrap_or(lowest)
+        let drawn = rng.random_range(0..offered.max(1));
+        table.offered(state).nth(drawn).unwrap_or(lowest)
     }
 
     fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {

@@ -63,11 +63,12 @@ impl Policy for Greedy {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Ties {
-    /// The action with the lowest index.
-    #[default]
-    Lowest,
     /// Each with the same probability.
+    #[default]
     Random,
+    /// The action with the lowest index. A table of equal values then leads to one and the same
+    /// action again and again: FrozenLake is not learned from a table of zeros at ε = 0.1.
+    Lowest,
 }
 
 impl Ties {

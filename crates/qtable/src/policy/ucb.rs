@@ -14,8 +14,8 @@ validated! {
     /// `Q(s,a) + c sqrt(ln N(s) / N(s,a))` (Auer, Cesa-Bianchi and Fischer 2002, state by state),
     /// where N counts the table's visits. Actions never tried come first.
     ///
-    /// Of several best ones it takes the lowest index, unless [`with_ties`](Ucb::with_ties) says
-    /// otherwise; with [`Ties::Random`] the actions never tried come in random order.
+    /// Of several best ones it draws one, so that actions never tried come in random order, unless
+    /// [`with_ties`](Ucb::with_ties) says otherwise.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Ucb {
         width: f64,

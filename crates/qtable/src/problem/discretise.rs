@@ -241,9 +241,9 @@ impl Product {
     }
 
     fn restore(mut self) -> Result<Self, Error> {
-        let bins = self.quantities.iter().map(Intervals::bins);
+        let mut bins = self.quantities.iter().map(Intervals::bins);
         self.states = bins
-            .fold(Some(1usize), |states, bins| states?.checked_mul(bins))
+            .try_fold(1usize, usize::checked_mul)
             .ok_or(Error::TooLarge {
                 states: usize::MAX,
                 actions: 1,

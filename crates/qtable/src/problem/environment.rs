@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use crate::error::Error;
-use crate::step::{Action, State, Status, Step};
+use crate::step::{Action, State, Step};
 
 /// A problem with finitely many states and actions.
 ///
@@ -60,17 +60,18 @@ pub trait Environment {
     /// A failure of the environment. Training gives the episode up and keeps what it has learned.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error>;
 
-    /// Returns `true` if a state offers an action (the action mask). Every state must offer at
-    /// least one, and the answer must not change. By default all actions are offered.
+    /// Returns `true` if a state offers an action (the action mask). The answer must not change, and
+    /// a state without any action must end the episode. By default all actions are offered.
     fn allows(&self, state: State, action: Action) -> bool {
         let _ = (state, action);
         true
     }
 
-    /// Returns `true` if an episode that ended with this step was a success, for reports only. By
-    /// default a success is a termination with a positive reward.
-    fn succeeded(&self, last: &Step) -> bool {
-        last.status == Status::Terminated && last.reward > 0.0
+    /// Returns whether an episode that ended with this step was a success, for reports only. By
+    /// default `None`: the environment does not tell.
+    fn succeeded(&self, last: &Step) -> Option<bool> {
+        let _ = last;
+        None
     }
 }
 
@@ -98,7 +99,7 @@ macro_rules! forwarded {
                 (**self).allows(state, action)
             }
 
-            fn succeeded(&self, last: &Step) -> bool {
+            fn succeeded(&self, last: &Step) -> Option<bool> {
                 (**self).succeeded(last)
             }
         }

@@ -66,7 +66,7 @@ impl<E: Environment> Environment for TimeLimit<E> {
         self.inner.allows(state, action)
     }
 
-    fn succeeded(&self, last: &Step) -> bool {
+    fn succeeded(&self, last: &Step) -> Option<bool> {
         self.inner.succeeded(last)
     }
 }

@@ -7,7 +7,7 @@ use crate::validated::validated;
 
 validated! {
     /// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by
-    /// `actions` truth values with at least one `true` in every row.
+    /// `actions` truth values. A state without any action is a terminal one.
     ///
     /// A [`QTable`](crate::QTable) with a mask never reports a forbidden action as its best, and no
     /// policy chooses one.
@@ -22,7 +22,7 @@ impl ActionMask {
     /// Creates a mask by asking `allows` for every pair.
     ///
     /// # Errors
-    /// An empty shape, one that does not fit into memory, or a state without any action.
+    /// An empty shape, or one that does not fit into memory.
     pub fn new(
         states: usize,
         actions: usize,
@@ -77,19 +77,14 @@ impl ActionMask {
     fn restore(self) -> Result<Self, Error> {
         let states = self.allowed.len() / self.actions.max(1);
         let needed = checked_entries(states, self.actions)?;
-        if needed != self.allowed.len() {
-            return Err(Error::WrongLength {
-                what: "the mask",
-                needed,
-                found: self.allowed.len(),
-            });
+        if needed == self.allowed.len() {
+            return Ok(self);
         }
-        match (0..states).find(|&state| !self.row(State(state)).contains(&true)) {
-            Some(state) => Err(Error::NoActionAllowed {
-                state: State(state),
-            }),
-            None => Ok(self),
-        }
+        Err(Error::WrongLength {
+            what: "the mask",
+            needed,
+            found: self.allowed.len(),
+        })
     }
 }
 

@@ -12,7 +12,7 @@ pub const FROZEN_LAKE_8X8: [&str; 8] = [
     "SFFFFFFF", "FFFFFFFF", "FFFHFFFF", "FFFFFHFF", "FFFHFFFF", "FHHFFFHF", "FHFFHFHF", "FFFHFFFG",
 ];
 
-/// FrozenLake-v1: cross the ice from `S` to `G` without falling into a hole.
+/// Creates FrozenLake-v1: cross the ice from `S` to `G` without falling into a hole.
 ///
 /// States are `row * columns + column`. Actions: 0 left, 1 down, 2 right, 3 up; a move off the map
 /// stays. On slippery ice the move goes the way asked for or to either side of it, each with
@@ -85,9 +85,10 @@ pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Err
             .map(|&state| (state, share))
             .collect::<Vec<_>>(),
     )
+    .map(ModelEnvironment::with_success_by_reward)
 }
 
-/// CliffWalking-v1: from the lower left to the lower right corner of a 4x12 grid, along a cliff.
+/// Creates CliffWalking-v1: walk from the lower left to the lower right corner of a 4x12 grid, along a cliff.
 ///
 /// States are `row * 12 + column`; the start is 36, the goal 47, the cliff 37 to 46. Actions: 0 up,
 /// 1 right, 2 down, 3 left; a move off the grid stays. Every move pays -1, one into the cliff -100
@@ -115,10 +116,10 @@ pub fn cliff_walking() -> Result<ModelEnvironment, Error> {
             _ => Outcome::certain(direction, -1.0, direction == GOAL),
         }]
     })?;
-    Ok(ModelEnvironment::new(model, &[(START, 1.0)])?.with_success_at_any_termination())
+    ModelEnvironment::new(model, &[(START, 1.0)])
 }
 
-/// A row of `length` cells. Action 0 goes left (at the left end it stays), action 1 right; the
+/// Creates a row of `length` cells. Action 0 goes left (at the left end it stays), action 1 right; the
 /// right end pays 1 and ends the episode. From the left end on.
 ///
 /// The optimum is `V*(s) = γ^(length - 2 - s)` for every cell but the last.
@@ -151,7 +152,7 @@ enum Direction {
 }
 
 impl Direction {
-    /// The cell one step away, or the same cell at the border of the grid.
+    /// Returns the cell one step away, or the same cell at the border of the grid.
     fn from(self, state: State, rows: usize, columns: usize) -> State {
         let (row, column) = (state.0 / columns, state.0 % columns);
         let (row, column) = match self {

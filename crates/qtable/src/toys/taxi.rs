@@ -5,12 +5,12 @@ use crate::model::{Model, ModelEnvironment, Outcome};
 use crate::step::{Action, State};
 
 /// Row and column of the four stands: 0 red, 1 green, 2 yellow, 3 blue.
-pub const TAXI_STANDS: [(usize, usize); 4] = [(0, 0), (0, 4), (4, 0), (4, 3)];
+const TAXI_STANDS: [(usize, usize); 4] = [(0, 0), (0, 4), (4, 0), (4, 3)];
 
 /// The passenger's place while in the taxi.
 const IN_TAXI: usize = 4;
 
-/// Whether there is no wall between a column and the next one to the east, for each row.
+/// For each row, `true` if no wall stands between a column and the next one to the east.
 const OPEN_TO_THE_EAST: [[bool; 4]; 5] = [
     [true, false, true, true],
     [true, false, true, true],
@@ -19,10 +19,11 @@ const OPEN_TO_THE_EAST: [[bool; 4]; 5] = [
     [false, true, false, true],
 ];
 
-/// Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with
+/// Creates Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with
 /// walls.
 ///
-/// States are numbered by [`taxi_state`]. Actions: 0 south, 1 north, 2 east, 3 west, 4 pick up, 5
+/// States are `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at stand 0
+/// to 3 (red, green, yellow, blue), or 4 for in the taxi. Actions: 0 south, 1 north, 2 east, 3 west, 4 pick up, 5
 /// drop off; a move into a wall stays. Every action pays -1, an impossible pick-up or drop-off -10,
 /// the drop-off at the destination 20 and ends the episode. A drop-off at another stand leaves the
 /// passenger there. The 300 first states, with the passenger at a stand other than the destination,
@@ -46,9 +47,8 @@ pub fn taxi() -> Result<ModelEnvironment, Error> {
     ModelEnvironment::new(model, &start)
 }
 
-/// The state `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at stand 0
-/// to 3, or 4 for in the taxi.
-pub fn taxi_state(row: usize, column: usize, passenger: usize, destination: usize) -> State {
+/// Returns the number of a state.
+fn taxi_state(row: usize, column: usize, passenger: usize, destination: usize) -> State {
     State(((row * 5 + column) * 5 + passenger) * 4 + destination)
 }
 

@@ -14,11 +14,15 @@ use crate::training::course::Actor;
 use crate::training::curve::Record;
 use crate::training::driver::{Training, Until, check_fit};
 
+/// Actions below which the plain policy is faster than cached weights.
+const FEW: usize = 8;
+
 impl Training<QLearning, Boltzmann> {
     /// Trains like [`run_with`](Training::run_with), several times faster: α and the temperature
     /// stand still within each of `blocks` equal parts from one record to the next, and the actions
     /// are drawn from a [`CachedBoltzmann`].
     ///
+    /// Below 8 actions the plain policy is the faster one, and this is [`run_with`](Training::run_with).
     /// With 256 to 1024 blocks in a run nothing of the course of the schedules is lost. (An α by
     /// visits changes at every visit all the same.) Values are kept as `f32` while it runs and
     /// written back before `on_record` is called and at the end, also after an error. The result is
@@ -39,6 +43,9 @@ impl Training<QLearning, Boltzmann> {
         mut on_record: impl FnMut(&Record, &mut Self) -> ControlFlow<()>,
     ) -> Result<bool, Error> {
         positive("blocks", blocks)?;
+        if self.table.actions() < FEW {
+            return self.run_with(environment, until, rng, on_record);
+        }
         check_fit(environment, &self.table)?;
         if self.has_reached(until) {
             return Ok(false);

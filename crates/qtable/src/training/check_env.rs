@@ -7,6 +7,7 @@ use crate::error::{Error, check_reward, positive};
 use crate::problem::Environment;
 use crate::step::{Action, Status, Step};
 use crate::table::{ActionMask, QTable};
+use crate::training::driver::check_choice;
 
 /// The steps, endings and states that [`check_env`] has met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,6 +120,7 @@ fn play<E: Environment + ?Sized>(
         },
     )];
     for taken in 0..limit as usize {
+        check_choice(table, state)?;
         let offered: Vec<Action> = table.offered(state).collect();
         let action = given
             .get(taken)

@@ -12,8 +12,8 @@ pub struct Record {
     pub actions: u64,
     /// Episodes ended so far.
     pub episodes: u64,
-    /// Fraction of the episodes that ended in success, `0..=1`
-    /// ([`Environment::succeeded`](crate::Environment::succeeded)).
+    /// Fraction of the episodes that ended in success, `0..=1`; `None` if the environment does not
+    /// tell ([`Environment::succeeded`](crate::Environment::succeeded)).
     pub success_share: Option<f64>,
     /// Mean reward of an action.
     pub mean_reward: Option<f64>,
@@ -34,6 +34,8 @@ pub(crate) struct Tally {
     td_error: f64,
     episodes: u64,
     successes: u64,
+    /// Episodes of which the environment told whether they succeeded.
+    judged: u64,
     episode_steps: u64,
     episode_returns: f64,
 }
@@ -49,11 +51,14 @@ impl Tally {
         self.td_error += td_error.abs();
     }
 
-    pub(crate) fn add_episode(&mut self, steps: u64, sum: f64, success: bool) {
+    pub(crate) fn add_episode(&mut self, steps: u64, sum: f64, success: Option<bool>) {
         self.episodes = self.episodes.saturating_add(1);
         self.episode_steps = self.episode_steps.saturating_add(steps);
         self.episode_returns += sum;
-        self.successes = self.successes.saturating_add(u64::from(success));
+        self.successes = self
+            .successes
+            .saturating_add(u64::from(success == Some(true)));
+        self.judged = self.judged.saturating_add(u64::from(success.is_some()));
     }
 
     /// Returns the record of what was added, at the totals given.
@@ -62,7 +67,7 @@ impl Tally {
         Record {
             actions,
             episodes,
-            success_share: mean(self.successes as f64, self.episodes),
+            success_share: mean(self.successes as f64, self.judged),
             mean_reward: mean(self.reward, self.actions),
             mean_return: mean(self.episode_returns, self.episodes),
             mean_steps: mean(self.episode_steps as f64, self.episodes),

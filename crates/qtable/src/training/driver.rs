@@ -74,8 +74,7 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// a record is made every 1000 actions.
     ///
     /// # Errors
-    /// [`Error::ShapeMismatch`] if table and environment differ, or a mask that leaves a state
-    /// without action.
+    /// [`Error::ShapeMismatch`] if table and environment differ.
     pub fn new<E: Environment + ?Sized>(
         environment: &E,
         mut table: QTable,
@@ -272,6 +271,16 @@ pub(super) fn check_fit<E: Environment + ?Sized>(
     table.check_shape("the environment", states, actions)
 }
 
+/// Refuses a state outside the table, or one without an action to choose.
+#[inline(always)]
+pub(super) fn check_choice(table: &QTable, state: State) -> Result<(), Error> {
+    table.check_state(state)?;
+    if table.equals(state) > 0 {
+        return Ok(());
+    }
+    Err(Error::NoActionAllowed { state })
+}
+
 /// A policy that acts on a table, and a learner that improves it.
 struct Pair<'a, L, P> {
     table: &'a mut QTable,
@@ -292,10 +301,12 @@ impl<L: Learner, P: Policy> Actor for Pair<'_, L, P> {
         before: Option<Action>,
         rng: &mut dyn Rng,
     ) -> Result<Action, Error> {
-        self.table.check_state(state)?;
         let action = match before {
             Some(action) => action,
-            None => self.policy.choose(self.table, state, rng),
+            None => {
+                check_choice(self.table, state)?;
+                self.policy.choose(self.table, state, rng)
+            }
         };
         self.table.check(state, action).map(|()| action)
     }

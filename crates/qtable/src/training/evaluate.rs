@@ -9,7 +9,7 @@ use crate::policy::Policy;
 use crate::problem::Environment;
 use crate::step::Status;
 use crate::table::{ActionMask, QTable};
-use crate::training::driver::check_fit;
+use crate::training::driver::{check_choice, check_fit};
 
 /// The results of a policy in a number of episodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +17,9 @@ use crate::training::driver::check_fit;
 pub struct Evaluation {
     /// Episodes played.
     pub episodes: u64,
-    /// Fraction of them that ended in success ([`Environment::succeeded`]), `0..=1`.
-    pub success_share: f64,
+    /// Fraction of them that ended in success, `0..=1`; `None` if the environment does not tell
+    /// ([`Environment::succeeded`]).
+    pub success_share: Option<f64>,
     /// Mean number of steps of an episode.
     pub mean_steps: f64,
     /// Mean number of steps of an episode that succeeded; `None` if none did.
@@ -41,7 +42,7 @@ pub struct Evaluation {
 ///     let optimum = lake.model().value_iteration(0.99, 1e-9)?.table;
 ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
 ///     let found = evaluate(&mut lake, &optimum, &mut Greedy, 2_000, 100, &mut rng)?;
-///     assert!((found.success_share - 0.74).abs() < 0.05);
+///     assert!((found.success_share.unwrap_or(0.0) - 0.74).abs() < 0.05);
 ///     Ok(())
 /// }
 /// ```
@@ -66,7 +67,7 @@ pub fn evaluate<E: Environment + ?Sized, P: Policy + ?Sized>(
         masked.insert(table.clone()).set_mask(mask)?;
     }
     let table = masked.as_ref().unwrap_or(table);
-    let (mut successes, mut steps_of_successes, mut all_steps) = (0, 0, 0);
+    let (mut successes, mut steps_of_successes, mut all_steps, mut told) = (0, 0, 0, false);
     // Mean and sum of squares about it, after Welford.
     let (mut mean, mut squares, mut total) = (0.0, 0.0, 0.0);
     for episode in 1..=episodes {
@@ -74,7 +75,7 @@ pub fn evaluate<E: Environment + ?Sized, P: Policy + ?Sized>(
         let mut state = environment.reset(rng)?;
         let mut sum = 0.0;
         for taken in 1..=limit {
-            table.check_state(state)?;
+            check_choice(table, state)?;
             let action = policy.choose(table, state, rng);
             table.check(state, action)?;
             let step = environment.step(action, rng)?;
@@ -83,7 +84,8 @@ pub fn evaluate<E: Environment + ?Sized, P: Policy + ?Sized>(
             sum += step.reward;
             state = step.observation;
             if step.status != Status::Continuing {
-                if environment.succeeded(&step) {
+                told |= environment.succeeded(&step).is_some();
+                if environment.succeeded(&step) == Some(true) {
                     successes += 1;
                     steps_of_successes += taken;
                 }
@@ -98,7 +100,7 @@ pub fn evaluate<E: Environment + ?Sized, P: Policy + ?Sized>(
     let count = episodes as f64;
     Ok(Evaluation {
         episodes,
-        success_share: successes as f64 / count,
+        success_share: told.then(|| successes as f64 / count),
         mean_steps: all_steps as f64 / count,
         mean_steps_to_success: (successes > 0)
             .then(|| steps_of_successes as f64 / successes as f64),

@@ -81,10 +81,7 @@ fn damaged_csv_is_refused_with_its_line() {
         read("0,0,NaN,0,1"),
         Err(Error::ValueNotFinite { .. })
     ));
-    assert!(matches!(
-        read("0,0,1,0,0"),
-        Err(Error::NoActionAllowed { .. })
-    ));
+    assert!(read("0,0,1,0,0").is_ok(), "a terminal state");
     assert!(matches!(read(""), Err(Error::EmptyShape { .. })));
     assert!(matches!(
         QTable::from_csv("0,0,1,1,1\n0,1,1,1,1"),

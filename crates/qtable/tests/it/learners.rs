@@ -3,7 +3,7 @@
 use qtable::{
     Action, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa, Experience,
     Greedy, Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping, QLambda, QLearning,
-    QTable, Sarsa, SarsaLambda, Schedule, State, Status, Step, Training, Until, toys,
+    QTable, Sarsa, SarsaLambda, Schedule, State, Status, Step, Ties, Training, Until, toys,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -103,7 +103,7 @@ fn every_learner_walks_along_the_cliff_in_13_steps() {
     for (name, learner) in learners(&zeros(&toy), &Schedule::constant(0.2).unwrap(), 0.99) {
         let epsilon =
             Schedule::piecewise(&[(0, 0.5), (actions / 2, 0.05), (actions * 3 / 4, 0.0)]).unwrap();
-        let policy = Box::new(EpsilonGreedy::new(epsilon).unwrap());
+        let policy = Box::new(EpsilonGreedy::new(epsilon).unwrap().with_ties(Ties::Lowest));
         let table = learned(&toy, learner, policy, actions, 5);
         let found = toy.assess(&table.greedy(), 0.99, 200).unwrap();
         assert!((found.success - 1.0).abs() < 1e-12, "{name}: {found:?}");
@@ -386,12 +386,11 @@ fn settings_out_of_range_are_refused() {
     assert!(
         PrioritizedSweeping::new(&table, 0.9)
             .unwrap()
-            .with_threshold(0.0)
+            .with_threshold(-1.0)
             .is_err()
     );
     assert!(EpsilonGreedy::new(above).is_err());
     assert!(Boltzmann::new(Schedule::constant(1e-7).unwrap()).is_err());
-    assert!(Boltzmann::new(Schedule::linear(1e7, 1.0, 5).unwrap()).is_err());
 }
 
 /// Two steps along three states, by hand.

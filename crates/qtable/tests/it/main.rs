@@ -14,6 +14,7 @@ mod learners;
 mod optimum;
 #[cfg(feature = "files")]
 mod persistence;
+mod regression;
 #[cfg(feature = "files")]
 mod resume;
 mod support;

@@ -13,7 +13,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::support::{Settings, constant, forged};
+use crate::support::{Settings, constant, corridor, forged};
 
 type World = TimeLimit<ModelEnvironment>;
 
@@ -101,9 +101,10 @@ fn a_run_in_blocks_goes_on_as_if_it_had_not_stopped() {
             record_every: 81,
             ..Settings::new(1_000)
         };
-        let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
-        let mut lake = TimeLimit::new(lake, 30).unwrap();
-        let mut whole = settings.begin(&lake, begun()).unwrap();
+        let mut lake = TimeLimit::new(corridor(), 30).unwrap();
+        let mut whole = settings
+            .begin(&lake, QTable::filled(16, 8, 0.3).unwrap())
+            .unwrap();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(42);
         let mut bytes = encode("run", &(&whole, &lake, &rng)).unwrap();
         let go_on =
@@ -192,7 +193,7 @@ fn damaged_parts_of_a_run_are_refused() {
     assert!(!intervals(vec![2.0, 1.0], None) && !intervals(vec![1.0], Some(2)));
     let mask = |allowed: Vec<bool>| forged::<ActionMask>("ActionMask", (2u64, allowed)).is_ok();
     assert!(mask(vec![true, false, false, true]));
-    assert!(!mask(vec![true, false, false, false]) && !mask(vec![true; 3]));
+    assert!(!mask(vec![true; 3]));
 }
 
 /// A run of SARSA on three cells with the given counters, in which state 0 is next and an action
@@ -203,7 +204,7 @@ fn forged_run(chosen: u64, count: u64) -> Training<Sarsa, EpsilonGreedy> {
     let learner = (half, 0.9, clock);
     let policy = (half, 0u32, clock);
     let running = Some((0u64, Some(chosen), count, 0.0));
-    let tally = (count, 0.0, 0.0, count, count, count, 0.0);
+    let tally = (count, 0.0, 0.0, count, count, count, count, 0.0);
     let counts = (u64::MAX, 1u64, count, count.saturating_sub(1));
     let parts = (
         table,

@@ -1,8 +1,8 @@
 //! An environment that answers as a test wants, and runs with settings of one's own.
 
 use qtable::{
-    Action, Boltzmann, Environment, Error, QLearning, QTable, Schedule, State, Status, Step,
-    Training, Until,
+    Action, Boltzmann, Environment, Error, Model, ModelEnvironment, Outcome, QLearning, QTable,
+    Schedule, State, Status, Step, Training, Until,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
@@ -35,6 +35,9 @@ impl<F: FnMut(u64) -> Step> Environment for Odd<F> {
         self.steps += 1;
         Ok((self.answer)(self.steps))
     }
+    fn succeeded(&self, last: &Step) -> Option<bool> {
+        Some(last.status == Status::Terminated)
+    }
 }
 
 pub(crate) fn odd(answer: impl FnMut(u64) -> Step) -> Odd<impl FnMut(u64) -> Step> {
@@ -47,6 +50,23 @@ pub(crate) fn step(observation: usize, reward: f64, status: Status) -> Step {
         reward,
         status,
     }
+}
+
+/// 16 cells in a row and 8 actions that go 3 cells back to 4 ahead, or now and then nowhere; the last
+/// cell ends the episode.
+pub(crate) fn corridor() -> ModelEnvironment {
+    let model = Model::new(16, 8, |State(cell), Action(action)| {
+        let next = (cell + action).saturating_sub(3).min(15);
+        let outcome = |next: usize, probability| Outcome {
+            probability,
+            ..Outcome::certain(State(next), f64::from(u8::from(next == 15)), next == 15)
+        };
+        match cell {
+            15 => vec![],
+            _ => vec![outcome(next, 0.8), outcome(cell, 0.2)],
+        }
+    });
+    ModelEnvironment::new(model.unwrap(), &[(State(0), 1.0)]).unwrap()
 }
 
 /// Settings of Q-learning with a Boltzmann policy.

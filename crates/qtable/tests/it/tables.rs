@@ -212,14 +212,18 @@ fn every_policy_chooses_as_often_as_it_says() {
     }
     let policies: Vec<Box<dyn Policy>> = vec![
         Box::new(Greedy),
-        Box::new(EpsilonGreedy::new(constant(0.4)).unwrap()),
+        Box::new(
+            EpsilonGreedy::new(constant(0.4))
+                .unwrap()
+                .with_ties(Ties::Lowest),
+        ),
         Box::new(
             EpsilonGreedy::new(constant(0.4))
                 .unwrap()
                 .with_ties(Ties::Random),
         ),
         Box::new(Boltzmann::new(constant(1.5)).unwrap()),
-        Box::new(Ucb::new(1.0).unwrap()),
+        Box::new(Ucb::new(1.0).unwrap().with_ties(Ties::Lowest)),
         Box::new(Ucb::new(1.0).unwrap().with_ties(Ties::Random)),
     ];
     for (index, mut policy) in policies.into_iter().enumerate() {
@@ -282,7 +286,7 @@ fn boltzmann_has_the_probabilities_of_equation_4() {
 #[test]
 fn ucb_tries_everything_once_and_then_by_its_bound() {
     let mut table = row(&[0.0, 5.0, 0.0]);
-    let mut ucb = Ucb::new(2.0).unwrap();
+    let mut ucb = Ucb::new(2.0).unwrap().with_ties(Ties::Lowest);
     for expected in [0, 1, 2] {
         let action = ucb.choose(&table, State(0), &mut rng(0));
         assert_eq!(action, Action(expected));
