@@ -20,8 +20,8 @@ const SCENES: [&str; 3] = ["1 ball", "+20 distractors", "192x144, 1 ball"];
 /// The standard transform takes minutes under callgrind on a large frame.
 const SMALL_ONLY: &str = "SHT";
 const EDGES: &str = "edges";
-/// The a contrario detector, which finds edges of its own: all of its work is counted, with its default
-/// settings.
+/// The a contrario detector, which finds edges of its own: all of its work is counted, with its
+/// default settings.
 const A_CONTRARIO: &str = "a contrario, edges included";
 
 fn main() -> ExitCode {

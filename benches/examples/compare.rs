@@ -19,21 +19,21 @@ use plotters::prelude::*;
 /// Compares the circle detectors on rendered scenes.
 #[derive(Parser)]
 struct Options {
-    /// How many frames per scene.
+    /// Frames per scene.
     #[arg(long, default_value_t = 20)]
     seeds: u64,
     /// The standard Hough transform takes about a second per frame, so it gets fewer.
     #[arg(long, default_value_t = 5)]
     slow_seeds: u64,
-    /// Where to write the table.
+    /// File for the table.
     #[arg(long)]
     csv: Option<PathBuf>,
-    /// Where to draw the times.
+    /// File for the diagram of the times.
     #[arg(long)]
     svg: Option<PathBuf>,
 }
 
-/// What a detector did on the frames of a scene.
+/// Result of a detector on the frames of a scene.
 struct Row {
     scene: &'static str,
     detector: &'static str,
@@ -49,8 +49,8 @@ struct Row {
     memory: usize,
 }
 
-const HEADER: &str = "scene,detector,frames,mean_edge_pixels,search_cpu_ms_median,search_cpu_ms_max,truths,found,matched_2px,\
-recall,precision,centre_error_px_median,memory_bytes";
+const HEADER: &str = "scene,detector,frames,mean_edge_pixels,search_cpu_ms_median,\
+search_cpu_ms_max,truths,found,matched_2px,recall,precision,centre_error_px_median,memory_bytes";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse();

@@ -1,7 +1,9 @@
 //! Writes the edge images of a folder of frames, and the CPU time of every frame as CSV.
 //!
-//! cargo run --release -p circle-benches --features imageproc --example edges -- frames/ --edges edges/ --times
-//! times.csv
+//! ```text
+//! cargo run --release -p circle-benches --features imageproc --example edges -- \
+//!     frames/ --edges edges/ --times times.csv
+//! ```
 
 #![allow(
     clippy::print_stdout,
@@ -31,7 +33,7 @@ struct Options {
     /// Folder, which must exist, to write the edge images to.
     #[arg(long)]
     edges: Option<PathBuf>,
-    /// Where to write file,cpu_us,low,high: the least CPU time of the repetitions, and the
+    /// File for file,cpu_us,low,high: the least CPU time of the repetitions, and the
     /// thresholds of the frame.
     #[arg(long)]
     times: Option<PathBuf>,
@@ -43,7 +45,7 @@ struct Options {
     /// Upper threshold of the gradient.
     #[arg(long, default_value_t = 70.0)]
     high: f32,
-    /// How far the frame's noise raises the thresholds; 0 keeps them.
+    /// Factor by which the frame's noise raises the thresholds; 0 keeps them.
     #[arg(long, default_value_t = 5.0)]
     noise_factor: f32,
 }

@@ -2,7 +2,8 @@
 //! what kind each is of.
 //!
 //! ```text
-//! cargo run --release -p circle-benches --example scenes -- --out out/scenes --frames 20 --seed 1 --size 768x576
+//! cargo run --release -p circle-benches --example scenes -- \
+//!     --out out/scenes --frames 20 --seed 1 --size 768x576
 //! ```
 //!
 //! writes `out/scenes/KIND_NNN.png`, `truth.csv` (file,cx,cy,r; (0, 0) is the centre of the

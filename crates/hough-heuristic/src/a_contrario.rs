@@ -1,4 +1,4 @@
-//! The detector whose score can be trusted.
+//! The a contrario detector.
 
 mod arcs;
 mod budget;
@@ -9,6 +9,8 @@ mod fit;
 mod halve;
 mod level;
 mod measure;
+mod measurement;
+mod partners;
 mod polar;
 mod proof;
 mod prover;
@@ -21,6 +23,7 @@ mod twins;
 use image::GrayImage;
 
 pub use config::AContrarioConfig;
+pub use measurement::{Effort, Measurement};
 
 use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
@@ -36,36 +39,41 @@ use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
 use search::{Outline, Search};
 
-/// Finds an unknown number of circles, and says of each how sure it is and how exact.
+/// An *a contrario* detector: finds an unknown number of circles, each with the number of false
+/// alarms that bounds its chance origin, and with the standard errors of its measurement.
 ///
-/// It keeps the paper's idea: draw edge points, solve for the circle, look at the image itself; no
-/// accumulator. What is drawn are *pairs* on one row or column whose gradients mirror one another,
-/// at a half, a quarter and further halves of the frame, the smallest first; where no circle
-/// explains an edge, it is followed for a few pixels, and the *arc* has a circle too. A circle
+/// **A contrario.** A detection is accepted for being unlikely under a model of chance, not for
+/// passing a threshold tuned to a scene. The *number of false alarms* (NFA) of a circle is the
+/// expected number of circles at least as good in a frame of pure chance (Desolneux, Moisan and
+/// Morel, 2000; for circles Akinlar and Topal, 2013). Small is good.
+///
+/// **Search.** The paper's idea stays: draw edge points, solve for the circle, check the image
+/// itself, keep no accumulator. The draws are *pairs* of points on one row or column whose gradients
+/// mirror one another, on the frame halved several times, smallest size first. An edge that no
+/// circle explains is followed for a few pixels, and the circle of that *arc* is tried too. A circle
 /// whose outline runs along edges is fitted and becomes a candidate.
 ///
-/// **Proof.** A candidate is looked at where its radius is 12 to 24 px (smaller ones at the full
-/// size; in noise from 4.5 px on), at twice that size if the frame has it (in noise also at four
-/// times) and, in doubt, at half of it; what says most counts. On 64 rays across its outline the
-/// strongest edge that runs along it is sought within a third of the radius (3 to 8 px) on either
-/// side. If there were no circle, that edge would lie anywhere: within a tolerance of a quarter or
-/// half a pixel (in noise up to 1.2 px) by a known chance, be the picture as textured as it may.
-/// The number of false alarms is the number of circles that differ noticeably in the frame, times
-/// the probability that chance alone puts so many of the edges on the outline (Hoeffding's bound of
-/// the binomial tail, over samples that do not overlap; a ray without any edge counts as a quarter
-/// of a sample), and a thousand times as much if more than a tenth of the circle lies outside of
-/// the frame. The score is `c / (c + 1)` with `c` minus its decimal logarithm, 0 where that is
-/// negative: 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in
-/// 100, 0.8 for one in
-/// 10000. The bound is far from tight: of 500 rendered frames without a circle, half of them noisy,
-///        3 gave one with a score of 0.5 or more. Chance is not all there is: wheels, holes,
-///        fingertips and letters are round, and score high. Lamps do not: an edge whose bright side
-///        is as bright as can be counts for nothing where the light falls off around it, for it is
-///        where the exposure ends.
+/// **Proof.** A candidate is examined at the size where its radius is 12 to 24 px (smaller ones at
+/// the full size; in noise from 4.5 px on), at twice that size if there is one (in noise also at
+/// four times) and, in doubt, at half of it; the best result counts. On each of 64 rays across the
+/// outline, the strongest edge along it is sought within a third of the radius (3 to 8 px) on either
+/// side. Under the model of chance that edge lies anywhere in the window, so it lies within the
+/// tolerance (a quarter or half a pixel, in noise up to 1.2 px) with a known probability, however
+/// textured the picture. The NFA is the number of distinguishable circles in the frame times
+/// Hoeffding's bound on the probability of so many edges on the outline. Samples that overlap count
+/// in part, a ray without any edge counts a quarter, and a circle of which more than a tenth lies
+/// outside the frame has a thousandfold NFA.
 ///
-/// **Measurement.** The circle is then followed down to the full size (in strong noise to half of
-/// it) and fitted there, weighted by the slope; the inward bias that blur gives a ball that darkens
-/// towards its limb is taken out.
+/// **Score.** `c / (c + 1)`, where `c` is minus the decimal logarithm of the NFA, or 0 if that is
+/// negative. 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in
+/// 100, 0.8 for one in 10,000. The bound is loose: 3 of 500 rendered frames without a circle, half
+/// of them noisy, gave one with a score of 0.5 or more. Real frames contain more than chance:
+/// wheels, holes, fingertips and letters are round and score high. Lamps do not: an edge with an
+/// overexposed bright side does not count if the light falls off around it.
+///
+/// **Measurement.** The circle is followed down to the full size (in strong noise to half of it) and
+/// fitted there, weighted by the slope. The inward bias that blur gives a ball that darkens towards
+/// its limb is removed.
 ///
 /// ```
 /// use hough_heuristic::image::{GrayImage, Luma};
@@ -88,9 +96,9 @@ pub struct AContrario {
     outline: Outline,
     /// Of the coarser sizes, one after the other, and of the finest.
     edges: [Edges; 2],
-    /// As many as a frame needed so far.
+    /// Halved frames, as many as any frame needed so far.
     sizes: Vec<Size>,
-    /// How many of them belong to the last frame.
+    /// Number of them that belong to the last frame.
     depth: usize,
     collected: Collected,
     polar: Polar,
@@ -98,45 +106,12 @@ pub struct AContrario {
     measurements: Vec<Measurement>,
     found: Vec<Detection>,
     budget: Budget,
-    /// What [`AContrario::track`] looks at.
+    /// The part of the frame that [`AContrario::track`] searches.
     window: GrayImage,
 }
 
-/// All that is known of a circle found by [`AContrario`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Measurement {
-    /// The circle, in pixels of the frame.
-    pub circle: Circle,
-    /// The score of its [`Detection`], 0..=1.
-    pub score: f64,
-    /// Decimal logarithm of the number of false alarms.
-    pub log_false_alarms: f64,
-    /// Standard error of the centre along x and along y, pixels.
-    pub centre_error: f64,
-    /// Standard error of the radius, pixels.
-    pub radius_error: f64,
-    /// Shortest by longest diameter of the outline, 0..=1.
-    pub axis_ratio: f64,
-    /// Share of the outline that lies in the frame, 0..=1.
-    pub visible: f64,
-    /// Share of that on which the strongest edge nearby is the outline, 0..=1.
-    pub covered: f64,
-}
-
-/// What the last frame took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Effort {
-    /// Pairs drawn.
-    pub draws: u64,
-    /// Places looked at: about what the time is proportional to, apart from finding the edges.
-    pub looks: u64,
-    /// Whether the budget ended the search, so that there may be more circles.
-    pub ended_by_budget: bool,
-}
-
 impl AContrario {
-    /// A detector with these settings.
+    /// Builds a detector with these settings.
     ///
     /// # Errors
     /// The first parameter outside its range.
@@ -160,12 +135,12 @@ impl AContrario {
         })
     }
 
-    /// What is known of the circles found last, in the order of the detections.
+    /// Returns the measurements of the circles found last, in the order of the detections.
     pub fn measurements(&self) -> &[Measurement] {
         &self.measurements
     }
 
-    /// What the last frame took.
+    /// Returns the work that the last frame took.
     pub fn effort(&self) -> Effort {
         Effort {
             draws: self.budget.draws,
@@ -216,13 +191,13 @@ impl AContrario {
             .resize(depth.max(self.sizes.len()), Size::default());
         for index in 0..depth {
             let (before, rest) = self.sizes.split_at_mut(index);
-            let (grey, width) = before
+            let (gray, width) = before
                 .last()
                 .map_or((frame.as_raw(), frame.width() as usize), |size| {
-                    (&size.grey, size.width)
+                    (&size.gray, size.width)
                 });
             let size = &mut rest[0];
-            (size.width, size.height) = halve::halve(grey, width, &mut size.grey);
+            (size.width, size.height) = halve::halve(gray, width, &mut size.gray);
         }
     }
 
@@ -244,17 +219,17 @@ impl AContrario {
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
         let contrast = self.config.contrast as f32;
         let edges_of = |depth: usize, Edges { maxima, level }: &mut Edges| {
-            let grey = pyramid.grey(depth);
-            let pixels = grey.width * grey.height;
+            let gray = pyramid.gray(depth);
+            let pixels = gray.width * gray.height;
             let noise = noise / (1 << depth) as f32 + ROUNDING;
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
             let points = maxima.find(
-                grey.pixels,
-                grey.width,
+                gray.pixels,
+                gray.width,
                 threshold,
                 pixels / PIXELS_PER_POINT,
             );
-            level.fill(grey.width, grey.height, points);
+            level.fill(gray.width, gray.height, points);
         };
         let mut search = |depth: usize, level: &mut Level| {
             let scale = (1 << depth) as f32;
@@ -391,10 +366,10 @@ impl CircleDetector for AContrario {
     }
 }
 
-/// The circles of a single frame with a radius of `min_radius..=max_radius` pixels, best first.
+/// Returns the circles of a single frame with radii of `min_radius..=max_radius` pixels, best first.
 ///
-/// For one-off use: [`AContrario`] with the default settings, which reports up to 32 circles. For a
-/// stream of frames build a detector once.
+/// Runs [`AContrario`] with its default settings, which report up to 32 circles. For a stream of
+/// frames build a detector once.
 ///
 /// # Errors
 /// [`ConfigError::RadiusRange`] if the range is empty, [`ConfigError::OutOfRange`] if its lower end
@@ -418,7 +393,7 @@ pub fn detect_circles(
 const LEAST_SIDE: u32 = 12;
 /// Deviation of the Gaussian that smooths each size, its pixels.
 const SMOOTHING: f32 = 0.8;
-/// How often a frame is halved at the most.
+/// Largest number of halvings of a frame.
 const DEEPEST: usize = 5;
 /// Frames of so many pixels are worth a second thread.
 const LARGE_FRAME: usize = 1_000_000;
@@ -426,18 +401,18 @@ const LARGE_FRAME: usize = 1_000_000;
 const CANDIDATES: usize = 192;
 /// One point of this many pixels may be an edge; of more the strongest are taken.
 const PIXELS_PER_POINT: usize = 12;
-/// What the operator makes of a step of one grey level.
+/// Gradient of a step of one gray level.
 const STEP_GAIN: f32 = 2.3;
 /// The threshold in deviations of the noise.
 const NOISE_FACTOR: f32 = 3.5;
-/// What rounding adds to the noise of each size, grey levels.
+/// Noise that rounding adds at each size, gray levels.
 const ROUNDING: f32 = 0.3;
 /// Circles about one place that differ noticeably, at each size.
 const RADII: usize = 12;
-/// Noise above which the larger circles are measured at half the size of the frame, grey levels.
+/// Noise above which the larger circles are measured at half the size of the frame, gray levels.
 const NOISY: f32 = 15.0;
 
-/// Whether two circles are two accounts of one thing.
+/// Returns `true` if two circles belong to one thing.
 fn is_same(a: &Circle, b: &Circle) -> bool {
     let off = ((a.x - b.x).powi(2) + (a.y - b.y).powi(2)).sqrt();
     let (small, large) = (a.radius.min(b.radius), a.radius.max(b.radius));
@@ -452,7 +427,7 @@ fn circle_of(ring: &Ring) -> Circle {
     }
 }
 
-/// Does both, each on a thread of its own if that is wanted and can be had.
+/// Runs both, each on a thread of its own if `apart` and the feature `parallel` are set.
 fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     #[cfg(feature = "parallel")]
     if apart {
@@ -520,7 +495,7 @@ impl Vectorized for Measuring<'_> {
         let finest = usize::from(self.noise > NOISY).min(self.proof.depth);
         let frames = (finest..=self.proof.depth)
             .rev()
-            .map(|depth| pyramid.grey(depth));
+            .map(|depth| pyramid.gray(depth));
         let scale = (1 << finest) as f32;
         let (start, noise) = (self.proof.ring, self.noise / scale);
         measure::measure(frames, self.circle, self.polar, start, noise)

@@ -8,33 +8,35 @@ use crate::region::Region;
 /// The largest tolerance, pixels, for which the counts of near edge pixels fit in a byte.
 pub(crate) const MAX_TOLERANCE: f64 = 8.0;
 
-/// Which circles a detector reports.
+/// Rules by which the transforms report a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Acceptance {
-    /// The offset θ that β must exceed (default 0.65; 0..1, both excluded). Lower: balls more
-    /// hidden are found, and more circles that are none.
+    /// Offset θ that β must exceed (default 0.65; 0..1, both excluded). Smaller values find balls
+    /// that are more hidden, and more false circles.
     pub theta: f64,
-    /// How far an edge pixel may lie from a pixel of the circle to match it, pixels (default 1;
-    /// 0..=8). Larger: rounder than round is forgiven, and texture matches more by chance.
+    /// Largest distance of an edge pixel from a circle's pixel that it matches, pixels (default 1;
+    /// 0..=8). Larger values accept balls that are not quite round, and texture matches more often
+    /// by chance.
     pub tolerance: f64,
-    /// The smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a
-    /// tolerance of 1, corners and texture begin to pass for circles.
+    /// Smallest radius, pixels (default 15; 1..=max_radius). Below about 15 px, with a tolerance of
+    /// 1, corners and texture begin to pass for circles.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius` the
+    /// Largest radius, pixels (default 300; min_radius..=100000). If it equals `min_radius`, the
     /// radius is known: two pixels then determine a circle, and only the centre is fitted.
     pub max_radius: f64,
-    /// How many circles to look for (default 1; at least 1).
+    /// Largest number of circles reported (default 1; at least 1).
     pub max_circles: usize,
-    /// The least distance between the centres of two circles found, pixels (default 8; at least 0).
-    /// 0 allows concentric ones.
+    /// Smallest distance between the centres of two circles, pixels (default 8; at least 0). 0
+    /// allows concentric circles.
     pub min_distance: f64,
-    /// Where the centre may lie (default None: anywhere, even outside the frame).
+    /// Region in which the centre must lie (default None: anywhere, even outside the frame).
     pub region: Option<Region>,
-    /// Whether to fit an accepted circle to its edge pixels by least squares (default true). The
-    /// Hough transforms, whose cells are coarse, fit a candidate once before they verify it in any
-    /// case.
+    /// Fits an accepted circle to its edge pixels by least squares (default true). Three whole
+    /// pixels give the centre to about a pixel, the fit to a twentieth; it goes beyond the paper.
+    /// The Hough transforms always fit a candidate once before they verify it, since their cells
+    /// are coarse.
     pub refine: bool,
 }
 
@@ -104,7 +106,7 @@ impl Acceptance {
         (self.min_radius >= self.max_radius).then_some(self.min_radius)
     }
 
-    /// Whether this circle may be reported beside those found.
+    /// Returns `true` if this circle may be reported beside those found.
     pub(crate) fn admits(&self, circle: &Circle, found: &[Detection]) -> bool {
         (self.min_radius..=self.max_radius).contains(&circle.radius)
             && self.region.is_none_or(|region| region.holds(circle))
@@ -115,8 +117,8 @@ impl Acceptance {
     }
 }
 
-/// How far from an accepted circle the edge pixels lie that it explains, pixels: what matches it,
-/// and what the blur of the border and a ball that is not quite round leave beside it.
+/// Largest distance from an accepted circle of the edge pixels that it explains, pixels: the
+/// tolerance, the blur of the border, and a ball that is not quite round.
 pub(crate) fn explained_band(tolerance: f64, radius: f64) -> f64 {
     tolerance + 1.5 + 0.01 * radius
 }

@@ -14,8 +14,8 @@ pub struct Circle {
     pub radius: f64,
 }
 
-/// What the controller looks at: centre and radius of the ball's outline in units that do not
-/// depend on the resolution of the frame (section 2.1 of the paper).
+/// The paper's image features: centre and radius of the ball's outline in units that do not depend
+/// on the resolution of the frame (section 2.1).
 ///
 /// The whole frame is [`Features::WIDTH`] x [`Features::HEIGHT`] units with the origin at its
 /// top-left *corner*, so that the middle of the frame is (96, 72) at every resolution. The paper's
@@ -38,7 +38,7 @@ impl Features {
     /// Height of a frame in feature units.
     pub const HEIGHT: f64 = 144.0;
 
-    /// The features of `circle`, found in a frame `frame_width` pixels wide.
+    /// Returns the features of `circle`, found in a frame `frame_width` pixels wide.
     ///
     /// Pixels are square, so one scale serves both axes. A frame of width 0 has no circles; it
     /// gives features that are not finite.
@@ -51,7 +51,7 @@ impl Features {
         }
     }
 
-    /// The circle with these features in a frame `frame_width` pixels wide: the inverse of
+    /// Returns the circle with these features in a frame `frame_width` pixels wide: the inverse of
     /// [`Features::from_circle`].
     pub fn to_circle(self, frame_width: u32) -> Circle {
         let pixels = f64::from(frame_width) / Self::WIDTH;

@@ -10,13 +10,13 @@ mod noise;
 #[cfg(test)]
 mod plain;
 mod rows;
+mod smoothing;
 
 use image::GrayImage;
 
 pub use canny::{Canny, CannyConfig};
 pub use dispatch::{Vectorized, widest};
-pub use gradient::EdgeGradient;
-pub(crate) use gradient::Geometry;
+pub(crate) use gradient::{EdgeGradient, Geometry};
 #[cfg(feature = "imageproc")]
 pub use imageproc_canny::ImageprocCanny;
 pub(crate) use maxima::Maxima;
@@ -34,7 +34,7 @@ pub struct EdgePixel {
 
 /// The edges of one frame: as an image, and as the list of coordinates that the paper calls `D`.
 ///
-/// The two always agree: the list holds every lighted pixel once, row by row.
+/// The two always agree: the list holds every edge pixel once, row by row.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeMap {
     image: GrayImage,
@@ -44,7 +44,7 @@ pub struct EdgeMap {
 }
 
 impl EdgeMap {
-    /// The map of an edge image: every pixel that is not 0 is an edge.
+    /// Returns the map of an edge image: every pixel that is not 0 is an edge.
     pub fn from_image(edges: &GrayImage) -> Self {
         let mut map = Self::default();
         map.copy_from(edges);
@@ -53,7 +53,7 @@ impl EdgeMap {
 
     /// Replaces the map by that of an edge image in which every pixel that is not 0 is an edge.
     ///
-    /// Reuses the memory of the map; this is what an [`EdgeDetector`] of one's own ends with.
+    /// Reuses the memory of the map; a user-defined [`EdgeDetector`] ends with this call.
     pub fn copy_from(&mut self, edges: &GrayImage) {
         self.clear(edges.width(), edges.height());
         for (x, y, pixel) in edges.enumerate_pixels() {
@@ -63,24 +63,24 @@ impl EdgeMap {
         }
     }
 
-    /// The edge image: 255 on an edge, 0 elsewhere, of the size of the frame.
+    /// Returns the edge image: 255 on an edge, 0 elsewhere, of the size of the frame.
     pub fn image(&self) -> &GrayImage {
         &self.image
     }
 
-    /// The structure `D`: all edge pixels, row by row.
+    /// Returns the structure `D`: all edge pixels, row by row.
     pub fn pixels(&self) -> &[EdgePixel] {
         &self.pixels
     }
 
-    /// The grey-level gradient at each pixel of [`pixels`](EdgeMap::pixels), in the same order;
-    /// empty if the detector knows none.
-    pub fn gradients(&self) -> &[EdgeGradient] {
-        &self.gradients
+    /// Returns the gradient at the pixel of this index in [`pixels`](EdgeMap::pixels), from dark to
+    /// bright, in the units of [`CannyConfig::low`]; `None` if the detector knows no gradients.
+    pub fn gradient(&self, index: usize) -> Option<(f64, f64)> {
+        self.gradients.get(index).map(EdgeGradient::vector)
     }
 
-    /// Where the edge runs at the pixel of this index in [`pixels`](EdgeMap::pixels), to a fraction
-    /// of a pixel where the detector knows it, else the centre of the pixel.
+    /// Returns the position of the edge at the pixel of this index in [`pixels`](EdgeMap::pixels):
+    /// to a fraction of a pixel if the detector knows gradients, else the centre of the pixel.
     ///
     /// # Panics
     /// If there are not so many pixels.
@@ -93,12 +93,12 @@ impl EdgeMap {
         (f64::from(pixel.x) + dx, f64::from(pixel.y) + dy)
     }
 
-    /// Columns of the frame.
+    /// Returns the columns of the frame.
     pub fn width(&self) -> u32 {
         self.image.width()
     }
 
-    /// Rows of the frame.
+    /// Returns the rows of the frame.
     pub fn height(&self) -> u32 {
         self.image.height()
     }
@@ -136,10 +136,10 @@ impl EdgeMap {
 /// that the operator is undefined on it (0x0 among them) has no edges; its map still has the size
 /// of the frame.
 pub trait EdgeDetector {
-    /// The edges of `frame`.
+    /// Returns the edges of `frame`.
     fn detect_edges<'a>(&'a mut self, frame: &GrayImage) -> &'a EdgeMap;
 
-    /// The edges found last; an empty map before the first frame.
+    /// Returns the edges found last; an empty map before the first frame.
     fn edges(&self) -> &EdgeMap;
 }
 

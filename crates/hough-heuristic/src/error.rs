@@ -18,7 +18,8 @@ pub enum ConfigError {
     },
     /// The radius range is empty, negative, or reaches beyond any frame.
     #[error(
-        "the radius range {min}..={max} px is not usable: both ends must lie in 1..=100000, in order"
+        "the radius range {min}..={max} px is not usable: both ends must lie in 1..=100000, in \
+         order"
     )]
     RadiusRange {
         /// The smallest radius, pixels.

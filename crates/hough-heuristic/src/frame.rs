@@ -1,4 +1,4 @@
-//! Where frames come from.
+//! Sources of frames.
 
 #[cfg(feature = "files")]
 mod files;
@@ -39,7 +39,7 @@ pub enum FrameError {
     Failed {
         /// The file, device or stream.
         origin: String,
-        /// What went wrong and, where known, what to do.
+        /// The fault and, where known, the remedy.
         reason: String,
     },
 }

@@ -1,70 +1,73 @@
-//! Finds circles in an edge image by sampling three pixels and checking the image itself, with no
-//! accumulator.
+//! Circle detectors for gray images: an a contrario detector for photographs, and Hough transforms
+//! without and with an accumulator.
 //!
 //! A frame passes two stages, each behind a trait with one principal method. An [`EdgeDetector`]
 //! turns the [`GrayImage`](image::GrayImage) into an [`EdgeMap`]: the edge image, the list of its
-//! lighted pixels that the literature calls the structure `D`, and where it is known the gradient
-//! of each. A [`CircleDetector`] turns the frame into [`Detection`]s, best first, each a [`Circle`]
-//! with a score between 0 and 1 that means the same at every radius.
+//! edge pixels that the literature calls the structure `D`, and, if known, their gradients. A
+//! [`CircleDetector`] turns the frame into [`Detection`]s, best first, each a [`Circle`] with a
+//! score between 0 and 1.
 //!
 //! ```
 //! use hough_heuristic::image::{GrayImage, Luma};
-//! use hough_heuristic::{CircleDetector, Heuristic, HeuristicConfig};
+//! use hough_heuristic::{AContrario, AContrarioConfig, CircleDetector};
 //!
-//! // A dark ball of radius 28 before a bright wall.
-//! let frame = GrayImage::from_fn(192, 144, |x, y| {
-//!     let (dx, dy) = (f64::from(x) - 100.0, f64::from(y) - 70.0);
-//!     Luma([if dx.hypot(dy) < 28.0 { 40 } else { 200 }])
-//! });
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     // A dark ball of radius 28 before a bright wall.
+//!     let frame = GrayImage::from_fn(192, 144, |x, y| {
+//!         let (dx, dy) = (f64::from(x) - 100.0, f64::from(y) - 70.0);
+//!         Luma([if dx.hypot(dy) < 28.0 { 40 } else { 200 }])
+//!     });
 //!
-//! let mut detector = Heuristic::with_canny(HeuristicConfig::default())?;
-//! let ball = detector.detect(&frame)?[0];
-//! assert!((ball.circle.x - 100.0).abs() < 0.5 && (ball.circle.radius - 28.0).abs() < 0.5);
-//! assert!(ball.score > 0.9);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//!     let mut detector = AContrario::new(AContrarioConfig::default())?;
+//!     let ball = detector.detect(&frame)?[0];
+//!     assert!((ball.circle.x - 100.0).abs() < 0.5 && (ball.circle.radius - 28.0).abs() < 0.5);
+//!     assert!(ball.score > 0.9);
+//!     Ok(())
+//! }
 //! ```
 //!
 //! # Detectors
 //!
-//! * [`AContrario`]: for real photographs. An unknown number of circles, each proven against chance
-//!   and measured with its standard error, in a bounded number of draws; goes beyond the paper.
-//!   [`detect_circles`] is a call of it.
-//! * [`Heuristic`]: a random search that needs no memory but the edges themselves. The detector of
-//!   the paper this project follows (section 2.1).
-//! * [`RandomizedHough`] and [`StandardHough`]: the two transforms the paper compares it with. They
-//!   accept circles by the same rules ([`Acceptance`]), so that what differs is the search.
-//! * [`CurveSearch`]: the paper's algorithm as it stands there, for any [`Curve`] given by n
-//!   pixels, such as [`Line`] and [`Ellipse`].
+//! * [`AContrario`]: for photographs. It finds an unknown number of circles, each with its number of
+//!   false alarms and standard errors, in a bounded number of draws. It goes beyond the paper.
+//!   [`detect_circles`] calls it for a single frame.
+//! * [`Heuristic`]: the detector of the paper that this project follows (section 2.1), a random
+//!   search whose only memory is the edges.
+//! * [`RandomizedHough`] and [`StandardHough`]: the two transforms that the paper compares it with.
+//!   All three accept circles by one rule ([`Acceptance`]), so that only the search differs.
+//! * [`CurveSearch`]: the paper's algorithm for any [`Curve`] given by n pixels, such as [`Line`] and
+//!   [`Ellipse`].
 //!
 //! # Edges
 //!
-//! [`Canny`] is the crate's own operator, fast enough to be unnoticed at 50 frames a second, with
-//! sub-pixel positions and thresholds that rise with the frame's noise; [`ImageprocCanny`] is that
-//! of the crate `imageproc`. [`EdgeMap::from_image`] takes the edges of any other.
+//! [`Canny`] is the crate's own operator: fused integer passes, sub-pixel positions, thresholds that
+//! rise with the frame's noise. `ImageprocCanny` (feature `imageproc`) wraps that of the crate
+//! `imageproc`. [`EdgeMap::from_image`] takes the edges of any other.
 //!
 //! # Frames
 //!
-//! A [`FrameSource`] delivers them: `ImageFiles` from files and folders (feature `files`, on by
-//! default), [`FrameStream`] from any reader, so also from a camera through a pipe.
+//! A [`FrameSource`] delivers frames: `ImageFiles` (feature `files`, on by default) from files and
+//! folders, [`FrameStream`] from any reader, so also from a camera through a pipe. A frame in memory
+//! whose rows are padded becomes a [`GrayImage`](image::GrayImage) by
+//! [`FlatSamples`](image::FlatSamples).
 //!
 //! # Conventions
 //!
 //! Coordinates are pixels with `(0, 0)` at the *centre* of the top-left pixel, x to the right and y
-//! down; [`Features`] are units that do not depend on the resolution. A detector owns its buffers,
-//! so use one detector for many frames: it allocates only for a frame that is larger, or has more
-//! edges, or takes more draws or votes than all before it. What it finds depends on its
-//! configuration (seed included) and the frame, never on the frames before, and is the same on
-//! every machine whose square roots are IEEE's; only [`StandardHough`] and [`Ellipse`] go through
-//! sines and arc tangents, whose last bits differ between platforms.
+//! down; [`Features`] are units that do not depend on the resolution. A detector owns its buffers:
+//! use one for many frames. It allocates only for a frame that is larger, or has more edges, or
+//! takes more draws or votes than all before. Its result depends on its configuration (seed
+//! included) and the frame alone, and is the same on every machine with IEEE square roots; only
+//! [`StandardHough`] and [`Ellipse`] use sines and arc tangents, whose last bits differ between
+//! platforms.
 //!
 //! # Limitations
 //!
-//! [`AContrario`] finds what is round: lamps, wheels and letters too. The others go by β:
-//!
-//! β asks whether pixels of the circle are edges, not whether those edges run along it. Where edges
-//! cover more than a tenth of the picture, as in grass or gravel, chance alone lifts β above any
-//! useful θ, and what is found there means little. A sphere far off the optical axis projects to an
-//! ellipse; a larger `tolerance` forgives a little of that.
+//! [`AContrario`] finds everything round: lamps, wheels and letters too. The other detectors go by
+//! the belonging β, the share of the circle's pixels that are edges, whatever the direction of those
+//! edges. Where edges cover more than a tenth of the picture, as in grass or gravel, chance lifts β
+//! above any useful θ. A sphere far off the optical axis projects to an ellipse, which a larger
+//! `tolerance` accepts up to a point.
 
 mod a_contrario;
 mod acceptance;
@@ -91,7 +94,7 @@ pub use curve::{Curve, Ellipse, Line};
 pub use detect::{CircleDetector, Detection, FrameRefused};
 #[cfg(feature = "imageproc")]
 pub use edges::ImageprocCanny;
-pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeGradient, EdgeMap, EdgePixel};
+pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeMap, EdgePixel};
 pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
 #[cfg(feature = "files")]

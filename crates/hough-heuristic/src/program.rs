@@ -56,7 +56,12 @@ struct Options {
     max_circles: usize,
 
     /// Detect N times in each image and report the least time
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
     repeat: u32,
 
     /// Seed of the random sampling
@@ -93,11 +98,11 @@ enum DetectorName {
     AContrario,
     /// Three random edge pixels, belonging against a threshold (the paper's)
     Heuristic,
-    /// The same, all three pixels from the whole image, as the paper samples
+    /// The heuristic with all three pixels from the whole image, as the paper samples
     HeuristicAnywhere,
     /// Randomized Hough transform
     Rht,
-    /// The same, all three pixels from the whole image, as Xu and Oja sample
+    /// That transform with all three pixels from the whole image, as Xu and Oja sample
     RhtAnywhere,
     /// Standard Hough transform; takes seconds on large images
     Sht,
@@ -233,7 +238,7 @@ fn search(frame: &GrayImage, detector: &mut dyn Staged, repeat: u32) -> Result<S
     Ok(searched)
 }
 
-/// What has been found so far.
+/// The results so far.
 #[derive(Default)]
 struct Results {
     csv: String,

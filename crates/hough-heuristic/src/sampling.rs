@@ -1,4 +1,4 @@
-//! How the random searches draw their pixels.
+//! The draws of the random searches.
 
 pub(crate) mod structure;
 
@@ -12,7 +12,7 @@ use crate::curve::circles_of_radius;
 use crate::edges::EdgePixel;
 use crate::sampling::structure::Structure;
 
-/// Where the pixels of a draw come from.
+/// Source of the pixels of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -93,7 +93,7 @@ impl Sampler {
     }
 }
 
-/// How far the windows reach: 64 diameters, each longer than the one before by the same factor.
+/// Returns the reaches of the windows: 64 diameters in geometric progression.
 fn reaches(min_radius: f64, max_radius: f64) -> Vec<f64> {
     // The 64th root by square roots, which have the same bits on every platform.
     let factor = (0..6).fold(max_radius / min_radius, |root, _| root.sqrt());

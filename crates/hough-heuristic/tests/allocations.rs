@@ -110,7 +110,7 @@ fn frame(width: u32, height: u32, balls: usize, distractors: usize, seed: u64) -
     scene.render().0
 }
 
-/// How many allocations a frame takes, and how many circles it has.
+/// Counts the allocations for a frame, and its circles.
 fn allocations(detector: &mut dyn CircleDetector, frame: &GrayImage) -> (usize, usize) {
     let before = ALLOCATIONS.with(Cell::get);
     let circles = detector.detect(frame).unwrap().len();
@@ -123,7 +123,7 @@ fn edges(detector: &mut dyn Staged, frame: &GrayImage) -> usize {
 }
 
 #[test]
-fn the_a_contrario_detector_allocates_nothing_after_the_first_frame_either() {
+fn the_a_contrario_detector_allocates_for_the_first_frame_only() {
     let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
     let crowded = frame(500, 400, 8, 25, 1);
     let (first, circles) = allocations(&mut detector, &crowded);

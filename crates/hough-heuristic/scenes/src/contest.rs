@@ -14,7 +14,7 @@ use crate::staged::Staged;
 pub struct Round {
     pub name: &'static str,
     pub scene: Scene,
-    /// Whether the edge thresholds stay as they are in noise.
+    /// Keeps the edge thresholds in noise.
     pub fixed_thresholds: bool,
 }
 

@@ -11,9 +11,9 @@ use rand::{RngExt, SeedableRng};
 pub fn patterns(width: u32, height: u32) -> Vec<(String, GrayImage)> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     let mut frames = Vec::new();
-    let mut paint = |name: String, grey: &mut dyn FnMut(f64, f64, f64) -> f64| {
+    let mut paint = |name: String, gray: &mut dyn FnMut(f64, f64, f64) -> f64| {
         let frame = GrayImage::from_fn(width, height, |x, y| {
-            Luma([grey(x.into(), y.into(), rng.random()).clamp(0.0, 255.0) as u8])
+            Luma([gray(x.into(), y.into(), rng.random()).clamp(0.0, 255.0) as u8])
         });
         frames.push((name, frame));
     };

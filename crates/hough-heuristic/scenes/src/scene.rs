@@ -6,7 +6,7 @@ use hough_heuristic::image::GrayImage;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-/// What a scene shows; the seed decides where.
+/// Content of a scene; the seed places it.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
     pub width: u32,
@@ -14,7 +14,7 @@ pub struct Scene {
     pub balls: usize,
     /// Polygons and bars that are not round.
     pub distractors: usize,
-    /// Standard deviation of the noise, grey levels.
+    /// Standard deviation of the noise, gray levels.
     pub noise: f64,
     /// Range of the balls' radius, pixels.
     pub radius: (f64, f64),
@@ -78,15 +78,15 @@ impl Scene {
 pub(crate) struct Canvas {
     pub width: u32,
     pub height: u32,
-    /// Grey levels, row by row.
-    pub grey: Vec<f64>,
+    /// Gray levels, row by row.
+    pub gray: Vec<f64>,
 }
 
 impl Canvas {
     fn new(width: u32, height: u32, rng: &mut Xoshiro256PlusPlus) -> Self {
         let base = rng.random_range(110.0..150.0);
         let (slope_x, slope_y) = (rng.random_range(-20.0..20.0), rng.random_range(-20.0..20.0));
-        let grey = (0..height)
+        let gray = (0..height)
             .flat_map(|y| (0..width).map(move |x| (x, y)))
             .map(|(x, y)| {
                 base + slope_x * f64::from(x) / f64::from(width)
@@ -96,7 +96,7 @@ impl Canvas {
         Self {
             width,
             height,
-            grey,
+            gray,
         }
     }
 
@@ -113,13 +113,13 @@ impl Canvas {
             for x in clamp(left - 2.0, self.width)..clamp(right + 3.0, self.width) {
                 let (px, py) = (f64::from(x), f64::from(y));
                 let cover = (inside(px, py) + 0.5).clamp(0.0, 1.0);
-                let grey = &mut self.grey[(y * self.width + x) as usize];
-                *grey += cover * (shade(px, py) - *grey);
+                let gray = &mut self.gray[(y * self.width + x) as usize];
+                *gray += cover * (shade(px, py) - *gray);
             }
         }
     }
 
-    /// A matt ball, lit from the upper left, on average at least 35 grey levels off the background.
+    /// A matt ball, lit from the upper left, on average at least 35 gray levels off the background.
     fn ball(&mut self, ball: &Circle, rng: &mut Xoshiro256PlusPlus) {
         let &Circle { x, y, radius } = ball;
         let dark = rng.random_bool(0.5);
@@ -139,7 +139,7 @@ impl Canvas {
         );
     }
 
-    /// A triangle, quadrilateral or bar of some grey level, clear of the balls.
+    /// A triangle, quadrilateral or bar of some gray level, clear of the balls.
     fn distractor(&mut self, balls: &[Circle], rng: &mut Xoshiro256PlusPlus) {
         let span = f64::from(self.width.min(self.height));
         let (cx, cy) = (
@@ -152,7 +152,7 @@ impl Canvas {
             rng.random_range(0.04..0.2) * span,
             rng.random_range(0.02..0.12) * span,
         );
-        let grey = rng.random_range(10.0..250.0);
+        let gray = rng.random_range(10.0..250.0);
         let polygon: Vec<(f64, f64)> = (0..corners)
             .map(|corner| {
                 let angle = std::f64::consts::TAU * (f64::from(corner) + 0.5) / f64::from(corners);
@@ -173,23 +173,23 @@ impl Canvas {
         self.paint(
             (cx - reach, cy - reach, cx + reach, cy + reach),
             convex(&polygon),
-            |_, _| grey,
+            |_, _| gray,
         );
     }
 
-    /// The picture in whole grey levels, with noise of this deviation.
+    /// The picture in whole gray levels, with noise of this deviation.
     pub(crate) fn develop(self, noise: f64, rng: &mut Xoshiro256PlusPlus) -> GrayImage {
-        let mut bytes = Vec::with_capacity(self.grey.len());
-        for grey in self.grey {
+        let mut bytes = Vec::with_capacity(self.gray.len());
+        for gray in self.gray {
             let (u, v): (f64, f64) = (rng.random(), rng.random());
             let normal = (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos();
-            bytes.push((grey + noise * normal).round().clamp(0.0, 255.0) as u8);
+            bytes.push((gray + noise * normal).round().clamp(0.0, 255.0) as u8);
         }
         GrayImage::from_raw(self.width, self.height, bytes).expect("one byte per pixel")
     }
 }
 
-/// How far inside of a convex polygon a point lies, pixels; its corners turn from x to y.
+/// Distance of a point inside a convex polygon, pixels; its corners turn from x to y.
 pub(crate) fn convex(corners: &[(f64, f64)]) -> impl Fn(f64, f64) -> f64 {
     move |px, py| {
         corners
@@ -203,7 +203,7 @@ pub(crate) fn convex(corners: &[(f64, f64)]) -> impl Fn(f64, f64) -> f64 {
     }
 }
 
-/// Whether a detection is this ball: centre and radius each within `tolerance` pixels.
+/// Returns `true` if centre and radius agree with the ball to `tolerance` pixels each.
 pub fn same(found: &Circle, truth: &Circle, tolerance: f64) -> bool {
     (found.x - truth.x).hypot(found.y - truth.y) <= tolerance
         && (found.radius - truth.radius).abs() <= tolerance

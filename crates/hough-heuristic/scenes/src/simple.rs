@@ -1,7 +1,7 @@
 //! Seeded scenes with one difficulty each, on which detectors are compared: bright matt balls
 //! before a plain ground.
 //!
-//! Lengths are for frames of 768x576 pixels and scale with the size; noise is in grey levels and
+//! Lengths are for frames of 768x576 pixels and scale with the size; noise is in gray levels and
 //! does not.
 
 use std::f64::consts::{PI, TAU};
@@ -13,14 +13,14 @@ use rand::{RngExt, SeedableRng};
 
 use crate::scene::{Canvas, convex};
 
-/// What a kind of scene shows.
+/// Content of a kind of scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
     pub name: &'static str,
     pub balls: usize,
     /// Rectangles, bars and triangles behind the balls.
     pub distractors: usize,
-    /// Standard deviation of the noise, grey levels.
+    /// Standard deviation of the noise, gray levels.
     pub noise: f64,
     pub difficulty: Difficulty,
 }
@@ -107,7 +107,7 @@ impl Kind {
             canvas: Canvas {
                 width,
                 height,
-                grey: vec![0.0; width as usize * height as usize],
+                gray: vec![0.0; width as usize * height as usize],
             },
         };
         painter.ground();
@@ -145,9 +145,9 @@ impl Painter {
             self.rng.random_range(-12.0..12.0),
         );
         let (width, height) = (self.canvas.width as usize, self.canvas.height as usize);
-        for (index, grey) in self.canvas.grey.iter_mut().enumerate() {
+        for (index, gray) in self.canvas.gray.iter_mut().enumerate() {
             let along = |at: usize, length: usize| 2.0 * at as f64 / (length - 1) as f64 - 1.0;
-            *grey = base + x * along(index % width, width) + y * along(index / width, height);
+            *gray = base + x * along(index % width, width) + y * along(index / width, height);
         }
     }
 
@@ -160,7 +160,7 @@ impl Painter {
 
     /// A rectangle, a bar across the frame or a triangle.
     fn distractor(&mut self) {
-        let grey = self.rng.random_range(20.0..230.0);
+        let gray = self.rng.random_range(20.0..230.0);
         let (x, y) = self.anywhere();
         let corners = match self.rng.random_range(0..3) {
             0 => {
@@ -184,10 +184,10 @@ impl Painter {
                 (0..3).map(|_| (x + off(), y + off())).collect()
             }
         };
-        self.canvas.polygon(corners, grey);
+        self.canvas.polygon(corners, gray);
     }
 
-    /// Where balls may lie: inside of the frame and clear of one another.
+    /// Places for balls: inside of the frame and clear of one another.
     fn place(&mut self, count: usize) -> Vec<Circle> {
         let gap = 3.0 * self.scale.max(1.0);
         let most = if count > 1 { MOST_OF_MANY } else { MOST_ALONE };
@@ -244,12 +244,12 @@ impl Painter {
     /// A plate whose straight edge cuts off 40 % of the outline.
     fn plate_before(&mut self, ball: &Circle) {
         let turn = self.rng.random_range(0.0..TAU);
-        let grey = self.rng.random_range(20.0..160.0);
+        let gray = self.rng.random_range(20.0..160.0);
         let reach = 1.2 * ball.radius;
         let away = ball.radius * (0.4 * PI).cos() + 0.5 * reach;
         let middle = (ball.x + away * turn.cos(), ball.y + away * turn.sin());
         self.canvas
-            .polygon(rectangle(middle, turn, 0.5 * reach, reach), grey);
+            .polygon(rectangle(middle, turn, 0.5 * reach, reach), gray);
     }
 
     /// Moves the camera while the shutter is open.
@@ -258,7 +258,7 @@ impl Painter {
         let turn = self.rng.random_range(0.0..PI);
         let steps = (2.0 * length).ceil() as usize;
         let canvas = &self.canvas;
-        let mut smeared = vec![0.0; canvas.grey.len()];
+        let mut smeared = vec![0.0; canvas.gray.len()];
         for step in 0..=steps {
             let along = length * (step as f64 / steps as f64 - 0.5);
             let (dx, dy) = (along * turn.cos(), along * turn.sin());
@@ -270,7 +270,7 @@ impl Painter {
                 }
             }
         }
-        self.canvas.grey = smeared;
+        self.canvas.gray = smeared;
     }
 }
 
@@ -290,7 +290,7 @@ fn rectangle((x, y): (f64, f64), turn: f64, long: f64, wide: f64) -> Vec<(f64, f
 
 impl Canvas {
     /// Fills a convex polygon.
-    fn polygon(&mut self, mut corners: Vec<(f64, f64)>, grey: f64) {
+    fn polygon(&mut self, mut corners: Vec<(f64, f64)>, gray: f64) {
         let turn = |a: &(f64, f64), b: &(f64, f64)| a.0 * b.1 - a.1 * b.0;
         let area: f64 = corners
             .iter()
@@ -308,10 +308,10 @@ impl Canvas {
             )
         };
         let ((left, right), (top, bottom)) = (ends(|corner| corner.0), ends(|corner| corner.1));
-        self.paint((left, top, right, bottom), convex(&corners), |_, _| grey);
+        self.paint((left, top, right, bottom), convex(&corners), |_, _| gray);
     }
 
-    /// The grey level between pixels; beyond the border that of the border.
+    /// The gray level between pixels; beyond the border that of the border.
     fn at(&self, x: f64, y: f64) -> f64 {
         let (x, y) = (
             x.clamp(0.0, f64::from(self.width - 1)),
@@ -322,7 +322,7 @@ impl Canvas {
             (y as usize).min(self.height as usize - 2),
         );
         let (fx, fy) = (x - column as f64, y - row as f64);
-        let pixel = |x: usize, y: usize| self.grey[y * self.width as usize + x];
+        let pixel = |x: usize, y: usize| self.gray[y * self.width as usize + x];
         let line = |y: usize| pixel(column, y) + (pixel(column + 1, y) - pixel(column, y)) * fx;
         line(row) + (line(row + 1) - line(row)) * fy
     }
@@ -335,18 +335,18 @@ impl Canvas {
             .collect();
         let sum: f64 = weights.iter().sum();
         for (dx, dy) in [(1, 0), (0, 1)] {
-            let mut smooth = Vec::with_capacity(self.grey.len());
+            let mut smooth = Vec::with_capacity(self.gray.len());
             for y in 0..self.height as i32 {
                 for x in 0..self.width as i32 {
                     let taps = (-reach..=reach).zip(&weights).map(|(k, weight)| {
                         let column = (x + k * dx).clamp(0, self.width as i32 - 1);
                         let row = (y + k * dy).clamp(0, self.height as i32 - 1);
-                        weight * self.grey[(row * self.width as i32 + column) as usize]
+                        weight * self.gray[(row * self.width as i32 + column) as usize]
                     });
                     smooth.push(taps.sum::<f64>() / sum);
                 }
             }
-            self.grey = smooth;
+            self.gray = smooth;
         }
     }
 }

@@ -8,7 +8,7 @@ use super::polar::Ring;
 use super::prover::Prover;
 use super::search::{Search, Start};
 
-/// How far an arc is followed to either side, steps of [`STEP`] pixels.
+/// Steps of [`STEP`] pixels that an arc is followed to either side.
 const STEPS: usize = 6;
 const STEP: f32 = 2.0;
 /// Every how many points one begins an arc.
@@ -19,10 +19,10 @@ const OWN: usize = 2;
 const LEAST_POINTS: usize = 9;
 /// The cosine of the most that the direction may change in a step.
 const LEAST_STRAIGHT: f32 = 0.8;
-/// How far the points of an arc may lie off its circle, pixels, in the quadratic mean.
+/// Largest quadratic mean of the distances of an arc's points from its circle, pixels.
 const SCATTER: f32 = 0.35;
-/// What is asked of the outline is less than of a pair's, whose two sides are seen. The points that
-/// the circle is fitted to lie nearer to it: farther off are those of what hides it.
+/// Less of the outline is required than for a pair, of which two sides are visible. The circle is
+/// fitted to nearer points only: those farther off belong to what hides it.
 const START: Start = Start {
     share: 0.34,
     reach: [1.5; 2],

@@ -1,20 +1,19 @@
-//! What a frame may cost: counted, so that the same frame is always searched as far.
+//! The limit of work per frame. It is counted, so that a frame is always searched as far.
 
 use std::time::{Duration, Instant};
 
 use super::AContrarioConfig;
 use crate::clock;
 
-/// Looks that a draw takes, in the mean over dense texture; those of all draws are shared by what
-/// takes few and what takes many.
+/// Looks that a draw takes on average over dense texture. All draws share their looks.
 const LOOKS_PER_DRAW: u64 = 16;
-/// The budget of smaller frames is that of one with so many million pixels: a circle costs the same
-/// in each.
+/// Smaller frames get the budget of this many million pixels, since a circle costs as much in
+/// each.
 const LEAST_MEGAPIXELS: f64 = 0.25;
 
-/// What a proof costs at one size, in looks.
+/// Cost of a proof at one size, in looks.
 pub(super) const PROOF: u64 = 1500;
-/// What a measurement costs, in looks.
+/// Cost of a measurement, in looks.
 pub(super) const MEASURING: u64 = 1500;
 
 /// The parts of the work, each with looks of its own after those of the parts before it.
@@ -25,7 +24,7 @@ pub(super) enum Stage {
     Measurements,
 }
 
-/// What may be spent, and what has been.
+/// The limits, and the work done so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Budget {
     pub(super) draws: u64,
@@ -35,9 +34,9 @@ pub(super) struct Budget {
     /// By [`Stage`].
     most_looks: [u64; 3],
     deadline: Option<Instant>,
-    /// Whether the deadline has passed.
+    /// Set once the deadline has passed.
     late: bool,
-    /// Whether any part was cut short.
+    /// Set once any part was cut short.
     pub(super) spent: bool,
 }
 
@@ -58,7 +57,7 @@ impl Budget {
         }
     }
 
-    /// Whether this part of the work is to end.
+    /// Returns `true` if this part of the work is to end.
     #[inline(always)]
     pub(super) fn is_over(&mut self, stage: Stage) -> bool {
         let drawn = matches!(stage, Stage::Search) && self.draws >= self.most_draws;
@@ -67,7 +66,7 @@ impl Budget {
         over
     }
 
-    /// Looks at the clock, if there is one to be looked at.
+    /// Reads the clock if there is a deadline, and returns `true` if it has passed.
     pub(super) fn is_late(&mut self) -> bool {
         self.late |= self
             .deadline

@@ -5,7 +5,7 @@ use super::polar::Ring;
 use super::proof::log10;
 use super::search::Support;
 
-/// How often a circle is met before it is passed by.
+/// Number of meetings with a circle after which it is skipped.
 const MEETINGS: u32 = 3;
 
 /// A circle found at some level, in pixels of the frame.
@@ -16,11 +16,11 @@ pub(super) struct Candidate {
     pub(super) r: f32,
     /// Pixels of the frame per pixel of its level.
     pub(super) scale: f32,
-    /// How much speaks for it, to choose among candidates.
+    /// Strength of the evidence, to choose among candidates.
     pub(super) weight: f32,
-    /// Whether it has been to the proof.
+    /// Set once it has been to the proof.
     pub(super) tried: bool,
-    /// How often it was met.
+    /// Number of meetings.
     met: u32,
 }
 
@@ -53,7 +53,7 @@ impl Candidate {
     }
 }
 
-/// The divergence of what the outline shows from what chance would, over all of the outline.
+/// Divergence of the outline's edges from those of chance, summed over the outline.
 fn weight(r: f32, support: Support) -> f32 {
     let independent = (2.0 * r).min(32.0) * support.visible as f32 / 32.0;
     let (share, chance) = (support.share().min(0.999), 0.2);
@@ -78,7 +78,7 @@ impl Collected {
         self.most = most;
     }
 
-    /// Whether nearly this circle has been met often enough.
+    /// Counts a meeting; returns `true` if nearly this circle has been met often enough.
     pub(super) fn is_known(&mut self, circle: &Candidate, budget: &mut Budget) -> bool {
         budget.looks += self.candidates.len() as u64 / 8;
         let known = self.candidates.iter_mut().find(|known| known.near(circle));
@@ -88,7 +88,7 @@ impl Collected {
         })
     }
 
-    /// Keeps the better of those that are nearly one; tells where it is if it was kept.
+    /// Keeps the better of nearly equal candidates; returns its index if it was kept.
     pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
         budget.looks += self.candidates.len() as u64 / 8;
         let better = |known: &Candidate| candidate.weight > known.weight;

@@ -4,40 +4,41 @@ use crate::error::ConfigError;
 use crate::error::{require, require_radii};
 use crate::region::Region;
 
-/// The settings of [`AContrario`](crate::AContrario).
+/// Settings of [`AContrario`](crate::AContrario).
 ///
-/// The defaults are meant for every frame: there is no threshold to tune to a scene.
+/// The defaults suit every kind of frame; no threshold needs tuning to a scene.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct AContrarioConfig {
-    /// The smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame
-    /// is searched too, which takes several times as long.
+    /// Smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is
+    /// searched too, which takes several times as long.
     pub min_radius: f64,
-    /// The largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius` the
-    /// radius is known: circles that measure within a pixel and 5 % of it are reported, with that
-    /// radius.
+    /// Largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius`, the
+    /// radius is known: circles whose measured radius is within 1 px plus 5 % of it are reported
+    /// with that radius.
     pub max_radius: f64,
-    /// The most circles reported (default 32; at least 1): the best.
+    /// Largest number of circles reported, best first (default 32; at least 1).
     pub max_circles: usize,
-    /// The least score reported (default 0.5, at most one circle of pure chance in ten frames;
-    /// 0..=1). Higher: fewer things that are hardly round. Lower: little more, as what is below is
-    /// mostly chance.
+    /// Smallest score reported (default 0.5, which bounds circles of pure chance by one in ten
+    /// frames; 0..=1). Larger values drop things that are hardly round. Smaller values add mostly
+    /// circles of chance.
     pub min_score: f64,
-    /// The least contrast of an edge to be drawn, grey levels (default 8; above 0..=128). Lower
-    /// finds fainter circles and takes longer; noise raises it.
+    /// Smallest contrast of an edge that is drawn, gray levels (default 8; above 0..=128). Smaller
+    /// values find fainter circles and take longer. Noise raises it.
     pub contrast: f64,
-    /// How many pairs may be drawn, for each million pixels of the frame (default 50000; at least
-    /// 1), a frame of less than a quarter of a million counting as a quarter. Sixteen looks go with
-    /// each draw and bound all of the work that depends on what the frame shows. Less leaves out
-    /// circles amid dense texture, more finds little.
+    /// Largest number of pairs drawn per million pixels of the frame (default 50000; at least 1).
+    /// A frame below 250,000 pixels counts as that many. Each draw brings a budget of 16 looks,
+    /// which bounds all work that depends on the frame's content. Smaller values miss circles amid
+    /// dense texture; larger ones find little more.
     pub draws_per_megapixel: u32,
-    /// How long the search may take, milliseconds for each million pixels (default None: no clock
-    /// is looked at; above 0). With a clock what is found depends on the machine too.
+    /// Time limit of the search, milliseconds per million pixels (default None; above 0). With a
+    /// time limit the result depends on the speed of the machine. It has no effect on targets
+    /// without a clock.
     pub milliseconds_per_megapixel: Option<f64>,
-    /// Where the centre may lie (default None: anywhere).
+    /// Region in which the centre must lie (default None: anywhere).
     pub region: Option<Region>,
-    /// The seed of the draws (default 1).
+    /// Seed of the draws (default 1).
     pub seed: u64,
 }
 

@@ -14,7 +14,7 @@ pub(super) struct UnitCircle {
     points: Vec<(f32, f32)>,
     /// Their codes.
     codes: Vec<u8>,
-    /// The same in lists of x and of y, for 64, 128 and 256 steps.
+    /// The points in lists of x and of y, for 64, 128 and 256 steps.
     rays: [(Vec<f32>, Vec<f32>); 3],
 }
 
@@ -77,7 +77,7 @@ impl UnitCircle {
         self.points[(index * TURN / count) % TURN]
     }
 
-    /// The same, and its code.
+    /// Returns a point as [`point`](Self::point) does, and its code.
     #[inline(always)]
     pub(super) fn coded_point(&self, index: usize, count: usize) -> ((f32, f32), u8) {
         let index = (index * TURN / count) % TURN;
@@ -104,7 +104,7 @@ pub(super) fn code(x: f32, y: f32) -> u8 {
     (nearest - i32::from(place > half + 0.5)) as u8 % CODES
 }
 
-/// How far apart two codes are, 0..=32.
+/// Difference of two codes, 0..=32.
 #[cfg(test)]
 fn apart(a: u8, b: u8) -> u8 {
     let difference = a.wrapping_sub(b) % CODES;

@@ -4,43 +4,43 @@ use crate::edges::{Vectorized, widest};
 
 /// Makes `half` the frame of half the width and height (odd rests cut off), each pixel the rounded
 /// mean of four.
-pub(super) fn halve(grey: &[u8], width: usize, half: &mut Vec<u8>) -> (usize, usize) {
-    let height = grey.len().checked_div(width).unwrap_or(0);
+pub(super) fn halve(gray: &[u8], width: usize, half: &mut Vec<u8>) -> (usize, usize) {
+    let height = gray.len().checked_div(width).unwrap_or(0);
     let (columns, rows) = (width / 2, height / 2);
     half.resize(columns * rows, 0);
     if columns > 0 {
-        halve_rows(grey, width, half);
+        halve_rows(gray, width, half);
     }
     (columns, rows)
 }
 
 #[cfg(not(feature = "parallel"))]
-fn halve_rows(grey: &[u8], width: usize, half: &mut [u8]) {
-    widest(Halving { grey, width, half });
+fn halve_rows(gray: &[u8], width: usize, half: &mut [u8]) {
+    widest(Halving { gray, width, half });
 }
 
 /// Large frames a strip of rows on each thread.
 #[cfg(feature = "parallel")]
-fn halve_rows(grey: &[u8], width: usize, half: &mut [u8]) {
+fn halve_rows(gray: &[u8], width: usize, half: &mut [u8]) {
     use rayon::prelude::*;
 
     /// Strips of fewer pixels are not worth a thread's waking.
     const LEAST_STRIP: usize = if cfg!(test) { 60 } else { 1_500_000 };
     let count = rayon::current_num_threads()
-        .min(grey.len() / LEAST_STRIP)
+        .min(gray.len() / LEAST_STRIP)
         .max(1);
-    let rows = (grey.len() / width / 2).div_ceil(count).max(1);
+    let rows = (gray.len() / width / 2).div_ceil(count).max(1);
     if count == 1 {
-        widest(Halving { grey, width, half });
+        widest(Halving { gray, width, half });
     } else {
-        grey.par_chunks(2 * rows * width)
+        gray.par_chunks(2 * rows * width)
             .zip(half.par_chunks_mut(rows * (width / 2)))
-            .for_each(|(grey, half)| widest(Halving { grey, width, half }));
+            .for_each(|(gray, half)| widest(Halving { gray, width, half }));
     }
 }
 
 struct Halving<'a> {
-    grey: &'a [u8],
+    gray: &'a [u8],
     width: usize,
     half: &'a mut [u8],
 }
@@ -50,7 +50,7 @@ impl Vectorized for Halving<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let rows = self.grey.chunks_exact(2 * self.width);
+        let rows = self.gray.chunks_exact(2 * self.width);
         for (pair, out) in rows.zip(self.half.chunks_exact_mut(self.width / 2)) {
             let (upper, lower) = pair.split_at(self.width);
             let pairs = upper
@@ -76,16 +76,17 @@ mod tests {
     proptest! {
         #[test]
         fn every_way_gives_the_mean(width in 2usize..90, height in 0usize..9, seed: u64) {
-            let grey: Vec<u8> = (0..width * height)
+            let gray: Vec<u8> = (0..width * height)
                 .map(|k| (seed.wrapping_mul(2 * k as u64 + 1) >> 32) as u8)
                 .collect();
             let (mut fast, mut plain) = (Vec::new(), vec![0; (width / 2) * (height / 2)]);
-            prop_assert_eq!(halve(&grey, width, &mut fast), (width / 2, height / 2));
-            Halving { grey: &grey, width, half: &mut plain }.run();
+            prop_assert_eq!(halve(&gray, width, &mut fast), (width / 2, height / 2));
+            Halving { gray: &gray, width, half: &mut plain }.run();
             prop_assert_eq!(&fast, &plain);
             for (index, half) in fast.iter().enumerate() {
                 let at = index / (width / 2) * 2 * width + index % (width / 2) * 2;
-                let sum: u16 = [at, at + 1, at + width, at + width + 1].map(|k| u16::from(grey[k])).iter().sum();
+                let four = [at, at + 1, at + width, at + width + 1];
+                let sum: u16 = four.map(|k| u16::from(gray[k])).iter().sum();
                 prop_assert_eq!(u16::from(*half), (sum + 2) / 4);
             }
         }

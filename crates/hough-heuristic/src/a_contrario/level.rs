@@ -14,7 +14,7 @@ pub(super) const EDGE: u8 = 0x80;
 /// have changed places.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lines {
-    /// Where each line begins, and at the end the number of points.
+    /// Index of each line's first point, and at the end the number of points.
     starts: Vec<u32>,
     /// Position, pixels of the level.
     pub(super) x: Vec<f32>,
@@ -35,12 +35,12 @@ pub(super) struct Level {
     pub(super) columns: Lines,
     /// Which points no circle explains so far, and no arc in which they lie was looked at.
     pub(super) free: Vec<bool>,
-    /// How steep the edge is at each point.
+    /// Steepness of the edge at each point.
     strength: Vec<f32>,
     /// For each pixel: 0 where no edge is within a pixel, else [`EDGE`] and the code of the edge's
     /// normal.
     near: Vec<u8>,
-    /// Where `near` is not 0: which point it is.
+    /// Index of the point, where `near` is not 0.
     nearest: Vec<u32>,
 }
 
@@ -64,7 +64,7 @@ impl Level {
     #[inline(always)]
     fn fill_rows(&mut self, candidates: &[Candidate]) {
         let (width, rows) = (self.width, &mut self.rows);
-        rows.make_room(candidates.len());
+        rows.reserve(candidates.len());
         let ids = rows.id.len() as u32..(candidates.len() + LANES) as u32;
         rows.id.extend(ids);
         self.strength
@@ -151,7 +151,7 @@ impl Level {
         self.nearest[pixel] as usize
     }
 
-    /// How steep the edge is at the point that a mark stands for.
+    /// Steepness of the edge at the point that a mark stands for.
     #[inline(always)]
     pub(super) fn strength_at(&self, pixel: usize) -> f32 {
         self.strength[self.nearest[pixel] as usize]
@@ -176,11 +176,11 @@ impl Level {
 }
 
 impl Lines {
-    /// Makes room for `count` points and a margin.
-    fn make_room(&mut self, count: usize) {
-        let room = self.x.len().max(count + LANES);
+    /// Reserves space for `count` points and a margin.
+    fn reserve(&mut self, count: usize) {
+        let space = self.x.len().max(count + LANES);
         for values in [&mut self.x, &mut self.y, &mut self.nx, &mut self.ny] {
-            values.resize(room, 0.0);
+            values.resize(space, 0.0);
         }
     }
 
@@ -201,7 +201,7 @@ impl Lines {
         for index in 2..self.starts.len() {
             self.starts[index] += self.starts[index - 1];
         }
-        self.make_room(count);
+        self.reserve(count);
         self.id.resize(self.x.len(), 0);
         for index in 0..count {
             let slot = &mut self.starts[column(rows.x[index]) + 1];

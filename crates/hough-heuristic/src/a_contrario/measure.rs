@@ -3,7 +3,7 @@
 
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
-use super::polar::{Grey, LANES, Polar, Ring};
+use super::polar::{Gray, LANES, Polar, Ring};
 
 /// A circle as measured.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,7 +47,7 @@ impl Measured {
         );
     }
 
-    /// The same in a frame whose pixels are `factor` times as small.
+    /// Converts to a frame whose pixels are `factor` times as small.
     pub(super) fn grown(&self, factor: f32) -> Self {
         Self {
             ring: self.ring.grown(factor),
@@ -65,8 +65,8 @@ impl Measured {
     }
 }
 
-/// What the scatter of the rays is worth beyond their number, as found on rendered frames: the
-/// errors of neighbours go together.
+/// Factor on the standard errors, found on rendered frames: neighbouring rays have correlated
+/// errors.
 const SCATTER: f32 = 2.0;
 /// Errors that no number of rays takes away, pixels: of pixels as squares, and for each pixel that
 /// shading had displaced the outline.
@@ -77,10 +77,10 @@ const LIMB_RADIUS: f32 = 1.1;
 
 /// The most directions.
 const MOST: usize = 256;
-/// How far on either side of the outline edges are sought, pixels.
+/// Reach of the search for edges on either side of the outline, pixels.
 const REACH: usize = 4;
 
-/// How often the circle is fitted at the full size.
+/// Number of fits at the full size.
 const ROUNDS: usize = 3;
 
 /// The steepest place along each ray.
@@ -92,7 +92,7 @@ struct Steepest {
 /// Measures the ring on ever finer frames, the finest last; `None` where it gets lost.
 #[inline(always)]
 pub(super) fn measure<'a>(
-    frames: impl Iterator<Item = Grey<'a>>,
+    frames: impl Iterator<Item = Gray<'a>>,
     circle: &UnitCircle,
     polar: &mut Polar,
     start: Ring,
@@ -167,10 +167,10 @@ pub(super) fn measure<'a>(
 
 /// Parts of the outline that are looked at on their own.
 const SECTORS: usize = 8;
-/// How far the profile across the outline is looked at, pixels.
+/// Reach of the profile across the outline, pixels.
 const PROFILE: usize = 8;
 
-/// How far the outline of a shaded ball lies outside of the steepest place.
+/// Estimates the distance of a shaded ball's outline outside the steepest place.
 ///
 /// A ball that darkens towards its limb has slopes inside of the outline but none outside, and blur
 /// moves the steepest place inward. Where the profile of the slope has the half width `w` on the
@@ -179,7 +179,7 @@ const PROFILE: usize = 8;
 /// px and blur of 0.6 to 1.8 px.
 #[inline(always)]
 fn limb_shift(
-    frame: Grey<'_>,
+    frame: Gray<'_>,
     rays: Rays<'_>,
     polar: &mut Polar,
     ring: &Ring,
@@ -229,7 +229,7 @@ fn limb_shift(
     moments.step()
 }
 
-/// How far outside of its top a profile has its outline; None where the top is not above `least`.
+/// Distance of the outline outside the top of a profile; `None` if the top does not exceed `least`.
 #[inline(always)]
 fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     let middle = profile.len() / 2;

@@ -5,9 +5,9 @@
 
 use super::directions::Rays;
 
-/// A grey frame of any size of the pyramid.
+/// A gray frame of any size of the pyramid.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Grey<'a> {
+pub(super) struct Gray<'a> {
     pub(super) pixels: &'a [u8],
     pub(super) width: usize,
     pub(super) height: usize,
@@ -50,9 +50,9 @@ pub(super) struct Polar {
     pub(super) rays: usize,
     /// Distances.
     pub(super) steps: usize,
-    /// Grey levels, one row more than distances; a row begins and ends with [`MARGIN`] values of
+    /// Gray levels, one row more than distances; a row begins and ends with [`MARGIN`] values of
     /// the other end.
-    grey: Vec<f32>,
+    gray: Vec<f32>,
     /// Derivative outward per pixel, averaged along the outline; `rays` values a row.
     pub(super) outward: Vec<f32>,
     /// Derivative along the outline per pixel; `rays` values a row.
@@ -63,21 +63,21 @@ pub(super) struct Polar {
 
 /// Directions that are worked on together.
 pub(super) const LANES: usize = 8;
-/// How many directions at the most are averaged on either side.
+/// Largest number of directions averaged on either side.
 const MARGIN: usize = 8;
 
 impl Polar {
-    /// How far a row lies outside of the outline, pixels; fractions lie between rows.
+    /// Distance of a row outside the outline, pixels; fractions lie between rows.
     #[inline(always)]
     pub(super) fn distance(&self, row: f32) -> f32 {
         row - 0.5 * (self.steps - 1) as f32
     }
 
-    /// The grey level half a pixel inside of the distance of this row; there is one row more than
+    /// The gray level half a pixel inside of the distance of this row; there is one row more than
     /// distances.
     #[inline(always)]
-    pub(super) fn grey(&self, row: usize, ray: usize) -> f32 {
-        self.grey[row.min(self.steps) * (self.rays + 2 * MARGIN) + MARGIN + ray]
+    pub(super) fn gray(&self, row: usize, ray: usize) -> f32 {
+        self.gray[row.min(self.steps) * (self.rays + 2 * MARGIN) + MARGIN + ray]
     }
 
     /// Samples the frame along the rays, up to `reach` pixels on either side of the outline, and
@@ -85,7 +85,7 @@ impl Polar {
     #[inline(always)]
     pub(super) fn sample(
         &mut self,
-        frame: Grey<'_>,
+        frame: Gray<'_>,
         rays: Rays<'_>,
         ring: &Ring,
         reach: usize,
@@ -96,12 +96,12 @@ impl Polar {
         let stride = count + 2 * MARGIN;
         self.rays = count;
         self.steps = 2 * reach + 1;
-        self.grey.resize((self.steps + 1) * stride, 0.0);
+        self.gray.resize((self.steps + 1) * stride, 0.0);
         self.outward.resize(self.steps * count, 0.0);
         self.along.resize(self.steps * count, 0.0);
         self.visible.resize(count, 0.0);
 
-        let Grey {
+        let Gray {
             pixels,
             width,
             height,
@@ -113,7 +113,7 @@ impl Polar {
         for (visible, (&ux, &uy)) in self.visible.iter_mut().zip(ux.iter().zip(uy)) {
             *visible = inside(ring.x + ring.r * ux, right) * inside(ring.y + ring.r * uy, bottom);
         }
-        for (step, row) in self.grey.chunks_exact_mut(stride).enumerate() {
+        for (step, row) in self.gray.chunks_exact_mut(stride).enumerate() {
             let r = ring.r - reach as f32 - 0.5 + step as f32;
             let out = &mut row[MARGIN..MARGIN + count];
             let (ux, uy) = (ux.as_chunks::<LANES>().0, uy.as_chunks::<LANES>().0);
@@ -135,7 +135,7 @@ impl Polar {
         let lag = ((1.0 / arc.max(0.1)) as usize + 1).max(half).min(MARGIN);
         let (share, slope) = (1.0 / (2 * half + 1) as f32, 0.25 / (lag as f32 * arc));
         for step in 0..self.steps {
-            let (near, far) = self.grey[step * stride..][..2 * stride].split_at(stride);
+            let (near, far) = self.gray[step * stride..][..2 * stride].split_at(stride);
             let out = &mut self.outward[step * count..][..count];
             let first = MARGIN - half;
             let (near_by, far_by) = (&near[first..][..count], &far[first..][..count]);
@@ -167,7 +167,7 @@ impl Polar {
 /// A cast would do, but as it saturates the compiler makes no vectors of it.
 #[inline(always)]
 pub(super) fn whole(x: f32) -> (i32, f32) {
-    // Numbers of this size have no room for fractions, and their last bits are whole numbers.
+    // Numbers of this size cannot hold fractions, and their last bits are whole numbers.
     const SHIFT: f32 = 12_582_912.0;
     let shifted = x + SHIFT;
     (
@@ -176,7 +176,7 @@ pub(super) fn whole(x: f32) -> (i32, f32) {
     )
 }
 
-/// The grey levels at distance `r` from the centre of the ring in eight directions.
+/// The gray levels at distance `r` from the centre of the ring in eight directions.
 #[inline(always)]
 fn bilinear(
     pixels: &[u8],
@@ -215,11 +215,11 @@ fn bilinear(
         c[lane] = (lower[lane] & 0xff) as f32;
         d[lane] = (lower[lane] >> 8) as f32;
     }
-    let mut grey = [0.0; LANES];
+    let mut gray = [0.0; LANES];
     for lane in 0..LANES {
         let upper = a[lane] + (b[lane] - a[lane]) * fx[lane];
         let lower = c[lane] + (d[lane] - c[lane]) * fx[lane];
-        grey[lane] = upper + (lower - upper) * fy[lane];
+        gray[lane] = upper + (lower - upper) * fy[lane];
     }
-    grey
+    gray
 }

@@ -1,34 +1,34 @@
-//! The evidence for a candidate, weighed where its radius is one or two dozen pixels: the same at
-//! every size.
+//! The number of false alarms of a candidate, computed at the size of the frame where its radius is
+//! one or two dozen pixels.
 
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
-use super::polar::{Grey, LANES, Polar, Ring};
+use super::polar::{Gray, LANES, Polar, Ring};
 use super::strongest::{Edges, RAYS, Window};
 
-/// How far on either side of the outline the strongest edge is sought, in radii.
+/// Reach of the search for the strongest edge on either side of the outline, in radii.
 const REACH: f32 = 0.33;
 /// The least and the most of that, pixels.
 const LEAST_REACH: usize = 3;
 const MOST_REACH: usize = 8;
-/// How far it is sought from the candidate, which is not exact, pixels.
+/// Reach of the first search, around the candidate, which is not exact, pixels.
 const FIRST_REACH: usize = 6;
 /// Samples that lie so far apart along the outline do not overlap, pixels.
 const SPACING: f32 = 2.5;
-/// Where slopes are averaged: the part of the averaged length that samples lie apart. With 0.75
-/// noise alone made five times as many circles, with 1 a tenth of those in noise of 40 grey levels
-/// were lost.
+/// Distance of independent samples as a share of the length over which slopes are averaged. At 0.75
+/// noise alone made five times as many circles; at 1 a tenth of the circles in noise of 40 gray
+/// levels were lost.
 const OVERLAP: f32 = 0.85;
 
 /// From here on slopes are averaged along the outline, and the edges of a circle may lie farther
-/// off it, grey levels.
+/// off it, gray levels.
 const NOISE: f32 = 3.0;
-/// Of a circle less than this part of which lies in the frame
+/// Share of a circle in the frame below which its number of false alarms is multiplied.
 const WHOLE: f32 = 0.9;
-/// the number of false alarms counts a thousandfold: its decimal logarithm.
+/// Decimal logarithm of that factor.
 const CUT: f32 = 3.0;
-/// What a ray without any edge counts among the samples. It says little of where the outline is:
-/// balls darken towards one side.
+/// Weight of a ray without any edge among the samples. It is weak evidence against an outline,
+/// since balls darken towards one side.
 const NO_EDGE: f32 = 0.25;
 
 /// Fewer rays than these do not make a circle.
@@ -38,14 +38,14 @@ const LEAST_NEAR: usize = 20;
 /// the edges: of balls of which two fifths are hidden some show little more.
 const LEAST_SHARE: [f32; 2] = [0.3, 0.4];
 
-/// What a candidate proved to be.
+/// Result of the proof of a candidate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Proof {
     /// In pixels of the level, or of the frame once it has been measured.
     pub(super) ring: Ring,
     /// Minus the decimal logarithm of the number of false alarms.
     pub(super) certainty: f32,
-    /// How many times the frame was halved for the proof.
+    /// Number of halvings of the frame for the proof.
     pub(super) depth: usize,
     /// Share of the outline in the frame whose strongest edge lies on the outline.
     pub(super) covered: f32,
@@ -54,7 +54,7 @@ pub(super) struct Proof {
 }
 
 impl Proof {
-    /// Whether it explains the edge points on it.
+    /// Returns `true` if it explains the edge points on it.
     pub(super) fn is_beyond_doubt(&self) -> bool {
         self.certainty >= 4.0
     }
@@ -74,10 +74,10 @@ impl Proof {
 /// The certainty that gives a score of one half.
 const HALF_SURE: f64 = 1.0;
 
-/// What the proof needs to know of the level.
+/// Properties of a level that the proof depends on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
-    /// Deviation of the noise at this level, grey levels.
+    /// Deviation of the noise at this level, gray levels.
     pub(super) noise: f32,
     /// Decimal logarithm of the number of circles that might have been tested.
     pub(super) tests: f32,
@@ -85,7 +85,7 @@ pub(super) struct Setting {
 
 #[inline(always)]
 pub(super) fn prove(
-    grey: Grey<'_>,
+    gray: Gray<'_>,
     circle: &UnitCircle,
     polar: &mut Polar,
     start: Ring,
@@ -113,7 +113,7 @@ pub(super) fn prove(
     for round in 0..4 {
         let edges = Edges::around(
             &ring,
-            grey,
+            gray,
             rays,
             polar,
             if round == 0 { wide } else { window },
@@ -141,9 +141,9 @@ pub(super) fn prove(
             break;
         }
     }
-    let mut edges = Edges::around(&ring, grey, rays, polar, window);
+    let mut edges = Edges::around(&ring, gray, rays, polar, window);
     if edges.are_clipped(polar) {
-        edges.leave_out_glow(&ring, grey, rays, polar, window);
+        edges.leave_out_glow(&ring, gray, rays, polar, window);
     }
     Some(weigh(polar, &edges, ring, setting, window))
 }

@@ -5,7 +5,7 @@ use image::GrayImage;
 use super::budget::PROOF;
 use super::candidate::Candidate;
 use super::directions::UnitCircle;
-use super::polar::{Grey, Polar, Ring};
+use super::polar::{Gray, Polar, Ring};
 use super::proof::{self, Proof, Setting};
 use crate::edges::{Vectorized, widest};
 
@@ -13,14 +13,14 @@ use crate::edges::{Vectorized, widest};
 const LARGE: f32 = 24.0;
 /// In noise, from this radius on.
 const SMALL: f32 = 9.0;
-/// What noise that is, grey levels.
+/// Noise from which on a frame counts as noisy, gray levels.
 const NOISY: f32 = 8.0;
 
 /// The least radius at which a circle is looked at a second time at half the size, pixels there.
 const LEAST_SECOND: f32 = 8.0;
 /// From this certainty on no larger size is asked, but in noise.
 const SURE: f32 = 12.0;
-/// What a second look takes from the certainty.
+/// Certainty that a second look costs.
 const SECOND_LOOK: f32 = 1.0;
 
 /// The frame and its halves.
@@ -33,27 +33,27 @@ pub(super) struct Pyramid<'a> {
 /// A frame of a power of two below the full size.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Size {
-    pub(super) grey: Vec<u8>,
+    pub(super) gray: Vec<u8>,
     pub(super) width: usize,
     pub(super) height: usize,
 }
 
 impl<'a> Pyramid<'a> {
-    /// How many times the frame was halved.
+    /// Number of halvings of the frame.
     pub(super) fn depth(&self) -> usize {
         self.sizes.len()
     }
 
     /// The frame, or the one that is as many times half of it.
-    pub(super) fn grey(&self, depth: usize) -> Grey<'a> {
+    pub(super) fn gray(&self, depth: usize) -> Gray<'a> {
         match depth.checked_sub(1).and_then(|index| self.sizes.get(index)) {
-            None => Grey {
+            None => Gray {
                 pixels: self.frame.as_raw(),
                 width: self.frame.width() as usize,
                 height: self.frame.height() as usize,
             },
-            Some(size) => Grey {
-                pixels: &size.grey,
+            Some(size) => Gray {
+                pixels: &size.gray,
                 width: size.width,
                 height: size.height,
             },
@@ -61,12 +61,12 @@ impl<'a> Pyramid<'a> {
     }
 }
 
-/// What is needed for proofs, and what has been proven.
+/// The data for proofs, and the proofs so far.
 pub(super) struct Prover<'a> {
     pub(super) pyramid: Pyramid<'a>,
     pub(super) circle: &'a UnitCircle,
     pub(super) polar: &'a mut Polar,
-    /// Deviation of the frame's noise, grey levels.
+    /// Deviation of the frame's noise, gray levels.
     pub(super) noise: f32,
     /// Decimal logarithm of the number of circles that might have been tested at the full size.
     pub(super) tests: f32,
@@ -108,7 +108,7 @@ impl Prover<'_> {
         *looks += PROOF;
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
-            grey: self.pyramid.grey(depth),
+            gray: self.pyramid.gray(depth),
             circle: self.circle,
             polar: self.polar,
             start: ring.shrunk(scale),
@@ -121,7 +121,7 @@ impl Prover<'_> {
         Some(Proof { depth, ..proof })
     }
 
-    /// How many times the frame is to be halved for a circle of this radius.
+    /// Number of halvings of the frame for a circle of this radius.
     fn depth_for(&self, mut r: f32) -> usize {
         let mut depth = 0;
         while depth < self.pyramid.depth()
@@ -148,7 +148,7 @@ fn better(first: Option<Proof>, second: Option<Proof>) -> Option<Proof> {
 
 /// The proof of a candidate.
 struct Proving<'a> {
-    grey: Grey<'a>,
+    gray: Gray<'a>,
     circle: &'a UnitCircle,
     polar: &'a mut Polar,
     start: Ring,
@@ -161,7 +161,7 @@ impl Vectorized for Proving<'_> {
     #[inline(always)]
     fn run(self) -> Self::Output {
         proof::prove(
-            self.grey,
+            self.gray,
             self.circle,
             self.polar,
             self.start,
@@ -177,21 +177,22 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The same source for any width of vectors gives the same bits.
+        /// Vectors of any width give the same bits.
         #[test]
         fn wide_vectors_prove_what_plain_code_proves(
             x in 10f32..70.0, y in 10f32..70.0, r in 6f32..24.0, noise in 0f32..40.0, seed: u64,
         ) {
             let frame = GrayImage::from_fn(80, 80, |px, py| {
                 let (dx, dy) = (px as f32 - x, py as f32 - y);
-                let random = (seed.wrapping_mul(u64::from(2 * (80 * py + px) + 1)) >> 40) as f32 / (1u64 << 24) as f32;
+                let random = seed.wrapping_mul(u64::from(2 * (80 * py + px) + 1)) >> 40;
+                let random = random as f32 / (1u64 << 24) as f32;
                 let ball = if (dx * dx + dy * dy).sqrt() < r { 60.0 } else { 170.0 };
                 Luma([(ball + noise * (2.0 * random - 1.0)).clamp(0.0, 255.0) as u8])
             });
             let circle = UnitCircle::new();
             let (mut wide, mut plain) = (Polar::default(), Polar::default());
             let of = |polar| Proving {
-                grey: Pyramid { frame: &frame, sizes: &[] }.grey(0),
+                gray: Pyramid { frame: &frame, sizes: &[] }.gray(0),
                 circle: &circle,
                 polar,
                 start: Ring { x: x + 0.7, y: y - 0.4, r: r + 0.5 },

@@ -5,27 +5,24 @@ use super::budget::{Budget, Stage};
 use super::candidate::{Candidate, Collected};
 use super::directions::{CODES, UnitCircle, code};
 use super::fit::Moments;
-use super::level::{EDGE, Level, Lines};
+use super::level::{EDGE, Level};
+use super::partners::{LEAST_ALONG, PARTNERS};
 use super::polar::{LANES, Ring, whole};
 use super::prover::Prover;
 
 /// Points of a circle's outline that are looked at.
 pub(super) const LOOKS: usize = 32;
-/// How far the direction of an edge may be off that of the outline, in codes of 2.8 degrees.
+/// Largest angle between an edge and the outline, in codes of 2.8 degrees.
 pub(super) const DIRECTION_SLACK: u8 = 7;
-/// The least part of a normal along the line that the pair lies on.
-const LEAST_ALONG: f32 = 0.58;
-/// Of the outline so much is to lie on edges, once it is fitted, for a circle to be worth a proof.
+/// Share of the fitted outline that must lie on edges before a proof.
 const LEAST_SHARE: f32 = 0.4;
-/// Of a ball hidden by two fifths little more is to be seen.
+/// Limits for pairs. A ball of which two fifths are hidden shows little more.
 const START: Start = Start {
     share: 0.44,
     reach: [3.0, 2.0],
 };
-/// How many mirrored partners of a point are tried.
-const PARTNERS: usize = 6;
 
-/// What a ring's outline shows.
+/// Edges along the outline of a ring.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Support {
     /// Points of the outline that lie on an edge along it.
@@ -239,19 +236,19 @@ impl Outline {
     }
 }
 
-/// Whether a pixel with this mark has an edge whose code lies at most twice the slack above the
-/// lowest.
+/// Returns `true` if a pixel with this mark has an edge whose code lies at most twice the slack
+/// above the lowest.
 #[inline]
 fn runs_along(mark: u8, lowest: u8) -> bool {
     mark & EDGE != 0 && mark.wrapping_sub(lowest) % CODES <= 2 * DIRECTION_SLACK
 }
 
-/// How a circle is looked at for the first time.
+/// Requirements of the first look at a circle.
 pub(super) struct Start {
     /// The share of the outline that must lie on edges.
     pub(super) share: f32,
-    /// How far off the circle the points lie that it is fitted to, pixels: in the first two rounds,
-    /// and then.
+    /// Largest distance from the circle of the points that it is fitted to, pixels: in the first
+    /// two rounds, and then.
     pub(super) reach: [f32; 2],
 }
 
@@ -416,82 +413,6 @@ impl Search<'_> {
             &mut budget.looks,
         );
         true
-    }
-}
-
-impl Lines {
-    /// The circles of the point `at` and the nearest points further along its line whose normals
-    /// mirror its own.
-    #[inline(always)]
-    fn partners(
-        &self,
-        (at, line_end): (usize, usize),
-        radii: (f32, f32),
-        mirror_slack: f32,
-        free: &[bool],
-        rings: &mut [Ring; PARTNERS],
-        looks: &mut u64,
-    ) -> usize {
-        // Inward: along the line at p, against it at q.
-        let sign = 1f32.copysign(self.nx[at]);
-        let (x, y, px, py) = (
-            self.x[at],
-            self.y[at],
-            sign * self.nx[at],
-            sign * self.ny[at],
-        );
-        let end = x + 2.0 * radii.1;
-        let mut count = 0;
-        let mut first = at + 1;
-        // The lists end in a margin of points that mirror none.
-        while first < line_end && self.x[first] <= end {
-            *looks += 1;
-            let block = |values: &'_ [f32]| -> [f32; LANES] {
-                values[first..first + LANES].as_chunks().0[0]
-            };
-            let (qx, qy, nx, ny) = (
-                block(&self.x),
-                block(&self.y),
-                block(&self.nx),
-                block(&self.ny),
-            );
-            // By how much what is to be at most 0 is more: one comparison for all of it keeps the
-            // lanes together.
-            let more = |a: f32, b: f32| if a > b { a } else { b };
-            let mut excess = [0.0; LANES];
-            for lane in 0..LANES {
-                let crossed = (px * ny[lane] + py * nx[lane]).abs();
-                let dx = qx[lane] - x;
-                let along = px + nx[lane].abs();
-                let direction = more(crossed - mirror_slack, LEAST_ALONG - nx[lane].abs());
-                let distance = more(radii.0 * along - dx, dx - radii.1 * along);
-                excess[lane] = more(more(direction, distance), (qy[lane] - y).abs() - 1.0);
-            }
-            let fits = std::hint::black_box(excess).map(|excess| u8::from(excess <= 0.0));
-            let mut bits = u64::from_le_bytes(fits);
-            while bits != 0 {
-                let lane = bits.trailing_zeros() as usize / 8;
-                bits &= bits - 1;
-                if !free[self.id[first + lane] as usize] {
-                    continue;
-                }
-                let sign = -(1f32.copysign(nx[lane]));
-                let (along, across) = (px - sign * nx[lane], py + sign * ny[lane]);
-                let length = (along * along + across * across).sqrt();
-                let r = 0.5 * (qx[lane] - x) * length / along;
-                rings[count] = Ring {
-                    x: 0.5 * (x + qx[lane]),
-                    y: 0.5 * (y + qy[lane]) + r * across / length,
-                    r,
-                };
-                count += 1;
-                if count == PARTNERS {
-                    return count;
-                }
-            }
-            first += LANES;
-        }
-        count
     }
 }
 

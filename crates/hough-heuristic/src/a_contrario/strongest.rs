@@ -1,33 +1,33 @@
 //! The strongest edge along each ray across an outline, and which of them are no edges of things.
 
 use super::directions::Rays;
-use super::polar::{Grey, LANES, Polar, Ring};
+use super::polar::{Gray, LANES, Polar, Ring};
 
 /// Directions that are looked in.
 pub(super) const RAYS: usize = 64;
-/// From here on grey levels are as bright as can be, but for what compression leaves.
+/// Gray level from which on a pixel counts as overexposed; compression leaves a margin.
 const CLIPPED: f32 = 245.0;
 /// By how much wider than for edges the window is for the light around, pixels.
 const FALL: usize = 4;
-/// The part of the edge that the light falls by from 3 to 6 px beyond it, from which on it is a
-/// glow: with lamps 0.1 to 0.5, with balls up to 0.03.
+/// Fall of the light from 3 to 6 px beyond an edge, as a share of the edge, from which on it is the
+/// glow of a lamp. Lamps have 0.1 to 0.5, balls up to 0.03.
 const GLOW: f32 = 0.08;
 
-/// How far around a circle edges are sought, and how slopes are averaged.
+/// Reach of the search around a circle, and the averaging of slopes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     /// Pixels on either side of the outline.
     pub(super) reach: usize,
     /// Rays on either side that a slope is averaged over.
     pub(super) half: usize,
-    /// The least slope of an edge, grey levels per pixel.
+    /// The least slope of an edge, gray levels per pixel.
     pub(super) least: f32,
 }
 
 /// The strongest edge along each ray.
 #[derive(Clone, Debug)]
 pub(super) struct Edges {
-    /// How far outside the outline, pixels.
+    /// Distance outside the outline, pixels.
     pub(super) distance: [f32; RAYS],
     /// Slope without its sign; 0 where there is no edge.
     pub(super) slope: [f32; RAYS],
@@ -40,13 +40,13 @@ impl Edges {
     #[inline(always)]
     pub(super) fn around(
         ring: &Ring,
-        grey: Grey<'_>,
+        gray: Gray<'_>,
         rays: Rays<'_>,
         polar: &mut Polar,
         window: Window,
     ) -> Self {
         let Window { reach, half, least } = window;
-        polar.sample(grey, rays, ring, reach, half);
+        polar.sample(gray, rays, ring, reach, half);
         let mut edges = Self {
             distance: [0.0; RAYS],
             slope: [0.0; RAYS],
@@ -93,11 +93,11 @@ impl Edges {
         edges
     }
 
-    /// The grey level `pixels` away from the edge of a ray, on the dark side of it if positive;
+    /// The gray level `pixels` away from the edge of a ray, on the dark side of it if positive;
     /// `beyond` is how much wider the window sampled is than the one in which the edges were
     /// sought.
     #[inline(always)]
-    fn grey(&self, polar: &Polar, ray: usize, pixels: i32, beyond: usize) -> f32 {
+    fn gray(&self, polar: &Polar, ray: usize, pixels: i32, beyond: usize) -> f32 {
         let step = self.at[ray] - 1 + beyond as i32;
         // The edge lies between this row and the next.
         let outward = polar.outward[step.max(0) as usize * RAYS + ray];
@@ -106,18 +106,18 @@ impl Edges {
         } else {
             step + 1 - pixels
         };
-        polar.grey(row.max(0) as usize, ray)
+        polar.gray(row.max(0) as usize, ray)
     }
 
-    /// Whether an edge lies on the outline and its bright side is as bright as can be.
+    /// Returns `true` if an edge lies on the outline and its bright side is overexposed.
     #[inline(always)]
     fn is_clipped(&self, polar: &Polar, ray: usize, beyond: usize) -> bool {
         self.slope[ray] > 0.0
             && self.distance[ray].abs() <= 1.5
-            && self.grey(polar, ray, -2, beyond) >= CLIPPED
+            && self.gray(polar, ray, -2, beyond) >= CLIPPED
     }
 
-    /// Whether a good part of the outline runs along what is as bright as can be.
+    /// Returns `true` if an eighth of the outline or more runs along an overexposed area.
     pub(super) fn are_clipped(&self, polar: &Polar) -> bool {
         (0..RAYS)
             .filter(|&ray| self.is_clipped(polar, ray, 0))
@@ -130,15 +130,15 @@ impl Edges {
     pub(super) fn leave_out_glow(
         &mut self,
         ring: &Ring,
-        grey: Grey<'_>,
+        gray: Gray<'_>,
         rays: Rays<'_>,
         polar: &mut Polar,
         window: Window,
     ) {
-        polar.sample(grey, rays, ring, window.reach + FALL, window.half);
+        polar.sample(gray, rays, ring, window.reach + FALL, window.half);
         let (mut drop, mut fall) = (0.0, 0.0);
         for ray in (0..RAYS).filter(|&ray| self.is_clipped(polar, ray, FALL)) {
-            let [bright, dark, far] = [-2, 3, 6].map(|pixels| self.grey(polar, ray, pixels, FALL));
+            let [bright, dark, far] = [-2, 3, 6].map(|pixels| self.gray(polar, ray, pixels, FALL));
             drop += bright - dark;
             fall += dark - far;
         }

@@ -15,7 +15,8 @@ impl AContrario {
     /// A `last` or a `reach` that is not finite, or has no radius, is never there.
     ///
     /// # Errors
-    /// [`FrameRefused`] if the whole frame is to be searched and the configuration does not suit it.
+    /// [`FrameRefused`] if the whole frame is to be searched and the configuration does not suit
+    /// it.
     pub fn track(
         &mut self,
         frame: &GrayImage,
@@ -44,16 +45,16 @@ impl AContrario {
         if !usable || reach < 0.0 || radii.0 > radii.1 {
             return None;
         }
-        // Room for the outline wherever it may be, and for the rays beyond it.
-        let room = last.radius + 2.0 * reach + MARGIN;
+        // The window holds the outline wherever it may be, and the rays beyond it.
+        let extent = last.radius + 2.0 * reach + MARGIN;
         let clip = |value: f64, end: u32| value.clamp(0.0, f64::from(end)) as u32;
         let (left, right) = (
-            clip(last.x - room, frame.width()),
-            clip(last.x + room + 1.0, frame.width()),
+            clip(last.x - extent, frame.width()),
+            clip(last.x + extent + 1.0, frame.width()),
         );
         let (top, bottom) = (
-            clip(last.y - room, frame.height()),
-            clip(last.y + room + 1.0, frame.height()),
+            clip(last.y - extent, frame.height()),
+            clip(last.y + extent + 1.0, frame.height()),
         );
         let (width, height) = (right - left, bottom - top);
         if width < LEAST_SIDE || height < LEAST_SIDE {

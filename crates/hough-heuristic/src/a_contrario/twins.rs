@@ -13,12 +13,12 @@ fn frame(ball: &Ring, noise: f32, seed: u64) -> GrayImage {
         let random = (seed.wrapping_mul(u64::from(2 * (160 * y + x) + 1)) >> 40) as f32
             / (1u64 << 24) as f32;
         let bar = if (x + 2 * y) % 47 < 9 { 40.0 } else { 0.0 };
-        let grey = if (dx * dx + dy * dy).sqrt() < ball.r {
+        let gray = if (dx * dx + dy * dy).sqrt() < ball.r {
             60.0
         } else {
             150.0 + bar
         };
-        Luma([(grey + noise * (2.0 * random - 1.0)).clamp(0.0, 255.0) as u8])
+        Luma([(gray + noise * (2.0 * random - 1.0)).clamp(0.0, 255.0) as u8])
     })
 }
 
@@ -73,7 +73,8 @@ proptest! {
 
     #[test]
     fn wide_vectors_measure_what_plain_code_measures(
-        ball in balls(), off in (-2f32..2.0, -2f32..2.0, -1f32..1.0), noise in 0f32..40.0, seed: u64,
+        ball in balls(), off in (-2f32..2.0, -2f32..2.0, -1f32..1.0), noise in 0f32..40.0,
+        seed: u64,
     ) {
         let frame = frame(&ball, noise, seed);
         let circle = UnitCircle::new();

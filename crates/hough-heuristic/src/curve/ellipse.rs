@@ -97,8 +97,8 @@ impl Curve for Ellipse {
             .then_some(ellipse)
     }
 
-    /// Where the curve is nearer to the horizontal the pixel of each column that lies nearest to
-    /// it, elsewhere that of each row.
+    /// Visits the nearest pixel of each column where the curve is nearer to the horizontal, and
+    /// that of each row elsewhere.
     fn outline(&self, _width: u32, _height: u32, mut visit: impl FnMut(i32, i32) -> bool) -> bool {
         let (a, b, c) = self.quadratic();
         // Along a column at dx the curve has dy = (-b dx ± root) / 2c, and the slope there tells

@@ -6,18 +6,18 @@
 
 use super::rows::{self, Candidate, Passes, Rows};
 
-/// Work that is worth compiling for wider vectors: whatever [`run`](Vectorized::run) and the
-/// functions inlined into it do (`#[inline(always)]` on both). [`widest`] does it.
+/// Work that is compiled for several widths of vectors: [`run`](Vectorized::run) and the functions
+/// inlined into it (`#[inline(always)]` on both). [`widest`] runs it.
 pub trait Vectorized {
-    /// What it gives.
+    /// The result.
     type Output;
 
-    /// Does the work; to be inlined always.
+    /// Does the work. Mark it `#[inline(always)]`.
     fn run(self) -> Self::Output;
 }
 
-/// Does `work` by the fastest code for this machine: with AVX2 where the processor has it. There
-/// are no fused multiplications, so the result is always the same.
+/// Runs `work` by the fastest code for this machine: with AVX2 if the processor has it. The result
+/// does not depend on the machine, since there are no fused multiplications.
 ///
 /// ```
 /// use hough_heuristic::{Vectorized, widest};
@@ -55,7 +55,7 @@ fn with_avx2<W: Vectorized>(work: W) -> W::Output {
 /// [`rows::candidates`] by the fastest code for this machine.
 pub(super) fn candidates(
     passes: &Passes,
-    grey: &[u8],
+    gray: &[u8],
     width: usize,
     rows: &mut Rows,
     marks: &mut [u8],
@@ -64,33 +64,33 @@ pub(super) fn candidates(
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the function needs nothing but AVX2, which has just been detected.
-        unsafe { candidates_avx2(passes, grey, width, rows, marks, found) };
+        unsafe { candidates_avx2(passes, gray, width, rows, marks, found) };
         return;
     }
-    candidates_baseline(passes, grey, width, rows, marks, found);
+    candidates_baseline(passes, gray, width, rows, marks, found);
 }
 
 /// [`rows::candidates`] for the baseline of the target: SSE2, NEON, or no vectors at all.
 pub(super) fn candidates_baseline(
     passes: &Passes,
-    grey: &[u8],
+    gray: &[u8],
     width: usize,
     rows: &mut Rows,
     marks: &mut [u8],
     found: &mut Vec<Candidate>,
 ) {
-    rows::candidates(passes, grey, width, rows, marks, found);
+    rows::candidates(passes, gray, width, rows, marks, found);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn candidates_avx2(
     passes: &Passes,
-    grey: &[u8],
+    gray: &[u8],
     width: usize,
     rows: &mut Rows,
     marks: &mut [u8],
     found: &mut Vec<Candidate>,
 ) {
-    rows::candidates(passes, grey, width, rows, marks, found);
+    rows::candidates(passes, gray, width, rows, marks, found);
 }

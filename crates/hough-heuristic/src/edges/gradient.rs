@@ -1,10 +1,10 @@
-//! What an edge pixel knows of the grey levels around it.
+//! The gray-level gradient at an edge pixel.
 
 use super::rows::UNITS;
 
-/// The grey-level gradient at an edge pixel.
+/// The gray-level gradient at an edge pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EdgeGradient {
+pub(crate) struct EdgeGradient {
     x: i16,
     y: i16,
     /// Squared length at the neighbour before, here, and at the neighbour behind, along the
@@ -19,7 +19,7 @@ impl EdgeGradient {
 
     /// The gradient, from dark to bright, in the units of
     /// [`CannyConfig::low`](crate::CannyConfig::low).
-    pub fn vector(&self) -> (f64, f64) {
+    pub(crate) fn vector(&self) -> (f64, f64) {
         (
             f64::from(self.x) / f64::from(UNITS),
             f64::from(self.y) / f64::from(UNITS),
@@ -27,7 +27,8 @@ impl EdgeGradient {
     }
 
     /// The gradient's length, in the same units.
-    pub fn strength(&self) -> f64 {
+    #[cfg(test)]
+    pub(super) fn strength(&self) -> f64 {
         f64::from(self.squares[1]).sqrt() / f64::from(UNITS)
     }
 
@@ -36,7 +37,7 @@ impl EdgeGradient {
     ///
     /// The top of the parabola through the gradient's length here and at the two neighbours across
     /// the edge.
-    pub fn offset(&self) -> (f64, f64) {
+    pub(crate) fn offset(&self) -> (f64, f64) {
         let [before, here, behind] = self.squares.map(|square| f64::from(square).sqrt());
         let bend = 2.0 * here - before - behind;
         if bend <= 0.0 {
@@ -121,7 +122,8 @@ mod tests {
     proptest! {
         #[test]
         fn eight_at_once_are_where_each_is(
-            vectors in uniform8((-16320i16..=16320, -16320i16..=16320)), around in uniform8((0.0f64..1.2, 0.0f64..1.2)),
+            vectors in uniform8((-16320i16..=16320, -16320i16..=16320)),
+            around in uniform8((0.0f64..1.2, 0.0f64..1.2)),
         ) {
             let gradients: [EdgeGradient; 8] = std::array::from_fn(|i| {
                 let (x, y) = vectors[i];
@@ -132,12 +134,15 @@ mod tests {
             let geometry = Geometry::of(gradients.each_ref());
             for (i, gradient) in gradients.iter().enumerate() {
                 let ((x, y), (dx, dy)) = (gradient.vector(), gradient.offset());
-                prop_assert_eq!((geometry.x[i], geometry.y[i]), ((16.0 * x) as f32, (16.0 * y) as f32));
+                let units = ((16.0 * x) as f32, (16.0 * y) as f32);
+                prop_assert_eq!((geometry.x[i], geometry.y[i]), units);
                 // Where the three lengths are nearly on a line single precision places the top of
                 // the parabola anywhere.
-                let [before, here, behind] = gradient.squares.map(|square| f64::from(square).sqrt());
+                let lengths = gradient.squares.map(|square| f64::from(square).sqrt());
+                let [before, here, behind] = lengths;
                 if (2.0 * here - before - behind).abs() > 1e-3 * here {
-                    let off = (f64::from(geometry.dx[i]) - dx).abs() + (f64::from(geometry.dy[i]) - dy).abs();
+                    let (x, y) = (f64::from(geometry.dx[i]), f64::from(geometry.dy[i]));
+                    let off = (x - dx).abs() + (y - dy).abs();
                     prop_assert!(off < 1e-3, "{:?}: {}", gradient, off);
                 }
             }

@@ -1,9 +1,9 @@
 //! The maxima of the gradient across edges, without hysteresis: what a detector wants that looks
 //! for order itself.
 
-use super::canny::{noise_gain, smoothing_weights};
 use super::dispatch;
 use super::rows::{Candidate, Passes, Rows, UNITS};
+use super::smoothing::{noise_gain, smoothing_weights};
 
 /// Finds the pixels whose gradient is a maximum across the edge.
 #[derive(Clone, Debug)]
@@ -41,26 +41,26 @@ impl Maxima {
         self.noise_gain
     }
 
-    /// The maxima above `threshold`, in grey levels of Sobel's gradient, row by row, and of more
+    /// The maxima above `threshold`, in gray levels of Sobel's gradient, row by row, and of more
     /// than `most` only the strongest; none in a frame below 3x3.
     pub(crate) fn find(
         &mut self,
-        grey: &[u8],
+        gray: &[u8],
         width: usize,
         threshold: f32,
         most: usize,
     ) -> &[Candidate] {
         self.candidates.clear();
-        let height = grey.len().checked_div(width).unwrap_or(0);
+        let height = gray.len().checked_div(width).unwrap_or(0);
         if width >= 3 && height >= 3 {
             let threshold = threshold * UNITS;
             self.passes.low = (threshold * threshold) as i32;
             #[cfg(feature = "parallel")]
-            let found = self.find_in_strips(grey, width);
+            let found = self.find_in_strips(gray, width);
             #[cfg(not(feature = "parallel"))]
             let found = false;
             if !found {
-                self.find_at_once(grey, width);
+                self.find_at_once(gray, width);
             }
         }
         if self.candidates.len() > most {
@@ -78,10 +78,10 @@ impl Maxima {
         &self.candidates
     }
 
-    fn find_at_once(&mut self, grey: &[u8], width: usize) {
+    fn find_at_once(&mut self, gray: &[u8], width: usize) {
         dispatch::candidates(
             &self.passes,
-            grey,
+            gray,
             width,
             &mut self.rows,
             &mut [],
@@ -110,12 +110,12 @@ const LEAST_ROWS: usize = 4;
 impl Maxima {
     /// Finds the candidates of large frames, a strip of rows on each thread; false if the frame is
     /// too small for that.
-    fn find_in_strips(&mut self, grey: &[u8], width: usize) -> bool {
+    fn find_in_strips(&mut self, gray: &[u8], width: usize) -> bool {
         use rayon::prelude::*;
 
-        let height = grey.len() / width;
+        let height = gray.len() / width;
         let count = rayon::current_num_threads()
-            .min(grey.len() / LEAST_STRIP)
+            .min(gray.len() / LEAST_STRIP)
             .min(height / LEAST_ROWS);
         if count < 2 {
             return false;
@@ -136,7 +136,7 @@ impl Maxima {
                     own.start.saturating_sub(around),
                     (own.end + around).min(height),
                 );
-                let part = &grey[first * width..end * width];
+                let part = &gray[first * width..end * width];
                 let Strip { rows, candidates } = strip;
                 candidates.clear();
                 dispatch::candidates(passes, part, width, rows, &mut [], candidates);
@@ -160,10 +160,11 @@ mod tests {
     proptest! {
         #[test]
         fn strips_give_what_the_whole_frame_gives(
-            width in 3usize..60, height in 3usize..90, threads in 2usize..7, roughness in 1u8..=255, seed: u64, sigma in 0f32..=2.0,
+            width in 3usize..60, height in 3usize..90, threads in 2usize..7,
+            roughness in 1u8..=255, seed: u64, sigma in 0f32..=2.0,
         ) {
             let mut state = seed | 1;
-            let grey: Vec<u8> = (0..width * height).map(|index| {
+            let gray: Vec<u8> = (0..width * height).map(|index| {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                 let step = if (index % width + index / width) % 23 < 11 { 90 } else { 0 };
                 ((state >> 56) as u8 % roughness).saturating_add(step)
@@ -172,10 +173,10 @@ mod tests {
             let (mut strips, mut whole) = (Maxima::new(sigma), Maxima::new(sigma));
             let low = 20.0 * UNITS;
             (strips.passes.low, whole.passes.low) = ((low * low) as i32, (low * low) as i32);
-            let split = pool.install(|| strips.find_in_strips(&grey, width));
-            prop_assert_eq!(split, grey.len() >= 2 * LEAST_STRIP && height >= 2 * LEAST_ROWS);
+            let split = pool.install(|| strips.find_in_strips(&gray, width));
+            prop_assert_eq!(split, gray.len() >= 2 * LEAST_STRIP && height >= 2 * LEAST_ROWS);
             if split {
-                whole.find_at_once(&grey, width);
+                whole.find_at_once(&gray, width);
                 prop_assert_eq!(&strips.candidates, &whole.candidates);
             }
         }

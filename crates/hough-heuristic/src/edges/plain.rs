@@ -9,7 +9,7 @@ pub(super) struct Maximum {
     /// Place in the frame, row by row.
     pub(super) index: usize,
     pub(super) mark: u8,
-    /// The gradient in grey levels.
+    /// The gradient in gray levels.
     pub(super) vector: (f64, f64),
     /// Its length.
     pub(super) strength: f64,
@@ -18,8 +18,8 @@ pub(super) struct Maximum {
 }
 
 /// The candidates of a frame of at least 3x3 pixels, row by row.
-pub(super) fn maxima(passes: &Passes, grey: &[u8], width: usize) -> Vec<Maximum> {
-    let (w, h) = (width as isize, (grey.len() / width) as isize);
+pub(super) fn maxima(passes: &Passes, gray: &[u8], width: usize) -> Vec<Maximum> {
+    let (w, h) = (width as isize, (gray.len() / width) as isize);
     let at = |x: isize, y: isize| (y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize;
     let plane = |value: &dyn Fn(isize, isize) -> i32| -> Vec<i32> {
         (0..h)
@@ -32,7 +32,7 @@ pub(super) fn maxima(passes: &Passes, grey: &[u8], width: usize) -> Vec<Maximum>
 
     let down = plane(&|x, y| {
         let sum: i32 = (-reach..=reach)
-            .map(|k| weight(k) * i32::from(grey[at(x, y + k)]))
+            .map(|k| weight(k) * i32::from(gray[at(x, y + k)]))
             .sum();
         (sum + 8) >> 4
     });

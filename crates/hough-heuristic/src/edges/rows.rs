@@ -7,7 +7,7 @@
 
 use super::{EdgeGradient, EdgePixel};
 
-/// Grey levels are carried in sixteenths from the smoothing on.
+/// Gray levels are carried in sixteenths from the smoothing on.
 pub(super) const UNITS: f32 = 16.0;
 /// The smoothing weights of one direction sum up to this.
 pub(super) const WEIGHT_SUM: u16 = 64;
@@ -18,7 +18,7 @@ const BLOCK: usize = 32;
 /// `tan(22.5 degrees)` in units of 2^-15: where the sectors of the gradient direction meet.
 const TAN_22: i32 = 13573;
 
-/// What the passes need to know.
+/// Parameters of the passes.
 #[derive(Clone, Debug)]
 pub(super) struct Passes {
     /// Half of the symmetric smoothing kernel: the centre's weight, then outward.
@@ -31,7 +31,7 @@ pub(super) struct Passes {
 /// The rows in work, reused from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
-    /// One row smoothed along the columns, in quarters of a grey level, `reach` pixels wider at
+    /// One row smoothed along the columns, in quarters of a gray level, `reach` pixels wider at
     /// either end.
     across: Vec<u16>,
     /// Three smoothed rows, in units, a pixel wider at either end.
@@ -43,9 +43,9 @@ pub(super) struct Rows {
 struct GradientRow {
     x: Vec<i16>,
     y: Vec<i16>,
-    /// Squared length, if it has been asked for.
+    /// Squared length, if it has been computed.
     square: Vec<i32>,
-    /// Whether it has.
+    /// Set if it has.
     squared: bool,
 }
 
@@ -66,19 +66,19 @@ pub(super) const STRONG: u8 = 2;
 #[inline(always)]
 pub(super) fn candidates(
     passes: &Passes,
-    grey: &[u8],
+    gray: &[u8],
     width: usize,
     rows: &mut Rows,
     marks: &mut [u8],
     found: &mut Vec<Candidate>,
 ) {
-    let height = grey.len() / width;
+    let height = gray.len() / width;
     rows.resize(width, passes.weights.len() - 1);
     let last = height - 1;
     for y in 0..=height {
         // Row y is smoothed, then row y - 1 differentiated, then the maxima of row y - 2 found.
         if y <= last {
-            rows.smooth_row(passes, grey, width, y);
+            rows.smooth_row(passes, gray, width, y);
         }
         if y >= 1 {
             let middle = y - 1;
@@ -101,7 +101,7 @@ pub(super) fn candidates(
 }
 
 impl Rows {
-    /// Makes room for rows of `width` pixels. What an earlier frame left beyond them is never
+    /// Reserves rows of `width` pixels. What an earlier frame left beyond them is never
     /// looked at in a way that shows.
     fn resize(&mut self, width: usize, reach: usize) {
         // The maxima of a block are sought a pixel farther to the right, and need a pixel beyond.
@@ -118,15 +118,15 @@ impl Rows {
     }
 
     #[inline(always)]
-    fn smooth_row(&mut self, passes: &Passes, grey: &[u8], width: usize, y: usize) {
+    fn smooth_row(&mut self, passes: &Passes, gray: &[u8], width: usize, y: usize) {
         let out = &mut self.smooth[y % 3];
         // The reach as a constant lets the loops unroll.
         match passes.weights[..] {
-            [_] => smooth::<0>(passes, grey, width, y, &mut self.across, out),
-            [_, _] => smooth::<1>(passes, grey, width, y, &mut self.across, out),
-            [_, _, _] => smooth::<2>(passes, grey, width, y, &mut self.across, out),
-            [_, _, _, _] => smooth::<3>(passes, grey, width, y, &mut self.across, out),
-            _ => smooth::<MAX_REACH>(passes, grey, width, y, &mut self.across, out),
+            [_] => smooth::<0>(passes, gray, width, y, &mut self.across, out),
+            [_, _] => smooth::<1>(passes, gray, width, y, &mut self.across, out),
+            [_, _, _] => smooth::<2>(passes, gray, width, y, &mut self.across, out),
+            [_, _, _, _] => smooth::<3>(passes, gray, width, y, &mut self.across, out),
+            _ => smooth::<MAX_REACH>(passes, gray, width, y, &mut self.across, out),
         }
     }
 }
@@ -136,15 +136,15 @@ impl Rows {
 #[inline(always)]
 fn smooth<const REACH: usize>(
     passes: &Passes,
-    grey: &[u8],
+    gray: &[u8],
     width: usize,
     y: usize,
     across: &mut [u16],
     out: &mut [i16],
 ) {
     let weights = &passes.weights[..=REACH];
-    let last = grey.len() / width - 1;
-    let row = |y: usize| &grey[y * width..][..width];
+    let last = gray.len() / width - 1;
+    let row = |y: usize| &gray[y * width..][..width];
     let centre = row(y);
     let above: [&[u8]; REACH] = std::array::from_fn(|k| row(y.saturating_sub(k + 1)));
     let below: [&[u8]; REACH] = std::array::from_fn(|k| row((y + k + 1).min(last)));
@@ -192,7 +192,7 @@ fn differentiate(a: &[i16], b: &[i16], c: &[i16], out: &mut GradientRow) {
 }
 
 impl GradientRow {
-    /// Whether the squared length may exceed `low` anywhere in the block at `x`.
+    /// Returns `true` if the squared length may exceed `low` in the block at `x`.
     #[inline(always)]
     fn may_exceed(&self, low: i32, x: usize) -> bool {
         if self.squared {

@@ -118,8 +118,8 @@ mod tests {
     #[test]
     fn a_folder_is_read_in_order_and_past_a_broken_file() {
         let folder = tempfile::tempdir().unwrap();
-        for (name, grey) in [("b.png", 20), ("a.PGM", 10), ("d.jpg", 40)] {
-            let frame = GrayImage::from_pixel(4, 3, image::Luma([grey]));
+        for (name, gray) in [("b.png", 20), ("a.PGM", 10), ("d.jpg", 40)] {
+            let frame = GrayImage::from_pixel(4, 3, image::Luma([gray]));
             frame.save(folder.path().join(name)).unwrap();
         }
         std::fs::write(folder.path().join("c.png"), b"not an image").unwrap();
@@ -127,19 +127,19 @@ mod tests {
 
         let mut files = ImageFiles::open(folder.path()).unwrap();
         assert_eq!(files.last_path(), None);
-        let (mut greys, mut frame) = (Vec::new(), GrayImage::default());
+        let (mut grays, mut frame) = (Vec::new(), GrayImage::default());
         loop {
             match files.grab(&mut frame) {
-                Ok(()) => greys.push(frame.get_pixel(0, 0).0[0]),
+                Ok(()) => grays.push(frame.get_pixel(0, 0).0[0]),
                 Err(FrameError::End) => break,
                 Err(error) => {
                     assert!(error.to_string().contains("c.png"), "{error}");
                     assert!(files.last_path().unwrap().ends_with("c.png"));
-                    greys.push(0);
+                    grays.push(0);
                 }
             }
         }
-        assert_eq!(greys, [10, 20, 0, 40]);
+        assert_eq!(grays, [10, 20, 0, 40]);
         assert!(matches!(files.grab(&mut frame), Err(FrameError::End)));
     }
 

@@ -192,7 +192,8 @@ fn parse_header(line: &[u8]) -> Result<(u32, u32, u64), String> {
         "444alpha" => 3 * pixels,
         other => {
             return Err(format!(
-                "Y4M colour space {other:?} is not read; convert to 8 bits, for example with -pix_fmt yuv420p"
+                "Y4M colour space {other:?} is not read; convert to 8 bits, for example with \
+                 -pix_fmt yuv420p"
             ));
         }
     };
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_cut_anywhere_delivers_what_was_whole_and_names_the_frame() {
+    fn a_cut_stream_delivers_the_whole_frames_and_names_the_next() {
         let bytes = y4m(" C420", 12, 3);
         let frame = (bytes.len() - y4m(" C420", 12, 0).len()) / 3;
         let header = bytes.len() - 3 * frame;

@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interlaced_streams_say_so_and_frames_of_another_size_are_refused() {
+    fn interlacing_is_declared_and_other_sizes_are_refused() {
         let mut video = Y4mWriter::new(Vec::new(), 25, 1)
             .expect("a rate")
             .interlaced();

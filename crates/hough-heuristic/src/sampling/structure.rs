@@ -17,7 +17,7 @@ const CELL: u32 = 16;
 pub(crate) struct Structure {
     columns: u32,
     rows: u32,
-    /// Where each cell begins in `entries`, and at the end their number.
+    /// Index of each cell's first entry, and at the end their number.
     starts: Vec<u32>,
     entries: Vec<Entry>,
     spare: Vec<Entry>,
@@ -117,7 +117,7 @@ impl Structure {
         window
     }
 
-    /// Where the pixels of a row of the window begin, and how many they are.
+    /// First index and number of the pixels in a row of the window.
     fn run(&self, window: &Window, row: u32) -> (u32, u32) {
         let start = self.starts[(row * self.columns + window.left) as usize];
         let end = self.starts[(row * self.columns + window.right + 1) as usize];

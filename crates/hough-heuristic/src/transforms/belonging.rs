@@ -21,7 +21,7 @@ pub(crate) struct NearEdges {
     disc: Vec<(i32, i32)>,
 }
 
-/// How many directions the first look has at most.
+/// Largest number of directions of the first look.
 const PROBES: usize = 32;
 
 impl NearEdges {
@@ -63,8 +63,8 @@ impl NearEdges {
         }
     }
 
-    /// Whether an edge pixel lies within the tolerance of the pixel. Pixels outside the frame never
-    /// match.
+    /// Returns `true` if an edge pixel lies within the tolerance of the pixel. Pixels outside the
+    /// frame never match.
     #[inline]
     pub(crate) fn matches(&self, x: i32, y: i32) -> bool {
         index(x, y, self.width, self.height).is_some_and(|index| self.counts[index] != 0)

@@ -15,12 +15,12 @@ use crate::sampling::structure::Structure;
 pub struct CurveSearchConfig {
     /// The offset θ that β must exceed (default 0.6; 0..1, both excluded).
     pub theta: f64,
-    /// How many n-tuples are drawn at most (default 60000; at least 1).
+    /// Largest number of n-tuples drawn (default 60000; at least 1).
     pub iterations: u32,
-    /// How far an edge pixel may lie from a pixel of the curve to match it, pixels (default 1;
+    /// Largest distance of an edge pixel from a curve's pixel that it matches, pixels (default 1;
     /// 0..=8).
     pub tolerance: f64,
-    /// How many curves to look for (default 1; at least 1).
+    /// Largest number of curves reported (default 1; at least 1).
     pub max_curves: usize,
     /// If given, all pixels of a draw lie within about this distance of the first along each axis,
     /// pixels (default none: they come from anywhere; at least 1).
@@ -74,7 +74,8 @@ pub struct FoundCurve<C> {
 ///     Luma([if (level - 1.0).abs() < 0.025 { 255 } else { 0 }])
 /// });
 /// let mut search = CurveSearch::new(CurveSearchConfig::default())?;
-/// let found = search.find::<Ellipse>(&EdgeMap::from_image(&edges), |ellipse| ellipse.minor > 10.0);
+/// let edges = EdgeMap::from_image(&edges);
+/// let found = search.find::<Ellipse>(&edges, |ellipse| ellipse.minor > 10.0);
 /// assert_eq!(found.len(), 1);
 /// assert!((found[0].curve.x - 60.0).abs() < 1.5 && found[0].beta > 0.6);
 /// # Ok::<(), hough_heuristic::ConfigError>(())
@@ -87,7 +88,7 @@ pub struct CurveSearch {
 }
 
 impl CurveSearch {
-    /// A search with these settings.
+    /// Builds a search with these settings.
     ///
     /// # Errors
     /// [`ConfigError::OutOfRange`] for the first parameter outside its range.
@@ -128,12 +129,11 @@ impl CurveSearch {
         })
     }
 
-    /// The curves of an edge image for which `admits` is true, in the order in which they were
-    /// found.
+    /// Returns the curves of an edge image for which `admits` is true, in the order in which they
+    /// were found.
     ///
-    /// Checking a curve takes as long as its outline is, up to the length at which no image with so
-    /// many edge pixels could give it a β above θ. So let `admits` turn away those much larger than
-    /// the image.
+    /// The time to check a curve grows with its outline. Let `admits` refuse curves much larger
+    /// than the image.
     pub fn find<C: Curve>(
         &mut self,
         edges: &EdgeMap,

@@ -1,5 +1,5 @@
-//! What every detector does with a candidate: count its edge pixels, fit it to them, and take them
-//! out.
+//! The handling of a candidate that the detectors share: its edge pixels are counted, it is fitted
+//! to them, and they are taken out.
 
 use super::belonging::{NearEdges, Probes};
 use super::fit::fit_circle;
@@ -90,7 +90,7 @@ impl Evidence {
     pub(crate) fn accept(&mut self, edges: &EdgeMap, drawn: Detection, found: &mut Vec<Detection>) {
         let mut accepted = drawn;
         if self.acceptance.refine {
-            // Room for the error of a circle through three whole pixels.
+            // The circle through three whole pixels may be that far off.
             let reach = 2.0 * self.acceptance.tolerance + 1.0;
             let fitted = self.fitted(edges, drawn.circle, reach);
             let fitted = fitted.filter(|circle| self.acceptance.admits(circle, found));

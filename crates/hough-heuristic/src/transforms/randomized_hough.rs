@@ -12,24 +12,24 @@ use crate::error::{ConfigError, require, require_iterations};
 use crate::sampling::{Draw, Sampler, Sampling};
 use crate::stages::Stages;
 
-/// The settings of [`RandomizedHough`].
+/// Settings of [`RandomizedHough`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct RandomizedHoughConfig {
-    /// Which circles are reported.
+    /// Rules by which circles are reported.
     pub accept: Acceptance,
-    /// How many triples are drawn at most per frame (default 60000; at least 1).
+    /// Largest number of triples drawn per frame (default 60000; at least 1).
     pub iterations: u32,
-    /// How many triples must agree before their circle is verified (default 2; 2..=255). More:
-    /// fewer verifications, and many more draws.
+    /// Number of triples that must agree before their circle is verified (default 2; 2..=255).
+    /// Larger values cost fewer verifications and many more draws.
     pub votes: u32,
-    /// Side of a cell of the parameter space, pixels, the same for centre and radius (default 4;
-    /// 0.5..=64). Smaller: cells are more exact, and triples of one circle agree more rarely.
+    /// Side of a cell of the parameter space, pixels, for centre and radius (default 4; 0.5..=64).
+    /// Smaller cells are more exact, and triples of one circle agree more rarely.
     pub cell: f64,
-    /// Where draws come from (default [`Sampling::Near`]). [`Sampling::Anywhere`] is Xu and Oja's.
+    /// Source of the draws (default [`Sampling::Near`]). [`Sampling::Anywhere`] is Xu and Oja's.
     pub sampling: Sampling,
-    /// The seed of the draws (default 1). They begin anew with every frame.
+    /// Seed of the draws (default 1). They begin anew with every frame.
     pub seed: u64,
 }
 
@@ -86,7 +86,7 @@ impl<E: EdgeDetector> RandomizedHough<E> {
         Ok(Self {
             frames: Frames::new(edge_detector, Evidence::new(accept)?),
             sampler: Sampler::new(sampling, &accept, seed),
-            cells: Cells::with_room_for(iterations),
+            cells: Cells::with_capacity_for(iterations),
             config,
         })
     }
@@ -182,7 +182,7 @@ impl Cells {
     /// A table that asks for no memory until more than this many cells have a vote (or 65536, if
     /// that is less). What is set aside is not touched, so it costs nothing, before the table grows
     /// into it.
-    fn with_room_for(votes: u32) -> Self {
+    fn with_capacity_for(votes: u32) -> Self {
         let slots = (2 * (votes.min(FORESEEN) as usize + 1)).next_power_of_two();
         Self {
             slots: Vec::with_capacity(slots.max(SMALLEST)),
@@ -238,7 +238,7 @@ impl Cells {
         Some(mean)
     }
 
-    /// Where the cell of this key is, or would be.
+    /// Index of the cell with this key, or of the slot for it.
     fn place(&self, key: u64) -> usize {
         let mask = self.slots.len() - 1;
         let mut place = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
@@ -276,7 +276,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_are_told_apart_while_the_table_grows_and_forgotten_when_it_is_cleared() {
+    fn a_growing_table_keeps_its_cells_until_it_is_cleared() {
         let mut cells = Cells::default();
         cells.clear();
         let at = |k: i32| Circle {

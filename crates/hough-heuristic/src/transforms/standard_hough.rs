@@ -11,28 +11,28 @@ use crate::edges::{Canny, EdgeDetector};
 use crate::error::{ConfigError, require};
 use crate::stages::Stages;
 
-/// The settings of [`StandardHough`].
+/// Settings of [`StandardHough`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct StandardHoughConfig {
-    /// Which circles are reported.
+    /// Rules by which circles are reported.
     pub accept: Acceptance,
     /// Side of an accumulator cell along both axes of the centre and along the radius, pixels
-    /// (default 2; 1..=16). Memory and time fall with its third and second power; cells much larger
-    /// than the tolerance blur neighbouring circles.
+    /// (default 2; 1..=16). Memory falls with its third power, time with its second. Cells much
+    /// larger than the tolerance blur neighbouring circles.
     pub cell: f64,
-    /// Vote only along the gradient, where the edge detector knows it (default false). A pixel then
-    /// votes for an arc of `direction_error` to either side of the two directions instead of the
-    /// full circle.
+    /// Votes only along the gradient, if the edge detector knows it (default false). A pixel then
+    /// votes for arcs of `direction_error` to either side of the two directions instead of the full
+    /// circle.
     pub gradient: bool,
-    /// How far the gradient's direction may be off, radians (default 0.15; 0..=1). Noise turns a
-    /// gradient by the ratio of its own deviation to the edge's strength.
+    /// Largest error of the gradient's direction, radians (default 0.15; 0..=1). Noise turns a
+    /// gradient by the ratio of the noise's deviation to the edge's strength.
     pub direction_error: f64,
-    /// The share of the outline's cells that must have voted before a peak is verified (default
-    /// 0.4; 0..1).
+    /// Share of the outline's cells that must have voted before a peak is verified (default 0.4;
+    /// 0..1).
     pub min_votes: f64,
-    /// The most memory that the accumulator may take, bytes (default 2^29, half a gigabyte; at
+    /// Largest memory of the accumulator, bytes (default 2^29, half a gigabyte; at
     /// least 1). A frame that needs more is refused: [`FrameRefused::Accumulator`].
     pub max_memory: u64,
 }
@@ -84,10 +84,10 @@ struct Ring {
     radius: f64,
     /// Around the full circle, each cell once, in the order of their direction.
     cells: Vec<(i32, i32)>,
-    /// The same, beginning `spread` cells earlier and ending as many later, so that the arc of a
+    /// The cells from `spread` earlier to `spread` later, so that the arc of a
     /// direction is in one piece.
     around: Vec<(i32, i32)>,
-    /// How many of the cells to either side of a direction its error covers.
+    /// Number of cells to either side of a direction that its error covers.
     spread: usize,
     /// The votes a complete circle gets in its cell.
     complete: f64,
@@ -180,7 +180,7 @@ impl<E: EdgeDetector> StandardHough<E> {
         self.frames.stages(memory)
     }
 
-    /// How many of the radii a frame can hold.
+    /// Number of radii that a frame can hold.
     fn fitting(&self, width: u32, height: u32) -> usize {
         // No circle through a pixel of the frame has its centre in the frame and a larger radius.
         let (w, h) = (f64::from(width), f64::from(height));
@@ -242,10 +242,8 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             accumulator.clear(edges.width(), edges.height(), cell, rings.len());
             turns.clear();
             if gradient {
-                turns.extend(edges.gradients().iter().map(|gradient| {
-                    let (gx, gy) = gradient.vector();
-                    gy.atan2(gx) / std::f64::consts::TAU
-                }));
+                let gradients = (0..edges.pixels().len()).map_while(|index| edges.gradient(index));
+                turns.extend(gradients.map(|(gx, gy)| gy.atan2(gx) / std::f64::consts::TAU));
             }
             for (layer, ring) in rings.iter().enumerate() {
                 for (index, pixel) in edges.pixels().iter().enumerate() {

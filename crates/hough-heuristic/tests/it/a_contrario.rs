@@ -119,7 +119,7 @@ fn the_seed_decides_the_order_and_little_else() {
     }
 }
 
-/// How many balls of a kind of scene are found to 2 px, and how many other circles.
+/// Counts the balls of a kind of scene that are found to 2 px, and the other circles.
 fn found_of(kind: &Kind, seed: u64, frames: u64) -> (usize, usize) {
     let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
     let (mut hits, mut others) = (0, 0);
@@ -229,7 +229,9 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn random_bytes_do_no_harm(width in 12u32..120, height in 12u32..120, seed: u64, levels in 1u8..=255) {
+    fn random_bytes_do_no_harm(
+        width in 12u32..120, height in 12u32..120, seed: u64, levels in 1u8..=255,
+    ) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let frame = GrayImage::from_fn(width, height, |_, _| Luma([rng.next_u32() as u8 % levels]));
         let mut detector = with(|config| {
@@ -248,7 +250,9 @@ proptest! {
     }
 
     #[test]
-    fn any_last_circle_can_be_followed(x in -1e3f64..1e3, y in -1e3f64..1e3, radius in -1e2f64..1e3, reach in -10f64..1e3) {
+    fn any_last_circle_can_be_followed(
+        x in -1e3f64..1e3, y in -1e3f64..1e3, radius in -1e2f64..1e3, reach in -10f64..1e3,
+    ) {
         let (frame, _) = SCENE.render();
         plain().track(&frame, &Circle { x, y, radius }, reach).unwrap();
     }
@@ -277,7 +281,7 @@ fn no_pattern_takes_more_than_the_budget() {
 }
 
 #[test]
-fn a_budget_that_allows_nothing_is_an_error_and_a_small_one_is_told() {
+fn an_empty_budget_is_refused_and_a_spent_one_is_reported() {
     let refused = |change: fn(&mut AContrarioConfig)| {
         let mut config = AContrarioConfig::default();
         change(&mut config);

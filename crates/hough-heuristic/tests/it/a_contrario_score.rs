@@ -1,4 +1,4 @@
-//! What `AContrario` says of a circle: that its score and its standard errors hold, and what counts as
+//! The score of `AContrario` and its standard errors, and what counts as
 //! round.
 
 use hough_heuristic::image::{GrayImage, Luma, imageops};

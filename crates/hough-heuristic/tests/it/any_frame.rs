@@ -24,7 +24,7 @@ fn saturated_noise(width: u32, height: u32, seed: u32) -> GrayImage {
     })
 }
 
-/// How many edge pixels a detector had to search.
+/// Counts the edge pixels that a detector searches.
 trait EdgesOf {
     fn edges_of(&mut self, frame: &GrayImage) -> usize;
 }
@@ -53,8 +53,8 @@ fn every_small_size_and_every_flat_frame_passes() {
                     edges > 0 || width < 6 || height < 6,
                     "{name} {width}x{height}"
                 );
-                for grey in [0, 255] {
-                    let flat = GrayImage::from_pixel(width, height, Luma([grey]));
+                for gray in [0, 255] {
+                    let flat = GrayImage::from_pixel(width, height, Luma([gray]));
                     assert_eq!(
                         detector.detect(&flat).unwrap(),
                         [],
@@ -77,7 +77,8 @@ proptest! {
 
     #[test]
     fn any_bytes_are_a_frame(
-        bytes in proptest::collection::vec(any::<u8>(), 1..4000), width in 1u32..80, min in 1f64..20.0, span in 0f64..40.0
+        bytes in proptest::collection::vec(any::<u8>(), 1..4000), width in 1u32..80,
+        min in 1f64..20.0, span in 0f64..40.0,
     ) {
         let height = bytes.len() as u32 / width;
         let pixels = bytes[..(width * height) as usize].to_vec();
@@ -92,7 +93,8 @@ proptest! {
         for (name, mut detector) in all_on(accept, FIXED) {
             let found = detector.detect(&frame).unwrap().to_vec();
             let edges = detector.stages().edges.pixels().len();
-            prop_assert!(edges > 0 || width < 12 || height < 12, "{}: no edges in {}x{}", name, width, height);
+            let tiny = width < 12 || height < 12;
+            prop_assert!(edges > 0 || tiny, "{}: no edges in {}x{}", name, width, height);
             for f in &found {
                 let Circle { x, y, radius } = f.circle;
                 prop_assert!(x.is_finite() && y.is_finite(), "{}", name);

@@ -1,4 +1,4 @@
-//! What holds for every detector.
+//! Properties of every detector.
 
 use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{

@@ -131,8 +131,8 @@ fn frames_without_circles_give_none() {
         (3, 3),
         (768, 576),
     ] {
-        for grey in [0, 255] {
-            let frame = GrayImage::from_pixel(width, height, Luma([grey]));
+        for gray in [0, 255] {
+            let frame = GrayImage::from_pixel(width, height, Luma([gray]));
             assert_eq!(detector.detect(&frame).unwrap(), []);
         }
     }
