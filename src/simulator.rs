@@ -1,6 +1,6 @@
 //! The simulator in which both behaviours are learned, as in section 4 of the paper.
 
-use grasp_agent::{BehaviourSpec, JointLimits, LearnError, Lesson, Percept, schedule};
+use grasp_agent::{BehaviourError, BehaviourSpec, JointLimits, LearningSettings, Lesson, Percept};
 use pipeline_sim::{
     CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample,
 };
@@ -79,7 +79,7 @@ impl Simulator {
         })
     }
 
-    /// Learns `spec` in this simulator with the paper's settings ([`schedule`]).
+    /// Learns `spec` in this simulator with the paper's settings ([`LearningSettings::paper`]).
     ///
     /// With `trials`, percepts to start from, the best table of the second half of the run is kept
     /// ([`grasp_agent::learn`]); without, the last one.
@@ -94,10 +94,10 @@ impl Simulator {
         actions: u64,
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Record),
-    ) -> Result<Lesson, LearnError> {
+    ) -> Result<Lesson, BehaviourError> {
         let simulate = |percept: &Percept, delta: &JointDelta| self.predict(percept, delta);
         let start = |rng: &mut dyn Rng| self.start(rng);
-        let config = schedule(actions)?;
+        let config = LearningSettings::paper(actions)?;
         grasp_agent::learn(spec, simulate, start, trials, &config, rng, on_progress)
     }
 }

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, LearnError, Learned, Lesson,
+    Agent, BehaviourError, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, Learned, Lesson,
     Percept,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
@@ -233,7 +233,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     taught.ok_or_else(|| "at least one seed is needed".into())
 }
 
-fn scored(lesson: &Result<Lesson, LearnError>, starts: &[PlaneStart]) -> String {
+fn scored(lesson: &Result<Lesson, BehaviourError>, starts: &[PlaneStart]) -> String {
     match lesson {
         Ok(lesson) => {
             let s = score(&lesson.behaviour, Learned::APPROACHING_KAPPA, starts);

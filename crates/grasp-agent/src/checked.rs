@@ -1,20 +1,27 @@
-//! Settings that are read are checked as those that are made are.
+//! Validation of settings on deserialization.
 
-/// Implements `Serialize` and `Deserialize` for settings that derive both with
-/// `#[serde(remote = "Self")]` and have a `check` that says whether they can be used.
+/// Implements `Deserialize` for settings with a method `check`, which is called on what was read.
 macro_rules! checked {
-    ($type:ident) => {
-        #[cfg(feature = "serde")]
-        impl serde::Serialize for $type {
-            fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-                Self::serialize(self, to)
-            }
-        }
-
+    ($type:ident { $($field:ident: $kind:ty),* $(,)? }) => {
         #[cfg(feature = "serde")]
         impl<'de> serde::Deserialize<'de> for $type {
             fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                let read = Self::deserialize(from)?;
+                #[derive(serde::Deserialize)]
+                struct Read {
+                    $($field: $kind),*
+                }
+                let Read { $($field),* } = serde::Deserialize::deserialize(from)?;
+                let read = Self { $($field),* };
+                read.check().map_err(serde::de::Error::custom)?;
+                Ok(read)
+            }
+        }
+    };
+    ($type:ident($kind:ty)) => {
+        #[cfg(feature = "serde")]
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                let read = Self(<$kind as serde::Deserialize>::deserialize(from)?);
                 read.check().map_err(serde::de::Error::custom)?;
                 Ok(read)
             }
@@ -24,7 +31,7 @@ macro_rules! checked {
 
 pub(crate) use checked;
 
-/// Refuses a quantity that must be a size and is none, by its name.
+/// Checks that the quantity called `name` is a size.
 pub(crate) fn above_zero(name: &str, value: f64) -> Result<(), String> {
     if value.is_finite() && value > 0.0 {
         return Ok(());

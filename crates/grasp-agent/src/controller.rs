@@ -72,7 +72,7 @@ pub enum Feedback {
 ///
 /// impl Controller for Turn {
 ///     fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
-///         let turn = JointDelta::of(Joint::J1, (0.002 * (96.0 - ball.features.x)).clamp(-0.08, 0.08));
+///         let turn = JointDelta::of(Joint::J1, 0.001 * (96.0 - ball.features.x));
 ///         if request.limits.admit(&(request.joints + turn)) {
 ///             Ok(Decision::Move(turn))
 ///         } else {

@@ -1,100 +1,108 @@
-//! What can go wrong.
+//! Errors.
 
 use hough_heuristic::FrameError;
 use puma_val2::{ArmError, Joint};
 
-/// Why a behaviour could not be made, saved or loaded.
+/// Reason why a behaviour could not be made, learned, saved or loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BehaviourError {
-    /// A table that does not fit the specification.
+    /// A table does not fit the specification.
     #[error(
-        "the table of behaviour `{name}` has {}x{} entries (states x actions) where {}x{} are needed",
+        "the table of behaviour `{name}` has {}x{} entries (states x actions), expected {}x{}",
         found.0, found.1, expected.0, expected.1
     )]
     Shape {
-        /// The behaviour.
+        /// Name of the behaviour.
         name: String,
         /// States and actions of the specification.
         expected: (usize, usize),
         /// States and actions of the table.
         found: (usize, usize),
     },
-    /// A file that holds another behaviour than the one asked for.
-    #[error("{}: holds another behaviour than the `{name}` asked for: its {part} differs; train again, or use the specification it was trained for", path.display())]
+    /// A file holds another behaviour than the one asked for.
+    #[error(
+        "{}: holds another behaviour than `{name}`: its {part} differs; train again, or use the \
+         specification it was trained for",
+        path.display()
+    )]
     Foreign {
         /// The file.
         path: std::path::PathBuf,
-        /// The first part of the specification that differs.
+        /// First part of the specification that differs.
         part: &'static str,
-        /// The behaviour that was asked for.
+        /// Name of the behaviour asked for.
         name: String,
     },
-    /// A setting that nothing can be learned by.
+    /// A setting of learning at work is out of its range.
     #[error("{quantity} of learning at work is {value}; it must be {allowed}")]
     Learning {
-        /// Which one.
+        /// Name of the setting.
         quantity: &'static str,
-        /// What was given.
+        /// Value that was given.
         value: f64,
-        /// What it may be.
+        /// Values allowed.
         allowed: &'static str,
     },
-    /// Text that is no behaviour, or none of the one asked for.
-    #[error("this text is no behaviour that can be used here: {what}")]
+    /// Training failed: settings out of range, or a reward that is not a number.
+    #[error("training: {0}")]
+    Training(#[from] qtable::Error),
+    /// A text is not a behaviour, policy, belief or controller that can be used here.
+    #[error("this text cannot be used here: {what}")]
     Text {
-        /// What is wrong, and where.
+        /// The fault and its place.
         what: String,
     },
-    /// A file that cannot be written or read, or is damaged.
+    /// A file cannot be written or read, or is damaged.
     #[cfg(feature = "serde")]
     #[error(transparent)]
     File(#[from] qtable::FileError),
 }
 
-/// Why a run was broken off. The arm stands.
+/// Reason why a run was broken off. The arm has been told to stop.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AgentError {
-    /// The camera delivered no frame.
+    /// The camera delivered no frame, or the frame could not be searched.
     #[error("the camera failed: {0}")]
     Camera(#[from] FrameError),
     /// The arm, or the line to it, failed.
     #[error("the arm failed: {0}")]
     Arm(#[from] ArmError),
-    /// The camera delivers the same frame again and again while it is moved.
+    /// The image has not changed although the arm has moved.
     #[error(
-        "the camera seems to be frozen: {looks} frames in a row, each from another pose, are the same or show the ball at exactly the same place"
+        "the camera seems to be frozen: {looks} images in a row, each from another pose, are the \
+         same"
     )]
     FrozenCamera {
-        /// How many frames.
+        /// Number of images.
         looks: usize,
     },
-    /// A replayed run took another course than the logged one: another controller, another
-    /// configuration, or other knowledge.
+    /// A replayed run took another course than the logged one: another controller, other settings,
+    /// or other knowledge.
     #[error("the replayed run differs from the log at event {event} (counted from 0)")]
     Replay {
-        /// The first event that differs.
+        /// Index of the first event that differs.
         event: usize,
     },
-    /// The arm does not say where it stands.
+    /// The arm reports an angle that is not finite.
     #[error("the arm reports an angle of {joint} that is not finite")]
     Pose {
-        /// The first joint that has no finite angle.
+        /// First joint without a finite angle.
         joint: Joint,
     },
-    /// A search or a recovery named a viewpoint that is no pose.
+    /// A search or a recovery named a pose that is not finite.
     #[error("viewpoint {number} is no pose to look from: its {joint} is not finite")]
     Viewpoint {
-        /// Its number.
+        /// Number of the viewpoint.
         number: usize,
-        /// The first joint that has no finite angle.
+        /// First joint without a finite angle.
         joint: Joint,
     },
-    /// Text that is no saved run.
+    /// A text is not a saved run, or its controller cannot be made again.
     #[error("this text is no saved run: {0}")]
     SavedRun(String),
-    /// A configuration that cannot work.
+    /// Settings cannot work.
     #[error("agent configuration: {0}")]
     Config(String),
 }

@@ -6,14 +6,10 @@ use crate::checked::checked;
 
 /// Range that a task keeps each joint in, radians (low, high), `JT1` first; both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct JointLimits(pub [(f64, f64); 6]);
 
-checked!(JointLimits);
+checked!(JointLimits([(f64, f64); 6]));
 
 impl JointLimits {
     /// Largest turns of `JT1` to `JT3` in one move of the paper's behaviours (section 3.1),

@@ -1,6 +1,6 @@
 //! Both behaviours of the paper, learned in one simulator.
 
-use grasp_agent::{BehaviourPair, LearnError, Learned, Percept};
+use grasp_agent::{BehaviourError, BehaviourPair, Learned, Percept};
 use puma_grasp::Simulator;
 use rand::Rng;
 
@@ -21,7 +21,7 @@ pub fn learn_both(
     pair: BehaviourPair,
     seed: u64,
     rng: &mut dyn Rng,
-) -> Result<Learned, LearnError> {
+) -> Result<Learned, BehaviourError> {
     let anywhere: Vec<Percept> = (0..TRIALS).map(|_| simulator.start(rng)).collect();
     let found = search_percepts(TRIALS, seed);
     let quiet = &mut |_: &qtable::Record| ();

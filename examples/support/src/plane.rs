@@ -5,8 +5,8 @@
 //! theta 3) is the whole state. Centering has nothing to do here.
 
 use grasp_agent::{
-    ArmPlane, Behaviour, BehaviourSpec, CameraModel, Episode, JointLimits, LearnError, Lesson,
-    Percept, schedule,
+    ArmPlane, Behaviour, BehaviourError, BehaviourSpec, CameraModel, JointLimits, LearningSettings,
+    Lesson, Percept,
 };
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace};
@@ -106,14 +106,14 @@ impl ExactPlane {
         actions: u64,
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Record),
-    ) -> Result<Lesson, LearnError> {
+    ) -> Result<Lesson, BehaviourError> {
         let mut plane = ArmPlane::new(&self.model, JointLimits::paper());
         let simulate = |percept: &Percept, delta: &JointDelta| {
             let after = plane.after(percept, delta)?;
             self.sight.sees_features(&after.features).then_some(after)
         };
         let start = |rng: &mut dyn Rng| self.start(rng);
-        let config = schedule(actions)?;
+        let config = LearningSettings::paper(actions)?;
         grasp_agent::learn(spec, simulate, start, trials, &config, rng, on_progress)
     }
 }
@@ -176,22 +176,19 @@ pub fn score(behaviour: &Behaviour, kappa: f64, starts: &[PlaneStart]) -> PlaneS
     }
 }
 
-fn steps_to_goal(behaviour: &Behaviour, kappa: f64, start: &PlaneStart) -> Option<usize> {
-    let spec = behaviour.spec();
-    let mut episode = Episode::new(behaviour);
-    let mut joints = start.joints;
-    for step in 0..=MOST_STEPS {
-        let percept = Percept::new(start.cell.features(&joints).ok()?, &joints);
-        if spec.at_goal(&percept) {
-            return Some(step);
-        }
-        let state = spec.state(&percept).ok()?;
-        let admitted = |action: Action| start.cell.within_limits(&(joints + spec.delta(action)));
-        let action = behaviour.choose(state, &episode, kappa, admitted)?;
-        episode.chose(state, action);
-        joints = joints + spec.delta(action);
-    }
-    None
+fn steps_to_goal(behaviour: &Behaviour, penalty: f64, start: &PlaneStart) -> Option<usize> {
+    let cell = &start.cell;
+    let joints = std::cell::Cell::new(start.joints);
+    let perceive = || {
+        let features = cell.features(&joints.get()).ok()?;
+        Some(Percept::new(features, &joints.get()))
+    };
+    let within = |_: &Percept, delta: &JointDelta| cell.within_limits(&(joints.get() + *delta));
+    let steps = behaviour.steps_to_goal(&perceive()?, penalty, MOST_STEPS, within, |_, delta| {
+        joints.set(joints.get() + *delta);
+        perceive()
+    });
+    steps.ok()
 }
 
 /// Returns the fewest steps from `joints` to the goal with the actions of `spec`, the ball in view

@@ -6,25 +6,25 @@ use puma_val2::{Joint, JointDelta};
 use qtable::{Action, Boltzmann, QLearning, QTable, Record, Schedule, State, Training, Until};
 use rand::Rng;
 
-use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
+use crate::behaviour::policy::{Behaviour, KAPPA};
 use crate::behaviour::spec::BehaviourSpec;
 use crate::behaviour::task::BehaviourTask;
 use crate::error::BehaviourError;
 use crate::limits::JointLimits;
 use crate::percept::Percept;
 
-/// Working range of `JT3`, degrees: a move beyond it is refused, and nothing changes.
+/// Working range of `JT3`, degrees. A move beyond it is not chosen.
 const ELBOW_RANGE: (f64, f64) = JointLimits::PAPER_DEGREES[2];
 
-/// A behaviour just learned, and how that went.
+/// Result of learning a behaviour.
 #[derive(Clone, Debug)]
 pub struct Lesson {
-    /// What was learned.
+    /// The learned behaviour.
     pub behaviour: Behaviour,
     /// Learning curve, oldest record first.
     pub curve: Vec<Record>,
-    /// Actions after which the table was as it is in `behaviour`: all of them, or fewer where the
-    /// best table was kept.
+    /// Number of actions after which the table of `behaviour` was reached: all of them, or fewer
+    /// if the best table was kept.
     pub learned_by: u64,
 }
 
@@ -45,40 +45,66 @@ pub struct LearningSettings {
     pub record_every: u64,
 }
 
-/// Returns the paper's settings (section 4) for a number of actions: γ = 0.9, α from 0.6, T from
-/// 1000, 60 actions to an episode, 100 records. The ends of the two schedules, which the paper does
-/// not give, are 0.1 for α and 5 for T.
-///
-/// Both ends are high: on states as coarse as these, values that are still moving and actions that
-/// are still tried find the policies that reach the goal from everywhere. A colder end settles early
-/// on some that do not.
-///
-/// # Errors
-/// No actions to learn by.
-pub fn schedule(actions: u64) -> Result<LearningSettings, LearnError> {
-    Ok(LearningSettings {
-        gamma: 0.9,
-        alpha: Schedule::exponential(0.6, 0.1, actions)?,
-        temperature: Schedule::exponential(1000.0, 5.0, actions)?,
-        actions,
-        episode_limit: 60,
-        record_every: actions.div_ceil(100),
-    })
+impl LearningSettings {
+    /// Returns the paper's settings (section 4) for a number of actions: γ = 0.9, α from 0.6, T
+    /// from 1000, 60 actions to an episode, 100 records. The ends of the two schedules, which
+    /// the paper does not give, are 0.1 for α and 5 for T.
+    ///
+    /// Both ends are high: on states as coarse as these, values that are still moving and actions
+    /// that are still tried find the policies that reach the goal from everywhere. A colder end
+    /// settles early on some that do not.
+    ///
+    /// # Errors
+    /// No actions to learn by.
+    pub fn paper(actions: u64) -> Result<Self, BehaviourError> {
+        Ok(Self {
+            gamma: 0.9,
+            alpha: Schedule::exponential(0.6, 0.1, actions)?,
+            temperature: Schedule::exponential(1000.0, 5.0, actions)?,
+            actions,
+            episode_limit: 60,
+            record_every: actions.div_ceil(100),
+        })
+    }
 }
 
-/// Learns `spec` in a simulator: `simulate` gives what is perceived after a move, `None` where the
-/// ball is lost, and `start` draws where an episode begins.
+/// Learns `spec` in a simulator: `simulate` returns the percept after a move, `None` if the ball is
+/// lost, and `start` draws the percept that an episode begins with.
 ///
-/// With `trials` the best of the tables met on the way is kept: in the second half of the run, at
-/// every record of the learning curve, the greedy policy goes for the ball from each of them in the
-/// simulator, and the table that needs the fewest steps stays, with an action that lost the ball in
-/// a trial not chosen in its state any more. Without trials the last table is kept.
+/// With `trials`, the best of the tables met on the way is kept. In the second half of the run, at
+/// every record of the learning curve, the greedy policy is tried in the simulator from each of
+/// them. The table that needs the fewest steps stays, without the actions that lost the ball in a
+/// trial. Otherwise the last table is kept; on coarse states it is never at rest, since each update
+/// may lose a way here and find one there.
 ///
-/// A table on coarse states is never at rest: with each update the policy may lose a way here and
-/// find one there.
+/// ```
+/// use grasp_agent::hough_heuristic::Features;
+/// use grasp_agent::puma_val2::{Joint, JointDelta};
+/// use grasp_agent::qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use grasp_agent::{BehaviourSpec, LearningSettings, Percept, learn};
+///
+/// fn main() -> Result<(), Box<dyn std::error::Error>> {
+///     // A degree of the first joint moves the ball by four units.
+///     let simulate = |percept: &Percept, delta: &JointDelta| {
+///         let mut next = *percept;
+///         next.features.x += 4.0 * delta[Joint::J1].to_degrees();
+///         (0.0..192.0).contains(&next.features.x).then_some(next)
+///     };
+///     let start = |rng: &mut dyn Rng| Percept {
+///         features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
+///         theta3: 0.0,
+///     };
+///     let settings = LearningSettings::paper(20_000)?;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     let spec = BehaviourSpec::centering();
+///     let lesson = learn(spec, simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
+///     assert!(lesson.curve.last().and_then(|record| record.success_share) > Some(0.9));
+///     Ok(())
+/// }
+/// ```
 ///
 /// # Errors
-/// A reward that is not a number (the literal Eq. 5 and 6 divide by zero on their targets).
+/// A reward that is not a number: the literal Eq. 5 and 6 divide by zero on their targets.
 pub fn learn(
     spec: BehaviourSpec,
     mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
@@ -87,7 +113,7 @@ pub fn learn(
     settings: &LearningSettings,
     rng: &mut dyn Rng,
     on_progress: &mut dyn FnMut(&Record),
-) -> Result<Lesson, LearnError> {
+) -> Result<Lesson, BehaviourError> {
     /// Parts from record to record in which α and the temperature stand still.
     const BLOCKS: u64 = 5;
     let (gamma, actions) = (settings.gamma, settings.actions);
@@ -144,13 +170,12 @@ fn along_lines(schedule: &Schedule, every: u64, actions: u64) -> Result<Schedule
     Schedule::piecewise(&points)
 }
 
-/// What the greedy policy, with the loop breaker of approaching, came to from a number of starts
-/// together.
+/// Trials of the greedy policy, with the repetition penalty, from a number of starts.
 #[derive(Debug, Default)]
 struct Trials {
-    /// Steps to the goal; a trial that did not reach it counts as [`Trials::FAILED`].
+    /// Steps to the goal, together; a trial that did not reach it counts as [`Trials::FAILED`].
     steps: usize,
-    /// The states and actions that lost the ball.
+    /// States and actions that lost the ball.
     lost_by: Vec<(State, Action)>,
 }
 
@@ -164,59 +189,46 @@ impl Trials {
         behaviour: &Behaviour,
         mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
     ) -> Self {
-        let spec = behaviour.spec();
-        let deltas: Vec<JointDelta> = (0..spec.actions()).map(|a| spec.delta(Action(a))).collect();
         let mut trials = Self::default();
-        let mut steps = |start: &Percept| {
-            let (mut now, mut episode) = (*start, Episode::new(behaviour));
-            for step in 0..Self::MOST {
-                if spec.at_goal(&now) {
-                    return Some(step);
-                }
-                let elbow = now.theta3 + Percept::THETA3_ZERO;
-                let admitted = |action: Action| {
-                    let turned = elbow + deltas[action.0][Joint::J3].to_degrees();
-                    (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
-                };
-                let state = spec.state(&now).ok()?;
-                let action = behaviour.choose(state, &episode, KAPPA, admitted)?;
-                episode.chose(state, action);
-                let Some(after) = simulate(&now, &deltas[action.0]) else {
-                    trials.lost_by.push((state, action));
-                    return None;
-                };
-                now = after;
-            }
-            None
+        let within = |now: &Percept, delta: &JointDelta| {
+            let turned = now.theta3 + Percept::THETA3_ZERO + delta[Joint::J3].to_degrees();
+            (ELBOW_RANGE.0..=ELBOW_RANGE.1).contains(&turned)
         };
-        trials.steps = starts
-            .iter()
-            .map(|start| steps(start).unwrap_or(Self::FAILED))
-            .sum();
+        for start in starts {
+            let run = behaviour.steps_to_goal(start, KAPPA, Self::MOST, within, &mut simulate);
+            trials.steps += match run {
+                Ok(steps) if steps < Self::MOST => steps,
+                Ok(_) => Self::FAILED,
+                Err(lost_by) => {
+                    trials.lost_by.extend(lost_by);
+                    Self::FAILED
+                }
+            };
+        }
         trials
     }
 
-    /// Steps that no table can save by losing no ball any more.
+    /// Returns the least number of steps that a table could need if it lost no ball any more.
     fn at_least(&self) -> usize {
         self.steps
             .saturating_sub(Self::FAILED.saturating_mul(self.lost_by.len()))
     }
 }
 
-/// `table` without the actions by which its greedy policy loses the ball from `starts`, and what it
-/// comes to then.
+/// Removes the actions by which the greedy policy loses the ball from `starts`, and returns the
+/// trials without them.
 ///
 /// A state is a region, and an action that is the best in nearly all of it may lose the ball from
 /// one of its corners: on average that costs too little to be noticed. Such an action gets the
-/// lowest value of its state. Not done where even without losses it would take `fewest` steps or
-/// more.
+/// lowest value of its state. Stops early if the policy would take `fewest` steps or more even
+/// without losses.
 fn without_losses(
     starts: &[Percept],
     mut behaviour: Behaviour,
     fewest: usize,
     mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
-) -> Result<(Trials, QTable), LearnError> {
-    /// What takes the place of an action may lose the ball as well.
+) -> Result<(Trials, QTable), BehaviourError> {
+    /// The action that replaces another may lose the ball as well.
     const ROUNDS: usize = 5;
     let mut tried = Trials::of(starts, &behaviour, &mut simulate);
     for _ in 0..ROUNDS {
@@ -238,28 +250,17 @@ fn without_losses(
     Ok((tried, behaviour.into_table()))
 }
 
-/// Why a behaviour could not be learned.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LearnError {
-    /// Training could not go on.
-    #[error("training: {0}")]
-    Training(#[from] qtable::Error),
-    /// What was learned does not fit the behaviour.
-    #[error(transparent)]
-    Behaviour(#[from] BehaviourError),
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::behaviour::policy::Episode;
     use crate::limits::JointLimits;
     use crate::sight::arm_plane::ArmPlane;
     use crate::sight::camera_model::CameraModel;
     use hough_heuristic::Features;
 
     #[test]
-    fn an_action_that_loses_the_ball_in_a_trial_is_not_chosen_in_its_state_any_more() {
+    fn actions_that_lose_the_ball_in_a_trial_are_removed() {
         let spec = BehaviourSpec::approaching_fine();
         let seen = |y, r| Percept {
             features: Features { x: 98.7, y, r },

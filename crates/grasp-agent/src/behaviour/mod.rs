@@ -1,4 +1,4 @@
-//! Behaviours as data, what they learn, and how they learn it.
+//! Behaviours: specification, reward, learning, learned table.
 
 pub(crate) mod learning;
 pub(crate) mod policy;

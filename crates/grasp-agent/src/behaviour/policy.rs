@@ -1,14 +1,14 @@
-//! A learned behaviour, and how it is used at run time.
+//! A learned behaviour, and the choice of its actions.
 
-use qtable::{Action, QTable, State};
+use puma_val2::JointDelta;
+use qtable::rand::rngs::Xoshiro256PlusPlus;
+use qtable::{Action, Boltzmann, Policy, QLearning, QTable, State, Step};
 
 use crate::behaviour::spec::BehaviourSpec;
 use crate::error::BehaviourError;
+use crate::percept::Percept;
 
-/// Weight of the loop breaker where no other is asked for.
-pub(crate) const KAPPA: f64 = 20.0;
-
-/// A behaviour with what it has learned: the Q-table over its states and actions.
+/// A learned behaviour: a specification, and the Q-table over its states and actions.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -20,7 +20,7 @@ pub struct Behaviour {
     table: QTable,
 }
 
-/// The same as it comes from a file.
+/// A [`Behaviour`] as it is read.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Unchecked {
@@ -39,55 +39,80 @@ impl TryFrom<Unchecked> for Behaviour {
 }
 
 impl Behaviour {
-    /// Joins a specification and a table learned for it.
+    /// Joins a specification and a table that was learned for it.
     ///
     /// # Errors
-    /// [`BehaviourError::Shape`] when the table is not one of `spec.states()` x `spec.actions()`.
+    /// [`BehaviourError::Shape`] if the table does not have `spec.states()` x `spec.actions()`
+    /// entries.
     pub fn new(spec: BehaviourSpec, table: QTable) -> Result<Self, BehaviourError> {
-        let behaviour = Self { spec, table };
-        behaviour.check_shape()?;
-        Ok(behaviour)
-    }
-
-    fn check_shape(&self) -> Result<(), BehaviourError> {
         let (expected, found) = (
-            (self.spec.states(), self.spec.actions()),
-            (self.table.states(), self.table.actions()),
+            (spec.states(), spec.actions()),
+            (table.states(), table.actions()),
         );
         if expected == found {
-            Ok(())
-        } else {
-            Err(BehaviourError::Shape {
-                name: self.spec.name.clone(),
-                expected,
-                found,
-            })
+            return Ok(Self { spec, table });
         }
+        Err(BehaviourError::Shape {
+            name: spec.name,
+            expected,
+            found,
+        })
     }
 
-    /// What the behaviour is.
+    /// Returns the specification.
     pub fn spec(&self) -> &BehaviourSpec {
         &self.spec
     }
 
-    /// What it has learned.
+    /// Returns the table.
     pub fn table(&self) -> &QTable {
         &self.table
     }
 
-    /// What it has learned, by itself.
-    pub fn into_table(self) -> QTable {
+    /// Returns the table without the specification.
+    pub(crate) fn into_table(self) -> QTable {
         self.table
     }
 
-    /// The action with the highest Q in `state` after the loop breaker, among those that `allowed`
-    /// admits.
+    /// Runs the greedy policy in a simulator: `simulate` returns the percept after a move, `None`
+    /// if the ball is lost; moves that `admitted` refuses are not chosen. `penalty` is the
+    /// repetition penalty, see [`Learned::with_kappa`](crate::Learned::with_kappa).
     ///
-    /// The loop breaker takes `kappa` off an action's Q when the same action has already been
-    /// chosen in the same state during this episode, three times as much when it has twice, then 7
-    /// and 15 times: a greedy policy on coarse states may otherwise go round in circles for ever.
-    /// Equal values go to the lowest action. `None` when nothing is allowed.
-    pub fn choose(
+    /// Returns the number of steps to the goal.
+    ///
+    /// # Errors
+    /// The state and action that lost the ball; `None` if the goal was not reached within `most`
+    /// steps.
+    pub fn steps_to_goal(
+        &self,
+        start: &Percept,
+        penalty: f64,
+        most: usize,
+        mut admitted: impl FnMut(&Percept, &JointDelta) -> bool,
+        mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+    ) -> Result<usize, Option<(State, Action)>> {
+        let spec = &self.spec;
+        let (mut now, mut episode) = (*start, Episode::new(self));
+        for step in 0..=most {
+            if spec.at_goal(&now) {
+                return Ok(step);
+            }
+            if step == most {
+                break;
+            }
+            let state = spec.state(&now).map_err(|_| None)?;
+            let allowed = |action| admitted(&now, &spec.delta(action));
+            let action = self.choose(state, &episode, penalty, allowed).ok_or(None)?;
+            episode.chose(state, action);
+            let after = simulate(&now, &spec.delta(action));
+            now = after.ok_or(Some((state, action)))?;
+        }
+        Err(None)
+    }
+
+    /// Returns the action with the highest Q in `state` after the repetition penalty, among those
+    /// that `allowed` admits; `None` if there is none. Equal values go to the lowest action.
+    pub(crate) fn choose(
         &self,
         state: State,
         episode: &Episode,
@@ -106,47 +131,39 @@ impl Behaviour {
         best.map(|(action, _)| action)
     }
 
-    /// An action drawn from the Boltzmann distribution (the paper's Eq. 4) at `temperature`, over
-    /// the Q after the loop breaker (see [`Behaviour::choose`]) of the actions that `allowed`
-    /// admits. `chance`, in 0..1, decides the draw. `None` when nothing is allowed.
-    pub fn explore(
+    /// Draws an action by `policy` (the paper's Eq. 4) from the Q after the repetition penalty,
+    /// among those that `allowed` admits; `None` if there is none.
+    pub(crate) fn explore(
         &self,
         state: State,
         episode: &Episode,
         kappa: f64,
-        temperature: f64,
-        chance: f64,
+        policy: &mut Boltzmann,
+        rng: &mut Xoshiro256PlusPlus,
         mut allowed: impl FnMut(Action) -> bool,
     ) -> Option<Action> {
-        let best = self.choose(state, episode, kappa, &mut allowed)?;
-        let row = self.table.row(state);
-        let worth =
-            |action: Action| row[action.0] - kappa * f64::from(episode.weight(state, action));
-        let weights: Vec<f64> = (0..row.len())
-            .map(Action)
-            .map(|action| {
-                if allowed(action) {
-                    ((worth(action) - worth(best)) / temperature).exp()
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        let mut rest = chance * weights.iter().sum::<f64>();
-        let drawn = weights.iter().position(|weight| {
-            rest -= weight;
-            rest < 0.0
-        });
-        Some(drawn.map_or(best, Action))
+        let actions = (0..self.table.actions()).map(Action);
+        let admitted: Vec<Action> = actions.filter(|action| allowed(*action)).collect();
+        let mut worth = QTable::new(1, admitted.len()).ok()?;
+        for (index, action) in admitted.iter().enumerate() {
+            let penalty = kappa * f64::from(episode.weight(state, *action));
+            let value = self.table.value(state, *action) - penalty;
+            worth.set(State(0), Action(index), value).ok()?;
+        }
+        let Action(index) = policy.choose(&worth, State(0), rng);
+        admitted.get(index).copied()
     }
 
-    /// Sets a value learned at work and counts the visit; what is not finite, or not in the table,
-    /// changes nothing.
-    pub(crate) fn teach(&mut self, state: State, action: Action, value: f64) {
-        if self.table.set(state, action, value).is_ok() {
-            // The pair is in the table, or `set` would have refused it.
-            let _ = self.table.visit(state, action);
-        }
+    /// Learns from one step by `learner`; a step that is not finite changes nothing.
+    pub(crate) fn learn(
+        &mut self,
+        learner: &mut QLearning,
+        state: State,
+        action: Action,
+        step: &Step,
+    ) {
+        // The table refuses values that are not finite and stays as it is.
+        let _ = learner.update(&mut self.table, state, action, step);
     }
 }
 
@@ -155,15 +172,15 @@ impl Behaviour {
     /// Writes the behaviour to `path`, whole or not at all.
     ///
     /// # Errors
-    /// What kept the file from being written.
+    /// Reason why the file could not be written.
     pub fn save(&self, path: &std::path::Path) -> Result<(), BehaviourError> {
         Ok(qtable::save(path, FILE_KIND, self)?)
     }
 
-    /// Reads a behaviour that is exactly `expected`, but for what it has learned.
+    /// Reads a behaviour whose specification is `expected`.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged or is none of ours; a behaviour with other states,
+    /// A file that cannot be read, is damaged or of another kind; a behaviour with other states,
     /// actions, goal or reward.
     pub fn load(path: &std::path::Path, expected: &BehaviourSpec) -> Result<Self, BehaviourError> {
         let behaviour: Self = qtable::load(path, FILE_KIND)?;
@@ -181,20 +198,24 @@ impl Behaviour {
 #[cfg(feature = "serde")]
 const FILE_KIND: &str = "grasp-agent behaviour";
 
-/// What was chosen during one episode, for the loop breaker.
+/// Repetition penalty unless set otherwise, in units of Q.
+pub(crate) const KAPPA: f64 = 20.0;
+
+/// Weight of an action that lost the ball, in ordinary choices: it is not chosen again.
+pub(crate) const LOST_WEIGHT: u32 = 50;
+
+/// Choices of one episode, for the repetition penalty.
+///
+/// A greedy policy on coarse states may go round in circles for ever. The penalty, `kappa` times
+/// the weight, is subtracted from the Q of actions that were chosen before in the same state.
 #[derive(Clone, Debug)]
-pub struct Episode {
+pub(crate) struct Episode {
     actions: usize,
     weights: Vec<u32>,
 }
 
-/// How much choosing an action that lost the ball weighs, in ordinary choices: enough that it is
-/// not chosen again.
-pub(crate) const LOST_WEIGHT: u32 = 50;
-
 impl Episode {
-    /// The beginning of an episode of `behaviour`.
-    pub fn new(behaviour: &Behaviour) -> Self {
+    pub(crate) fn new(behaviour: &Behaviour) -> Self {
         let (states, actions) = (behaviour.table.states(), behaviour.table.actions());
         Self {
             actions,
@@ -202,18 +223,17 @@ impl Episode {
         }
     }
 
-    /// What the loop breaker takes off the Q of `action` in `state`, in units of its kappa.
-    pub fn weight(&self, state: State, action: Action) -> u32 {
+    fn weight(&self, state: State, action: Action) -> u32 {
         self.weights[state.0 * self.actions + action.0]
     }
 
-    /// Notes that `action` was chosen in `state`: its weight grows from 0 to 1, 3, 7, 15.
-    pub fn chose(&mut self, state: State, action: Action) {
+    /// Records a choice: the weight of `action` grows from 0 to 1, 3, 7, 15.
+    pub(crate) fn chose(&mut self, state: State, action: Action) {
         self.add(state, action, self.weight(state, action).saturating_add(1));
     }
 
-    /// Notes that `action`, chosen in `state`, lost the ball.
-    pub fn lost_by(&mut self, state: State, action: Action) {
+    /// Records that `action` lost the ball.
+    pub(crate) fn lost_by(&mut self, state: State, action: Action) {
         self.add(state, action, LOST_WEIGHT);
     }
 
@@ -226,6 +246,8 @@ impl Episode {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "serde")]
+    use crate::behaviour::reward::Reward;
 
     fn behaviour() -> Behaviour {
         let spec = BehaviourSpec::centering();
@@ -274,7 +296,7 @@ mod tests {
 
     #[cfg(feature = "serde")]
     #[test]
-    fn what_is_read_is_checked_as_what_is_made() {
+    fn a_behaviour_is_validated_on_deserialization() {
         let sound = serde_json::to_value(behaviour()).unwrap();
         assert_eq!(
             serde_json::from_value::<Behaviour>(sound.clone()).unwrap(),
@@ -294,14 +316,14 @@ mod tests {
 
     #[cfg(feature = "serde")]
     #[test]
-    fn a_saved_behaviour_comes_back_equal_and_a_foreign_one_is_refused() {
+    fn a_saved_behaviour_comes_back_and_others_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("centering.policy");
         let behaviour = behaviour();
         behaviour.save(&path).unwrap();
         assert_eq!(Behaviour::load(&path, behaviour.spec()).unwrap(), behaviour);
 
-        let literal = BehaviourSpec::centering().with_reward(crate::Reward::centering_literal());
+        let literal = BehaviourSpec::centering().with_reward(Reward::centering_literal());
         let refused = Behaviour::load(&path, &literal).unwrap_err();
         assert!(refused.to_string().contains("reward"), "{refused}");
         let refused = Behaviour::load(&path, &BehaviourSpec::approaching()).unwrap_err();

@@ -1,24 +1,23 @@
-//! Both behaviours together, with the paper's values and with ours.
+//! Pairs of behaviours: the paper's, and a finer one.
 
 use qtable::Error;
 
 use crate::behaviour::reward::Reward;
 use crate::behaviour::spec::{BehaviourSpec, GoalInterval};
 
-/// The two behaviours of the paper, as data: what a [`Learned`](crate::Learned) controller is
-/// taught.
+/// The two behaviours of a [`Learned`](crate::Learned) controller, as data.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BehaviourPair {
-    /// x and r decide on `JT1`.
+    /// Turns `JT1` by x and r.
     pub centering: BehaviourSpec,
-    /// y, r and theta 3 decide on `JT2` and `JT3`.
+    /// Turns `JT2` and `JT3` by y, r and theta 3.
     pub approaching: BehaviourSpec,
 }
 
 impl BehaviourPair {
-    /// The paper as it is printed: 42 states by 9 actions, 90 by 81, the rewards of Eq. 5 and 6.
-    /// They do not teach the goal, see [`Reward`].
+    /// Returns the paper's behaviours as printed: 42 states by 9 actions, 90 by 81, and the rewards
+    /// of Eq. 5 and 6, which do not teach the goal (see [`Reward`]).
     pub fn paper_literal() -> Self {
         Self {
             centering: BehaviourSpec::centering().with_reward(Reward::centering_literal()),
@@ -26,7 +25,7 @@ impl BehaviourPair {
         }
     }
 
-    /// The same with both mends of [`Reward::mended`].
+    /// Returns the paper's behaviours with the mends of [`Reward::mended`].
     pub fn paper_mended() -> Self {
         Self {
             centering: BehaviourSpec::centering(),
@@ -34,8 +33,8 @@ impl BehaviourPair {
         }
     }
 
-    /// [`BehaviourPair::paper_mended`] with 540 states for approaching, and a lost ball that stays
-    /// lost ([`BehaviourSpec::approaching_fine`]).
+    /// Returns [`BehaviourPair::paper_mended`] with [`BehaviourSpec::approaching_fine`]: 540
+    /// states, and a lost ball that stays lost.
     pub fn fine() -> Self {
         Self {
             approaching: BehaviourSpec::approaching_fine(),
@@ -46,8 +45,7 @@ impl BehaviourPair {
     /// Returns the pair with another goal interval of y for approaching.
     ///
     /// # Errors
-    /// Intervals of approaching into which that goal does not fit; those of the presets take both
-    /// of the paper's.
+    /// Ends that are not finite or not in order.
     pub fn with_y_goal(self, goal: GoalInterval) -> Result<Self, Error> {
         Ok(Self {
             approaching: self.approaching.with_y_goal(goal)?,
@@ -55,8 +53,7 @@ impl BehaviourPair {
         })
     }
 
-    /// Where both behaviours want to be: the goal of the [`AgentConfig`](crate::AgentConfig) that
-    /// they work under.
+    /// Returns the goal of both behaviours, for [`AgentConfig::goal`](crate::AgentConfig::goal).
     pub fn goal(&self) -> Vec<GoalInterval> {
         [&self.centering, &self.approaching]
             .into_iter()

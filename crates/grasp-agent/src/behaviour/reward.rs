@@ -6,31 +6,27 @@ use crate::percept::{Input, Percept};
 /// A reward of the paper's form, as data.
 ///
 /// Arriving at the goal pays `goal`, losing the ball pays `lost`. Any other step pays the sum of
-/// `weight / |value - target|` over all terms when at least one of them came closer to its target,
-/// and nothing otherwise. With one term (x, 100, 103) that is Eq. 5, with the two terms (y, 20, 78)
+/// `weight / |value - target|` over all terms if at least one of them came closer to its target,
+/// and nothing otherwise. With one term (x, 100, 103) this is Eq. 5, with the two terms (y, 20, 78)
 /// and (r, 50, 33) it is Eq. 6.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Reward {
-    /// For arriving at the goal \[100\].
+    /// Pay for arriving at the goal (default 100).
     pub goal: f64,
-    /// For losing the ball \[-100\].
+    /// Pay for losing the ball (default -100).
     pub lost: f64,
-    /// What pays for coming closer.
+    /// Terms that pay for coming closer.
     pub terms: Vec<RewardTerm>,
-    /// Least denominator of a term, in the units of its input \[1; literally 0\].
+    /// Least denominator of a term, in the units of its input (default 1; literally 0).
     ///
     /// At 0 the reward grows without bound near a target, and is infinite on it.
     pub floor: f64,
-    /// Whether the goal, once reached, is kept \[true; literally false\].
+    /// `true` if the goal, once reached, is kept (default; literally `false`).
     ///
-    /// A goal that merely ends the episode is worth 100, and near it going away and coming back
-    /// pays more than that for ever; a goal that is kept pays 100 at every step to come, 100 / (1 -
-    /// gamma) in all.
+    /// A goal that only ends the episode is worth 100; near it, going away and coming back pays
+    /// more than that. A goal that is kept pays 100 at every step to come, 100 / (1 - gamma) in
+    /// all.
     pub absorbing: bool,
 }
 
@@ -38,60 +34,62 @@ pub struct Reward {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RewardTerm {
-    /// The quantity that should come closer.
+    /// Quantity that should come closer.
     pub input: Input,
-    /// What closeness pays.
+    /// Pay at a distance of 1.
     pub weight: f64,
-    /// Where the quantity should go.
+    /// Value that the quantity should reach.
     pub target: f64,
 }
 
 impl RewardTerm {
+    const fn new(input: Input, weight: f64, target: f64) -> Self {
+        Self {
+            input,
+            weight,
+            target,
+        }
+    }
+
     fn distance(&self, percept: &Percept) -> f64 {
         (self.input.of(percept) - self.target).abs()
     }
 }
 
-checked!(Reward);
+checked!(Reward {
+    goal: f64,
+    lost: f64,
+    terms: Vec<RewardTerm>,
+    floor: f64,
+    absorbing: bool,
+});
 
 impl Reward {
-    /// Eq. 5 of the paper as printed.
+    /// Returns Eq. 5 of the paper as printed.
     pub fn centering_literal() -> Self {
-        Self::literal(vec![RewardTerm {
-            input: Input::X,
-            weight: 100.0,
-            target: 103.0,
-        }])
+        Self::literal([RewardTerm::new(Input::X, 100.0, 103.0)])
     }
 
-    /// Eq. 6 of the paper as printed.
+    /// Returns Eq. 6 of the paper as printed.
     pub fn approaching_literal() -> Self {
-        Self::literal(vec![
-            RewardTerm {
-                input: Input::Y,
-                weight: 20.0,
-                target: 78.0,
-            },
-            RewardTerm {
-                input: Input::R,
-                weight: 50.0,
-                target: 33.0,
-            },
+        Self::literal([
+            RewardTerm::new(Input::Y, 20.0, 78.0),
+            RewardTerm::new(Input::R, 50.0, 33.0),
         ])
     }
 
-    fn literal(terms: Vec<RewardTerm>) -> Self {
+    fn literal<const N: usize>(terms: [RewardTerm; N]) -> Self {
         Self {
             goal: 100.0,
             lost: -100.0,
-            terms,
+            terms: terms.into(),
             floor: 0.0,
             absorbing: false,
         }
     }
 
-    /// The same reward with the two mends that make it teach the goal: denominators of at least 1
-    /// and an absorbing goal.
+    /// Applies the two mends without which the reward does not teach the goal: denominators of at
+    /// least 1, and an absorbing goal.
     #[must_use]
     pub fn mended(self) -> Self {
         Self {
@@ -101,7 +99,6 @@ impl Reward {
         }
     }
 
-    /// Whether it is a reward; if not, why.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let of_terms = self
@@ -126,7 +123,7 @@ impl Reward {
         Ok(())
     }
 
-    /// What arriving at the goal is worth under the discount factor `gamma`.
+    /// Returns the value of arriving at the goal under the discount factor `gamma`.
     pub fn arrival(&self, gamma: f64) -> f64 {
         if self.absorbing {
             self.goal / (1.0 - gamma)
@@ -135,13 +132,10 @@ impl Reward {
         }
     }
 
-    /// What a step from `before` to `after`, neither of them lost nor at the goal, pays.
+    /// Returns the pay for a step from `before` to `after`, neither of them lost or at the goal.
     pub fn step(&self, before: &Percept, after: &Percept) -> f64 {
-        if self
-            .terms
-            .iter()
-            .any(|term| term.distance(after) < term.distance(before))
-        {
+        let closer = |term: &RewardTerm| term.distance(after) < term.distance(before);
+        if self.terms.iter().any(closer) {
             self.terms
                 .iter()
                 .map(|term| term.weight / term.distance(after).max(self.floor))
@@ -185,12 +179,9 @@ mod tests {
     #[test]
     fn the_literal_reward_has_poles_and_the_mended_one_has_none() {
         let (before, on_target) = (percept(0.0, 60.0, 20.0), percept(0.0, 78.0, 20.0));
-        assert!(
-            Reward::approaching_literal()
-                .step(&before, &on_target)
-                .is_infinite()
-        );
-        let mended = Reward::approaching_literal().mended();
+        let literal = Reward::approaching_literal();
+        assert!(literal.step(&before, &on_target).is_infinite());
+        let mended = literal.mended();
         assert!((mended.step(&before, &on_target) - (20.0 + 50.0 / 13.0)).abs() < 1e-12);
         assert!((mended.arrival(0.9) - 1000.0).abs() < 1e-9);
     }

@@ -1,5 +1,4 @@
-//! A behaviour as data: its states, its actions, its goal and its reward, with the paper's values
-//! as presets.
+//! Behaviours as data: states, actions, goal and reward, with the paper's values as presets.
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta};
@@ -9,50 +8,44 @@ use crate::behaviour::reward::Reward;
 use crate::checked::checked;
 use crate::percept::{Input, Percept};
 
-/// Everything that defines a behaviour, but for what it has learned.
+/// A behaviour as data, without its table.
 ///
 /// The state is the product of intervals of some inputs; the action is the product of angle steps
-/// of some joints. Both behaviours of the paper, and finer ones, are values of this type.
+/// of some joints.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct BehaviourSpec {
-    /// What it is called, in files and messages.
+    /// Name, for files and messages.
     pub name: String,
-    /// The inputs, in the order of the intervals of `space`.
+    /// Inputs, in the order of the intervals of `space`.
     pub inputs: Vec<Input>,
-    /// The intervals of each input.
+    /// Intervals of each input.
     pub space: Product,
-    /// The joints that it moves, and by which steps.
+    /// Joints that it moves, and their steps.
     pub moves: Vec<JointSteps>,
-    /// Where it wants to be: every one of these intervals must hold.
+    /// Intervals that hold together at the goal.
     pub goal: Vec<GoalInterval>,
-    /// What it is taught by.
+    /// Reward that teaches it.
     pub reward: Reward,
 }
 
-/// The steps that a behaviour can make with one joint, in degrees.
+/// Steps that a behaviour can make with one joint.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct JointSteps {
     /// The joint.
     pub joint: Joint,
-    /// Its steps, degrees.
+    /// The steps, degrees.
     pub degrees: Vec<f64>,
 }
 
-checked!(JointSteps);
+checked!(JointSteps {
+    joint: Joint,
+    degrees: Vec<f64>,
+});
 
 #[cfg(feature = "serde")]
 impl JointSteps {
-    /// Whether there are steps; if not, why.
     fn check(&self) -> Result<(), String> {
         let Self { joint, degrees } = self;
         if degrees.is_empty() {
@@ -67,21 +60,21 @@ impl JointSteps {
 
 /// A goal interval of one input, closed at both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct GoalInterval {
     /// The input.
     pub input: Input,
-    /// Lowest value that is still good.
+    /// Lowest value at the goal.
     pub low: f64,
-    /// Highest value that is still good.
+    /// Highest value at the goal.
     pub high: f64,
 }
 
-checked!(GoalInterval);
+checked!(GoalInterval {
+    input: Input,
+    low: f64,
+    high: f64,
+});
 
 impl GoalInterval {
     /// The paper's goal interval of x, feature units.
@@ -125,7 +118,7 @@ impl GoalInterval {
         (self.low..=self.high).contains(&self.input.of(percept))
     }
 
-    /// Whether anything can lie in it; if not, why.
+    /// Checks that the interval is one.
     pub(crate) fn check(&self) -> Result<(), String> {
         let Self { input, low, high } = self;
         if low.is_finite() && high.is_finite() && low <= high {
@@ -140,11 +133,18 @@ const R_EDGES: [f64; 5] = [14.0, 22.0, R.low, R.high, 47.0];
 const Y: GoalInterval = GoalInterval::Y;
 const R: GoalInterval = GoalInterval::R;
 
-checked!(BehaviourSpec);
+checked!(BehaviourSpec {
+    name: String,
+    inputs: Vec<Input>,
+    space: Product,
+    moves: Vec<JointSteps>,
+    goal: Vec<GoalInterval>,
+    reward: Reward,
+});
 
 impl BehaviourSpec {
-    /// The paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of J1, Eq.
-    /// 5 with both mends.
+    /// Returns the paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of
+    /// J1, Eq. 5 with both mends.
     ///
     /// The goal interval \[99, 108\] and the steps of 5 and 1 degrees are the paper's; it does not
     /// print the others.
@@ -175,8 +175,8 @@ impl BehaviourSpec {
         }
     }
 
-    /// The paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90 states), 9
-    /// steps of J2 by 9 of J3 (81 actions), Eq. 6 with both mends.
+    /// Returns the paper's approaching behaviour: 5 intervals of y by 6 of r by 3 of theta 3 (90
+    /// states), 9 steps of J2 by 9 of J3 (81 actions), Eq. 6 with both mends.
     ///
     /// The goal (y in \[74, 82\], r in \[32, 34\]) and the steps of 20, 6 and 16, 5 degrees are the
     /// paper's; it does not print the others.
@@ -204,12 +204,12 @@ impl BehaviourSpec {
         }
     }
 
-    /// Approaching on 540 states: 9 intervals of y by 10 of r by 6 of theta 3, otherwise as
-    /// [`BehaviourSpec::approaching`], but that a lost ball stays lost as the goal stays reached:
-    /// it costs 100 / (1 - gamma) with the paper's gamma of 0.9.
+    /// Returns [`BehaviourSpec::approaching`] on 540 states, 9 intervals of y by 10 of r by 6 of
+    /// theta 3. A lost ball costs 1000: 100 / (1 - gamma) with the paper's gamma of 0.9, as the
+    /// goal is worth.
     ///
-    /// In regions as small as these the long actions lose the ball from a corner only, and one
-    /// penalty of 100 is too little, on average over the region, to keep them from it.
+    /// In regions as small as these the long actions lose the ball from a corner only. A penalty of
+    /// 100 is too little, on average over the region, to bar them.
     pub fn approaching_fine() -> Self {
         let approaching = Self::approaching();
         Self {
@@ -267,25 +267,25 @@ impl BehaviourSpec {
         Ok(self)
     }
 
-    /// The same behaviour taught by another reward.
+    /// Returns the behaviour with another reward.
     #[must_use]
     pub fn with_reward(self, reward: Reward) -> Self {
         Self { reward, ..self }
     }
 
-    /// How many states it tells apart.
+    /// Returns the number of states.
     pub fn states(&self) -> usize {
         self.space.states()
     }
 
-    /// How many actions it chooses from; the largest number there is if they are more.
+    /// Returns the number of actions, [`usize::MAX`] if there are more.
     pub fn actions(&self) -> usize {
         self.moves.iter().fold(1, |actions: usize, steps| {
             actions.saturating_mul(steps.degrees.len())
         })
     }
 
-    /// The state that `percept` falls into.
+    /// Returns the state of `percept`.
     ///
     /// # Errors
     /// An input that is NaN, with its position.
@@ -308,10 +308,8 @@ impl BehaviourSpec {
         Ok(State(state))
     }
 
-    /// The joint move that `action` stands for: a mixed-radix number, the last joint's step varying
-    /// fastest.
-    ///
-    /// An action of [`BehaviourSpec::actions`] or beyond counts from the beginning again.
+    /// Returns the joint move of `action`, a mixed-radix number in which the last joint's step
+    /// varies fastest. Actions from [`BehaviourSpec::actions`] on repeat from the beginning.
     pub fn delta(&self, action: Action) -> JointDelta {
         let mut degrees = [0.0; 6];
         let mut rest = action.0;
@@ -327,7 +325,7 @@ impl BehaviourSpec {
         JointDelta::from_degrees(degrees)
     }
 
-    /// Whether a program could run it; if not, why.
+    /// Checks that a program could run it.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let axes = self.space.quantities().len();
@@ -356,7 +354,7 @@ impl BehaviourSpec {
         self.reward.check()
     }
 
-    /// The first part in which two specifications differ.
+    /// Returns the first part in which two specifications differ.
     #[cfg(feature = "serde")]
     pub(crate) fn difference(&self, other: &Self) -> &'static str {
         match () {
@@ -368,7 +366,7 @@ impl BehaviourSpec {
         }
     }
 
-    /// Whether `percept` is where the behaviour wants to be.
+    /// Returns `true` if `percept` is at the goal.
     pub fn at_goal(&self, percept: &Percept) -> bool {
         self.goal.iter().all(|interval| interval.holds(percept))
     }
@@ -376,7 +374,7 @@ impl BehaviourSpec {
 
 const NO_GOAL: usize = usize::MAX;
 
-/// The product of intervals with the given edges and goal bins.
+/// Returns the product of intervals with these edges and goal bins.
 fn product<const N: usize>(axes: [(&[f64], usize); N]) -> Product {
     let intervals = axes.into_iter().map(|(edges, goal)| {
         let intervals = Intervals::new(edges)?;

@@ -1,4 +1,4 @@
-//! Learning a behaviour in a simulator: the behaviour as a reinforcement-learning environment.
+//! A behaviour in a simulator, as an environment of `qtable`.
 
 use hough_heuristic::Features;
 use puma_val2::JointDelta;
@@ -8,14 +8,10 @@ use rand::Rng;
 use crate::behaviour::spec::BehaviourSpec;
 use crate::percept::Percept;
 
-/// A behaviour in a simulator: states, actions and rewards of the specification, what follows from
-/// the simulator.
-///
-/// The simulator is any closure that turns a percept and a joint move into the next percept, or
-/// `None` when the ball is lost; the starts are drawn by a second one.
-pub struct BehaviourTask<'a, M, S> {
+/// States, actions and rewards of a specification, with the percepts of a simulator.
+pub(crate) struct BehaviourTask<'a, M, S> {
     spec: &'a BehaviourSpec,
-    /// The joint move of each action.
+    /// Joint move of each action.
     deltas: Vec<JointDelta>,
     gamma: f64,
     simulate: M,
@@ -24,7 +20,7 @@ pub struct BehaviourTask<'a, M, S> {
     state: State,
 }
 
-/// How often a start is drawn again before one at the goal is accepted.
+/// Draws of a start before one at the goal is accepted.
 const STARTS_TRIED: usize = 1000;
 
 impl<'a, M, S> BehaviourTask<'a, M, S>
@@ -32,9 +28,8 @@ where
     M: FnMut(&Percept, &JointDelta) -> Option<Percept>,
     S: FnMut(&mut dyn Rng) -> Percept,
 {
-    /// A task for learning `spec` with the discount factor `gamma` (an absorbing goal is worth
-    /// more, the higher it is).
-    pub fn new(spec: &'a BehaviourSpec, gamma: f64, simulate: M, start: S) -> Self {
+    /// Creates the environment; `gamma` is the discount factor, for the value of an absorbing goal.
+    pub(crate) fn new(spec: &'a BehaviourSpec, gamma: f64, simulate: M, start: S) -> Self {
         let now = Percept {
             features: Features {
                 x: 0.0,
@@ -55,15 +50,6 @@ where
     }
 }
 
-impl<M, S> std::fmt::Debug for BehaviourTask<'_, M, S> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("BehaviourTask")
-            .field("spec", &self.spec.name)
-            .field("now", &self.now)
-            .finish_non_exhaustive()
-    }
-}
-
 impl<M, S> Environment for BehaviourTask<'_, M, S>
 where
     M: FnMut(&Percept, &JointDelta) -> Option<Percept>,
@@ -78,8 +64,7 @@ where
     }
 
     fn reset(&mut self, rng: &mut dyn Rng) -> Result<State, qtable::Error> {
-        // A start at the goal would be an episode without a choice, so it is drawn again, but not
-        // for ever.
+        // A start at the goal would be an episode without a choice.
         for _ in 0..STARTS_TRIED {
             self.now = (self.start)(rng);
             if !self.spec.at_goal(&self.now) {
@@ -95,7 +80,7 @@ where
         let known = self.deltas.get(action.0).copied();
         let delta = known.unwrap_or_else(|| self.spec.delta(action));
         let after = (self.simulate)(&self.now, &delta);
-        // What is not a number cannot be seen either.
+        // A percept that is not a number counts as lost.
         let seen = after.and_then(|percept| Some((percept, self.spec.state(&percept).ok()?)));
         let Some((after, observation)) = seen else {
             return Ok(Step {

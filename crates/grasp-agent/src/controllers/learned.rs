@@ -1,24 +1,22 @@
-//! The paper's controller: two learned behaviours side by side, and learning that goes on while
-//! they work.
+//! The paper's controller: two learned behaviours, frozen or learning at work.
 
 use puma_val2::JointDelta;
 use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::rand::{RngExt, SeedableRng};
-use qtable::{Action, QTable, State};
+use qtable::{Action, Boltzmann, QLearning, Schedule, State, Status, Step};
 
 use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
-use crate::behaviour::spec::BehaviourSpec;
 #[cfg(feature = "serde")]
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::error::BehaviourError;
 use crate::percept::{Percept, Sighting};
 
-/// Centering and approaching (section 3 of the paper), each choosing for its own joints in every
-/// cycle.
+/// The paper's controller (section 3): centering and approaching, each of which chooses for its own
+/// joints in every cycle.
 ///
-/// Frozen unless [`Learned::learning`] is asked for. Learning is one-step Q-learning on what really
-/// happens, by the rewards of the specifications; moves out of the working limits are never tried.
+/// It is frozen unless [`Learned::learning`] is called. Learning at work is one-step Q-learning by
+/// the rewards of the specifications; moves out of the working limits are never tried.
 #[derive(Clone, Debug)]
 pub struct Learned {
     centering: Half,
@@ -26,36 +24,37 @@ pub struct Learned {
     learning: Option<Learning>,
 }
 
-/// Learning that goes on, and its random numbers.
+/// Learning at work: the learner, the policy, and its random numbers.
 #[derive(Clone, Debug)]
 struct Learning {
     settings: OnlineLearning,
+    learner: QLearning,
+    policy: Boltzmann,
     rng: Xoshiro256PlusPlus,
-    /// Numbers drawn so far.
+    /// Actions drawn so far.
     draws: u64,
 }
 
 impl Learning {
-    /// Goes on after so many draws.
-    fn after(settings: OnlineLearning, draws: u64) -> Self {
+    /// Goes on after so many draws; `None` for settings that `qtable` refuses.
+    fn after(settings: OnlineLearning, draws: u64) -> Option<Self> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
         for _ in 0..draws {
             let _: f64 = rng.random();
         }
-        Self {
+        let alpha = Schedule::constant(settings.alpha).ok()?;
+        let temperature = Schedule::constant(settings.temperature).ok()?;
+        Some(Self {
             settings,
+            learner: QLearning::new(alpha, settings.gamma).ok()?,
+            policy: Boltzmann::new(temperature).ok()?,
             rng,
             draws,
-        }
-    }
-
-    fn draw(&mut self) -> f64 {
-        self.draws += 1;
-        self.rng.random()
+        })
     }
 }
 
-/// How learning goes on at work.
+/// Settings of learning at work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -69,7 +68,7 @@ pub struct OnlineLearning {
     seed: u64,
 }
 
-/// The same as it comes from a file.
+/// An [`OnlineLearning`] as it is read.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Untested {
@@ -95,13 +94,12 @@ impl TryFrom<Untested> for OnlineLearning {
 }
 
 impl OnlineLearning {
-    /// With a discount factor, a learning rate, a Boltzmann temperature in units of Q, and the seed
-    /// of what is tried.
+    /// Creates settings from a discount factor, a learning rate, a Boltzmann temperature in units
+    /// of Q, and the seed of the exploration.
     ///
     /// # Errors
-    /// [`BehaviourError::Learning`] for a `gamma` that is not in 0..1 (at 1 a goal that is kept
-    /// would be worth infinitely much), an `alpha` that is not in 0..=1, a `temperature` that is
-    /// not a finite number above zero.
+    /// [`BehaviourError::Learning`] for a `gamma` outside 0..1 (at 1 a goal that is kept would be
+    /// worth infinitely much), an `alpha` outside 0..=1, a `temperature` outside 1e-6..=1e6.
     pub fn new(
         gamma: f64,
         alpha: f64,
@@ -119,8 +117,8 @@ impl OnlineLearning {
             (
                 "temperature",
                 temperature,
-                temperature.is_finite() && temperature > 0.0,
-                "a finite number above 0",
+                (1e-6..=1e6).contains(&temperature),
+                "from 1e-6 to 1e6",
             ),
         ];
         match sound.into_iter().find(|(_, _, sound, _)| !sound) {
@@ -138,8 +136,8 @@ impl OnlineLearning {
         }
     }
 
-    /// Discount factor 0.9, learning rate 0.1, temperature 0.3: careful enough that what was
-    /// learned in simulation is not forgotten.
+    /// Returns settings that do not forget what was learned in simulation: discount factor 0.9,
+    /// learning rate 0.1, temperature 0.3.
     pub fn careful(seed: u64) -> Self {
         Self {
             gamma: 0.9,
@@ -148,36 +146,16 @@ impl OnlineLearning {
             seed,
         }
     }
-
-    /// Discount factor, in 0..1.
-    pub fn gamma(&self) -> f64 {
-        self.gamma
-    }
-
-    /// Learning rate, in 0..=1.
-    pub fn alpha(&self) -> f64 {
-        self.alpha
-    }
-
-    /// Boltzmann temperature in units of Q, above zero; the higher, the more is tried.
-    pub fn temperature(&self) -> f64 {
-        self.temperature
-    }
-
-    /// Seed of what is tried.
-    pub fn seed(&self) -> u64 {
-        self.seed
-    }
 }
 
 impl Learned {
-    /// Loop breaker of centering unless set otherwise, in units of Q.
+    /// Default repetition penalty of centering, in units of Q.
     pub const CENTERING_KAPPA: f64 = KAPPA;
-    /// Loop breaker of approaching unless set otherwise, in units of Q.
+    /// Default repetition penalty of approaching, in units of Q.
     pub const APPROACHING_KAPPA: f64 = KAPPA;
 
-    /// Two behaviours, frozen, with the loop breaker at [`Learned::CENTERING_KAPPA`] and
-    /// [`Learned::APPROACHING_KAPPA`].
+    /// Creates a controller from two behaviours, frozen, with the repetition penalties
+    /// [`Learned::CENTERING_KAPPA`] and [`Learned::APPROACHING_KAPPA`].
     pub fn new(centering: Behaviour, approaching: Behaviour) -> Self {
         Self {
             centering: Half::new(centering, Self::CENTERING_KAPPA),
@@ -186,9 +164,11 @@ impl Learned {
         }
     }
 
-    /// The same with another loop breaker: what choosing an action again in the same state costs,
-    /// see [`Behaviour::choose`]. 0 is the plain greedy policy; what is not a finite number above
-    /// zero counts as 0.
+    /// Sets the repetition penalties: the value subtracted from the Q of an action that was chosen
+    /// once before in the same state of this run, 3, 7 and 15 times as much after more choices.
+    ///
+    /// A greedy policy on coarse states may otherwise go round in circles for ever. 0 is the plain
+    /// greedy policy; a penalty that is negative or not finite counts as 0.
     #[must_use]
     pub fn with_kappa(mut self, centering: f64, approaching: f64) -> Self {
         let sound = |kappa: f64| {
@@ -202,43 +182,43 @@ impl Learned {
         self
     }
 
-    /// The loop breakers of centering and approaching, units of Q.
+    /// Returns the repetition penalties of centering and approaching, units of Q.
     pub fn kappa(&self) -> (f64, f64) {
         (self.centering.kappa, self.approaching.kappa)
     }
 
-    /// The same, learning from what happens.
+    /// Makes the controller learn at work.
     #[must_use]
     pub fn learning(mut self, settings: OnlineLearning) -> Self {
-        self.learning = Some(Learning::after(settings, 0));
+        self.learning = Learning::after(settings, 0);
         self
     }
 
     /// Goes on learning after so many random numbers.
     #[cfg(feature = "serde")]
     pub(crate) fn resumed(mut self, (settings, draws): (OnlineLearning, u64)) -> Self {
-        self.learning = Some(Learning::after(settings, draws));
+        self.learning = Learning::after(settings, draws);
         self
     }
 
-    /// The same, learning nothing more.
+    /// Stops learning.
     #[must_use]
     pub fn frozen(mut self) -> Self {
         self.learning = None;
         self
     }
 
-    /// Centering as it is now.
+    /// Returns centering in its present state.
     pub fn centering(&self) -> &Behaviour {
         &self.centering.behaviour
     }
 
-    /// Approaching as it is now.
+    /// Returns approaching in its present state.
     pub fn approaching(&self) -> &Behaviour {
         &self.approaching.behaviour
     }
 
-    /// The two behaviours, to be saved for example.
+    /// Returns both behaviours, for example to save them.
     pub fn into_behaviours(self) -> (Behaviour, Behaviour) {
         (self.centering.behaviour, self.approaching.behaviour)
     }
@@ -267,10 +247,10 @@ impl Controller for Learned {
                 Feedback::Begin => half.begin(),
                 Feedback::Seen { ball, joints } => {
                     let now = Percept::new(ball.features, joints);
-                    half.learn(self.learning.as_ref(), Some(&now));
+                    half.learn(self.learning.as_mut(), Some(&now));
                 }
                 Feedback::Lost | Feedback::TakenBack => {
-                    half.learn(self.learning.as_ref(), None);
+                    half.learn(self.learning.as_mut(), None);
                     half.bar_last();
                 }
                 _ => {}
@@ -296,7 +276,7 @@ struct Half {
     behaviour: Behaviour,
     kappa: f64,
     episode: Episode,
-    /// What was perceived, and what was chosen then.
+    /// Last percept, its state, and the action chosen.
     last: Option<(Percept, State, Action)>,
 }
 
@@ -333,14 +313,14 @@ impl Half {
             None => self
                 .behaviour
                 .choose(state, &self.episode, self.kappa, allowed),
-            Some(learning) => self.behaviour.explore(
-                state,
-                &self.episode,
-                self.kappa,
-                learning.settings.temperature,
-                learning.draw(),
-                allowed,
-            ),
+            Some(learning) => {
+                let Learning { policy, rng, .. } = learning;
+                let drawn =
+                    self.behaviour
+                        .explore(state, &self.episode, self.kappa, policy, rng, allowed);
+                learning.draws += u64::from(drawn.is_some());
+                drawn
+            }
         };
         let action = action.ok_or(GaveUp::NoMoveLeft)?;
         self.last = Some((*percept, state, action));
@@ -355,31 +335,31 @@ impl Half {
         }
     }
 
-    /// Learns from the action chosen last, after which `now` is perceived, or the ball is lost.
-    fn learn(&mut self, learning: Option<&Learning>, now: Option<&Percept>) {
+    /// Learns from the action chosen last, after which `now` is perceived, or the ball is lost: the
+    /// paper's Eq. 3.
+    fn learn(&mut self, learning: Option<&mut Learning>, now: Option<&Percept>) {
         let (Some((before, state, action)), Some(learning)) = (self.last, learning) else {
             return;
         };
-        let settings = &learning.settings;
-        let value = match now {
-            Some(now) => self.worth(settings.gamma, &before, now),
-            None => Some(self.behaviour.spec().reward.lost),
+        let (spec, gamma) = (self.behaviour.spec(), learning.settings.gamma);
+        let (observation, reward, status) = match now {
+            None => (state, spec.reward.lost, Status::Terminated),
+            Some(now) => {
+                let Ok(next) = spec.state(now) else { return };
+                if spec.at_goal(now) {
+                    (next, spec.reward.arrival(gamma), Status::Terminated)
+                } else {
+                    let paid = spec.reward.step(&before, now);
+                    (next, paid, Status::Continuing)
+                }
+            }
         };
-        let Some(value) = value else { return };
-        let old = self.behaviour.table().value(state, action);
-        self.behaviour
-            .teach(state, action, old + settings.alpha * (value - old));
-    }
-
-    /// The paper's Eq. 3 for a step that kept the ball in view: what it paid and what follows.
-    /// `None` where that is no number.
-    fn worth(&self, gamma: f64, before: &Percept, after: &Percept) -> Option<f64> {
-        let spec: &BehaviourSpec = self.behaviour.spec();
-        if spec.at_goal(after) {
-            return Some(spec.reward.arrival(gamma));
-        }
-        let table: &QTable = self.behaviour.table();
-        let next = spec.state(after).ok()?;
-        Some(spec.reward.step(before, after) + gamma * table.max(next))
+        let step = Step {
+            observation,
+            reward,
+            status,
+        };
+        let learner = &mut learning.learner;
+        self.behaviour.learn(learner, state, action, &step);
     }
 }

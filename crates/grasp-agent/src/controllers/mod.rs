@@ -1,4 +1,4 @@
-//! The controllers: learned, servoing, hybrid, and wrappers about them.
+//! Controllers: learned, servo, hybrid, and one with another goal.
 
 pub(crate) mod hybrid;
 pub(crate) mod learned;

@@ -1,4 +1,4 @@
-//! A goal that was shown on the arm.
+//! Goals that were shown on the arm.
 
 use hough_heuristic::Features;
 use puma_val2::{JointDelta, Joints};
@@ -9,13 +9,12 @@ use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::percept::{Input, Sighting};
 
-/// What the camera shows where the gripper's turn brings the jaws around the ball, found by showing
-/// it once.
+/// A goal that was shown once on the arm: the features of the ball in the pose from which the grip
+/// brings the jaws around it.
 ///
-/// The paper's goal intervals (x 99..108, y 74..82, r 32..34) do not lie in the middle of the
-/// image: they are what *its* camera shows there. Another camera, or the same one mounted
-/// otherwise, shows something else. To teach the goal, the ball is put between the open jaws, the
-/// gripper's turn is taken back, and the arm looks. Nothing need be known of the camera for that.
+/// The paper's goal intervals (x 99..108, y 74..82, r 32..34) hold for its camera; another camera,
+/// or another mount, shows something else there. To teach the goal, put the ball between the open
+/// jaws, take the grip's turn back, and look. This needs no knowledge of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -29,7 +28,7 @@ pub struct TaughtGoal {
     grip: JointDelta,
 }
 
-/// A goal as it is read, before it is known to be one.
+/// A [`TaughtGoal`] as it is read.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Read {
@@ -57,17 +56,17 @@ impl TryFrom<Read> for TaughtGoal {
             from,
             grip,
         };
-        goal.checked().ok_or(
-            "a taught goal with a radius that is none, or an angle or place that is not finite",
-        )
+        goal.checked()
+            .ok_or("a taught goal needs a radius above 0, and finite angles and features")
     }
 }
 
 impl TaughtGoal {
-    /// The goal that shows as `seen` with the arm at `from`, from where `grip` brings the jaws
-    /// around the ball, in the place of the one that `intervals` have in their middle. `None` where
-    /// they do not say what x, y and r should be, and for a radius that is none. Nor is there one
-    /// of a pose or a grip that is not finite.
+    /// Creates the goal that shows as `seen` with the arm at `from`, from where `grip` brings the
+    /// jaws around the ball. It replaces the goal in the middle of `intervals`.
+    ///
+    /// `None` if the intervals lack x, y or r, for a radius that is not above 0, and for a pose or
+    /// a grip that is not finite.
     pub fn new(
         intervals: &[GoalInterval],
         seen: Features,
@@ -105,23 +104,23 @@ impl TaughtGoal {
         (finite && shows(untaught) && shows(taught)).then_some(self)
     }
 
-    /// The features of the ball at the goal.
+    /// Returns the features of the ball at the goal.
     pub fn features(&self) -> Features {
         self.taught
     }
 
-    /// The pose that it was seen from.
+    /// Returns the pose that they were seen from.
     pub fn seen_from(&self) -> Joints {
         self.from
     }
 
-    /// The move from there that brings the jaws around the ball.
+    /// Returns the move from there that brings the jaws around the ball.
     pub fn grip(&self) -> JointDelta {
         self.grip
     }
 
-    /// `intervals` about this goal: those of x and y moved, that of r scaled, others as they are.
-    pub fn intervals(&self, intervals: &[GoalInterval]) -> Vec<GoalInterval> {
+    /// Moves the intervals of x and y and scales that of r so that they lie about this goal.
+    pub(crate) fn intervals(&self, intervals: &[GoalInterval]) -> Vec<GoalInterval> {
         let Self {
             untaught, taught, ..
         } = self;
@@ -158,8 +157,8 @@ impl TaughtGoal {
     }
 }
 
-/// A controller whose goal is part of what it has learned, at work with a [`TaughtGoal`]: it is
-/// told what is seen as if that goal were its own.
+/// A controller whose goal is part of its learned knowledge, at work with a [`TaughtGoal`]: the
+/// features that it sees are moved so that the taught goal shows where its own was.
 #[derive(Clone, Debug)]
 pub struct Retargeted<C> {
     controller: C,
@@ -167,14 +166,9 @@ pub struct Retargeted<C> {
 }
 
 impl<C> Retargeted<C> {
-    /// `controller`, made for the goal that `goal` takes the place of.
+    /// Wraps a controller that was made for the goal that `goal` replaces.
     pub fn new(controller: C, goal: TaughtGoal) -> Self {
         Self { controller, goal }
-    }
-
-    /// The controller by itself.
-    pub fn into_inner(self) -> C {
-        self.controller
     }
 }
 
@@ -212,7 +206,7 @@ mod tests {
     use crate::run::config::AgentConfig;
 
     #[test]
-    fn the_goal_moves_and_what_is_made_for_the_old_one_is_told_of_it() {
+    fn intervals_and_sightings_move_with_the_goal() {
         let paper = AgentConfig::paper([Joints::default()]);
         let (intervals, grip) = (paper.goal.clone(), paper.grip);
         let seen = Features {
@@ -256,7 +250,7 @@ mod tests {
 
     #[cfg(feature = "serde")]
     #[test]
-    fn what_could_not_be_made_cannot_be_read() {
+    fn a_goal_is_validated_on_deserialization() {
         let paper = AgentConfig::paper([Joints::default()]);
         let seen = Features {
             x: 90.0,

@@ -27,8 +27,8 @@ impl EventLog {
         self.events.push(event.logged());
     }
 
-    /// Repeats the run with `agent` and the recorded answers of arm, sensors and camera. Returns the
-    /// outcome and the new log, which equals this one for an equal controller.
+    /// Repeats the run with `agent` and the recorded answers of arm, sensors and camera. Returns
+    /// the outcome and the new log, which equals this one for an equal controller.
     ///
     /// # Errors
     /// [`AgentError::Replay`] at the first event that differs; otherwise the error that the run
@@ -150,8 +150,8 @@ fn unmoved(reason: String) -> ArmError {
     }
 }
 
-/// Returns a small frame that is distinct for each number. The log holds no frames, only whether two
-/// were equal.
+/// Returns a small frame that is distinct for each number. The log holds no frames, only whether
+/// two were equal.
 pub(crate) fn numbered(number: u32) -> GrayImage {
     GrayImage::from_fn(4, 1, |x, _| Luma([number.to_le_bytes()[x as usize]]))
 }
@@ -205,8 +205,8 @@ impl Tape<'_> {
         }
     }
 
-    /// Fails if the next event says that `order` was not answered. Such an order makes no event when
-    /// it succeeds.
+    /// Fails if the next event says that `order` was not answered. Such an order makes no event
+    /// when it succeeds.
     fn answers(&self, order: Order) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
             Some(EventKind::Unanswered(then)) if *then == order => Err(unmoved(self.silence())),

@@ -2,7 +2,8 @@
 
 use crate::controller::{Controller, SavedController};
 use crate::controllers::hybrid::belief::Belief;
-use crate::controllers::hybrid::controller::{Hybrid, HybridSettings};
+use crate::controllers::hybrid::controller::Hybrid;
+use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::learned::Learned;
 use crate::controllers::servo::controller::Servo;
 use crate::controllers::taught_goal::{Retargeted, TaughtGoal};

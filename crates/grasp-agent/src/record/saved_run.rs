@@ -13,39 +13,23 @@ use crate::sight::frozen::{FrozenCheck, Shown};
 
 /// One run with everything needed to repeat it and to compare the results.
 ///
+/// The example `run_agent` of this crate, with `SavedRun::before(&agent)` before the run and
+/// `saved.note(event)` for each event, gives a run that is complete in itself:
+///
 /// ```
-/// # use std::cell::RefCell;
-/// # use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
-/// # use grasp_agent::hough_heuristic::FrameError;
-/// use grasp_agent::{Agent, AgentConfig, Eye, Hybrid, HybridSettings, Replayed, SavedRun, Sighting};
-/// # struct Arm(Joints);
-/// # impl Manipulator for Arm {
-/// #     fn joints(&mut self) -> Result<Joints, ArmError> { Ok(self.0) }
-/// #     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> { self.move_to(self.0 + delta) }
-/// #     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> { self.0 = target; Ok(target) }
-/// #     fn set_gripper(&mut self, _: Gripper) -> Result<(), ArmError> { Ok(()) }
-/// #     fn stop(&mut self) -> Result<(), ArmError> { Ok(()) }
-/// # }
-/// # struct Free;
-/// # impl ProximitySensor for Free {
-/// #     fn object_near(&mut self) -> Result<bool, ArmError> { Ok(false) }
-/// # }
-/// # struct Dark;
-/// # impl Eye for Dark {
-/// #     fn look(&mut self) -> Result<Option<Sighting>, FrameError> { Ok(None) }
-/// # }
+/// use grasp_agent::puma_val2::Joints;
+/// use grasp_agent::{Agent, AgentConfig, AgentError, Hybrid, HybridSettings, SavedRun};
 ///
-/// let pose = Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
-/// let mut agent = Agent::with_controller(AgentConfig::paper([pose]), Hybrid::new(HybridSettings::paper()).frozen())?;
-/// let mut saved = SavedRun::before(&agent);
-/// # let (mut eye, mut arm, mut sensor) = (Dark, Arm(pose), Free);
-/// let outcome = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| saved.note(event))?;
-///
-/// let text = saved.to_json();
-/// // Another day, in another program:
-/// let replayed = SavedRun::from_json(&text)?.replay()?;
-/// assert!(matches!(replayed, Replayed::Same(Ok(again)) if again == outcome));
-/// # Ok::<(), grasp_agent::AgentError>(())
+/// fn main() -> Result<(), AgentError> {
+///     let pose = Joints::from_degrees([0.0, -110.0, 210.0, 0.0, 45.0, 0.0]);
+///     let hybrid = Hybrid::new(HybridSettings::paper());
+///     let agent = Agent::with_controller(AgentConfig::paper([pose]), hybrid)?;
+///     let text = SavedRun::before(&agent).to_json();
+///     // In another program:
+///     let saved = SavedRun::from_json(&text)?;
+///     assert_eq!(saved.config(), agent.config());
+///     Ok(())
+/// }
 /// ```
 #[derive(Clone, Debug)]
 pub struct SavedRun {

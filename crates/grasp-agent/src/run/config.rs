@@ -9,14 +9,10 @@ use crate::limits::JointLimits;
 
 /// Settings of an [`Agent`](crate::Agent).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct AgentConfig {
-    /// Poses to search from, at least one (section 2.2 of the paper: six). The nearest one is tried
-    /// first.
+    /// Poses to search from, at least one (section 2.2 of the paper: six). The nearest one is
+    /// tried first.
     pub search_poses: Vec<Joints>,
     /// Displacements with which the search poses are tried again, one after the other, if the ball
     /// is in view from none of them (default `J1` +12.5 with `J2` +6 degrees, then `J1` +12.5 with
@@ -25,9 +21,9 @@ pub struct AgentConfig {
     /// Intervals that must hold together before the gripper moves (default x 99..108, y 74..82, r
     /// 32..34).
     pub goal: Vec<GoalInterval>,
-    /// Move from the goal pose to the grip (default `J5` by -18.01 degrees): the paper's "the fifth
-    /// joint is activated". If it leads out of the limits and the controller has no aim of its own,
-    /// the run ends with [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
+    /// Move from the goal pose to the grip (default `J5` by -18.01 degrees): the paper's "the
+    /// fifth joint is activated". If it leads out of the limits and the controller has no aim
+    /// of its own, the run ends with [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
     pub grip: JointDelta,
     /// `true`: turns `JT6` for the grip so that the jaws close across the longer axis of what is
     /// seen ([`Sighting::long_axis`](crate::Sighting::long_axis)), by the shorter turn (default
@@ -48,8 +44,8 @@ pub struct AgentConfig {
     /// search of the paper's poses has 18; a user-supplied search might never end. Together with
     /// `max_cycles` this bounds the run.
     pub max_views: usize,
-    /// Frames to look at from one pose before the ball counts as not in view (default 2). Detection
-    /// by sampling can miss a circle once.
+    /// Frames to look at from one pose before the ball counts as not in view (default 2).
+    /// Detection by sampling can miss a circle once.
     pub looks: usize,
     /// Radius up to which any approach is slow enough, feature units (default 62).
     ///
@@ -62,17 +58,17 @@ pub struct AgentConfig {
     /// Lift that verifies the grip (default `J2` by -15 degrees). `None`: closing the jaws at the
     /// goal is success, whatever is between them.
     ///
-    /// After the jaws have closed, the hand goes back to the pose from which the ball was last seen
-    /// and looks whether the ball is still there. Then it is lifted by this move and looks whether
-    /// a ball was left behind. A ball that keeps its place in the image as the hand goes up is in
-    /// the jaws. A ball left behind is reached for again. A lift that is stopped, or shortened by
-    /// the limits to less than half, verifies nothing: the run ends with
-    /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) or
+    /// After the jaws have closed, the hand goes back to the pose from which the ball was last
+    /// seen and looks whether the ball is still there. Then it is lifted by this move and
+    /// looks whether a ball was left behind. A ball that keeps its place in the image as the
+    /// hand goes up is in the jaws. A ball left behind is reached for again. A lift that is
+    /// stopped, or shortened by the limits to less than half, verifies nothing: the run ends
+    /// with [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) or
     /// [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
     ///
     /// The jaws lie outside the camera's view, so this is a proof by exclusion: a ball that rolled
-    /// out of both views, or that the detector misses in two looks at each, counts as grasped. Only
-    /// a sensor in the jaws could tell.
+    /// out of both views, or that the detector misses in two looks at each, counts as grasped.
+    /// Only a sensor in the jaws could tell.
     pub lift: Option<JointDelta>,
     /// Least radius of a ball that was left behind, seen from the lifted hand, feature units
     /// (default 9). Smaller circles are something else, for example the end of the ball's stand.
@@ -86,7 +82,24 @@ pub struct AgentConfig {
     pub same_frames: usize,
 }
 
-checked!(AgentConfig);
+checked!(AgentConfig {
+    search_poses: Vec<Joints>,
+    search_again: Vec<JointDelta>,
+    goal: Vec<GoalInterval>,
+    grip: JointDelta,
+    grip_across: bool,
+    recovery: Vec<JointDelta>,
+    limits: JointLimits,
+    max_cycles: usize,
+    max_views: usize,
+    looks: usize,
+    approach_radius: f64,
+    approach_growth: f64,
+    lift: Option<JointDelta>,
+    left_behind: f64,
+    reach_tolerance: f64,
+    same_frames: usize,
+});
 
 impl AgentConfig {
     /// Returns the paper's settings with the given search poses, and the defaults where the paper

@@ -41,7 +41,7 @@ mod null_for_nan {
 
 impl RunEvent<'_> {
     /// Returns the event without its frame, for logs.
-    pub fn logged(&self) -> RunEvent<'static> {
+    pub(crate) fn logged(&self) -> RunEvent<'static> {
         RunEvent {
             cycle: self.cycle,
             kind: self.kind.clone(),

@@ -1,4 +1,4 @@
-//! Gripper activation: the hand goes for the ball, the jaws close, and what they hold is verified.
+//! Gripper activation: the hand goes for the ball, the jaws close, and the grip is verified.
 
 use puma_val2::{Gripper, Joint, JointDelta, Joints};
 
@@ -9,48 +9,46 @@ use crate::percept::Sighting;
 use crate::run::config::AgentConfig;
 use crate::run::event::EventKind;
 
-/// So many ways to the ball that were barred are too many.
+/// Number of barred ways to the ball that is too many.
 const OFTEN: usize = 3;
 
-/// Seen from where the ball was at the goal, what has less than this share of its radius is
-/// something smaller.
+/// Least share of the ball's radius, seen from the same pose, of something that can be the ball.
 const BALL_SIZED: f64 = 0.6;
 
-/// The second lift, as a share of the first.
+/// Second lift, as a share of the first.
 const AGAIN: f64 = 1.0 / 3.0;
 
 /// Least share of [`AgentConfig::lift`] from which a ball that was left behind looks displaced.
 const LEAST_LIFT: f64 = 0.5;
 
-/// What an order to move came to.
+/// Result of an order to move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Went {
-    /// The arm stands where it should.
+    /// The arm stands where it was sent.
     There,
     /// Something was too near; the arm has gone back to where it came from.
     Back,
 }
 
-/// What a [`GripperActivation`] acts by: arm, jaws and camera, supervised.
-///
-/// An [`Agent`](crate::Agent) has one; another serves to use or test the module alone.
+/// Arm, jaws and camera of a [`GripperActivation`], supervised. The run implements it, and the
+/// tests of this module.
 pub(crate) trait Hand {
-    /// Where the arm stands, as it reports.
+    /// Returns the joint angles that the arm reports.
     fn joints(&self) -> Joints;
 
-    /// The ball from where the arm stands; `None` if it is not in view.
+    /// Looks for the ball from where the arm stands; `None` if it is not in view.
     ///
     /// # Errors
     /// A camera that fails, or is frozen.
     fn look(&mut self) -> Result<Option<Sighting>, AgentError>;
 
-    /// Moves by `delta` and tells `done`.
+    /// Moves by `delta` and reports `done`.
     ///
     /// # Errors
     /// An arm that fails.
     fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError>;
 
-    /// Moves to `target` and tells `done`.
+    /// Moves to `target` and reports `done`.
     ///
     /// # Errors
     /// An arm that fails.
@@ -62,16 +60,16 @@ pub(crate) trait Hand {
     /// A gripper that fails.
     fn set_jaws(&mut self, jaws: Gripper) -> Result<(), AgentError>;
 
-    /// The move that brings the gripper to the ball, where the controller has one of its own.
+    /// Returns the move that brings the gripper to the ball, if the controller has one.
     fn aim(&mut self, seen: &Sighting) -> Option<JointDelta>;
 }
 
-/// What an activation of the gripper came to.
+/// Result of an activation of the gripper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum GripEnd {
-    /// The jaws hold the ball, as far as can be told.
+    /// The jaws hold the ball, verified by the camera only.
     Held(Sighting),
-    /// The jaws are closed, and what they hold cannot be told, for this reason.
+    /// The jaws are closed, and the grip could not be verified for this reason.
     Unknown(Sighting, GaveUp),
     /// The ball was not in the jaws, which have opened again.
     Missed(Sighting),
@@ -79,37 +77,36 @@ pub(crate) enum GripEnd {
     Unseen,
     /// The ball is in view, in another place; nothing was done.
     Elsewhere(Sighting),
-    /// There is no move to the ball, neither a fixed one that the limits allow nor one of the
+    /// There is no move to the ball, neither the fixed one within the limits nor one of the
     /// controller's; nothing was done.
     NoMove(Sighting),
     /// Something was too near on the way to the ball, and the hand has gone back.
     Barred,
-    /// The same, once too often.
+    /// Something was too near for the third time.
     BarredAgain,
 }
 
-/// The paper's activation of the gripper (section 2.2: the fifth joint, then the jaws), and whether
-/// it holds the ball.
+/// The paper's activation of the gripper (section 2.2: the fifth joint, then the jaws), and a
+/// verification of the grip.
 ///
-/// The verification is by exclusion: the jaws lie outside the camera's view, so a ball in them is
-/// not seen. None seen where it was and none below the lifted hand, in two looks each, counts as
-/// held; a ball seen where it was counts as missed, and so does any other that is left in view, but
-/// one that goes where the hand goes. A ball that left both views in another way, rolled off or
-/// knocked aside, passes for one that is held.
+/// The verification is by exclusion, since the jaws lie outside the camera's view. A ball that is
+/// seen in two looks neither in its place nor below the lifted hand counts as held, and so does one
+/// that moves with the hand. Any other ball in view counts as missed. A ball that rolled out of
+/// both views counts as held.
 #[derive(Clone, Debug)]
 pub(crate) struct GripperActivation {
     grip: JointDelta,
     lift: Option<JointDelta>,
     left_behind: f64,
     limits: JointLimits,
-    /// Ways of the gripper to the ball that were barred, in this run.
+    /// Barred ways of the gripper to the ball in this run.
     barred: usize,
-    /// Whether the last one was aimed by the controller.
+    /// `true` if the last one was aimed by the controller.
     own: bool,
 }
 
 impl GripperActivation {
-    /// The module with the settings of `config`, for one run within `limits`.
+    /// Creates the module with the settings of `config`, for one run within `limits`.
     pub(crate) fn new(config: &AgentConfig, limits: JointLimits) -> Self {
         Self {
             grip: config.grip,
@@ -121,12 +118,12 @@ impl GripperActivation {
         }
     }
 
-    /// Goes for the ball that was just `seen`. Away from the goal only a controller that can aim
-    /// from there does. `wandered` says whether the ball has shown in more than one place of the
-    /// image: what has not may be part of the camera.
+    /// Goes for the ball that was just `seen`. Away from the goal this takes a controller that can
+    /// aim. `wandered` is `true` if the ball has shown in more than one place of the image; an
+    /// object that has not may be part of the camera.
     ///
     /// # Errors
-    /// What `hand` reports.
+    /// The errors of `hand`.
     pub(crate) fn activate(
         &mut self,
         hand: &mut dyn Hand,
@@ -135,14 +132,14 @@ impl GripperActivation {
         wandered: bool,
     ) -> Result<GripEnd, AgentError> {
         let from = hand.joints();
-        // What shows for a moment only is no ball, and the jaws do not close on it.
+        // Require two consecutive sightings before closing, to reject one-frame false positives.
         let Some(ball) = hand.look()? else {
             return Ok(GripEnd::Unseen);
         };
         if !is_same_place(seen, &ball) {
             return Ok(GripEnd::Elsewhere(ball));
         }
-        // Where the controller's aim has just been barred, the settings' is tried.
+        // After a barred aim of the controller, try the fixed grip.
         let admitted = self.limits.admit(&(from + self.grip));
         let fixed = (at_goal && admitted).then_some(self.grip);
         let barred = std::mem::take(&mut self.own) && fixed.is_some();
@@ -180,8 +177,8 @@ impl GripperActivation {
         )
     }
 
-    /// Whether the jaws hold the ball that was seen from the last pose of `back`, the way back from
-    /// the grip.
+    /// Verifies that the jaws hold the ball that was seen from the last pose of `back`, the way
+    /// back from the grip.
     fn verify(
         &self,
         hand: &mut dyn Hand,
@@ -190,8 +187,7 @@ impl GripperActivation {
         lift: JointDelta,
         wandered: bool,
     ) -> Result<Held, AgentError> {
-        // Back the way it came, which was free: nothing but a ball that is not in the jaws can be
-        // in it.
+        // Back the way it came, which was free: only a ball outside the jaws can bar it.
         for pose in back {
             if pose != hand.joints() && hand.go_to(pose, EventKind::Withdrawn)? == Went::Back {
                 return Ok(Held::No);
@@ -199,8 +195,7 @@ impl GripperActivation {
         }
         let there = look_twice(hand)?;
         let [.., from] = back;
-        // As far as the limits let the hand go, with a third of the first lift kept for a second
-        // one.
+        // Lift as far as the limits allow, leaving a third of the first lift for a second.
         let share = share_within(&self.limits, &from, &lift, 1.0 + AGAIN) / (1.0 + AGAIN);
         if share < LEAST_LIFT {
             return Ok(Held::Unknown(GaveUp::NoMoveLeft));
@@ -210,14 +205,13 @@ impl GripperActivation {
             return Ok(Held::Unknown(GaveUp::Obstructed));
         }
         let (below, least) = (look_twice(hand)?, self.left_behind);
-        // What is as large as the ball is the ball: where it was, pushed aside, or in the jaws.
+        // Something as large as the ball is the ball: in its place, pushed aside, or in the jaws.
         let there = there.filter(|now| now.features.r > BALL_SIZED * seen.features.r);
         let below = below.filter(|now| now.features.r >= least);
         let Some(ball) = there.or(below) else {
             return Ok(Held::Yes);
         };
-        // What goes where the hand goes is in the jaws, unless it has been in the camera from the
-        // beginning.
+        // A ball that moves with the hand is in the jaws, unless it is part of the camera.
         if let (Some(there), Some(below)) = (&there, &below)
             && is_same_place(there, below)
         {
@@ -239,7 +233,7 @@ impl GripperActivation {
     }
 }
 
-/// Whether the jaws hold the ball.
+/// Result of the verification.
 #[derive(Clone, Copy, Debug)]
 enum Held {
     Yes,
@@ -254,7 +248,7 @@ impl From<bool> for Held {
     }
 }
 
-/// What is in view in two looks at the same place.
+/// Looks twice, and returns the ball if it is seen in the same place.
 fn look_twice(hand: &mut dyn Hand) -> Result<Option<Sighting>, AgentError> {
     let Some(first) = hand.look()? else {
         return Ok(None);
@@ -263,20 +257,20 @@ fn look_twice(hand: &mut dyn Hand) -> Result<Option<Sighting>, AgentError> {
     Ok(again.filter(|again| is_same_place(&first, again)))
 }
 
-/// The largest share of `delta`, up to `most`, that leads from `from` to a pose within `limits`; 0
-/// from a pose that is not in them.
+/// Returns the largest share of `delta`, up to `most`, that leads from `from` to a pose within
+/// `limits`; 0 from a pose outside them.
 fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f64) -> f64 {
     let shares = Joint::ALL.into_iter().map(|joint| {
         let (low, high) = limits.0[joint.index()];
         let turn = delta[joint];
-        let room = if turn > 0.0 {
+        let way = if turn > 0.0 {
             high - from[joint]
         } else {
             from[joint] - low
         };
-        match room / turn.abs() {
+        match way / turn.abs() {
             _ if turn == 0.0 => most,
-            // `min` makes a number of NaN.
+            // `min` turns NaN into a number.
             share if share.is_nan() => 0.0,
             share => share,
         }
@@ -284,8 +278,8 @@ fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f
     shares.fold(most, f64::min).max(0.0)
 }
 
-/// A grip in two parts: first the arm and `JT4`, with the fingers still beside the ball, then the
-/// hand, which brings them to both sides of it. What hardly moves need not go first.
+/// Splits a grip into two moves: first the arm and `JT4`, with the fingers still beside the ball,
+/// then the hand, which brings them to both sides of it. Small first moves are left out.
 fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     const HARDLY: f64 = 0.01;
     let mut parts = [JointDelta::default(), *delta];
@@ -300,8 +294,7 @@ fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
     parts
 }
 
-/// Whether two sightings from one pose can be of one ball: the noise of any camera that can be
-/// worked with is less than this.
+/// Returns `true` if two sightings from one pose can be of one ball, given the noise of a camera.
 pub(crate) fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
     let (a, b) = (a.features, b.features);
     (a.x - b.x).abs() < 10.0 && (a.y - b.y).abs() < 10.0 && (a.r - b.r).abs() < 6.0
@@ -454,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_that_is_stopped_grips_nothing_and_does_not_know_what_it_lifts() {
+    fn a_stopped_hand_grips_nothing_and_verifies_nothing() {
         let seen = [Some(AT_GOAL())];
         assert_eq!(
             activated(&seen, Some(1)),

@@ -1,4 +1,4 @@
-//! Runs: the agent, its state machine and the modules that it links.
+//! Runs: the agent, its state machine, and the modules that it links.
 
 pub(crate) mod agent;
 pub(crate) mod config;

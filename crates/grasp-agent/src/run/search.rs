@@ -17,9 +17,10 @@ pub struct Viewpoint {
 /// A module that names poses to look from, until the ball is in view: the paper's target search and
 /// its recovery of a lost target (section 2.2).
 ///
-/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) replaces the
-/// search, [`PoseSearch`] by default, and [`Agent::recovering_by`](crate::Agent::recovering_by) the
-/// recovery, [`RecoveryMoves`] by default.
+/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) replaces the search
+/// by [`AgentConfig::search_poses`](crate::AgentConfig::search_poses), and
+/// [`Agent::recovering_by`](crate::Agent::recovering_by) the recovery by
+/// [`AgentConfig::recovery`](crate::AgentConfig::recovery).
 ///
 /// ```
 /// use grasp_agent::puma_val2::Joints;
@@ -81,7 +82,7 @@ impl Clone for Box<dyn Search> {
 /// The paper's search: from fixed poses, the one with the nearest pan angle first, and then from
 /// beside them.
 #[derive(Clone, Debug)]
-pub struct PoseSearch {
+pub(crate) struct PoseSearch {
     poses: Vec<Joints>,
     again: Vec<JointDelta>,
     round: usize,
@@ -92,7 +93,7 @@ pub struct PoseSearch {
 impl PoseSearch {
     /// Creates a search from `poses` and then, for each displacement of `again` in turn, from all
     /// of them displaced by that. Viewpoints are numbered on from round to round.
-    pub fn new(poses: impl Into<Vec<Joints>>, again: impl Into<Vec<JointDelta>>) -> Self {
+    pub(crate) fn new(poses: impl Into<Vec<Joints>>, again: impl Into<Vec<JointDelta>>) -> Self {
         Self {
             poses: poses.into(),
             again: again.into(),
@@ -141,7 +142,7 @@ impl Search for PoseSearch {
 /// The paper's recovery: back to the pose of the last sighting (viewpoint 0), then fixed moves from
 /// there.
 #[derive(Clone, Debug)]
-pub struct RecoveryMoves {
+pub(crate) struct RecoveryMoves {
     moves: Vec<JointDelta>,
     from: Joints,
     next: usize,
@@ -149,7 +150,7 @@ pub struct RecoveryMoves {
 
 impl RecoveryMoves {
     /// Creates a recovery by `moves`, all relative to the pose of the last sighting.
-    pub fn new(moves: impl Into<Vec<JointDelta>>) -> Self {
+    pub(crate) fn new(moves: impl Into<Vec<JointDelta>>) -> Self {
         Self {
             moves: moves.into(),
             from: Joints::default(),

@@ -7,10 +7,11 @@ use puma_val2::Joints;
 use crate::sight::camera_model::CameraModel;
 
 impl CameraModel {
-    /// The pose near `from`, differing in the first three joints, in which a ball at `ball` shows
-    /// as `features`, or most nearly so, and how far the ball is then from its place before the
-    /// camera, metres. `None` for features that no ball has, and where a number is not finite.
-    pub fn pose_showing(
+    /// Returns the pose near `from`, differing in the first three joints, in which a ball at `ball`
+    /// shows most nearly as `features`, and the remaining distance of the ball from its place
+    /// before the camera, metres. `None` for features that no ball has, and if a number is not
+    /// finite.
+    pub(crate) fn pose_showing(
         &self,
         ball: &Point3<f64>,
         features: &Features,
@@ -20,8 +21,8 @@ impl CameraModel {
         off.is_finite().then_some((pose, off))
     }
 
-    /// The pose near `from`, differing in the first three joints, in which a ball at `ball` is at
-    /// `wanted` in the camera frame, or most nearly so, and how far off it is then, metres.
+    /// Returns the pose near `from`, differing in the first three joints, in which a ball at `ball`
+    /// is nearest to `wanted` in the camera frame, and the remaining distance, metres.
     pub(crate) fn pose_placing(
         &self,
         ball: &Point3<f64>,
@@ -33,16 +34,20 @@ impl CameraModel {
         solved(from, |joints| seen_at(joints) - wanted)
     }
 
-    /// The pose near `from`, differing in the first three joints, in which the gripper is at
-    /// `ball`; `None` if there is none within a millimetre.
+    /// Returns the pose near `from`, differing in the first three joints, in which the gripper is
+    /// at `ball`; `None` if there is none within a millimetre.
     pub(crate) fn pose_gripping(&self, ball: &Point3<f64>, from: &Joints) -> Option<Joints> {
         let (joints, miss) = solved(from, |joints| self.tool_point(joints) - ball);
         (miss < 0.001).then_some(joints)
     }
 
-    /// How the image of a ball at `ball` changes with the first three joints: rows x, y, r (feature
-    /// units) by columns JT1, JT2, JT3 (radians).
-    pub fn image_jacobian(&self, joints: &Joints, ball: &Point3<f64>) -> Option<Matrix3<f64>> {
+    /// Returns the image Jacobian of a ball at `ball`: rows x, y, r (feature units) by columns JT1,
+    /// JT2, JT3 (radians).
+    pub(crate) fn image_jacobian(
+        &self,
+        joints: &Joints,
+        ball: &Point3<f64>,
+    ) -> Option<Matrix3<f64>> {
         const TURN: f64 = 1e-5;
         let mut jacobian = Matrix3::zeros();
         for i in 0..3 {
@@ -59,8 +64,8 @@ impl CameraModel {
     }
 }
 
-/// The joints near `from`, differing in the first three, at which `error` is least, and how large
-/// it is there: Newton's method with damping.
+/// Returns the joints near `from`, differing in the first three, at which the error is least, and
+/// its norm there: Newton's method with damping.
 fn solved(from: &Joints, error_at: impl Fn(&Joints) -> Vector3<f64>) -> (Joints, f64) {
     const TURN: f64 = 1e-6;
     let (mut joints, mut error) = (*from, error_at(from));
@@ -79,7 +84,7 @@ fn solved(from: &Joints, error_at: impl Fn(&Joints) -> Vector3<f64>) -> (Joints,
         let Some(step) = normal.lu().solve(&(jacobian.transpose() * error)) else {
             break;
         };
-        // No more than half a radian at once: the arm turns, the model of it is straight.
+        // At most half a radian at once: beyond that the linear model does not hold.
         let step: Vector3<f64> = step * (0.5 / step.amax()).min(1.0);
         let mut next = joints;
         for i in 0..3 {

@@ -1,4 +1,4 @@
-//! Approaching without errors, quickly: the plane that the second and third joint move in.
+//! Fast exact simulator of approaching, in the plane of the second and third joint.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Joint, JointDelta, Joints};
@@ -7,27 +7,27 @@ use crate::limits::JointLimits;
 use crate::percept::Percept;
 use crate::sight::camera_model::CameraModel;
 
-/// An exact simulator of approaching: what is perceived after a move of `JT2` and `JT3`.
+/// Exact simulator of approaching: the percept after a move of `JT2` and `JT3`.
 ///
 /// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r, theta
-/// 3) is the whole state. It answers what [`CameraModel::after`] does, to rounding, in a tenth of
-/// the time: both joints turn about parallel axes, and the place of the ball behind the percept
-/// given last is remembered.
+/// 3) is the whole state. It returns the same as [`CameraModel::after`], to rounding, in a tenth of
+/// the time: both joints turn about parallel axes, and the place of the ball of the last percept is
+/// remembered.
 #[derive(Clone, Debug)]
 pub struct ArmPlane {
     model: CameraModel,
     limits: JointLimits,
-    /// From the shoulder to the elbow, in a frame that turns with the upper arm.
+    /// Vector from the shoulder to the elbow, in a frame that turns with the upper arm.
     elbow: Vector3<f64>,
-    /// The camera in a frame that turns with the forearm, with its origin in the elbow.
+    /// Camera in a frame that turns with the forearm, with its origin in the elbow.
     camera: Isometry3<f64>,
-    /// The percept given last, and where the ball is that shows so, from the elbow in the frame of
-    /// the upper arm.
+    /// Last percept returned, and the place of its ball from the elbow, in the frame of the upper
+    /// arm.
     last: Option<(Percept, Vector3<f64>)>,
 }
 
 impl ArmPlane {
-    /// The plane of the arm of `model`, with `JT5` at 45 degrees, as while reaching.
+    /// Creates the simulator of the arm of `model`, with `JT5` at 45 degrees.
     pub fn new(model: &CameraModel, limits: JointLimits) -> Self {
         let stretched = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
         let elbow = Vector3::new(model.arm.a2, model.arm.d2, 0.0);
@@ -42,8 +42,8 @@ impl ArmPlane {
         }
     }
 
-    /// What is perceived after the move, in the frame or outside it. A move that leads `JT3` out of
-    /// its limits is not made; `None` where the ball has no image.
+    /// Returns the percept after a move, in the frame or outside it. A move of `JT3` out of its
+    /// limits is not made. `None` if the ball has no image.
     pub fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let turned = delta[Joint::J3];
         let theta3 = percept.theta3 + turned.to_degrees();
@@ -70,7 +70,7 @@ impl ArmPlane {
     }
 }
 
-/// `v` turned about the y axis.
+/// Turns `v` about the y axis.
 fn about_y(v: &Vector3<f64>, angle: f64) -> Vector3<f64> {
     let (sin, cos) = angle.sin_cos();
     Vector3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x)
@@ -82,7 +82,7 @@ mod tests {
     use hough_heuristic::Features;
 
     #[test]
-    fn it_answers_as_the_camera_model_does_along_walks_and_jumps() {
+    fn the_plane_equals_the_camera_model_along_walks_and_jumps() {
         let (model, limits) = (CameraModel::paper(), JointLimits::paper());
         let mut plane = ArmPlane::new(&model, limits);
         let start = Percept {

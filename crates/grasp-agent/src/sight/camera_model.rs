@@ -1,4 +1,4 @@
-//! What a controller believes of its camera: optics, place on the hand, size of the ball.
+//! Camera model: optics, mount on the hand, size of the ball.
 
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -11,11 +11,11 @@ use crate::checked::above_zero;
 use crate::limits::JointLimits;
 use crate::percept::Percept;
 
-/// An arm with a camera on its hand, as a controller believes it to be, and the size of the ball.
+/// Model of an arm with a camera on its hand, and of the ball, as a controller believes them to be.
 ///
-/// It answers the two questions of visual servoing: what would be seen ([`CameraModel::view`]), and
-/// where is what is seen ([`CameraModel::locate`]). Lengths in metres, in VAL's world frame (origin
-/// at the shoulder, z up).
+/// [`CameraModel::view`] predicts the image of a ball at a place, [`CameraModel::locate`] computes
+/// the place from the image. Lengths are in metres, in VAL's world frame (origin at the shoulder, z
+/// up).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -23,25 +23,25 @@ use crate::percept::Percept;
     serde(into = "Written", try_from = "Written")
 )]
 pub struct CameraModel {
-    /// The arm.
+    /// Geometry of the arm.
     pub arm: PumaParams,
     /// Focal length, feature units (192 to the width of the frame).
     pub focal: f64,
-    /// Where the optical axis meets the image, feature units.
+    /// Principal point, feature units.
     pub centre: [f64; 2],
-    /// The camera frame (z along the optical axis, x right, y down in the image) in the hand frame
+    /// Camera frame (z along the optical axis, x right, y down in the image) in the hand frame
     /// ([`PumaParams::wrist`]).
     pub mount: Isometry3<f64>,
     /// Radius of the ball, metres.
     pub ball_radius: f64,
-    /// From the flange to the point between the finger pads, metres.
+    /// Distance from the flange to the point between the finger pads, metres.
     pub tool: f64,
 }
 
 impl CameraModel {
-    /// The paper's set-up: an 11.5 mm lens before a 2/3" CCD (8.8 mm wide), 60 mm above the tool
-    /// axis, 4.5 mm to its left and 20 mm past the wrist centre, looking along the tool axis; a
-    /// ball of 20 mm radius; a gripper of 126 mm.
+    /// Returns the paper's set-up: an 11.5 mm lens before a 2/3" CCD (8.8 mm wide), 60 mm above the
+    /// tool axis, 4.5 mm to its left and 20 mm past the wrist centre, looking along the tool axis;
+    /// a ball of 20 mm radius; a gripper of 126 mm.
     pub fn paper() -> Self {
         let axes = Matrix3::new(
             0.0, 1.0, 0.0, //
@@ -61,7 +61,7 @@ impl CameraModel {
         }
     }
 
-    /// Whether something can be seen by it; if not, why.
+    /// Checks that something can be seen by it.
     #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let arm = &self.arm;
@@ -78,29 +78,29 @@ impl CameraModel {
         above_zero("the radius of the ball", self.ball_radius)
     }
 
-    /// The ball's outline with the arm at `joints` and the ball's centre at `ball`, in the frame or
-    /// outside it; `None` where it has none, behind the camera for example.
+    /// Returns the outline of a ball at `ball` with the arm at `joints`, in the frame or outside
+    /// it; `None` if it has none, for example behind the camera.
     pub fn view(&self, joints: &Joints, ball: &Point3<f64>) -> Option<Features> {
-        self.view_from(&(self.arm.wrist(joints) * self.mount), ball)
+        let camera = self.arm.wrist(joints) * self.mount;
+        self.outline(&camera.inverse_transform_point(ball))
     }
 
-    /// Where the ball is that shows as `features` with the arm at `joints`; `None` for features
-    /// that no ball has.
+    /// Returns the place of a ball that shows as `features` with the arm at `joints`; `None` for
+    /// features that no ball has.
     pub fn locate(&self, joints: &Joints, features: &Features) -> Option<Point3<f64>> {
         Some(self.arm.wrist(joints) * self.mount * self.in_camera(features)?)
     }
 
-    /// What would be perceived after a move, in the frame or outside it: an exact simulator of
-    /// approaching, in which the percept is the whole state. A move that leads out of `limits` is
-    /// not made; `None` where the ball has no image.
+    /// Returns the percept after a move, in the frame or outside it: an exact simulator of
+    /// approaching, in which the percept is the whole state. A move of `JT3` out of `limits` is not
+    /// made. `None` if the ball has no image.
     pub fn after(
         &self,
         percept: &Percept,
         delta: &JointDelta,
         limits: &JointLimits,
     ) -> Option<Percept> {
-        // The plane of the upper arm and the forearm looks the same at every angle of the first two
-        // joints.
+        // The percept does not depend on the angles of the first two joints.
         let joints = Joints::from_degrees([
             0.0,
             -60.0,
@@ -119,16 +119,12 @@ impl CameraModel {
         Some(Percept::new(features, &moved))
     }
 
-    /// The point between the finger pads.
+    /// Returns the point between the finger pads.
     pub fn tool_point(&self, joints: &Joints) -> Point3<f64> {
         self.arm.wrist(joints) * Point3::new(0.0, 0.0, self.arm.d6 + self.tool)
     }
 
-    fn view_from(&self, camera: &Isometry3<f64>, ball: &Point3<f64>) -> Option<Features> {
-        self.outline(&camera.inverse_transform_point(ball))
-    }
-
-    /// The outline of the ball with its centre at `p` in the camera frame: centre and mean
+    /// Returns the outline of a ball with its centre at `p` in the camera frame: centre and mean
     /// semi-axis of the ellipse in which the image plane cuts the cone of rays that touch the ball.
     pub(crate) fn outline(&self, p: &Point3<f64>) -> Option<Features> {
         let depth2 = p.z * p.z;
@@ -153,7 +149,7 @@ impl CameraModel {
             .then_some(features)
     }
 
-    /// The inverse of [`CameraModel::outline`].
+    /// Inverts [`CameraModel::outline`].
     pub(crate) fn in_camera(&self, features: &Features) -> Option<Point3<f64>> {
         let wanted = [features.x, features.y, features.r];
         if !wanted.iter().all(|v| v.is_finite()) || features.r <= 0.0 {
@@ -168,8 +164,8 @@ impl CameraModel {
         };
         let depth = self.focal * self.ball_radius / features.r;
         let mut p = Point3::from(ray(features.x, features.y) * depth.max(1.01 * self.ball_radius));
-        // The outline's centre lies nearly, not exactly, in the direction of the ball's: correct by
-        // what is left.
+        // The centre of the outline lies nearly, not exactly, in the direction of the ball's:
+        // correct by the rest.
         for _ in 0..30 {
             let seen = self.outline(&p)?;
             let z = (p.z * seen.r / features.r).max(1.001 * self.ball_radius);
@@ -185,8 +181,8 @@ impl CameraModel {
     }
 }
 
-/// A [`CameraModel`] as it is written: the mount by the place of its origin, metres, and its turn,
-/// a unit quaternion (i, j, k, w).
+/// A [`CameraModel`] as it is written: the mount by the place of its origin, metres, and a unit
+/// quaternion (i, j, k, w).
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {
@@ -231,7 +227,7 @@ impl TryFrom<Written> for CameraModel {
             arm: written.arm,
             focal: written.focal,
             centre: written.centre,
-            // To the last digit what was written.
+            // Not normalised again, so that every digit comes back.
             mount: Isometry3::from_parts(
                 Translation3::from(written.mount_at),
                 UnitQuaternion::new_unchecked(turn),
@@ -250,7 +246,7 @@ mod tests {
 
     #[cfg(feature = "serde")]
     #[test]
-    fn a_model_is_read_as_it_was_written_and_a_turn_that_is_none_is_refused() {
+    fn a_model_comes_back_and_no_unit_quaternion_is_refused() {
         let model = CameraModel {
             mount: Isometry3::from_parts(
                 Translation3::new(0.1, -0.2, 0.3),
@@ -267,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_located_shows_as_it_was_seen() {
+    fn a_located_ball_shows_as_it_was_seen() {
         let model = CameraModel::paper();
         let joints = Joints::from_degrees([10.0, -80.0, 195.0, 0.0, 45.0, 0.0]);
         for (x, y, r) in [
@@ -300,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_goal_the_fifth_joint_alone_brings_the_gripper_to_the_ball() {
+    fn at_the_goal_the_fifth_joint_brings_the_gripper_to_the_ball() {
         let model = CameraModel::paper();
         let goal = Joints::from_degrees([0.0, -53.0, 186.2, 0.0, 45.0, 0.0]);
         let ball = model

@@ -1,4 +1,4 @@
-//! Eyes, and what they look for: targets in frames, the camera's model, a frozen camera.
+//! Sight: eyes, targets in frames, the camera model, the frozen-camera check.
 
 pub(crate) mod aiming;
 pub(crate) mod arm_plane;

@@ -136,7 +136,7 @@ impl Search for Once {
 }
 
 #[test]
-fn a_circle_that_keeps_its_place_in_the_image_is_no_grasp_whatever_was_seen_before_the_search() {
+fn a_circle_that_keeps_its_place_in_the_image_is_no_grasp() {
     let never_before = |n: u32| (n > 12).then_some(AT_GOAL);
     let once_before = |n: u32| match n {
         0 => Some(ASIDE),
@@ -217,7 +217,7 @@ impl Search for Endless {
 }
 
 #[test]
-fn a_search_that_never_ends_has_found_nothing_after_so_many_viewpoints() {
+fn an_endless_search_ends_after_so_many_viewpoints() {
     let (end, log) = run(agent(1).searching_by(Endless), false, |_| None);
     let outcome = end.unwrap();
     assert_eq!(

@@ -246,7 +246,7 @@ fn an_arm_that_its_own_guard_halts_is_taken_back_and_goes_on() {
 }
 
 #[test]
-fn where_every_move_is_halted_a_controller_that_can_aim_from_there_grips() {
+fn a_hybrid_grips_from_where_every_move_is_halted() {
     // The hybrid is halted again and again on its way, and knows by then where the ball is.
     let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
     for run in 0..10 {
@@ -288,7 +288,7 @@ fn every_search_begins_with_an_event() {
 }
 
 #[test]
-fn false_circles_neither_mislead_the_hybrid_for_long_nor_what_it_learns() {
+fn false_circles_do_not_mislead_the_hybrid_for_long() {
     let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
     let mut reached = 0;
     for run in 0..20 {
@@ -318,8 +318,7 @@ fn what_was_learned_before_the_line_died_is_kept() {
 }
 
 #[test]
-fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a_pose_out_of_limits()
- {
+fn phantoms_cause_no_grip_and_no_pose_out_of_limits() {
     let checked = config();
     for gain in [1.0, 0.5] {
         let servo = ServoSettings::paper().with_gain(gain);
@@ -346,7 +345,7 @@ fn circles_where_there_is_no_ball_end_no_run_in_a_grip_that_is_believed_nor_in_a
 
 #[cfg(feature = "serde")]
 #[test]
-fn what_the_behaviours_learned_before_the_line_died_can_be_saved_and_resumed() {
+fn behaviours_learned_before_a_fault_are_saved_and_resumed() {
     use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning, qtable::QTable};
     let blank = |spec: &grasp_agent::BehaviourSpec| {
         let table = QTable::new(spec.states(), spec.actions()).unwrap();

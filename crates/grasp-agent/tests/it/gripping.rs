@@ -59,7 +59,7 @@ fn a_closed_hand_that_is_halted_has_not_succeeded() {
 }
 
 #[test]
-fn a_circle_in_the_goal_that_is_no_ball_is_not_taken_for_a_success() {
+fn false_circles_at_the_goal_are_no_success() {
     for (fault, gripped) in [
         (Fault::PhantomOnce, false),
         (Fault::PhantomFromThere, true),
@@ -98,7 +98,7 @@ fn a_ball_that_is_not_gripped_is_reached_for_again() {
 }
 
 #[test]
-fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
+fn a_ball_seen_in_the_jaws_is_not_one_left_behind() {
     let at_once: &[_] = &["lifted", "seen", "seen", "grasped"];
     let then: &[_] = &["lifted", "seen", "seen", "lifted", "seen", "grasped"];
     for (from, expected) in [(0, at_once), (2, then)] {
@@ -110,7 +110,7 @@ fn a_ball_that_shows_in_the_jaws_is_told_from_one_that_was_left_behind() {
 }
 
 #[test]
-fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
+fn a_ball_that_was_squeezed_out_is_not_grasped() {
     let (end, log, cell) = end_of(Fault::SqueezedOut);
     assert_eq!(end.unwrap().gave_up, None);
     assert!(cell.0.borrow().held);
@@ -120,7 +120,7 @@ fn a_ball_that_was_squeezed_out_is_not_taken_for_one_in_the_jaws() {
 }
 
 #[test]
-fn two_places_in_the_goal_in_turn_do_not_keep_a_run_going_for_ever() {
+fn a_ball_at_two_places_in_turn_ends_with_the_cycles() {
     let mut wide = config();
     wide.goal = BehaviourPair::paper_mended()
         .with_y_goal(GoalInterval::Y_SECTION_4)
@@ -165,11 +165,11 @@ fn a_lift_that_the_limits_do_not_allow_is_no_verification() {
             config.limits.0[4].1 = (45.0 + degrees).to_radians();
         }
     };
-    for (room, gave_up) in [
+    for (slack, gave_up) in [
         (0.0, Some(GaveUp::NoMoveLeft)),
         (9.0, Some(GaveUp::NoMoveLeft)),
         (11.0, None),
     ] {
-        assert_eq!(end_with(upward(room)).0.gave_up, gave_up, "{room}");
+        assert_eq!(end_with(upward(slack)).0.gave_up, gave_up, "{slack}");
     }
 }

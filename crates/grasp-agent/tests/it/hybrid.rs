@@ -107,7 +107,7 @@ fn focal(agent: &Agent<Hybrid>) -> (f64, f64) {
 }
 
 #[test]
-fn a_controller_that_begins_with_a_belief_goes_on_learning_from_there() {
+fn a_hybrid_with_a_belief_goes_on_learning() {
     let new = |hybrid| Agent::with_controller(config(), hybrid).unwrap();
     let mut first = new(Hybrid::new(HybridSettings::paper()));
     runs(&mut first, wrong(1.0));

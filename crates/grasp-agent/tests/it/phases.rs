@@ -110,7 +110,7 @@ fn every_transition_is_one_of_the_diagram_and_in_the_log() {
 }
 
 #[test]
-fn going_for_the_ball_away_from_the_goal_and_coming_back_are_told() {
+fn a_grip_away_from_the_goal_is_in_the_log() {
     // Three moves have been taken back, not in a row: a servo controller cannot aim, and reaches
     // on.
     let (_, log, _) = end_of(Fault::HaltedNear(20.0));

@@ -43,7 +43,7 @@ fn eggs(longest_minor: f64) -> EggTarget {
 }
 
 #[test]
-fn an_egg_is_its_centre_and_its_shorter_half_axis_however_it_lies() {
+fn an_egg_is_its_centre_and_its_shorter_half_axis() {
     let mut eggs = eggs(200.0);
     for angle in [0.0, 0.5, 1.2, -0.8] {
         let egg = ellipse(400.0, 300.0, 84.0, 60.0, angle);

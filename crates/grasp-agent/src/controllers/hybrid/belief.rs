@@ -16,11 +16,7 @@ use crate::sight::camera_model::CameraModel;
 
 /// Expected errors of an uncalibrated cell, as standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Prior {
     /// Logarithm of the focal length \[0.3\].
     pub focal: f64,
@@ -36,7 +32,14 @@ pub struct Prior {
     pub play: f64,
 }
 
-checked!(Prior);
+checked!(Prior {
+    focal: f64,
+    centre: f64,
+    turn: f64,
+    shift: f64,
+    radius: f64,
+    play: f64,
+});
 
 impl Prior {
     /// Returns the errors of a cell set up by eye: the values in the brackets of the fields.
@@ -79,8 +82,8 @@ impl Prior {
 ///
 /// The thirteen parameters: logarithm of the focal length over the nominal one; shift of the
 /// principal point (feature units); rotation of the camera about its x, y and z axes (radians) and
-/// translation along them (metres); logarithm of the ball's radius over the nominal one; backlash of
-/// `JT1`, `JT2` and `JT3` (whole width, radians).
+/// translation along them (metres); logarithm of the ball's radius over the nominal one; backlash
+/// of `JT1`, `JT2` and `JT3` (whole width, radians).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -128,7 +131,10 @@ impl TryFrom<Unchecked> for Belief {
             })
         } else {
             Err(BehaviourError::Text {
-                what: "a belief needs thirteen finite means, their information matrix, and a noise above 0".into(),
+                what:
+                    "a belief needs thirteen finite means, their information matrix, and a noise \
+                       above 0"
+                        .into(),
             })
         }
     }

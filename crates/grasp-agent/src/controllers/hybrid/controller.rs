@@ -4,114 +4,27 @@ use hough_heuristic::Features;
 use nalgebra::{Point3, SMatrix, Vector3};
 use puma_val2::{Joint, JointDelta, Joints};
 
-use crate::behaviour::spec::GoalInterval;
-use crate::checked::checked;
 #[cfg(feature = "serde")]
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
-use crate::controllers::hybrid::belief::{Belief, Prior};
+use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
 use crate::controllers::hybrid::parameters::{
     Numbers, WITH_BALL, corrected, deviations, sensitivity,
 };
-#[cfg(feature = "serde")]
-use crate::controllers::servo::settings::check_goal;
+use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::taught_goal::TaughtGoal;
 use crate::limits::JointLimits;
-#[cfg(feature = "serde")]
-use crate::limits::check_steps;
 use crate::percept::Sighting;
 use crate::sight::camera_model::CameraModel;
-
-/// Settings of a [`Hybrid`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
-pub struct HybridSettings {
-    /// Nominal camera and arm.
-    pub nominal: CameraModel,
-    /// Expected errors of the nominal model.
-    pub prior: Prior,
-    /// Fraction of the prior uncertainty added back when a saved belief is loaded, 0..=1 (default 0.2).
-    /// Larger values re-learn a knocked camera sooner; see [`Hybrid::with_belief`].
-    pub drift: f64,
-    /// Features of the ball at the goal (default (103.5, 78, 33)).
-    pub goal: Features,
-    /// Largest turns of `JT1` to `JT3` in one move, radians (default
-    /// [`JointLimits::PAPER_STEPS`]).
-    pub steps: [f64; 3],
-    /// Margin to the frame's border, in standard deviations of the predicted image place (default 2).
-    pub caution: f64,
-    /// Number of latest runs kept as evidence (default 400).
-    pub memory: usize,
-    /// Turn of `JT5` for the grip, radians (default -18.01 degrees).
-    pub grip_turn: f64,
-    /// Turn of `JT4` for the grip, radians (default 0).
-    pub grip_aside: f64,
-    /// Largest standard deviation of the ball's place, metres, at which the controller aims the
-    /// grip itself (default 0.008). Above it the agent's configured grip is used.
-    pub grip_certainty: f64,
-}
-
-checked!(HybridSettings);
-
-impl HybridSettings {
-    /// Returns the default settings.
-    pub fn paper() -> Self {
-        Self {
-            nominal: CameraModel::paper(),
-            prior: Prior::by_eye(),
-            drift: 0.2,
-            goal: GoalInterval::paper_features(),
-            steps: JointLimits::PAPER_STEPS,
-            caution: 2.0,
-            memory: 400,
-            grip_turn: -18.01_f64.to_radians(),
-            grip_aside: 0.0,
-            grip_certainty: 0.008,
-        }
-    }
-
-    /// Validates the settings.
-    #[cfg(feature = "serde")]
-    pub(crate) fn check(&self) -> Result<(), String> {
-        self.nominal.check()?;
-        self.prior.check()?;
-        check_goal(&self.goal)?;
-        check_steps(&self.steps)?;
-        for (name, value) in [
-            ("drift", self.drift),
-            ("caution", self.caution),
-            ("grip_certainty", self.grip_certainty),
-        ] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(format!(
-                    "{name} is {value}; expected a finite number, 0 or more"
-                ));
-            }
-        }
-        for (name, value) in [
-            ("grip_turn", self.grip_turn),
-            ("grip_aside", self.grip_aside),
-        ] {
-            if !value.is_finite() {
-                return Err(format!("{name} is {value}; expected a finite number"));
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Visual servoing with a camera model that is calibrated from the sightings.
 ///
 /// Each cycle estimates the ball's place and the thirteen parameters of a [`Belief`] from all
-/// sightings of the run (robust least squares, with the belief as prior). The arm then moves towards
-/// the goal pose, as far as the ball stays in view under the remaining uncertainty. A learning
-/// hybrid uses every run as evidence for the next.
+/// sightings of the run (robust least squares, with the belief as prior). The arm then moves
+/// towards the goal pose, as far as the ball stays in view under the remaining uncertainty. A
+/// learning hybrid uses every run as evidence for the next.
 #[derive(Clone, Debug)]
 pub struct Hybrid {
     settings: HybridSettings,
@@ -194,8 +107,8 @@ impl Hybrid {
         }
     }
 
-    /// Sets a goal that was taught on the arm. The taught grip also calibrates the camera, since the
-    /// ball was between the jaws, whose place the arm reports.
+    /// Sets a goal that was taught on the arm. The taught grip also calibrates the camera, since
+    /// the ball was between the jaws, whose place the arm reports.
     #[must_use]
     pub fn shown(mut self, goal: &TaughtGoal) -> Self {
         let (nominal, from) = (&self.settings.nominal, goal.seen_from());
@@ -341,12 +254,13 @@ impl Hybrid {
         let Some((f, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
             return false;
         };
-        let room = deviations(&by_all, &estimate.covariance) * self.settings.caution;
-        let inside = |v: f64, room: f64, low: f64, high: f64| v - room >= low && v + room <= high;
-        inside(f.x, room[0], MARGIN, Features::WIDTH - MARGIN)
-            && inside(f.y, room[1], MARGIN, Features::HEIGHT - MARGIN)
+        let margin = deviations(&by_all, &estimate.covariance) * self.settings.caution;
+        let inside =
+            |v: f64, margin: f64, low: f64, high: f64| v - margin >= low && v + margin <= high;
+        inside(f.x, margin[0], MARGIN, Features::WIDTH - MARGIN)
+            && inside(f.y, margin[1], MARGIN, Features::HEIGHT - MARGIN)
             && f.r >= least
-            && f.r + room[2] <= LARGEST
+            && f.r + margin[2] <= LARGEST
     }
 }
 

@@ -13,11 +13,7 @@ use crate::sight::camera_model::CameraModel;
 
 /// Settings common to all servo controllers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(remote = "Self")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ServoSettings {
     /// Camera and arm as they are believed to be.
     pub model: CameraModel,
@@ -31,7 +27,12 @@ pub struct ServoSettings {
     pub steps: [f64; 3],
 }
 
-checked!(ServoSettings);
+checked!(ServoSettings {
+    model: CameraModel,
+    goal: Features,
+    gain: f64,
+    steps: [f64; 3],
+});
 
 impl ServoSettings {
     /// Pose with the ball at the goal, degrees: the median over reachable balls.

@@ -1,4 +1,5 @@
-//! Acting of a run: orders to the arm, judged by supervision, and looks, checked for a frozen camera.
+//! Acting of a run: orders to the arm, judged by supervision, and looks, checked for a frozen
+//! camera.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -137,8 +138,8 @@ impl Run<'_> {
         Ok(went)
     }
 
-    /// Reports `done`, or that the order was not answered, and has supervision judge the move. Stops
-    /// the arm if something is too near.
+    /// Reports `done`, or that the order was not answered, and has supervision judge the move.
+    /// Stops the arm if something is too near.
     fn arrive(
         &mut self,
         order: Order,
