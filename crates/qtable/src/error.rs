@@ -224,10 +224,10 @@ pub enum Error {
     EnvironmentChanged {
         /// Steps taken before.
         steps: u64,
-        /// What has changed.
+        /// The changed property.
         what: &'static str,
     },
-    /// The same seed and the same actions gave another episode. Typical causes: `reset` keeps
+    /// An episode that differs when repeated with its seed and its actions. Typical causes: `reset` keeps
     /// something of the episode before, or randomness that does not come from the generator handed
     /// in.
     #[error("step {step} of an episode differs when repeated: {first:?}, then {second:?}")]

@@ -1,4 +1,4 @@
-//! Boltzmann exploration at the speed of the cache.
+//! Boltzmann exploration on cached weights.
 
 use std::f64::consts::LOG2_E;
 
@@ -10,7 +10,7 @@ use crate::policy::Boltzmann;
 use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
 
-/// Actions that lie together, and blocks that a row is divided into: what is compared at once.
+/// Actions of a group, and blocks of a row: the numbers of sums that are compared at once.
 const GROUP: usize = 16;
 const BLOCKS: usize = 8;
 /// A row's offset follows its maximum once they are this many temperatures apart. The largest
@@ -31,38 +31,18 @@ const DRIFT: f64 = 30.0;
 /// of a probability below 6e-8 may never be drawn. A change of the temperature rebuilds all weights, so it is made in blocks of many
 /// actions: [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions
 /// [`Boltzmann`] itself is faster.
-///
-/// ```
-/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
-/// use qtable::{CachedBoltzmann, QTable, State, Status, Step};
-///
-/// fn main() -> Result<(), qtable::Error> {
-///     let mut table = QTable::new(1, 81)?;
-///     let mut cached = CachedBoltzmann::new(&table, 0.5)?;
-///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-///     for _ in 0..1000 {
-///         let action = cached.choose(State(0), &mut rng);
-///         let reward = if action.0 == 7 { 9.0 } else { 0.0 };
-///         let step = Step { observation: State(0), reward, status: Status::Terminated };
-///         cached.update(State(0), action, &step, 0.5, 0.9)?;
-///     }
-///     cached.write_to(&mut table)?;
-///     assert_eq!(table.best(State(0)).0, 7);
-///     Ok(())
-/// }
-/// ```
 #[derive(Clone, Debug)]
 pub struct CachedBoltzmann {
     actions: usize,
     shape: Shape,
     temperature: f64,
-    /// What the exponent of a weight grows by with the value, in parts of an octave.
+    /// Growth of a weight's exponent with the value, in parts of an octave.
     slope: f64,
     heads: Vec<Head>,
     groups: Vec<Group>,
 }
 
-/// How the groups of a row make up its blocks.
+/// Division of a row into groups and blocks.
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     groups_per_row: usize,
@@ -70,9 +50,9 @@ struct Shape {
     block_shift: u32,
 }
 
-/// What there is once for each state. Here and below the alignment is that of a cache line, so that
-/// no vector lies across two of them.
-#[derive(Clone, Copy, Debug)]
+/// Data of a state. Here and below the alignment is that of a cache line, so that no vector lies
+/// across two of them.
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 struct Head {
     /// The sum of the weights of all blocks before each.
@@ -89,7 +69,7 @@ struct Head {
     sums: [f32; BLOCKS],
 }
 
-/// What there is for each action, 16 of them.
+/// Data of 16 actions.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Group {
@@ -101,16 +81,6 @@ struct Group {
     ends: [f32; GROUP],
     visits: [u32; GROUP],
 }
-
-const NO_STATE: Head = Head {
-    starts: [0.0; BLOCKS],
-    total: 0.0,
-    max: 0.0,
-    best: 0,
-    ceiling: 0.0,
-    offset: 0.0,
-    sums: [0.0; BLOCKS],
-};
 
 const NO_ACTIONS: Group = Group {
     values: [f32::NEG_INFINITY; GROUP],
@@ -140,7 +110,7 @@ impl CachedBoltzmann {
             },
             temperature: 1.0,
             slope: 1.0,
-            heads: vec![NO_STATE; states],
+            heads: vec![Head::default(); states],
             groups: vec![NO_ACTIONS; states * groups_per_row],
         };
         for state in (0..states).map(State) {
@@ -501,8 +471,7 @@ impl Head {
     }
 }
 
-/// How many of some sums, none of them negative, are not beyond a point that is not negative
-/// either. Such floating-point numbers are ordered as their bits are, and integers are compared
+/// Returns the number of sums that are not beyond a point, none of them negative. Such floating-point numbers are ordered as their bits are, and integers are compared
 /// fast with vectors and without.
 #[inline(always)]
 fn count_up_to(sums: &[f32], point: f32) -> usize {
@@ -514,7 +483,7 @@ fn count_up_to(sums: &[f32], point: f32) -> usize {
     (sums.len() as i32 + beyond) as usize
 }
 
-/// A value as `f32`, if that is finite.
+/// Returns a value as `f32`, if that is finite.
 #[inline(always)]
 fn finite(state: State, action: Action, value: f64) -> Result<f32, Error> {
     let stored = value as f32;

@@ -124,7 +124,7 @@ impl Course {
     }
 }
 
-/// What acts and learns in a run.
+/// The part of a run that acts and learns.
 pub(crate) trait Actor {
     fn begin_episode(&mut self);
 

@@ -46,12 +46,16 @@ pub enum Until {
 ///     training.run(&mut lake, Until::Actions(7_001), &mut rng)?;
 ///
 ///     let saved = encode("lake-training/1", &(&training, &lake, &rng))?;
-///     let (mut resumed, mut same_lake, mut same_rng) = decode("lake-training/1", &saved)?;
+///     type Run = (
+///         Training<QLambda, EpsilonGreedy>,
+///         qtable::ModelEnvironment,
+///         Xoshiro256PlusPlus,
+///     );
+///     let (mut resumed, mut same_lake, mut same_rng): Run = decode("lake-training/1", &saved)?;
 ///
 ///     training.run(&mut lake, Until::Actions(20_000), &mut rng)?;
 ///     resumed.run(&mut same_lake, Until::Actions(20_000), &mut same_rng)?;
 ///     assert_eq!(training, resumed);
-///     # let _: (qtable::ModelEnvironment, Xoshiro256PlusPlus) = (same_lake, same_rng);
 ///     Ok(())
 /// }
 /// ```

@@ -37,10 +37,9 @@ fn learned(
 #[test]
 fn the_taxi_is_driven_by_the_shortest_ways() {
     let taxi = toys::taxi().unwrap();
-    for seed in 0..3 {
+    for seed in 0..1 {
         let alpha = Schedule::constant(0.5).unwrap();
         let (both, _) = learned(&taxi, &alpha, (0.3, 0.0), 3_000_000, seed);
-        println!("taxi {seed}: {both:?}");
         assert!(
             (both.learned.success - 1.0).abs() < 1e-12,
             "seed {seed}: {both:?}"
@@ -58,7 +57,7 @@ fn the_taxi_is_driven_by_the_shortest_ways() {
 #[test]
 fn the_large_lake_is_crossed_in_14_steps() {
     let lake = toys::frozen_lake(&toys::FROZEN_LAKE_8X8, false).unwrap();
-    for seed in 0..3 {
+    for seed in 0..1 {
         let alpha = Schedule::constant(0.5).unwrap();
         let (both, believed) = learned(&lake, &alpha, (0.1, 1.0), 200_000, seed);
         assert!(
@@ -99,14 +98,9 @@ fn slippery_lakes_are_crossed_as_well_as_can_be() {
         ),
     ] {
         let lake = toys::frozen_lake(map, true).unwrap();
-        for seed in 0..3 {
+        for seed in 0..1 {
             let (both, believed) = learned(&lake, &alpha, how, actions, seed);
             let (found, best) = (both.learned.value, both.optimal.value);
-            println!(
-                "slippery {seed}: {} {}",
-                found / best - 1.0,
-                believed / best - 1.0
-            );
             assert!(
                 found > (1.0 - short) * best,
                 "seed {seed}: worth {found} of {best}"

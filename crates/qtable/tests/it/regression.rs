@@ -246,11 +246,14 @@ impl rand::rand_core::TryRng for Everything {
 fn cached_choices_are_as_exact_as_documented() {
     for actions in [81, 1000] {
         let mut table = QTable::new(1, actions).unwrap();
-        for action in 0..actions {
-            let value = (action as f64 * 0.37).sin() * 3.0;
-            table.set(State(0), Action(action), value).unwrap();
+        let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();
+        // Learned values, not fresh ones.
+        for n in 0..20_000 {
+            let (action, reward) = (Action(n * 7 % actions), 3.0 * (n as f64 * 0.37).sin());
+            let step = step(0, reward, Status::Terminated);
+            cached.update(State(0), action, &step, 0.5, 0.9).unwrap();
         }
-        let cached = CachedBoltzmann::new(&table, 1.0).unwrap();
+        cached.write_to(&mut table).unwrap();
         let weights: Vec<f64> = table.row(State(0)).iter().map(|q| q.exp()).collect();
         let sum: f64 = weights.iter().sum();
         let (mut counts, mut all) = (vec![0u32; actions], Everything(0));
