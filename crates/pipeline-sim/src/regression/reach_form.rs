@@ -19,10 +19,11 @@ pub enum ReachForm {
     Rigid8,
     /// Changes of Z and V on 1, and a, b, a², ab, b² each times 1, Z, V, E, and E²a.
     Rigid22,
-    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists of.
-    /// With c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`, they are
-    /// (c23 minus 1) and s23 times Z and V; (c3 minus c23) and (s3 minus s23) times 1, cos e, sin e;
-    /// 1 minus c3; s3. No further terms exist: the residual is the outline's slight ellipticity.
+    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists
+    /// of. With c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`, they
+    /// are (c23 minus 1) and s23 times Z and V; (c3 minus c23) and (s3 minus s23) times 1, cos e,
+    /// sin e; 1 minus c3; s3. No further terms exist: the residual is the outline's slight
+    /// ellipticity.
     RigidBody,
 }
 

@@ -226,8 +226,8 @@ fn lamp_points(light: &Light, turn: f64) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-/// Whether the ray from a point of the table upward along `d` meets the shape, which stands at the
-/// origin.
+/// Returns `true` if the ray from a point of the table upward along `d` meets the shape, which
+/// stands at the origin.
 fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
     match *shape {
         Shape::Box {

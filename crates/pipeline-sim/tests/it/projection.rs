@@ -25,7 +25,7 @@ fn ray(camera: &Camera, pixel: Point2<f64>) -> Vector3<f64> {
     Vector3::new(x, y, 1.0)
 }
 
-/// Whether the ray through a pixel meets the sphere.
+/// Returns `true` if the ray through a pixel meets the sphere.
 fn hits(camera: &Camera, pixel: Point2<f64>, centre: &Point3<f64>, radius: f64) -> bool {
     let ray = ray(camera, pixel).normalize();
     let along = ray.dot(&centre.coords);

@@ -1,4 +1,4 @@
-//! What the truth of a frame says is visible, and what hides what.
+//! The truth of a frame: visible fractions, and things that hide others.
 
 use nalgebra::{Point2, Point3, Vector3};
 use pipeline_sim::{
