@@ -197,7 +197,7 @@ impl Schedule {
     }
 
     /// Returns the smallest and the largest value.
-    pub fn range(&self) -> (f64, f64) {
+    pub(crate) fn range(&self) -> (f64, f64) {
         let (low, high) = match &self.shape {
             Shape::Constant(value) => (*value, *value),
             Shape::Linear { start, end, .. } | Shape::Exponential { start, end, .. } => {

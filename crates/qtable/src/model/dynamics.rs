@@ -148,11 +148,6 @@ impl Model {
         &self.outcomes[row[action.0]..row[action.0 + 1]]
     }
 
-    /// Returns the actions that each state offers, or `None` if all are offered everywhere.
-    pub fn mask(&self) -> Option<&ActionMask> {
-        self.mask.as_ref()
-    }
-
     /// Returns `true` for a state without actions.
     pub(super) fn is_terminal(&self, state: State) -> bool {
         let first = state.0 * self.actions;

@@ -139,13 +139,8 @@ impl ModelEstimate {
         self.actions
     }
 
-    /// Returns the number of pairs tried at least once.
-    pub fn tried(&self) -> usize {
-        self.tried.len()
-    }
-
     /// Returns how often a pair was tried; 0 also for a pair out of range.
-    pub fn trials(&self, state: State, action: Action) -> u64 {
+    pub(crate) fn trials(&self, state: State, action: Action) -> u64 {
         self.outcomes(state, action)
             .iter()
             .map(|seen| u64::from(seen.count))

@@ -58,11 +58,6 @@ impl ModelEnvironment {
         &self.start
     }
 
-    /// Returns the present state.
-    pub fn state(&self) -> State {
-        self.state
-    }
-
     fn restore(self) -> Result<Self, Error> {
         self.model.spread_start(&self.start)?;
         if self.state.0 < self.model.states() {

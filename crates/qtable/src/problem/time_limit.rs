@@ -32,11 +32,6 @@ impl<E: Environment> TimeLimit<E> {
             steps: 0,
         })
     }
-
-    /// Returns the environment inside.
-    pub fn inner(&self) -> &E {
-        &self.inner
-    }
 }
 
 impl<E: Environment> Environment for TimeLimit<E> {

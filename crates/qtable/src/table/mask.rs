@@ -50,17 +50,17 @@ impl ActionMask {
     }
 
     /// Returns `true` if an action of any state is forbidden.
-    pub fn restricts(&self) -> bool {
+    pub(crate) fn restricts(&self) -> bool {
         self.allowed.contains(&false)
     }
 
     /// Returns the number of states.
-    pub fn states(&self) -> usize {
+    pub(crate) fn states(&self) -> usize {
         self.allowed.len() / self.actions
     }
 
     /// Returns the number of actions.
-    pub fn actions(&self) -> usize {
+    pub(crate) fn actions(&self) -> usize {
         self.actions
     }
 

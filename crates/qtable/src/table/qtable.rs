@@ -13,7 +13,7 @@ validated! {
     /// searched again only when its best value falls. No value is ever infinite or NaN.
     ///
     /// Methods that take a [`State`] or an [`Action`] and return no `Result` panic outside the
-    /// table, like an index into a slice. [`get`](QTable::get) and [`check`](QTable::check) do not.
+    /// table, like an index into a slice. [`get`](QTable::get) does not.
     ///
     /// ```
     /// use qtable::{Action, QTable, State};
@@ -203,7 +203,7 @@ impl QTable {
     /// # Errors
     /// A state or action out of range, or an action that the mask forbids.
     #[inline(always)]
-    pub fn check(&self, state: State, action: Action) -> Result<(), Error> {
+    pub(crate) fn check(&self, state: State, action: Action) -> Result<(), Error> {
         self.entry(state, action).map(|_| ())
     }
 
@@ -212,7 +212,7 @@ impl QTable {
     /// # Errors
     /// [`Error::StateOutOfRange`].
     #[inline(always)]
-    pub fn check_state(&self, state: State) -> Result<(), Error> {
+    pub(crate) fn check_state(&self, state: State) -> Result<(), Error> {
         if state.0 < self.states() {
             Ok(())
         } else {
