@@ -224,9 +224,7 @@ impl Schedule {
     /// Returns the value now for a pair with a number of visits before.
     #[inline(always)]
     pub(crate) fn now(&self, clock: &Clock, visits: u32) -> f64 {
-        if let Shape::Constant(value) = self.shape {
-            value
-        } else if self.is_by_visits() {
+        if self.is_by_visits() {
             self.at(u64::from(visits))
         } else {
             self.at_time(clock)
@@ -236,6 +234,9 @@ impl Schedule {
     /// Returns the value now of a quantity that belongs to no pair.
     #[inline(always)]
     pub(crate) fn at_time(&self, clock: &Clock) -> f64 {
+        if let Shape::Constant(value) = self.shape {
+            return value;
+        }
         self.at(if self.by_episode {
             clock.episodes.saturating_sub(1)
         } else {

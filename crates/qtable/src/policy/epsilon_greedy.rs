@@ -48,6 +48,16 @@ impl EpsilonGreedy {
         self.epsilon.at_time(&self.clock)
     }
 
+    /// Draws one of several best actions. Rare in a table that has learned, so kept out of line.
+    #[cold]
+    #[inline(never)]
+    fn draw(&self, table: &QTable, state: State, equals: usize, rng: &mut dyn Rng) -> Action {
+        self.ties.pick(table.best(state), equals, rng, || {
+            let offered = table.offered(state);
+            offered.filter(|&action| is_best(table, state, action))
+        })
+    }
+
     fn restore(self) -> Result<Self, Error> {
         self.epsilon.check("epsilon", 0.0, 1.0, "in 0..=1")?;
         Ok(self)
@@ -61,10 +71,10 @@ impl Policy for EpsilonGreedy {
         self.clock.tick();
         let lowest = table.best(state);
         if rng.random::<f64>() >= epsilon {
-            return self.ties.pick(lowest, table.equals(state), rng, || {
-                let offered = table.offered(state);
-                offered.filter(|&action| is_best(table, state, action))
-            });
+            return match table.equals(state) {
+                0 | 1 => lowest,
+                equals => self.draw(table, state, equals, rng),
+            };
         }
         let Some(mask) = table.mask() else {
             return Action(rng.random_range(0..table.actions()));
