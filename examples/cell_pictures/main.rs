@@ -7,22 +7,16 @@
 //!
 //! writes and lists `overview.svg`, `search.png`, `goal.png`, `run.png` (animated) and `run.y4m`.
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for the terminal"
-)]
-
 mod overview;
 
 use std::error::Error;
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use example_support::files::{animated, writable_folder, write_whole};
 use example_support::program::ended;
+use example_support::say;
 use hough_heuristic::Y4mWriter;
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageFormat};
@@ -54,8 +48,7 @@ fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
     let save = |name: &str, bytes: &[u8]| {
         let path = options.out.join(name);
         write_whole(&path, bytes)?;
-        // A reader that has gone away does not keep the other pictures from being written.
-        let _ = writeln!(std::io::stdout(), "{}", path.display());
+        say!("{}", path.display());
         Ok::<(), Box<dyn Error>>(())
     };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);

@@ -5,11 +5,7 @@
 //! cargo run --release --example compare_controllers -- --help
 //! ```
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for a terminal"
-)]
+#![allow(clippy::print_stderr, reason = "a program for a terminal")]
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -18,7 +14,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use grasp_agent::{
     Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, Retargeted,
-    SavedRun, Servo, ServoLaw, ServoSettings, TaughtGoal,
+    SavedRun, Servo, ServoLaw as Law, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
 use puma_grasp::{BallDetector, Simulator};
@@ -27,9 +23,10 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::comparison::{self, Row, Tally};
 use example_support::files::{writable_folder, write_whole};
-use example_support::learning::{ACTIONS, TRIALS};
+use example_support::learning::{ACTIONS, ACTIONS_FINE, TRIALS};
 use example_support::plane::{ExactPlane, search_percepts};
-use example_support::program::ended;
+use example_support::program::{at_least_one, ended};
+use example_support::say;
 use world::World;
 
 mod world;
@@ -56,11 +53,11 @@ struct Options {
     seed: u64,
 
     /// Cells per level of errors
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = at_least_one::<u64>)]
     draws: u64,
 
     /// Balls per cell
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = at_least_one::<u64>)]
     starts: u64,
 
     /// Moves by which the hybrid learns each cell
@@ -103,10 +100,8 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
-    let rivals: Vec<Rival> = rivals(options)?
-        .into_iter()
-        .filter(|rival| rival.name.contains(&options.only))
-        .collect();
+    let mut rivals = rivals(options)?;
+    rivals.retain(|(name, _)| name.contains(&options.only));
     if rivals.is_empty() {
         return Err(format!("no controller has {:?} in its name", options.only).into());
     }
@@ -114,7 +109,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         folder: options.logs.then(|| options.out.join("failures")),
     };
     let mut rows = Vec::new();
-    println!("{}", Row::HEADER);
+    say!("{}", Row::HEADER);
     for level in &options.levels {
         let (mut tallies, mut unshown) = (vec![Tally::default(); rivals.len()], 0);
         for draw in 0..options.draws {
@@ -133,31 +128,29 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 || untaught.clone(),
                 |goal| untaught.clone().with_taught_goal(&goal),
             );
-            for (rival, tally) in rivals.iter().zip(&mut tallies) {
-                let run_of = |run: String| format!("{level} {} cell {draw} {run}", rival.name);
-                let controller = match rival.made {
-                    Made::Once(ref make) => make(goal.as_ref()),
-                    Made::InEachCell => {
+            for ((name, rival), tally) in rivals.iter().zip(&mut tallies) {
+                let run_of = |run: String| format!("{level} {name} cell {draw} {run}");
+                let controller = match rival {
+                    Rival::Hybrid => {
                         let agent =
                             Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
                         let seed = seed_of(options.seed, &[2, draw]);
                         let (hybrid, fault) = taught_hybrid(&mut world, agent, seed, options.moves);
                         // The hybrid works with what it had learned by then.
                         if let Some(Fault { run, saved, error }) = fault {
-                            failures.broken_off(
-                                &run_of(format!("teaching {run}")),
-                                &saved,
-                                &*error,
-                            )?;
+                            let run = run_of(format!("teaching {run}"));
+                            failures.broken_off(&run, &saved, &*error)?;
                             world = new_world()?;
                         }
                         Box::new(hybrid)
                     }
+                    _ => rival.controller(goal.as_ref()),
                 };
                 tally.begin_draw();
                 let mut agent = Agent::with_controller(config.clone(), controller)?;
                 for start in 0..options.starts {
                     let seed = seed_of(options.seed, &[3, draw, start]);
+                    let run_of_ball = run_of(format!("ball {start}"));
                     let mut saved = SavedRun::before(&agent);
                     let run = world.run(&mut agent, seed, &mut |event| saved.note(event));
                     let (mut trial, collisions) = match run {
@@ -165,11 +158,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         Ok(None) => continue,
                         // A run that a fault of arm or camera ends has failed.
                         Err(error) => {
-                            failures.broken_off(
-                                &run_of(format!("ball {start}")),
-                                &saved,
-                                &*error,
-                            )?;
+                            failures.broken_off(&run_of_ball, &saved, &*error)?;
                             tally.add_broken_off();
                             world = new_world()?;
                             continue;
@@ -189,40 +178,34 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                         *tally.collisions.get_or_insert(0) += collisions;
                     }
                     if !success {
-                        failures.keep(&run_of(format!("ball {start}")), &saved)?;
+                        failures.keep(&run_of_ball, &saved)?;
                     }
                 }
             }
         }
-        for (rival, tally) in rivals.iter().zip(&tallies) {
-            let row = Row::new(*level, &rival.name, tally);
-            println!("{row}");
+        for ((name, _), tally) in rivals.iter().zip(&tallies) {
+            let row = Row::new(*level, name, tally);
+            say!("{row}");
             rows.push(row);
         }
         if unshown > 0 {
-            println!(
-                "{level}: in {unshown} of {} cells the ball between the jaws is out of the camera's view; the goal there is the untaught one",
+            say!(
+                "{level}: in {unshown} of {} cells the ball between the jaws is out of the camera's \
+                 view; the goal there is the untaught one",
                 options.draws
             );
         }
     }
-    write_whole(
-        &options.out.join("comparison.csv"),
-        comparison::csv(&rows).as_bytes(),
-    )?;
-    write_whole(
-        &options.out.join("comparison.svg"),
-        comparison::plot(
-            &rows,
-            if options.grip {
-                "grasped"
-            } else {
-                "at the goal"
-            },
-        )?
-        .as_bytes(),
-    )?;
-    println!("results: {}", options.out.display());
+    let csv = comparison::csv(&rows);
+    write_whole(&options.out.join("comparison.csv"), csv.as_bytes())?;
+    let success = if options.grip {
+        "grasped"
+    } else {
+        "at the goal"
+    };
+    let svg = comparison::plot(&rows, success)?;
+    write_whole(&options.out.join("comparison.svg"), svg.as_bytes())?;
+    say!("results: {}", options.out.display());
     Ok(())
 }
 
@@ -255,79 +238,55 @@ impl Failures {
     }
 }
 
-/// A controller in the comparison and its maker.
-struct Rival {
-    name: String,
-    made: Made,
-}
-
-/// Makes a controller for the taught goal if there is one.
-type Make = Box<dyn Fn(Option<&TaughtGoal>) -> Box<dyn Controller>>;
-
-enum Made {
-    /// One for every cell.
-    Once(Make),
+/// A controller in the comparison.
+enum Rival {
+    Servo(Law, f64),
+    Learned(Learned),
+    Untaught,
     /// The hybrid, which learns each cell first.
-    InEachCell,
+    Hybrid,
 }
 
-fn rivals(options: &Options) -> Result<Vec<Rival>, Box<dyn Error>> {
-    let fixed = |name: &str, make: Make| Rival {
-        name: name.into(),
-        made: Made::Once(make),
-    };
-    let servo = |gain: f64, goal: Option<&TaughtGoal>| {
-        let paper = ServoSettings::paper().with_gain(gain);
-        ServoSettings {
-            goal: goal.map_or(paper.goal, TaughtGoal::features),
-            ..paper
-        }
-    };
-    let mut rivals = Vec::new();
-    for (gain, tag) in [(1.0, "gain 1"), (0.5, "gain 0.5")] {
-        rivals.push(fixed(
-            &format!("position-based, {tag}"),
-            Box::new(move |goal| Box::new(Servo::new(ServoLaw::PositionBased, servo(gain, goal)))),
-        ));
-        for (law, which) in [
-            (ServoLaw::ImageBasedAtGoal, "goal J"),
-            (ServoLaw::ImageBased, "current J"),
-        ] {
-            let name = format!("image-based {which}, {tag}");
-            rivals.push(fixed(
-                &name,
-                Box::new(move |goal| Box::new(Servo::new(law, servo(gain, goal)))),
-            ));
+impl Rival {
+    /// Makes the controller for the taught goal if there is one.
+    fn controller(&self, goal: Option<&TaughtGoal>) -> Box<dyn Controller> {
+        match (self, goal) {
+            (Self::Servo(law, gain), _) => {
+                let paper = ServoSettings::paper().with_gain(*gain);
+                let goal = goal.map_or(paper.goal, TaughtGoal::features);
+                Box::new(Servo::new(*law, ServoSettings { goal, ..paper }))
+            }
+            (Self::Learned(learned), None) => Box::new(learned.clone()),
+            (Self::Learned(learned), Some(goal)) => {
+                Box::new(Retargeted::new(learned.clone(), *goal))
+            }
+            (Self::Untaught | Self::Hybrid, _) => Box::new(new_hybrid(goal).frozen()),
         }
     }
-    for (gain, tag) in [(1.0, "gain 1"), (0.7, "gain 0.7"), (0.5, "gain 0.5")] {
-        rivals.push(fixed(
-            &format!("fuzzy, {tag}"),
-            Box::new(move |goal| Box::new(Servo::new(ServoLaw::Fuzzy, servo(gain, goal)))),
-        ));
-    }
-    rivals.push(fixed(
-        "look-ahead",
-        Box::new(move |goal| Box::new(Servo::new(ServoLaw::LookAhead, servo(1.0, goal)))),
-    ));
-    for (name, learned) in learned(options)? {
-        rivals.push(fixed(
-            name,
-            Box::new(move |goal| match goal {
-                None => Box::new(learned.clone()),
-                Some(goal) => Box::new(Retargeted::new(learned.clone(), *goal)),
-            }),
-        ));
-    }
-    rivals.push(fixed(
-        "hybrid, untaught",
-        Box::new(|goal| Box::new(new_hybrid(goal).frozen())),
-    ));
-    rivals.push(Rival {
-        name: "hybrid".into(),
-        made: Made::InEachCell,
-    });
-    Ok(rivals)
+}
+
+/// Returns all controllers with their names.
+fn rivals(options: &Options) -> Result<Vec<(&'static str, Rival)>, Box<dyn Error>> {
+    let servos = [
+        ("position-based, gain 1", Law::PositionBased, 1.0),
+        ("image-based goal J, gain 1", Law::ImageBasedAtGoal, 1.0),
+        ("image-based current J, gain 1", Law::ImageBased, 1.0),
+        ("position-based, gain 0.5", Law::PositionBased, 0.5),
+        ("image-based goal J, gain 0.5", Law::ImageBasedAtGoal, 0.5),
+        ("image-based current J, gain 0.5", Law::ImageBased, 0.5),
+        ("fuzzy, gain 1", Law::Fuzzy, 1.0),
+        ("fuzzy, gain 0.7", Law::Fuzzy, 0.7),
+        ("fuzzy, gain 0.5", Law::Fuzzy, 0.5),
+        ("look-ahead", Law::LookAhead, 1.0),
+    ];
+    let servos = servos.map(|(name, law, gain)| (name, Rival::Servo(law, gain)));
+    let learned = learned(options)?.into_iter();
+    let learned = learned.map(|(name, learned)| (name, Rival::Learned(learned)));
+    let hybrids = [
+        ("hybrid, untaught", Rival::Untaught),
+        ("hybrid", Rival::Hybrid),
+    ];
+    Ok(servos.into_iter().chain(learned).chain(hybrids).collect())
 }
 
 /// Returns the hybrid before its first move.
@@ -368,9 +327,9 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     let approaching = [
         linear.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
         rigid.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
-        rigid.learn(fine(), &trials, 4_000_000, &mut rng, quiet)?,
+        rigid.learn(fine(), &trials, ACTIONS_FINE, &mut rng, quiet)?,
         plane.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
-        plane.learn(fine(), &trials, 4_000_000, &mut rng, quiet)?,
+        plane.learn(fine(), &trials, ACTIONS_FINE, &mut rng, quiet)?,
     ];
     let both = approaching.map(|lesson| Learned::new(centering.clone(), lesson.behaviour));
     Ok(NAMES.into_iter().zip(both).collect())

@@ -2,11 +2,12 @@
 
 use std::error::Error;
 
-use example_support::trial::{Devices, Trial, TrialCell};
-use grasp_agent::{Agent, AgentConfig, CameraEye, Controller, RunEvent, TaughtGoal};
+use example_support::stages::Stages;
+use example_support::trial::{Trial, TrialCell, run_on_rig};
+use grasp_agent::{Agent, AgentConfig, Controller, RunEvent, TaughtGoal};
 use hough_heuristic::CircleDetector;
 use pipeline_sim::{ErrorLevel, Workspace};
-use puma_grasp::{Rig, RigParts, bright_ball_scene};
+use puma_grasp::{Rig, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -79,25 +80,13 @@ impl World {
             Self::Chain(rig, detector) => (rig, detector),
         };
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let (cell, workspace) = (rig.cell().clone(), Workspace::paper());
-        let Some((ball, _)) = workspace.sample_seen_ball(&cell.get(), &mut rng) else {
+        let (cell, workspace) = (rig.cell().get(), Workspace::paper());
+        let Some((ball, _)) = workspace.sample_seen_ball(&cell, &mut rng) else {
             return Ok(None);
         };
         rig.clear_for(workspace.search_poses()[3])?;
         rig.place(&ball)?;
-        let RigParts {
-            camera,
-            arm,
-            mut sensor,
-        } = rig.parts();
-        let trial = Devices {
-            eye: &mut CameraEye::new(camera, &mut **detector),
-            arm,
-            sensor: &mut *sensor,
-            cell: &cell,
-        }
-        .run(agent, observe)?;
-        drop(sensor);
+        let trial = run_on_rig(rig, &mut **detector, agent, &Stages::default(), observe)?;
         Ok(Some((trial, Some(rig.contacts().collisions))))
     }
 }

@@ -9,12 +9,6 @@
 //! cargo run --release --example ellipse_object -- --help
 //! ```
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for a terminal"
-)]
-
 use std::cell::Cell;
 use std::error::Error;
 use std::path::PathBuf;
@@ -39,7 +33,8 @@ use egg::{Egg, EggCamera};
 use example_support::files::{keep_run, writable_folder, write_png};
 use example_support::learning::learn_both;
 use example_support::overlay::Overlay;
-use example_support::program::ended;
+use example_support::program::{at_least_one, ended};
+use example_support::say;
 
 mod detour;
 mod egg;
@@ -64,7 +59,7 @@ struct Options {
     seed: u64,
 
     /// Number of eggs
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one::<u16>)]
     runs: u16,
 
     /// Length of the egg, millimetres; its thickness is 40
@@ -108,9 +103,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let run_file = |run: usize| options.out.join(format!("egg{run:03}.json"));
     let (mut gripped, mut moves) = (0, 0);
-    println!(
-        " run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result"
-    );
+    say!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
     for run in 1..=usize::from(options.runs) {
         let (place, _) = workspace
             .sample_seen_ball(&rig.cell().get(), &mut rng)
@@ -181,12 +174,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let [miss, off] = closed.map_or(["-".into(), "-".into()], |(miss, off)| {
             [1e3 * miss, off].map(|value| format!("{value:.1}"))
         });
-        println!(
+        say!(
             "{run:4}  {:5}  {:4}  {seen:<32} {miss:>9}  {off:>16}  {result}",
-            outcome.cycles, outcome.losses
+            outcome.cycles,
+            outcome.losses
         );
         if !held {
-            println!("      {}", keep_run(&run_file(run), &saved)?);
+            say!("      {}", keep_run(&run_file(run), &saved)?);
         }
         if let Some((frame, ellipse)) = last {
             let mut overlay = Overlay::new(&frame);
@@ -195,13 +189,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 let (u, v) = (ellipse.major * angle.cos(), ellipse.minor * angle.sin());
                 (ellipse.x + cos * u - sin * v, ellipse.y + sin * u + cos * v)
             });
-            write_png(
-                &options.out.join(format!("egg{run:03}.png")),
-                &overlay.into_image(),
-            )?;
+            let picture = options.out.join(format!("egg{run:03}.png"));
+            write_png(&picture, &overlay.into_image())?;
         }
     }
-    println!(
+    say!(
         "\n{gripped} of {} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
         options.runs,
         100.0 * gripped as f64 / f64::from(options.runs),

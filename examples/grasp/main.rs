@@ -4,12 +4,6 @@
 //! cargo run --release --example grasp -- --help
 //! ```
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for the terminal"
-)]
-
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -18,24 +12,25 @@ use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, CameraEye, EventKind, JointLimits,
-    Learned, Lesson, OnlineLearning, Percept, RunEvent, SavedRun,
+    Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, EventKind, JointLimits, Learned,
+    Lesson, OnlineLearning, Percept, RunEvent, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use pipeline_sim::{Ball, Cell, ReachForm, Workspace};
-use puma_grasp::{Rig, RigError, RigParts, Simulator, bright_ball_scene};
+use pipeline_sim::{Ball, Cell, Workspace};
+use puma_grasp::{Rig, RigError, Simulator, bright_ball_scene};
 use qtable::Record;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
 use example_support::files::{writable_folder, write_png, write_whole};
-use example_support::learning::{ACTIONS, TRIALS};
+use example_support::learning::{ACTIONS, ACTIONS_FINE, TRIALS};
 use example_support::plane::search_percepts;
-use example_support::program::{self, ended};
+use example_support::program::ended;
+use example_support::say;
 use example_support::stages::{Stages, Timed};
-use example_support::trial::{Devices, Trial};
-use options::{FormName, Options, RewardName};
+use example_support::trial::{Trial, run_on_rig};
+use options::{Options, RewardName};
 use record::{Picture, RunRecord};
 use results::{ContactSheet, Summary, TrainingSummary};
 
@@ -48,8 +43,6 @@ mod results;
 const SAMPLES: usize = 2_500;
 /// Standard deviation of the features in those samples, feature units.
 const FEATURE_NOISE: f64 = 0.5;
-/// Actions of training, approaching on 540 states.
-const ACTIONS_FINE: u64 = 4_000_000;
 
 fn main() -> ExitCode {
     ended(run(&Options::parse()))
@@ -73,13 +66,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         .map(|path| Taught::load(path, &pair))
         .transpose()?;
     let mut rig = open_rig(options)?;
-    say(
-        options,
-        &format!("connected to the VAL II controller on {}", rig.name()),
-    );
+    options.say(format_args!(
+        "connected to the VAL II controller on {}",
+        rig.name()
+    ));
 
     // Results of an earlier run are removed only now, after everything that can be refused.
-    let frames = Frames::new(&options.out.join("frames"))?;
+    let frames = Frames(emptied(&options.out.join("frames"))?);
     let failures = emptied(&options.out.join("failures"))?;
     let saved_runs = emptied(&options.out.join("saved"))?;
 
@@ -152,7 +145,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         match done {
             Ok(trial) => {
                 record.ended(&trial, rig.contacts().collisions);
-                bar.suspend(|| say(options, &one_line(run, &record)));
+                bar.suspend(|| options.say(one_line(run, &record)));
                 bar.inc(1);
             }
             Err(error) => {
@@ -189,9 +182,9 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 
     let summary = Summary::new(options.seed, training, &records);
     write_results(&options.out, &summary, &records, &sheet)?;
-    program::say(&summary.table());
-    say(options, &stages.to_string());
-    say(options, &format!("results: {}", options.out.display()));
+    say!("{}", summary.table());
+    options.say(&stages);
+    options.say(format_args!("results: {}", options.out.display()));
     broken_off.map_or(Ok(()), |reason| Err(reason.into()))
 }
 
@@ -223,23 +216,15 @@ impl Taught {
         cell: &Cell,
         rng: &mut dyn Rng,
     ) -> Result<Self, Box<dyn Error>> {
-        say(options, &format!("sampling {SAMPLES} moves in the cell"));
+        options.say(format_args!("sampling {SAMPLES} moves in the cell"));
         let (centering, reaching) = cell.sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
-        let form = match options.simulator.unwrap_or(FormName::Rigid22) {
-            FormName::Linear => ReachForm::Linear,
-            FormName::Rigid8 => ReachForm::Rigid8,
-            FormName::Rigid22 => ReachForm::Rigid22,
-        };
-        let simulator = Simulator::fit(&centering, &reaching, form)?;
+        let simulator = Simulator::fit(&centering, &reaching, options.form())?;
         let mut r2 = BTreeMap::new();
         for quality in simulator.quality() {
-            say(
-                options,
-                &format!(
-                    "  {:<16} R² {:.4}   rmse {:.2} units",
-                    quality.output, quality.r2, quality.rmse
-                ),
-            );
+            options.say(format_args!(
+                "  {:<16} R² {:.4}   rmse {:.2} units",
+                quality.output, quality.r2, quality.rmse
+            ));
             r2.insert(quality.output, quality.r2);
         }
         // With the literal rewards the last table is kept.
@@ -248,38 +233,22 @@ impl Taught {
             RewardName::Mended => TRIALS,
         };
         let anywhere: Vec<Percept> = (0..trials).map(|_| simulator.start(rng)).collect();
-        let first = teach(
-            options,
-            &pair.centering,
-            &simulator,
-            &anywhere,
-            ACTIONS.0,
-            rng,
-        )?;
-        let from_search = search_percepts(trials, options.seed);
+        let spec = &pair.centering;
+        let first = teach(options, spec, &simulator, &anywhere, ACTIONS.0, rng)?;
+        let (spec, found) = (&pair.approaching, search_percepts(trials, options.seed));
         let actions = if options.fine {
             ACTIONS_FINE
         } else {
             ACTIONS.1
         };
-        let second = teach(
-            options,
-            &pair.approaching,
-            &simulator,
-            &from_search,
-            actions,
-            rng,
-        )?;
+        let second = teach(options, spec, &simulator, &found, actions, rng)?;
 
         // Uses the policies as saved.
         for behaviour in [&first.behaviour, &second.behaviour] {
             behaviour.save(&policy_path(&options.out, behaviour.spec()))?;
         }
         let saved = Self::load(&options.out, pair)?;
-        say(
-            options,
-            &format!("policies saved to {}", options.out.display()),
-        );
+        options.say(format_args!("policies saved to {}", options.out.display()));
         Ok(Self {
             curves: Some((first.curve, second.curve)),
             r2,
@@ -295,11 +264,8 @@ impl Taught {
             let (learned, limits) = Learned::from_json(&text)
                 .map_err(|error| format!("{}: {error}", path.display()))?;
             let found = [learned.centering(), learned.approaching()].map(Behaviour::spec);
-            if found
-                .iter()
-                .zip([&pair.centering, &pair.approaching])
-                .any(|(found, spec)| found.goal != spec.goal)
-            {
+            let asked = [&pair.centering, &pair.approaching];
+            if found.map(|spec| &spec.goal) != asked.map(|spec| &spec.goal) {
                 return Err(format!(
                     "{}: learned for another goal; give the --y-goal it was learned with",
                     path.display()
@@ -331,7 +297,7 @@ fn export(
         return Ok(());
     };
     write_whole(path, learned.to_json(limits).as_bytes())?;
-    say(options, &format!("policy exported to {}", path.display()));
+    options.say(format_args!("policy exported to {}", path.display()));
     Ok(())
 }
 
@@ -340,19 +306,16 @@ fn policy_path(folder: &Path, spec: &BehaviourSpec) -> PathBuf {
 }
 
 fn behaviours(options: &Options) -> Result<BehaviourPair, Box<dyn Error>> {
-    let mended = BehaviourPair::paper_mended();
-    let literal = BehaviourPair::paper_literal();
-    let rewards = match options.reward() {
-        RewardName::Mended => mended,
-        RewardName::Literal => literal,
+    let mut pair = match options.reward() {
+        RewardName::Mended => BehaviourPair::paper_mended(),
+        RewardName::Literal => BehaviourPair::paper_literal(),
     };
-    let mut pair = if options.fine {
-        BehaviourPair::fine()
-    } else {
-        rewards.clone()
-    };
-    pair.centering.reward = rewards.centering.reward;
-    pair.approaching.reward = rewards.approaching.reward;
+    if options.fine {
+        let (paper, fine) = (pair, BehaviourPair::fine());
+        pair = fine;
+        pair.centering.reward = paper.centering.reward;
+        pair.approaching.reward = paper.approaching.reward;
+    }
     Ok(pair.with_y_goal(options.y_goal.goal())?)
 }
 
@@ -377,10 +340,9 @@ fn teach(
     bar.finish_and_clear();
     let success = lesson.curve.last().and_then(|record| record.success_share);
     let success = success.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
-    say(
-        options,
-        &format!("learned {size}, {actions} actions; goal reached in the last episodes: {success}"),
-    );
+    options.say(format_args!(
+        "learned {size}, {actions} actions; goal reached in the last episodes: {success}"
+    ));
     Ok(lesson)
 }
 
@@ -397,21 +359,9 @@ fn reach_for(
     observe: &mut Observe<'_>,
 ) -> Result<Trial, Box<dyn Error>> {
     rig.place(ball)?;
-    let (stages, cell) = (agent.controller().stages.clone(), rig.cell().clone());
-    let RigParts {
-        camera,
-        arm,
-        mut sensor,
-    } = rig.parts();
-    let (mut camera, mut detector) = (stages.around(camera), stages.around(detector));
-    let devices = Devices {
-        eye: &mut CameraEye::new(&mut camera, &mut detector),
-        arm: &mut stages.around(arm),
-        sensor: &mut *sensor,
-        cell: &cell,
-    };
+    let stages = agent.controller().stages.clone();
     let mut written = Ok(());
-    let trial = devices.run(agent, &mut |event| {
+    let trial = run_on_rig(rig, detector, agent, &stages, &mut |event| {
         if written.is_ok() {
             written = observe(event);
         }
@@ -456,10 +406,6 @@ fn is_ours(name: &str) -> bool {
 struct Frames(PathBuf);
 
 impl Frames {
-    fn new(folder: &Path) -> Result<Self, Box<dyn Error>> {
-        Ok(Self(emptied(folder)?))
-    }
-
     fn write(&self, picture: &Picture) -> Result<(), Box<dyn Error>> {
         let name = format!("run{:03}-frame{:03}.png", picture.run, picture.number);
         write_png(&self.0.join(name), &picture.captioned())
@@ -496,12 +442,6 @@ fn one_line(run: usize, record: &RunRecord) -> String {
         "not grasped"
     };
     format!("run {run:3}: ball at {x:5.0} {y:5.0} {z:5.0} mm, {cycles:2} moves, {result}")
-}
-
-fn say(options: &Options, words: &str) {
-    if !options.quiet {
-        program::say(words);
-    }
 }
 
 fn progress_bar(options: &Options, length: u64, unit: &str) -> ProgressBar {

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 use example_support::program::at_least_one;
+use example_support::say;
 use grasp_agent::GoalInterval;
+use pipeline_sim::ReachForm;
 use puma_grasp::BallDetector;
 
 /// Learns to reach a ball in simulation, then sees, reaches and grasps balls with a PUMA 560
@@ -24,7 +26,7 @@ pub(crate) struct Options {
     pub(crate) seed: u64,
 
     /// Number of balls
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one::<usize>)]
     pub(crate) runs: usize,
 
     /// Serial device of a VAL II controller or emulator, 9600 8N1; none is started then
@@ -87,6 +89,22 @@ impl Options {
     /// Returns the reward, by default the mended one.
     pub(crate) fn reward(&self) -> RewardName {
         self.reward.unwrap_or(RewardName::Mended)
+    }
+
+    /// Returns the form of the regression simulator, by default that of 22 terms.
+    pub(crate) fn form(&self) -> ReachForm {
+        match self.simulator {
+            Some(FormName::Linear) => ReachForm::Linear,
+            Some(FormName::Rigid8) => ReachForm::Rigid8,
+            Some(FormName::Rigid22) | None => ReachForm::Rigid22,
+        }
+    }
+
+    /// Prints a line unless --quiet is given.
+    pub(crate) fn say(&self, words: impl std::fmt::Display) {
+        if !self.quiet {
+            say!("{words}");
+        }
     }
 
     /// Refuses options that would have no effect.

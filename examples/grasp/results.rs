@@ -74,7 +74,8 @@ impl Summary {
     /// Returns the table that the program prints at the end.
     pub(crate) fn table(&self) -> String {
         let mut table = String::from(
-            "\n run   ball x,y,z (mm)          cycles  lost   final x, y, r            miss (mm)  result\n",
+            "\n run   ball x,y,z (mm)          cycles  lost   final x, y, r            miss (mm)  \
+             result\n",
         );
         for (index, run) in self.runs.iter().enumerate() {
             let [x, y, z] = run.ball_mm;

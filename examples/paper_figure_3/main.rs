@@ -5,12 +5,6 @@
 //! cargo run --release --example paper_figure_3
 //! ```
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for the terminal"
-)]
-
 use std::error::Error;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -29,6 +23,7 @@ use rand::{RngExt, SeedableRng};
 use example_support::files::{writable_folder, write_png};
 use example_support::overlay::Overlay;
 use example_support::program::ended;
+use example_support::say;
 
 /// Draws original, edges, structure D and the detected circle of a rendered scene.
 #[derive(Parser, Debug)]
@@ -92,7 +87,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         writable_folder(folder)?;
     }
     write_png(&options.picture, &sheet(&panels)?)?;
-    println!("{}", options.picture.display());
+    say!("{}", options.picture.display());
     Ok(())
 }
 
@@ -138,7 +133,7 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
     };
     let Some((pixels, circle)) = drawn else {
         let words = "D: no three of its pixels make a circle of such a radius";
-        return Overlay::over(picture).captioned(words).into_image();
+        return Overlay::from(picture).captioned(words).into_image();
     };
     let mut plot = |x: i32, y: i32, colour| {
         if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
@@ -158,7 +153,7 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         }
     }
     let beta = matched(edges, &circle);
-    Overlay::over(picture)
+    Overlay::from(picture)
         .captioned(&format!(
             "D, three of its pixels, their circle: beta {beta:.2}"
         ))

@@ -5,12 +5,6 @@
 //! cargo run --release --example paper_figures -- --help
 //! ```
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for a terminal"
-)]
-
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -21,6 +15,7 @@ use grasp_agent::{
     Agent, BehaviourError, BehaviourPair, BehaviourSpec, EventKind, GoalInterval, Learned, Lesson,
     Percept,
 };
+use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
 use puma_grasp::Simulator;
 use qtable::Record;
@@ -29,9 +24,11 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::cpu::cpu_time;
 use example_support::files::{writable_folder, write_png, write_whole};
+use example_support::learning::{ACTIONS, TRIALS};
 use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
 use example_support::plot::{Panel, drawn};
-use example_support::program::ended;
+use example_support::program::{at_least_one, ended};
+use example_support::say;
 use example_support::trial::TrialCell;
 
 mod on_the_arm;
@@ -47,7 +44,7 @@ struct Options {
     out: PathBuf,
 
     /// Number of seeds to learn with
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one::<u64>)]
     seeds: u64,
 
     /// First seed
@@ -55,7 +52,7 @@ struct Options {
     first_seed: u64,
 
     /// Balls, placed where the search finds them, to test the learned tables with
-    #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = at_least_one::<u16>)]
     starts: u16,
 
     /// Make figure 6 and its table only
@@ -67,7 +64,7 @@ struct Options {
     fine: u64,
 
     /// Number of arms, each with errors of its own
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one::<u64>)]
     arms: u64,
 }
 
@@ -79,7 +76,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     writable_folder(&options.out)?;
     let taught = figure_6(options)?;
     if options.learning_only {
-        println!("figures: {}", options.out.display());
+        say!("figures: {}", options.out.display());
         return Ok(());
     }
     figures_7_and_8(options, &taught)?;
@@ -90,7 +87,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let report = on_the_arm::from_simulation_to_the_arm(options.arms)?;
     write_whole(&options.out.join("on_the_arm.svg"), report.svg.as_bytes())?;
     write_whole(&options.out.join("on_the_arm.csv"), report.csv.as_bytes())?;
-    println!("figures: {}", options.out.display());
+    say!("figures: {}", options.out.display());
     Ok(())
 }
 
@@ -103,13 +100,14 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     );
     let optimum =
         starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
-    println!(
-        "Figure 6: approaching, learned with each simulator and reward, then tried in the exact plane from {} starts of the search \
-         (breadth-first optimum {optimum:.2} steps, loop breaker {}); without search and recovery, so that a ball once lost stays lost",
+    say!(
+        "Figure 6: approaching, learned with each simulator and reward, then tried in the exact \
+         plane from {} starts of the search (breadth-first optimum {optimum:.2} steps, loop \
+         breaker {}); without search and recovery, so that a ball once lost stays lost",
         starts.len(),
         Learned::APPROACHING_KAPPA
     );
-    println!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
+    say!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
     let mut curves: Vec<(&str, Vec<Vec<Record>>)> =
         vec![("centering", Vec::new()), ("approaching", Vec::new())];
     let mut taught = None;
@@ -120,68 +118,49 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
         let rigid = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
         let linear = Simulator::fit(&centering, &reaching, ReachForm::Linear)?;
-        let (literal, mended) = (
-            BehaviourPair::paper_literal(),
+        let literal = BehaviourPair::paper_literal().approaching;
+        let (mended, fine) = (
             BehaviourPair::paper_mended(),
+            BehaviourPair::fine().approaching,
         );
-        let (fine, wide) = (
-            BehaviourPair::fine(),
-            mended.clone().with_y_goal(GoalInterval::Y_SECTION_4)?,
-        );
-        let mut floored = literal.approaching.clone();
+        let wide = mended
+            .clone()
+            .with_y_goal(GoalInterval::Y_SECTION_4)?
+            .approaching;
+        let mut floored = literal.clone();
         floored.reward.floor = 1.0;
         let quiet = &mut |_: &Record| ();
-        let anywhere: Vec<Percept> = (0..500).map(|_| rigid.start(&mut rng)).collect();
-        let centering = rigid.learn(mended.centering, &anywhere, 60_000, &mut rng, quiet)?;
+        let anywhere: Vec<Percept> = (0..TRIALS).map(|_| rigid.start(&mut rng)).collect();
+        let centering = rigid.learn(mended.centering, &anywhere, ACTIONS.0, &mut rng, quiet)?;
         let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
         // A table of more states has more corners in which a ball can be lost.
         let more_found = search_percepts(10_000, seed.wrapping_add(1_000_000));
         let rng = &mut rng;
-        let (mended, wide, fine) = (mended.approaching, wide.approaching, fine.approaching);
+        let mended = mended.approaching;
         let (found, none) = (&found[..], &[][..]);
         type Cases<'a> = [(
             &'a str,
             Option<&'a Simulator>,
-            BehaviourSpec,
+            &'a BehaviourSpec,
             &'a [Percept],
-            u64,
         ); 8];
         let cases: Cases<'_> = [
-            ("exact plane, mended", None, mended.clone(), found, 500_000),
-            (
-                "exact plane, mended, last table",
-                None,
-                mended.clone(),
-                none,
-                500_000,
-            ),
-            ("exact plane, y goal 74..92", None, wide, found, 500_000),
-            (
-                "exact plane, literal",
-                None,
-                literal.approaching,
-                none,
-                500_000,
-            ),
-            ("exact plane, floored only", None, floored, none, 500_000),
-            ("exact plane, fine", None, fine, &more_found, options.fine),
-            (
-                "rigid regression, mended",
-                Some(&rigid),
-                mended.clone(),
-                found,
-                500_000,
-            ),
-            (
-                "linear regression, mended",
-                Some(&linear),
-                mended,
-                found,
-                500_000,
-            ),
+            ("exact plane, mended", None, &mended, found),
+            ("exact plane, mended, last table", None, &mended, none),
+            ("exact plane, y goal 74..92", None, &wide, found),
+            ("exact plane, literal", None, &literal, none),
+            ("exact plane, floored only", None, &floored, none),
+            ("exact plane, fine", None, &fine, &more_found),
+            ("rigid regression, mended", Some(&rigid), &mended, found),
+            ("linear regression, mended", Some(&linear), &mended, found),
         ];
-        let lessons = cases.map(|(name, simulator, spec, trials, actions)| {
-            let begin = cpu_time();
+        let lessons = cases.map(|(name, simulator, spec, trials)| {
+            let actions = if *spec == fine {
+                options.fine
+            } else {
+                ACTIONS.1
+            };
+            let (spec, begin) = (spec.clone(), cpu_time());
             let lesson = match simulator {
                 None => plane.learn(spec, trials, actions, rng, quiet),
                 Some(simulator) => simulator.learn(spec, trials, actions, rng, quiet),
@@ -189,7 +168,7 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
             (name, (lesson, cpu_time().saturating_sub(begin)))
         });
         for (name, (lesson, spent)) in &lessons {
-            println!(
+            say!(
                 "{seed:4}  {name:32} {}  {:8.2}",
                 scored(lesson, &starts),
                 spent.as_secs_f64()
@@ -214,22 +193,13 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
     write_whole(&options.out.join("figure6.csv"), csv.as_bytes())?;
     let mut panels = Vec::new();
     for (name, seeds) in &curves {
-        let success = Panel::of_seeds(
-            &format!("{name}: goal reached, % of episodes"),
-            seeds,
-            |r| r.success_share.map(|s| 100.0 * s),
-        );
-        panels.push(success.up_to(105.0));
-        panels.push(Panel::of_seeds(
-            &format!("{name}: mean error of Q"),
-            seeds,
-            |r| r.mean_td_error,
-        ));
+        let title = format!("{name}: goal reached, % of episodes");
+        let success = Panel::of_seeds(&title, seeds, |r| r.success_share.map(|s| 100.0 * s));
+        let title = format!("{name}: mean error of Q");
+        let error = Panel::of_seeds(&title, seeds, |r| r.mean_td_error);
+        panels.extend([success.up_to(105.0), error]);
     }
-    write_whole(
-        &options.out.join("figure6.svg"),
-        drawn(&panels, 2, (400, 290))?.as_bytes(),
-    )?;
+    write_svg(options, "figure6", &panels, 2)?;
     taught.ok_or_else(|| "at least one seed is needed".into())
 }
 
@@ -258,11 +228,11 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
             // The last sighting before each move.
             let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
             let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
-                let there = cell.features(joints).is_ok_and(|f| {
-                    (99.0..=108.0).contains(&f.x)
-                        && (74.0..=82.0).contains(&f.y)
-                        && (32.0..=34.0).contains(&f.r)
-                });
+                let at_goal = |f: &Features| {
+                    let inside = |(_, (low, high), of): &Feature| (*low..=*high).contains(&of(f));
+                    FEATURES.iter().all(inside)
+                };
+                let there = cell.features(joints).is_ok_and(|f| at_goal(&f));
                 if there && done < pushes {
                     done += usize::from(cell.push_to_radius(joints, 60.0));
                 }
@@ -275,10 +245,8 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                     if looked_at.replace(event.cycle) == Some(event.cycle) {
                         path.pop();
                     }
-                    path.push((
-                        sighting.features,
-                        Percept::new(sighting.features, &event.joints).theta3,
-                    ));
+                    let f = sighting.features;
+                    path.push((f, Percept::new(f, &event.joints).theta3));
                 }
             })?;
             for (step, (f, theta3)) in path.iter().enumerate() {
@@ -300,7 +268,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
     // as in the paper.
     let mut panels = Vec::new();
     for (low, high) in [(-50.0, 6.0), (6.0, 27.0), (27.0, 60.0)] {
-        let ends_here = |path: &&Vec<(hough_heuristic::Features, f64)>| {
+        let ends_here = |path: &&Vec<(Features, f64)>| {
             path.len() > 3
                 && path
                     .last()
@@ -329,10 +297,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
             panels.push(Panel::new(&title, "step", lines.collect()).with_goal(low_end, high_end));
         }
     }
-    write_whole(
-        &options.out.join("figure7.svg"),
-        drawn(&panels, 3, (400, 290))?.as_bytes(),
-    )?;
+    write_svg(options, "figure7", &panels, 3)?;
     let panels: Vec<Panel> = track
         .iter()
         .zip(1..)
@@ -345,23 +310,26 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Er
                 .up_to(70.0)
         })
         .collect();
-    write_whole(
-        &options.out.join("figure8.svg"),
-        drawn(&panels, 3, (400, 290))?.as_bytes(),
-    )
+    write_svg(options, "figure8", &panels, 3)
+}
+
+fn write_svg(
+    options: &Options,
+    figure: &str,
+    panels: &[Panel],
+    columns: usize,
+) -> Result<(), Box<dyn Error>> {
+    let svg = drawn(panels, columns, (400, 290))?;
+    write_whole(&options.out.join(format!("{figure}.svg")), svg.as_bytes())
 }
 
 /// Returns the distance of a ball from the goal in the image, in halves of its sides.
-fn off_centre(f: &hough_heuristic::Features) -> f64 {
+fn off_centre(f: &Features) -> f64 {
     ((f.x - 103.5) / 96.0).hypot((f.y - 78.0) / 72.0)
 }
 
 /// A feature: its name, its goal, and its reader.
-type Feature = (
-    &'static str,
-    (f64, f64),
-    fn(&hough_heuristic::Features) -> f64,
-);
+type Feature = (&'static str, (f64, f64), fn(&Features) -> f64);
 const FEATURES: [Feature; 3] = [
     ("x", (99.0, 108.0), |f| f.x),
     ("y", (74.0, 82.0), |f| f.y),

@@ -11,6 +11,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::learning::learn_both;
 use example_support::plot::{Panel, drawn};
+use example_support::say;
 use example_support::trial::TrialCell;
 use example_support::wilson::wilson;
 
@@ -30,14 +31,17 @@ pub(crate) struct Report {
 /// Learns in both regression simulators, takes the behaviours to `seeds` arms with errors drawn
 /// anew, and lets them go on learning there.
 pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn Error>> {
-    println!(
-        "\nFrom simulation to the arm: the behaviours at once, and after learning on there from so many moves"
+    say!(
+        "\nFrom simulation to the arm: the behaviours at once, and after learning on there from so \
+         many moves"
     );
-    println!(
-        "learned in          errors of the arm  goal   moves learned from  success %  95 % interval  moves of a success"
+    say!(
+        "learned in          errors of the arm  goal   moves learned from  success %  \
+         95 % interval  moves of a success"
     );
     let mut csv = String::from(
-        "learned_in,errors,goal,moves_learned_from,success_percent,interval_low,interval_high,moves\n",
+        "learned_in,errors,goal,moves_learned_from,success_percent,interval_low,interval_high,\
+         moves\n",
     );
     let mut panels = Vec::new();
     for (name, form) in [
@@ -74,9 +78,10 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
                 } else {
                     String::new()
                 };
-                println!(
-                    "{name:19} {level:18} {goal:5} {made:19}  {mean:9.1} {interval:>14} {moves:>18}",
-                    level = level.to_string()
+                let errors = level.to_string();
+                say!(
+                    "{name:19} {errors:18} {goal:5} {made:19}  {mean:9.1} {interval:>14} \
+                     {moves:>18}"
                 );
                 let _ = writeln!(
                     csv,

@@ -88,7 +88,7 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
     let camera = wrist * model.mount;
     let (sin, cos) = joints[Joint::J2].sin_cos();
     let elbow = into_plane.inverse() * Point3::new(model.arm.a2 * cos, 0.0, -model.arm.a2 * sin);
-    let mut drawing = Overlay::over(RgbImage::from_pixel(
+    let mut drawing = Overlay::from(RgbImage::from_pixel(
         TILE.0,
         TILE.1,
         image::Rgb([250, 250, 252]),
@@ -152,10 +152,10 @@ fn edges(moment: &Moment) -> Result<RgbImage, Box<dyn Error>> {
         );
         image.put_pixel(x, y, image::Rgb([255; 3]));
     }
-    Ok(Overlay::over(image).captioned("edges").into_image())
+    Ok(Overlay::from(image).captioned("edges").into_image())
 }
 
 fn small(overlay: Overlay, words: &str) -> RgbImage {
     let small = resize(&overlay.into_image(), TILE.0, TILE.1, FilterType::Triangle);
-    Overlay::over(small).captioned(words).into_image()
+    Overlay::from(small).captioned(words).into_image()
 }

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! cargo run --release --example render_dataset -- --out out/rendered --frames 20
-//! cargo run --release --example render_dataset -- --out out/benchmark --kinds benchmark --size 1920x1080
+//! cargo run --release --example render_dataset -- --kinds benchmark --size 1920x1080
 //! ```
 //!
 //! writes `out/rendered/KIND_NNN.png`, `truth.csv` (file,cx,cy,r,what,visible) and `frames.csv`
@@ -17,26 +17,19 @@
 //! difficulty at a time); `cell` and `benchmark` stand for all of either. The frames of a kind
 //! depend on the seed only, not on the other kinds drawn.
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for the terminal"
-)]
-
 mod kinds;
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
 use example_support::cpu::cpu_time;
-use example_support::files::{writable_folder, write_whole};
+use example_support::files::{writable_folder, write_png, write_whole};
 use example_support::program::ended;
-use image::ImageFormat;
+use example_support::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use kinds::{Kind, Kinds, repeated, share, size};
 use pipeline_sim::{Camera, Renderer, Round, RoundOutline};
@@ -76,7 +69,7 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
     let kinds: Vec<Kind> = options.kinds.iter().flat_map(|k| k.0.clone()).collect();
     if let Some(name) = repeated(&kinds) {
         let message = format!(
-            "the kind {name} is asked for more than once (`cell` and `benchmark` stand for all of theirs)"
+            "the kind {name} is named more than once (`cell` and `benchmark` name all of theirs)"
         );
         Options::command()
             .error(ErrorKind::ValueValidation, message)
@@ -94,14 +87,12 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
         let mut milliseconds = Vec::new();
         for i in 0..options.frames {
             let again = shared.take().filter(|_| i % options.per_scene.max(1) != 0);
-            let again = match again {
-                Some(renderer) => {
-                    let snapshot = kind.recipe.draw_again(options.size, &mut rng)?;
-                    snapshot.map(|snapshot| (renderer, snapshot))
-                }
-                None => None,
-            };
-            let (mut renderer, snapshot) = match again {
+            let mut drawn = None;
+            if let Some(renderer) = again {
+                let snapshot = kind.recipe.draw_again(options.size, &mut rng)?;
+                drawn = snapshot.map(|snapshot| (renderer, snapshot));
+            }
+            let (mut renderer, snapshot) = match drawn {
                 Some(drawn) => drawn,
                 None => kind.recipe.draw(options.size, &mut rng)?,
             };
@@ -109,17 +100,13 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             let before = cpu_time();
             let frame = snapshot.take(&mut renderer);
             milliseconds.push(1e3 * cpu_time().saturating_sub(before).as_secs_f64());
-            let mut png = std::io::Cursor::new(Vec::new());
-            frame.write_to(&mut png, ImageFormat::Png)?;
-            write_whole(&options.out.join(&file), png.get_ref())?;
+            write_png(&options.out.join(&file), frame)?;
             writeln!(frames, "{file},{name}")?;
             let sightings = snapshot.truth(&renderer);
             let scale = snapshot.cell.camera.focal_px() / Camera::paper().focal_px();
             let least = kind.least_radius * scale;
-            for sighting in sightings
-                .iter()
-                .filter(|s| counts(s, options.visible, least))
-            {
+            let counted = |sighting: &&RoundOutline| counts(sighting, options.visible, least);
+            for sighting in sightings.iter().filter(counted) {
                 let circle = sighting.ellipse.circle();
                 writeln!(
                     truth,
@@ -135,12 +122,8 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             milliseconds.first(),
             milliseconds.get(milliseconds.len() / 2),
         ) {
-            bar.suspend(|| {
-                writeln!(
-                    std::io::stdout(),
-                    "{name:20} CPU {least:.1} ms a frame at best, {median:.1} ms median"
-                )
-            })?;
+            let row = format!("{name:20} CPU, ms a frame: {least:.1} least, {median:.1} median");
+            bar.suspend(|| say!("{row}"));
         }
     }
     write_whole(&options.out.join("truth.csv"), truth.as_bytes())?;

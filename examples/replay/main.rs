@@ -13,7 +13,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use grasp_agent::{Replayed, RunEvent, SavedRun};
 
-use example_support::program::{ended, say};
+use example_support::program::ended;
+use example_support::say;
 
 /// Replays runs that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers`
 /// (--logs) or `ellipse_object` have saved, and reports whether they take the same course.
@@ -50,7 +51,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let events = &saved.log().events;
         if options.events {
             for (number, event) in events.iter().enumerate() {
-                say(&format!("{number:5} {}", told(event)));
+                say!("{number:5} {}", told(event));
             }
         }
         let name = file.display();
@@ -63,15 +64,15 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                     ),
                     Err(cause) => cause,
                 };
-                say(&format!("{name}: the same {} events; {end}", events.len()));
+                say!("{name}: the same {} events; {end}", events.len());
             }
             Replayed::Differs { event, then, now } => {
                 others += 1;
                 let told = |event: Option<RunEvent<'static>>| {
                     event.as_ref().map_or("the end".into(), told)
                 };
-                say(&format!("{name}: another course from event {event} on"));
-                say(&format!("  then: {}\n  now:  {}", told(then), told(now)));
+                say!("{name}: another course from event {event} on");
+                say!("  then: {}\n  now:  {}", told(then), told(now));
             }
         }
     }

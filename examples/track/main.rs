@@ -5,12 +5,6 @@
 //! cargo run --release --example track -- --help
 //! ```
 
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program for a terminal"
-)]
-
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -20,17 +14,17 @@ use clap::Parser;
 use example_support::ball_tally::{Counted, Tally};
 use example_support::files::{animated, keep_run, writable_folder, write_whole};
 use example_support::program::{at_least_one, ended};
+use example_support::say;
 use example_support::stages::{Stages, Timed};
-use example_support::trial::{Devices, Trial, TrialCell};
+use example_support::trial::{Trial, TrialCell, run_on_rig};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, Hybrid, HybridSettings, RunEvent,
-    SavedRun,
+    Agent, AgentConfig, AgentError, Belief, EventKind, Hybrid, HybridSettings, RunEvent, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use image::GrayImage;
 use image::imageops::{FilterType, resize};
 use pipeline_sim::{Cell, ErrorLevel, Workspace};
-use puma_grasp::{BallDetector, Rig, RigParts, bright_ball_scene};
+use puma_grasp::{BallDetector, Rig, bright_ball_scene};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -65,7 +59,7 @@ struct Options {
     teach: usize,
 
     /// Number of cells that the runs are spread over, each with errors drawn anew
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one::<usize>)]
     cells: usize,
 
     /// Movement of the ball
@@ -126,7 +120,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let cells = 0..options.cells;
     let done = cells.into_iter().try_for_each(|cell| runs.in_cell(cell));
     if options.shortcut {
-        println!("{}", runs.tally);
+        say!("{}", runs.tally);
         return done;
     }
     write_whole(&options.out.join("track.csv"), runs.csv.as_bytes())?;
@@ -134,8 +128,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let film = animated(&runs.film, (1, 3), (1, 3))?;
         write_whole(&options.out.join("track.png"), &film)?;
     }
-    println!("{}\n{}", runs.stages, runs.tally);
-    println!("results: {}", options.out.display());
+    say!("{}\n{}", runs.stages, runs.tally);
+    say!("results: {}", options.out.display());
     done
 }
 
@@ -251,7 +245,7 @@ impl Runs<'_> {
                         |reason| format!("not grasped: {reason}"),
                     ),
                 };
-                println!("run {run}: {reason}, {collisions} collisions; {kept}");
+                say!("run {run}: {reason}, {collisions} collisions; {kept}");
             }
         }
         Ok(())
@@ -268,7 +262,7 @@ impl Runs<'_> {
         saved: &mut SavedRun,
     ) -> Result<Trial, AgentError> {
         let (shared, mut gripped) = (rig.cell().clone(), false);
-        let (csv, film, stages) = (&mut self.csv, &mut self.film, &self.stages);
+        let (csv, film) = (&mut self.csv, &mut self.film);
         let mut observe = |event: &RunEvent<'_>| {
             saved.note(event);
             match &event.kind {
@@ -292,21 +286,7 @@ impl Runs<'_> {
                 film.push(resize(frame, width, height, FilterType::Triangle));
             }
         };
-        let cell = rig.cell().clone();
-        let RigParts {
-            camera,
-            arm,
-            mut sensor,
-        } = rig.parts();
-        let detector: &mut dyn CircleDetector = &mut *self.detector;
-        let (mut camera, mut detector) = (stages.around(camera), stages.around(detector));
-        let devices = Devices {
-            eye: &mut CameraEye::new(&mut camera, &mut detector),
-            arm: &mut stages.around(arm),
-            sensor: &mut *sensor,
-            cell: &cell,
-        };
-        devices.run(agent, &mut observe)
+        run_on_rig(rig, &mut *self.detector, agent, &self.stages, &mut observe)
     }
 }
 

@@ -79,7 +79,8 @@ impl fmt::Display for Tally {
             let [low, high] = wilson(grasped as f64 / runs as f64, runs as f64);
             write!(
                 f,
-                "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), {:.1} moves a run, {} stops by the proximity sensors",
+                "{grasped} of {runs} grasped ({:.1} %, 95 % interval {low:.1}..{high:.1}), \
+                 {:.1} moves a run, {} stops by the proximity sensors",
                 100.0 * grasped as f64 / runs as f64,
                 counted.iter().map(|run| run.moves).sum::<usize>() as f64 / runs as f64,
                 all().map(|run| run.near).sum::<usize>(),

@@ -85,7 +85,8 @@ pub struct Row {
 
 impl Row {
     /// Names of the columns.
-    pub const HEADER: &str = "level     controller                       success %  95 % interval  cells without failure  cycles  losses/run  collisions  runs";
+    pub const HEADER: &str = "level     controller                       success %  95 % interval  \
+                              cells without failure  cycles  losses/run  collisions  runs";
 
     /// Makes the row of controller `name` at a level of errors.
     pub fn new(level: ErrorLevel, name: &str, tally: &Tally) -> Self {
@@ -109,28 +110,20 @@ impl Row {
 
 impl fmt::Display for Row {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            level,
-            name,
-            success,
-            interval: [low, high],
-            whole_cells,
-            cells,
-            cycles,
-            losses,
-            collisions,
-            runs,
-        } = self;
-        let interval = number(*low, |low| format!("{low:.1}..{high:.1}"));
-        let whole = format!("{whole_cells} of {cells}");
+        let (level, [low, high]) = (self.level.to_string(), self.interval);
+        let interval = number(low, |low| format!("{low:.1}..{high:.1}"));
+        let whole = format!("{} of {}", self.whole_cells, self.cells);
         // NaN without a success.
-        let cycles = number(*cycles, |cycles| format!("{cycles:.1}"));
-        let collisions = collisions.map_or("-".into(), |count| count.to_string());
+        let cycles = number(self.cycles, |cycles| format!("{cycles:.1}"));
+        let collisions = self
+            .collisions
+            .map_or("-".into(), |count| count.to_string());
+        let (name, success, losses, runs) = (&self.name, self.success, self.losses, self.runs);
         write!(
             f,
-            "{:9} {name:32} {success:9.1} {interval:>14} {whole:>22} {cycles:>7} {losses:11.2} {collisions:>11} {runs:5}",
-            level.to_string()
-        )
+            "{level:9} {name:32} {success:9.1} {interval:>14} {whole:>22} {cycles:>7} "
+        )?;
+        write!(f, "{losses:11.2} {collisions:>11} {runs:5}")
     }
 }
 
@@ -146,27 +139,20 @@ fn number(value: f64, words: impl FnOnce(f64) -> String) -> String {
 /// Returns the rows as CSV.
 pub fn csv(rows: &[Row]) -> String {
     let mut csv = String::from(
-        "level,controller,success_percent,low,high,cells_without_failure,cells,cycles,losses_per_run,collisions,runs\n",
+        "level,controller,success_percent,low,high,cells_without_failure,cells,cycles,\
+         losses_per_run,collisions,runs\n",
     );
-    for Row {
-        level,
-        name,
-        success,
-        interval,
-        whole_cells,
-        cells,
-        cycles,
-        losses,
-        collisions,
-        runs,
-    } in rows
-    {
-        let collisions = collisions.map_or(String::new(), |count| count.to_string());
-        let [success, low, high, cycles] = [*success, interval[0], interval[1], *cycles]
-            .map(|value| number(value, |value| format!("{value:.3}")));
-        csv += &format!(
-            "{level},\"{name}\",{success},{low},{high},{whole_cells},{cells},{cycles},{losses:.4},{collisions},{runs}\n"
-        );
+    for row in rows {
+        let collisions = row
+            .collisions
+            .map_or(String::new(), |count| count.to_string());
+        let [success, low, high, cycles] =
+            [row.success, row.interval[0], row.interval[1], row.cycles]
+                .map(|value| number(value, |value| format!("{value:.3}")));
+        let (level, name, losses, runs) = (row.level, &row.name, row.losses, row.runs);
+        let cells = format!("{},{}", row.whole_cells, row.cells);
+        csv += &format!("{level},\"{name}\",{success},{low},{high},{cells},{cycles},");
+        csv += &format!("{losses:.4},{collisions},{runs}\n");
     }
     csv
 }

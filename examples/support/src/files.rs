@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use grasp_agent::SavedRun;
-use image::{GrayImage, RgbImage};
+use image::{GrayImage, ImageBuffer, Pixel, PixelWithColorType};
 
 /// Creates the folder if need be, and checks that files can be written into it.
 ///
@@ -81,7 +81,10 @@ pub fn animated(
 ///
 /// # Errors
 /// Those of [`write_whole`].
-pub fn write_png(path: &Path, picture: &RgbImage) -> Result<(), Box<dyn Error>> {
+pub fn write_png<P>(path: &Path, picture: &ImageBuffer<P, Vec<u8>>) -> Result<(), Box<dyn Error>>
+where
+    P: Pixel<Subpixel = u8> + PixelWithColorType,
+{
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png)?;
     write_whole(path, bytes.get_ref())

@@ -8,6 +8,8 @@ use crate::plane::search_percepts;
 
 /// Actions to learn from, centering and approaching.
 pub const ACTIONS: (u64, u64) = (60_000, 500_000);
+/// Actions to learn approaching on 540 states from.
+pub const ACTIONS_FINE: u64 = 4_000_000;
 /// Trials in the simulator by which the best table is chosen.
 pub const TRIALS: usize = 500;
 

@@ -29,12 +29,7 @@ impl Overlay {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
     }
 
-    /// Draws on a picture that is in colour already.
-    pub fn over(picture: RgbImage) -> Self {
-        Self(picture)
-    }
-
-    /// A found circle: its outline and its centre. Parts outside the frame are cut off.
+    /// Draws a found circle: its outline and its centre, clipped to the frame.
     pub fn circle(&mut self, circle: &Circle) {
         let green = Rgb888::new(60, 255, 60);
         let centre = Point::new(circle.x.round() as i32, circle.y.round() as i32);
@@ -50,14 +45,14 @@ impl Overlay {
         }
     }
 
-    /// A straight line.
+    /// Draws a straight line.
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
         let at = |(x, y): (f64, f64)| Point::new(x.round() as i32, y.round() as i32);
         let style = PrimitiveStyle::with_stroke(colour, width);
         let Ok(()) = Line::new(at(from), at(to)).into_styled(style).draw(self);
     }
 
-    /// A filled disc.
+    /// Draws a filled disc.
     pub fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
         let at = Point::new(centre.0.round() as i32, centre.1.round() as i32);
         let diameter = (2.0 * radius).round().max(1.0) as u32;
@@ -66,7 +61,7 @@ impl Overlay {
             .draw(self);
     }
 
-    /// A closed curve, given as a function of an angle.
+    /// Draws a closed curve, given as a function of an angle.
     pub fn closed(&mut self, point: impl Fn(f64) -> (f64, f64)) {
         const CORNERS: u32 = 120;
         let at = |corner: u32| {
@@ -81,7 +76,7 @@ impl Overlay {
         }
     }
 
-    /// Words on a dark bar at the top, which covers what is there.
+    /// Draws a caption on a dark bar over the top of the picture.
     fn caption(&mut self, words: &str) {
         let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), CAPTION));
         let Ok(()) = bar
@@ -91,7 +86,7 @@ impl Overlay {
         let Ok(_) = Text::with_baseline(words, Point::new(6, 2), style, Baseline::Top).draw(self);
     }
 
-    /// Words in a dark strip above the picture, which becomes higher by as much.
+    /// Adds a caption in a dark strip above the picture.
     pub fn captioned(self, words: &str) -> Self {
         let mut higher = RgbImage::new(self.0.width(), self.0.height() + CAPTION);
         image::imageops::replace(&mut higher, &self.0, 0, i64::from(CAPTION));

@@ -57,8 +57,9 @@ impl fmt::Display for Stages {
         let each = |time: Duration| 1e3 * time.as_secs_f64() / f64::from(spent.moves.max(1));
         write!(
             f,
-            "per move, ms of CPU: edges and circle {:.2}, decision {:.3}, serial line {:.2}; waiting for the arm {:.2} ms; \
-             rendering {:.2} ms of CPU, which a camera would not need ({} moves)",
+            "per move, ms of CPU: edges and circle {:.2}, decision {:.3}, serial line {:.2}; \
+             waiting for the arm {:.2} ms; rendering {:.2} ms of CPU, which a camera would not need \
+             ({} moves)",
             each(spent.detect),
             each(spent.decide),
             each(spent.serial),

@@ -1,19 +1,20 @@
 //! One ball and an agent that goes for it; and the cell without rendering, the feature shortcut.
 
-use std::fmt;
-
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, Controller, EventKind, Eye, RunEvent, RunOutcome,
+    Agent, AgentConfig, AgentError, CameraEye, Controller, EventKind, Eye, RunEvent, RunOutcome,
     ServoSettings, Sighting, TaughtGoal,
 };
-use hough_heuristic::{Features, FrameError};
+use hough_heuristic::{CircleDetector, Features, FrameError};
 use pipeline_sim::{
     Ball, Cell, ErrorLevel, Errors, FeatureCamera, HandShape, QuantityError, SharedCell,
     SimulatedArm, Workspace,
 };
+use puma_grasp::{Rig, RigParts};
 use puma_val2::{ArmError, Joint, JointDelta, Joints, Manipulator, ProximitySensor};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
+
+use crate::stages::Stages;
 
 /// [`FeatureCamera`] as an [`Eye`].
 #[derive(Debug)]
@@ -26,21 +27,11 @@ impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
 }
 
 /// The devices that an agent works with, and the cell around them.
-pub struct Devices<'a> {
-    /// The view of the ball.
-    pub eye: &'a mut dyn Eye,
-    /// The arm.
-    pub arm: &'a mut dyn Manipulator,
-    /// The proximity sensors.
-    pub sensor: &'a mut dyn ProximitySensor,
-    /// The cell with the ball.
-    pub cell: &'a SharedCell,
-}
-
-impl fmt::Debug for Devices<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Devices").finish_non_exhaustive()
-    }
+struct Devices<'a> {
+    eye: &'a mut dyn Eye,
+    arm: &'a mut dyn Manipulator,
+    sensor: &'a mut dyn ProximitySensor,
+    cell: &'a SharedCell,
 }
 
 /// The result of one run toward a ball.
@@ -56,12 +47,35 @@ pub struct Trial {
     pub near: usize,
 }
 
+/// Lets `agent` go for the ball in the rig's cell, and adds the time of each stage to `stages`.
+///
+/// # Errors
+/// Those of [`Agent::run_and_learn`].
+pub fn run_on_rig<C: Controller>(
+    rig: &mut Rig,
+    detector: &mut dyn CircleDetector,
+    agent: &mut Agent<C>,
+    stages: &Stages,
+    observe: &mut dyn FnMut(&RunEvent<'_>),
+) -> Result<Trial, AgentError> {
+    let cell = rig.cell().clone();
+    let RigParts {
+        camera,
+        arm,
+        mut sensor,
+    } = rig.parts();
+    let (mut camera, mut detector) = (stages.around(camera), stages.around(detector));
+    let devices = Devices {
+        eye: &mut CameraEye::new(&mut camera, &mut detector),
+        arm: &mut stages.around(arm),
+        sensor: &mut *sensor,
+        cell: &cell,
+    };
+    devices.run(agent, observe)
+}
+
 impl Devices<'_> {
-    /// Lets `agent` go for the ball.
-    ///
-    /// # Errors
-    /// Those of [`Agent::run_and_learn`].
-    pub fn run<C: Controller>(
+    fn run<C: Controller>(
         self,
         agent: &mut Agent<C>,
         observe: &mut dyn FnMut(&RunEvent<'_>),
