@@ -55,9 +55,8 @@ impl Stages<'_> {
             ("3_candidates.png", candidates),
             ("4_accepted.png", with_circles(frame, found)),
         ];
-        let mut paths = [const { PathBuf::new() }; 4];
-        for (path, (name, picture)) in paths.iter_mut().zip(&pictures) {
-            *path = folder.join(name);
+        let paths = pictures.each_ref().map(|(name, _)| folder.join(name));
+        for (path, (_, picture)) in paths.iter().zip(&pictures) {
             write_png(path, picture)?;
         }
         Ok(paths)

@@ -186,7 +186,7 @@ impl CurveSearch {
         while pixels.len() < count {
             match (self.config.reach, pixels.first()) {
                 (Some(reach), Some(&first)) => {
-                    pixels.push(self.structure.draw_around(first, reach, rng))
+                    pixels.push(self.structure.draw_around(first, reach, rng));
                 }
                 _ => pixels.extend(self.structure.draw_anywhere::<1>(rng).into_iter().flatten()),
             }
