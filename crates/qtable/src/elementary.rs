@@ -13,8 +13,8 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// Returns `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the largest
-/// number infinite.
+/// Returns `e^x` to 2 units in the last place. Results below 2^-1021 are 0, results above the
+/// largest number infinite.
 pub(crate) fn exp(x: f64) -> f64 {
     match x {
         x if x < LEAST => 0.0,

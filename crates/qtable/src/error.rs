@@ -83,7 +83,10 @@ pub enum Error {
         state: State,
     },
     /// A reward that is NaN or infinite. Typical cause: a division by a distance that became zero.
-    #[error("the reward of action {} in state {} is {reward}: it must be finite", action.0, state.0)]
+    #[error(
+        "the reward of action {} in state {} is {reward}: it must be finite",
+        action.0, state.0
+    )]
     RewardNotFinite {
         /// The state the action was taken in.
         state: State,
@@ -93,7 +96,10 @@ pub enum Error {
         reward: f64,
     },
     /// A value that is NaN or infinite, or that a cached table cannot hold as `f32`.
-    #[error("the value of action {} in state {} would be {value}: it must be finite", action.0, state.0)]
+    #[error(
+        "the value of action {} in state {} would be {value}: it must be finite",
+        action.0, state.0
+    )]
     ValueNotFinite {
         /// The state.
         state: State,
@@ -202,8 +208,8 @@ pub enum Error {
         /// The problem and what is expected instead.
         problem: String,
     },
-    /// A learner that keeps knowledge of its own met another table than the one it was made for, or a
-    /// table that was changed by hand.
+    /// A learner that keeps knowledge of its own met another table than the one it was made for, or
+    /// a table that was changed by hand.
     #[error(
         "the learner was made for another table (they differ at action {} of state {}): \
          make a learner for each table",
@@ -227,9 +233,9 @@ pub enum Error {
         /// The changed property.
         what: &'static str,
     },
-    /// An episode that differs when repeated with its seed and its actions. Typical causes: `reset` keeps
-    /// something of the episode before, or randomness that does not come from the generator handed
-    /// in.
+    /// An episode that differs when repeated with its seed and its actions. Typical causes: `reset`
+    /// keeps something of the episode before, or randomness that does not come from the generator
+    /// handed in.
     #[error("step {step} of an episode differs when repeated: {first:?}, then {second:?}")]
     NotReproducible {
         /// Number of the step within the episode; 0 is the reset.

@@ -294,7 +294,7 @@ const fn widest(length: u64) -> usize {
     }
 }
 
-/// Reads a value. bincode makes room for a text before it looks for its end, hence the bound on
+/// Reads a value. bincode allocates a text before it looks for its end, hence the bound on
 /// what a payload may claim.
 fn decode_within<T: DeserializeOwned, const BOUND: usize>(
     payload: &mut impl Read,

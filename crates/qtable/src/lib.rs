@@ -1,15 +1,15 @@
 //! Tabular reinforcement learning for problems with finitely many states and actions.
 //!
 //! An [`Environment`] is the problem, in Gymnasium's words. A [`QTable`] holds a value for each
-//! [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, and a [`Learner`] improves
-//! the table from each [`Step`]. [`Training`] runs them against each other; it can be stopped,
-//! saved, adjusted and continued.
+//! [`State`] and [`Action`]. A [`Policy`] chooses actions from the table, and a [`Learner`]
+//! improves the table from each [`Step`]. [`Training`] runs them against each other; it can be
+//! stopped, saved, adjusted and continued.
 //!
 //! [`over_seeds`] repeats an experiment, and [`Estimate`] is the mean with its 95 % interval.
 //! [`Intervals`] and their [`Product`] make states from measured quantities. Where the dynamics are
 //! known, a [`Model`] gives the optimum to compare with ([`ModelEnvironment::compare`]); a
-//! [`ModelEstimate`] is learned from experience. `save` and `load` (feature `files`) put all of this
-//! on disk.
+//! [`ModelEstimate`] is learned from experience. `save` and `load` (feature `files`) put all of
+//! this on disk.
 //!
 //! # Rules that hold everywhere
 //!

@@ -126,8 +126,8 @@ impl Schedule {
         Self::of(Shape::InverseVisits { start, scale })
     }
 
-    /// Creates the schedule `start / n^exponent` at the n-th visit of each state-action pair, with an
-    /// exponent in `0.5..=1` (above 0.5 the conditions of Robbins and Monro hold).
+    /// Creates the schedule `start / n^exponent` at the n-th visit of each state-action pair, with
+    /// an exponent in `0.5..=1` (above 0.5 the conditions of Robbins and Monro hold).
     ///
     /// An exponent of 0.6 to 0.8 learns faster than `1/n`, which weighs the first, wrong targets
     /// like the last ones (Even-Dar and Mansour 2003).

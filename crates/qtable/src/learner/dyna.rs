@@ -17,10 +17,10 @@ validated! {
     /// then on k steps drawn from a model: a pair tried before, each with the same probability, and
     /// one of the outcomes seen, by their counts.
     ///
-    /// The book keeps the last outcome only ([`with_last_outcome`](DynaQ::with_last_outcome)), which
-    /// notices sooner that a deterministic world has changed, and is wrong in a stochastic one.
-    /// [`with_bonus`](DynaQ::with_bonus) is Dyna-Q+. Imagined steps use the α of the present, and
-    /// count neither as visits nor for the schedule. Default: k = 5.
+    /// The book keeps the last outcome only ([`with_last_outcome`](DynaQ::with_last_outcome)),
+    /// which notices sooner that a deterministic world has changed, and is wrong in a stochastic
+    /// one. [`with_bonus`](DynaQ::with_bonus) is Dyna-Q+. Imagined steps use the α of the present,
+    /// and count neither as visits nor for the schedule. Default: k = 5.
     ///
     /// A learner belongs to the table it was made for; another table is refused with
     /// [`Error::OtherTable`].
@@ -75,9 +75,10 @@ impl DynaQ {
         Self { last_only, ..self }
     }
 
-    /// Makes it Dyna-Q+ (Sutton and Barto, section 8.3): an imagined reward grows by `κ sqrt(τ)` with
-    /// the steps τ since the pair was tried last, so that the learner looks again at what may have
-    /// changed. All actions of the states met are imagined; one never tried leads back to its state.
+    /// Makes it Dyna-Q+ (Sutton and Barto, section 8.3): an imagined reward grows by `κ sqrt(τ)`
+    /// with the steps τ since the pair was tried last, so that the learner looks again at what may
+    /// have changed. All actions of the states met are imagined; one never tried leads back to its
+    /// state.
     ///
     /// # Errors
     /// [`Error::Setting`] if κ is negative or not finite.

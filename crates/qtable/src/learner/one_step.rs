@@ -121,9 +121,9 @@ impl Learner for QLearning {
 /// SARSA (Rummery and Niranjan 1994): `Q(s,a) <- Q(s,a) + α (r + γ Q(s',a') - Q(s,a))` with the
 /// action `a'` that the policy takes next.
 ///
-/// It learns the value of the policy that acts, exploration included, and so keeps away from cliffs.
-/// The action after a truncated step is chosen for the update only: it advances a policy's schedule
-/// by one choice more than with Q-learning.
+/// It learns the value of the policy that acts, exploration included, and so keeps away from
+/// cliffs. The action after a truncated step is chosen for the update only: it advances a policy's
+/// schedule by one choice more than with Q-learning.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct Sarsa {

@@ -88,8 +88,8 @@ impl Model {
     /// is not offered.
     ///
     /// # Errors
-    /// An empty shape or one that does not fit into memory, a next state out of range, a reward that
-    /// is not finite, or probabilities that do not sum to 1 to within 1e-6.
+    /// An empty shape or one that does not fit into memory, a next state out of range, a reward
+    /// that is not finite, or probabilities that do not sum to 1 to within 1e-6.
     pub fn new(
         states: usize,
         actions: usize,

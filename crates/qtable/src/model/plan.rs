@@ -63,8 +63,8 @@ impl Model {
     }
 
     /// Plans by policy iteration (Howard 1960): values the present policy, makes it greedy for
-    /// these values, and so on until it stays. It begins with the greedy policy after as many sweeps
-    /// of value iteration as there are states, at most 1000.
+    /// these values, and so on until it stays. It begins with the greedy policy after as many
+    /// sweeps of value iteration as there are states, at most 1000.
     ///
     /// A policy is valued by elimination up to 1000 states, and by sweeps to `tolerance` beyond. At
     /// γ = 1 a policy met on the way may never end; then the sweeps do not settle, and value
@@ -110,7 +110,8 @@ impl Model {
     }
 
     /// Returns the value of each state under a deterministic policy, by elimination up to 1000
-    /// states and by sweeps to `tolerance` beyond. The action given for a terminal state is ignored.
+    /// states and by sweeps to `tolerance` beyond. The action given for a terminal state is
+    /// ignored.
     ///
     /// # Errors
     /// A policy of the wrong length or with an action that is not offered, γ outside `0..=1`, a
@@ -176,8 +177,8 @@ impl Model {
         }
     }
 
-    /// Solves `V = r + γ P V` for the values of a policy by elimination with pivots. `None` for more
-    /// than 1000 states, and for a policy that has no values because it never ends.
+    /// Solves `V = r + γ P V` for the values of a policy by elimination with pivots. `None` for
+    /// more than 1000 states, and for a policy that has no values because it never ends.
     fn eliminate(&self, policy: &[Action], gamma: f64) -> Option<Vec<f64>> {
         let n = self.states;
         if n > ELIMINATED {

@@ -16,8 +16,8 @@ pub trait Policy {
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action;
 
     /// Writes the probability of every action in the next call of [`choose`](Policy::choose) into
-    /// `probabilities`, one entry for each action, and returns `true`. Returns `false` if the policy
-    /// does not tell them.
+    /// `probabilities`, one entry for each action, and returns `true`. Returns `false` if the
+    /// policy does not tell them.
     fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {
         let _ = (table, state, probabilities);
         false

@@ -60,8 +60,8 @@ pub trait Environment {
     /// A failure of the environment. Training gives the episode up and keeps what it has learned.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error>;
 
-    /// Returns `true` if a state offers an action (the action mask). The answer must not change, and
-    /// a state without any action must end the episode. By default all actions are offered.
+    /// Returns `true` if a state offers an action (the action mask). The answer must not change,
+    /// and a state without any action must end the episode. By default all actions are offered.
     fn allows(&self, state: State, action: Action) -> bool {
         let _ = (state, action);
         true

@@ -6,8 +6,8 @@ use crate::table::mask::{ActionMask, checked_entries};
 use crate::validated::validated;
 
 validated! {
-    /// A dense table of action values, `states` rows of `actions` values, with a visit count for each
-    /// value.
+    /// A dense table of action values, `states` rows of `actions` values, with a visit count for
+    /// each value.
     ///
     /// The table keeps the best action of every row. A write costs one comparison; the row is
     /// searched again only when its best value falls. No value is ever infinite or NaN.

@@ -88,7 +88,8 @@ pub fn frozen_lake(map: &[&str], slippery: bool) -> Result<ModelEnvironment, Err
     .map(ModelEnvironment::with_success_by_reward)
 }
 
-/// Creates CliffWalking-v1: walk from the lower left to the lower right corner of a 4x12 grid, along a cliff.
+/// Creates CliffWalking-v1: walk from the lower left to the lower right corner of a 4x12 grid,
+/// along a cliff.
 ///
 /// States are `row * 12 + column`; the start is 36, the goal 47, the cliff 37 to 46. Actions: 0 up,
 /// 1 right, 2 down, 3 left; a move off the grid stays. Every move pays -1, one into the cliff -100
@@ -119,8 +120,8 @@ pub fn cliff_walking() -> Result<ModelEnvironment, Error> {
     ModelEnvironment::new(model, &[(START, 1.0)])
 }
 
-/// Creates a row of `length` cells. Action 0 goes left (at the left end it stays), action 1 right; the
-/// right end pays 1 and ends the episode. From the left end on.
+/// Creates a row of `length` cells. Action 0 goes left (at the left end it stays), action 1 right;
+/// the right end pays 1 and ends the episode. From the left end on.
 ///
 /// The optimum is `V*(s) = γ^(length - 2 - s)` for every cell but the last.
 ///

@@ -19,15 +19,15 @@ const OPEN_TO_THE_EAST: [[bool; 4]; 5] = [
     [false, true, false, true],
 ];
 
-/// Creates Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5 grid with
-/// walls.
+/// Creates Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5
+/// grid with walls.
 ///
 /// States are `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at stand 0
-/// to 3 (red, green, yellow, blue), or 4 for in the taxi. Actions: 0 south, 1 north, 2 east, 3 west, 4 pick up, 5
-/// drop off; a move into a wall stays. Every action pays -1, an impossible pick-up or drop-off -10,
-/// the drop-off at the destination 20 and ends the episode. A drop-off at another stand leaves the
-/// passenger there. The 300 first states, with the passenger at a stand other than the destination,
-/// are equally likely.
+/// to 3 (red, green, yellow, blue), or 4 for in the taxi. Actions: 0 south, 1 north, 2 east, 3
+/// west, 4 pick up, 5 drop off; a move into a wall stays. Every action pays -1, an impossible
+/// pick-up or drop-off -10, the drop-off at the destination 20 and ends the episode. A drop-off at
+/// another stand leaves the passenger there. The 300 first states, with the passenger at a stand
+/// other than the destination, are equally likely.
 ///
 /// # Errors
 /// None for this map; the type is that of all toys.

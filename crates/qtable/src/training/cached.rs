@@ -28,8 +28,8 @@ const DRIFT: f64 = 30.0;
 ///
 /// While T stands still the distribution is that of [`Boltzmann`] to single precision and 24 random
 /// bits: no probability is off by more than `1e-6 + 1e-8` for each action of the row, and an action
-/// of a probability below 6e-8 may never be drawn. A change of the temperature rebuilds all weights, so it is made in blocks of many
-/// actions: [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions
+/// of a probability below 6e-8 may never be drawn. A change of the temperature rebuilds all
+/// weights: use [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions
 /// [`Boltzmann`] itself is faster.
 #[derive(Clone, Debug)]
 pub struct CachedBoltzmann {
@@ -471,8 +471,9 @@ impl Head {
     }
 }
 
-/// Returns the number of sums that are not beyond a point, none of them negative. Such floating-point numbers are ordered as their bits are, and integers are compared
-/// fast with vectors and without.
+/// Returns the number of sums that are not beyond a point, none of them negative. Such
+/// floating-point numbers are ordered as their bits are, and integers are compared fast with
+/// vectors and without.
 #[inline(always)]
 fn count_up_to(sums: &[f32], point: f32) -> usize {
     let point = point.to_bits() as i32;

@@ -121,8 +121,8 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// Trains until a total is reached; not at all if it is reached already.
     ///
     /// # Errors
-    /// An environment of another shape or with a fault (state out of range, reward not finite), or a
-    /// policy or learner that fails. What was learned before stays; the episode is given up.
+    /// An environment of another shape or with a fault (state out of range, reward not finite), or
+    /// a policy or learner that fails. What was learned before stays; the episode is given up.
     pub fn run<E: Environment + ?Sized, R: Rng + ?Sized>(
         &mut self,
         environment: &mut E,
@@ -134,8 +134,8 @@ impl<L: Learner, P: Policy> Training<L, P> {
     }
 
     /// Trains like [`run`](Training::run) and calls `on_record` with every record and the run, for
-    /// a progress bar, an evaluation, a change of the policy, or an early stop. Returns `true` if it
-    /// was stopped early.
+    /// a progress bar, an evaluation, a change of the policy, or an early stop. Returns `true` if
+    /// it was stopped early.
     ///
     /// ```
     /// use std::ops::ControlFlow;

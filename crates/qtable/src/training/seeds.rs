@@ -13,7 +13,8 @@ use crate::training::curve::Record;
 /// ```
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 /// use qtable::{
-///     EpsilonGreedy, Estimate, QLearning, QTable, Schedule, State, Training, Until, over_seeds, toys,
+///     EpsilonGreedy, Estimate, QLearning, QTable, Schedule, State, Training, Until, over_seeds,
+///     toys,
 /// };
 ///
 /// fn main() -> Result<(), qtable::Error> {
@@ -116,8 +117,8 @@ impl std::fmt::Display for Estimate {
     }
 }
 
-/// Returns the 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher and
-/// Cornish from six degrees of freedom on).
+/// Returns the 97.5 % quantile of Student's t distribution, to 0.1 % (by the expansion of Fisher
+/// and Cornish from six degrees of freedom on).
 fn student_t(degrees: usize) -> f64 {
     const FEW: [f64; 5] = [12.706_2, 4.302_65, 3.182_45, 2.776_45, 2.570_58];
     if let Some(&t) = degrees.checked_sub(1).and_then(|index| FEW.get(index)) {

@@ -6,7 +6,10 @@ use qtable::{Action, ActionMask, Error, QTable, State};
 proptest! {
     #[test]
     fn csv_comes_back_to_the_bit(
-        values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO | prop::num::f64::SUBNORMAL, 12),
+        values in prop::collection::vec(
+            prop::num::f64::NORMAL | prop::num::f64::ZERO | prop::num::f64::SUBNORMAL,
+            12,
+        ),
         visits in prop::collection::vec(0u8..3, 12),
         masked in any::<bool>(),
     ) {
@@ -19,7 +22,10 @@ proptest! {
             }
         }
         if masked {
-            let mask = ActionMask::new(4, 3, |state, action| (state.0 + action.0) % 2 == 0 || action.0 == 1);
+            let offered = |state: State, action: Action| {
+                (state.0 + action.0) % 2 == 0 || action.0 == 1
+            };
+            let mask = ActionMask::new(4, 3, offered);
             table.set_mask(Some(mask.unwrap())).unwrap();
         }
         // What a mask forbids keeps its value.
@@ -29,7 +35,10 @@ proptest! {
     }
 
     #[test]
-    fn random_text_is_no_table(text in "\\PC{0,80}", lines in prop::collection::vec("[0-9,.eE-]{0,12}", 0..6)) {
+    fn random_text_is_no_table(
+        text in "\\PC{0,80}",
+        lines in prop::collection::vec("[0-9,.eE-]{0,12}", 0..6),
+    ) {
         prop_assert!(QTable::from_csv(&text).is_err());
         let with_header = format!("state,action,value,visits,offered\n{}", lines.join("\n"));
         // Whatever comes of it, it is no panic.

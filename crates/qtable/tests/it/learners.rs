@@ -213,7 +213,7 @@ fn answer(observation: usize, reward: f64, status: Status) -> Step {
 }
 
 #[test]
-fn no_learner_bootstraps_through_termination_and_all_do_through_truncation() {
+fn learners_bootstrap_through_truncation_not_termination() {
     for (status, wanted) in [
         (Status::Terminated, 1.0),
         (Status::Truncated, 1.0 + 0.5 * 8.0),

@@ -52,8 +52,8 @@ pub(crate) fn step(observation: usize, reward: f64, status: Status) -> Step {
     }
 }
 
-/// 16 cells in a row and 8 actions that go 3 cells back to 4 ahead, or now and then nowhere; the last
-/// cell ends the episode.
+/// 16 cells in a row and 8 actions that go 3 cells back to 4 ahead, or now and then nowhere; the
+/// last cell ends the episode.
 pub(crate) fn corridor() -> ModelEnvironment {
     let model = Model::new(16, 8, |State(cell), Action(action)| {
         let next = (cell + action).saturating_sub(3).min(15);

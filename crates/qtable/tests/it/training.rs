@@ -165,7 +165,7 @@ impl Policy for Wild {
 }
 
 #[test]
-fn a_policy_that_chooses_outside_the_table_is_refused_before_the_environment_sees_it() {
+fn an_action_outside_the_table_never_reaches_the_environment() {
     let mut chain = toys::chain(4).unwrap();
     let learner = QLearning::new(constant(0.5), 0.9).unwrap();
     let mut training = Training::new(&chain, QTable::new(4, 2).unwrap(), learner, Wild).unwrap();
