@@ -52,9 +52,13 @@
 //! stopped as far as the line allows it, and [`Val2Client::last_known`] is `None` where the last
 //! angles may be wrong. Every wait and every buffer is bounded.
 //!
+//! A line whose end does not come back is spoilt: an empty line would complete whatever its damaged
+//! end has made of it. Commands end with a blank, so that a doubled last character is harmless. A
+//! point must show the values of before when it is opened again, which proves its name.
+//!
 //! A controller that echoes nothing leaves a bare line unchecked: [`MoveWay::Automatic`] and
-//! [`Val2Client::move_hand`] then move by `POINT`, whose display is compared. With
-//! [`MoveWay::Drive`] on such a line a changed digit is found only after the motion.
+//! [`Val2Client::move_hand`] then move by `POINT`, whose display is compared, and a stored program,
+//! and motions by `DRIVE` or `#PPOINT` are refused.
 //!
 //! [`Val2Client::arm_proximity`] lets the controller itself stop the arm on a signal. While it is
 //! armed every motion is guarded or refused, and a short pulse is not overlooked: the program that
@@ -72,12 +76,12 @@
 //!
 //! | a move of | characters sent | received | moves per second, 30 ms quiet | 5 ms quiet |
 //! |---|---|---|---|---|
-//! | one joint, `DRIVE` | 27 | 250 | 3.1 | 3.7 |
-//! | two joints, two `DRIVE`s | 46 | 271 | 2.6 | 3.3 |
-//! | three joints, three `DRIVE`s | 67 | 294 | 2.3 | 3.0 |
-//! | three joints, `POINT` and `MOVE` | 74 | 567 | 1.3 | 1.6 |
+//! | one joint, `DRIVE` | 28 | 251 | 3.1 | 3.6 |
+//! | two joints, two `DRIVE`s | 48 | 273 | 2.6 | 3.3 |
+//! | three joints, three `DRIVE`s | 70 | 297 | 2.3 | 3.0 |
+//! | three joints, `POINT` and `MOVE` | 76 | 569 | 1.3 | 1.6 |
 //! | three joints, `MOVE #PPOINT` | 42 | 265 | 2.9 | 3.5 |
-//! | three joints, under a proximity guard | 85 | 606 | 1.2 | 1.5 |
+//! | three joints, under a proximity guard | 88 | 609 | 1.2 | 1.5 |
 //! | three joints, resident program | 23 | 72 | 9.3 | 12.2 |
 //!
 //! `WHERE` alone is 230 of the characters received. [`MoveWay::Automatic`] takes `DRIVE` for one

@@ -1,5 +1,7 @@
 //! Connection with the monitor, and calibration of the arm.
 
+use std::collections::BTreeMap;
+
 use crate::client::config::ClientConfig;
 use crate::client::dialogue::{NUDGE, SPOIL, is_boot_question, last_question, shortened, way_out};
 use crate::client::number::check_percent;
@@ -24,6 +26,8 @@ impl<T: Transport> Val2Client<T> {
             wire: Wire::new(transport),
             config,
             last_known: None,
+            points: BTreeMap::new(),
+            goal_program: None,
             lacks_ppoint: false,
             guard: None,
         };
@@ -44,6 +48,9 @@ impl<T: Transport> Val2Client<T> {
         self.wire.echo = None;
         self.last_known = None;
         self.guard = None;
+        self.points.clear();
+        self.goal_program = None;
+        self.lacks_ppoint = false;
         self.reach_monitor()?;
         self.find_echo()?;
         match self.config.speed_percent {

@@ -60,8 +60,10 @@ impl<T: Transport> Val2Client<T> {
         if let Some(signal) = self.guard {
             return self.run_guarded_once(signal, &[move_to_pose]);
         }
-        let line = if self.echoes() && self.config.check_echo {
-            format!("DO {move_to_pose}")
+        if self.wire.checks_echo(&self.config) {
+            let line = format!("DO {move_to_pose}");
+            self.command_once(&line, self.config.motion_timeout)
+                .map(drop)
         } else {
             let name = self.config.point_name.clone();
             self.define_point(&name, hand.val(), &|shown| {
@@ -69,10 +71,8 @@ impl<T: Transport> Val2Client<T> {
                 let (off, turned) = apart(&hand.pose(), &shown.pose());
                 off < 2e-5 && turned < 0.02
             })?;
-            format!("DO {word} {name}")
-        };
-        self.command_once(&line, self.config.motion_timeout)
-            .map(drop)
+            self.move_to_point(word, &name)
+        }
     }
 }
 

@@ -73,7 +73,9 @@ impl<T: Transport> Val2Client<T> {
         let means = match self.config.way {
             _ if self.guard.is_some() => self.coordinated(),
             MoveWay::Drive => Means::Drive(100.0),
-            MoveWay::Automatic if moving == 1 && self.echoes() => Means::Drive(100.0),
+            MoveWay::Automatic if moving == 1 && self.wire.checks_echo(&self.config) => {
+                Means::Drive(100.0)
+            }
             _ => self.coordinated(),
         };
         self.relative(delta, means)
@@ -91,7 +93,9 @@ impl<T: Transport> Val2Client<T> {
         match self.config.way {
             _ if self.guard.is_some() => Means::Guarded(None),
             MoveWay::Ppoint => Means::Ppoint,
-            MoveWay::Automatic if self.echoes() && !self.lacks_ppoint => Means::Ppoint,
+            MoveWay::Automatic if self.wire.checks_echo(&self.config) && !self.lacks_ppoint => {
+                Means::Ppoint
+            }
             _ => Means::Point,
         }
     }
@@ -129,6 +133,7 @@ impl<T: Transport> Val2Client<T> {
         target: Joints,
         mut means: Means,
     ) -> Result<Joints, ArmError> {
+        self.check_means(means)?;
         let mut from = start;
         let mut tries = 0;
         loop {
@@ -139,9 +144,16 @@ impl<T: Transport> Val2Client<T> {
                 && self.config.way == MoveWay::Automatic
                 && names_no_place(&failed.error)
             {
-                self.lacks_ppoint = true;
-                means = Means::Point;
-                continue;
+                // The refusal may be the line's fault.
+                self.lacks_ppoint = self.refuses_ppoint()?;
+                if self.lacks_ppoint {
+                    means = Means::Point;
+                    continue;
+                }
+                if tries < self.config.retries {
+                    tries += 1;
+                    continue;
+                }
             }
             let doubt = self.doubt(outcome)?;
             let stands = self.stand(target).map_err(|error| self.lost(error))?;
@@ -168,12 +180,44 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
+    /// Returns `true` for an error that may be the line's fault. Where nothing is echoed a refusal of
+    /// the words may be, too.
+    pub(super) fn is_doubtful(&self, error: &ArmError) -> bool {
+        is_doubt(error) || !self.wire.checks_echo(&self.config) && names_no_place(error)
+    }
+
+    /// Refuses a motion by one line that nothing can be compared with.
+    fn check_means(&self, means: Means) -> Result<(), ArmError> {
+        let one_line = matches!(means, Means::Drive(_) | Means::Ppoint);
+        if !one_line || self.wire.checks_echo(&self.config) {
+            return Ok(());
+        }
+        Err(ArmError::Setting {
+            what: "a motion by DRIVE or #PPOINT",
+            value: "used on a line without a checked echo".into(),
+            allowed: "move by POINT (`MoveWay::Point`), whose display is compared",
+        })
+    }
+
+    /// Returns `true` if the controller refuses `#PPOINT` in a line that moves nothing, twice.
+    fn refuses_ppoint(&mut self) -> Result<bool, ArmError> {
+        let line = "DO SET #PGTRY=#PPOINT(0,0,0,0,0,0)";
+        for _ in 0..2 {
+            match self.command(line) {
+                Ok(_) => return Ok(false),
+                Err(ArmError::Refused { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(true)
+    }
+
     /// Returns the doubt that a motion was commanded in, if any. Afterwards the monitor has its
     /// prompt again, or the arm has been told to stop.
     pub(super) fn doubt(&mut self, outcome: Result<(), Failed>) -> Result<Option<Doubt>, ArmError> {
         let error = match outcome {
             Ok(()) => return Ok(None),
-            Err(failed) if is_doubt(&failed.error) => failed.error,
+            Err(failed) if self.is_doubtful(&failed.error) => failed.error,
             Err(failed) => return Err(self.given_up(failed)),
         };
         let limit = self.config.motion_timeout;
@@ -216,8 +260,7 @@ impl<T: Transport> Val2Client<T> {
             }
             Means::Point => {
                 self.define_goal(&target)?;
-                let line = format!("DO MOVE #{}", self.config.point_name);
-                self.command_once(&line, patience).map(drop)
+                self.move_to_point("MOVE", &format!("#{}", self.config.point_name))
             }
             Means::Guarded(speed) => {
                 self.define_goal(&target)?;

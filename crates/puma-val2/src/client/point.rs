@@ -2,7 +2,7 @@
 
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
-use crate::client::wire::{Failed, is_doubt};
+use crate::client::wire::Failed;
 use crate::error::ArmError;
 use crate::joints::Joints;
 use crate::transport::Transport;
@@ -30,49 +30,101 @@ impl<T: Transport> Val2Client<T> {
         values: [f64; 6],
         fits: Fits<'_>,
     ) -> Result<(), Failed> {
-        let lines = [
-            format!("POINT {name}"),
-            values.map(|v| format!("{v:.3}")).join(","),
-        ];
         let mut tries = 0;
         loop {
-            match self.define_point_once(&lines, fits) {
-                Err(failed) if is_doubt(&failed.error) && tries < self.config.retries => {
+            let outcome = self
+                .define_point_once(name, values, fits)
+                .and_then(|shown| {
+                    // Where nothing is echoed the name itself may have been damaged: a name that shows
+                    // what it has shown before is right, a new one is shown again.
+                    let proven =
+                        self.wire.checks_echo(&self.config) || self.points.contains_key(name);
+                    if !proven {
+                        self.show_point(name, fits)?;
+                    }
+                    Ok(shown)
+                });
+            match outcome {
+                Err(failed) if self.is_doubtful(&failed.error) && tries < self.config.retries => {
                     tries += 1;
                     self.wire.settle(&self.config).map_err(not_done)?;
                 }
-                outcome => return outcome,
+                Ok(shown) => {
+                    self.points.insert(name.to_owned(), shown);
+                    return Ok(());
+                }
+                Err(failed) => {
+                    self.points.remove(name);
+                    return Err(failed);
+                }
             }
         }
     }
 
-    fn define_point_once(&mut self, lines: &[String; 2], fits: Fits<'_>) -> Result<(), Failed> {
-        let patience = self.config.patience();
-        for (typed, are_values) in lines.iter().zip([false, true]) {
-            let reply = self
+    fn define_point_once(
+        &mut self,
+        name: &str,
+        values: [f64; 6],
+        fits: Fits<'_>,
+    ) -> Result<[f64; 6], Failed> {
+        let before = self.points.get(name).copied();
+        let shown = self.ask_point(&format!("POINT {name}"))?;
+        let same = |shown: [(f64, f64); 6], before: [f64; 6]| {
+            let mut pairs = shown.iter().zip(before);
+            pairs.all(|((s, rounding), b)| (s - b).abs() < 0.000_6 + rounding)
+        };
+        if let (Some(before), Some(shown)) = (before, shown)
+            && !same(shown, before)
+        {
+            // Another point is open, or this one was changed by somebody else.
+            self.points.remove(name);
+            let error = self
                 .wire
-                .exchange(typed, patience, &self.config)
-                .map_err(|failed| not_done(failed.error))?;
-            self.without_message(typed, &reply)?;
-            if reply.ending != Ending::Question {
-                let error = self
-                    .wire
-                    .garbled(typed, "a question for changes", &reply.text);
-                return Err(not_done(error));
-            }
-            let shown = reply
-                .text
-                .split(['\r', '\n'])
-                .filter_map(shown_values)
-                .next_back();
-            if are_values && !shown.is_some_and(|shown| fits(&shown)) {
-                let error = self
-                    .wire
-                    .garbled(typed, "the same values displayed", &reply.text);
-                return Err(not_done(error));
-            }
+                .garbled("POINT", "the values of before displayed", "others");
+            return Err(not_done(error));
         }
-        self.command_once("", patience)
+        let typed = values.map(|v| format!("{v:.3}")).join(",");
+        let Some(shown) = self.ask_point(&typed)?.filter(|shown| fits(shown)) else {
+            let error = self
+                .wire
+                .garbled(&typed, "the same values displayed", "others");
+            return Err(not_done(error));
+        };
+        self.leave_point()?;
+        Ok(shown.map(|(value, _)| value))
+    }
+
+    /// Compares a point with the values that it must have.
+    fn show_point(&mut self, name: &str, fits: Fits<'_>) -> Result<(), Failed> {
+        let line = format!("POINT {name}");
+        if self.ask_point(&line)?.is_some_and(|shown| fits(&shown)) {
+            return self.leave_point();
+        }
+        let error = self
+            .wire
+            .garbled(&line, "the values just defined displayed", "others");
+        Err(not_done(error))
+    }
+
+    /// Types a line of the dialogue and returns the values displayed.
+    fn ask_point(&mut self, typed: &str) -> Result<Option<[(f64, f64); 6]>, Failed> {
+        let reply = self
+            .wire
+            .exchange(typed, self.config.patience(), &self.config)
+            .map_err(|failed| not_done(failed.error))?;
+        self.without_message(typed, &reply)?;
+        if reply.ending != Ending::Question {
+            let error = self
+                .wire
+                .garbled(typed, "a question for changes", &reply.text);
+            return Err(not_done(error));
+        }
+        let lines = reply.text.split(['\r', '\n']);
+        Ok(lines.filter_map(shown_values).next_back())
+    }
+
+    fn leave_point(&mut self) -> Result<(), Failed> {
+        self.command_once("", self.config.patience())
             .map(drop)
             .map_err(|failed| not_done(failed.error))
     }

@@ -2,6 +2,7 @@
 
 use crate::client::dialogue::{NUDGE, shortened};
 use crate::client::number::plain;
+use crate::client::point::not_done;
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
 use crate::client::wire::{Failed, Reply, is_doubt};
@@ -15,6 +16,9 @@ use crate::transport::Transport;
 const RUN: &str = "PGRUN";
 const ONCE: &str = "PGONCE";
 const HIT: &str = "PGHIT";
+
+/// Program that moves to a point where nothing is echoed.
+const GOAL: &str = "PGMOVE";
 
 /// Variable in which the called program notes that it ran. A signal that has come and gone leaves
 /// nothing else behind.
@@ -67,6 +71,27 @@ impl<T: Transport> Val2Client<T> {
             }
             _ => self.run(&format!("EXECUTE {RUN}")).map(drop),
         }
+    }
+
+    /// Moves to a point that has just been defined.
+    ///
+    /// Without an echo a damaged name could be that of a point that another damaged line has made.
+    /// A stored program holds the name then, and its listing has been compared.
+    pub(super) fn move_to_point(&mut self, word: &str, name: &str) -> Result<(), Failed> {
+        let motion = format!("{word} {name}");
+        if self.wire.checks_echo(&self.config) {
+            let line = format!("DO {motion}");
+            return self
+                .command_once(&line, self.config.motion_timeout)
+                .map(drop);
+        }
+        if self.goal_program.as_ref() != Some(&motion) {
+            self.goal_program = None;
+            self.store_program(GOAL, std::slice::from_ref(&motion))
+                .map_err(not_done)?;
+            self.goal_program = Some(motion);
+        }
+        self.run(&format!("EXECUTE {GOAL}")).map(drop)
     }
 
     /// Runs these steps under guard. Their goal must not depend on the arm's position.
@@ -126,7 +151,7 @@ impl<T: Transport> Val2Client<T> {
                 Err(error) if is_doubt(&error) || matches!(error, ArmError::Refused { .. }) => {
                     // Out of the editor in any case.
                     self.wire.settle(&self.config)?;
-                    if tries >= self.config.retries || !is_doubt(&error) {
+                    if tries >= self.config.retries || !self.is_doubtful(&error) {
                         return Err(error);
                     }
                     tries += 1;

@@ -75,7 +75,7 @@ impl<T: Transport> Val2Client<T> {
     /// [`ArmError::Setting`] on a line without echo, where nothing would check the angles on their
     /// way, and while a proximity guard is armed; otherwise what the line or the controller said.
     pub fn resident(&mut self) -> Result<Resident<'_, T>, ArmError> {
-        if !self.echoes() || !self.config.check_echo || self.guard.is_some() {
+        if !self.wire.checks_echo(&self.config) || self.guard.is_some() {
             return Err(ArmError::Setting {
                 what: "a resident program",
                 value: "started".into(),

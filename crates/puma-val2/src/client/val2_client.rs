@@ -1,5 +1,6 @@
 //! The client itself: its settings, its line and the calls that do not move the arm.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::client::config::ClientConfig;
@@ -32,6 +33,11 @@ pub struct Val2Client<T: Transport> {
     pub(super) wire: Wire<T>,
     pub(super) config: ClientConfig,
     pub(super) last_known: Option<Joints>,
+    /// Values that the controller has shown for points defined by this client, by name. A display
+    /// of other values betrays a damaged name.
+    pub(super) points: BTreeMap<String, [f64; 6]>,
+    /// Motion in the stored program that serves where nothing is echoed.
+    pub(super) goal_program: Option<String>,
     /// The controller has turned out not to know `#PPOINT`.
     pub(super) lacks_ppoint: bool,
     /// Signal that stops the next motions.

@@ -1,5 +1,7 @@
 //! The reply to `WHERE`.
 
+use std::f64::consts::PI;
+
 use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
 use crate::kinematics::xyzoat::Xyzoat;
@@ -65,10 +67,18 @@ impl Location {
 
     /// Returns `true` if the two halves belong together for an arm without tool and base shift,
     /// within 0.1 mm and 0.01 degrees: a check against characters that changed on the line.
+    ///
+    /// The hand does not show a turn of 360 degrees. Angles far out of range, or at 180 degrees,
+    /// where a sign makes a turn, are therefore never accepted at once.
     pub(crate) fn agrees(&self, arm: &PumaParams) -> bool {
+        let certain = self.joints.0.iter().zip(arm.ranges).all(|(angle, range)| {
+            let in_range = (range.min - 0.1..=range.max + 0.1).contains(angle);
+            in_range && (angle.abs() - PI).abs() > 1e-3
+        });
         let (by_joints, by_hand) = (arm.forward(&self.joints), self.hand.pose());
         let off = (by_joints.translation.vector - by_hand.translation.vector).norm();
-        off < 1e-4 && by_joints.rotation.angle_to(&by_hand.rotation) < 0.01_f64.to_radians()
+        let turned = by_joints.rotation.angle_to(&by_hand.rotation);
+        certain && off < 1e-4 && turned < 0.01_f64.to_radians()
     }
 }
 

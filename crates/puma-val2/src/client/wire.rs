@@ -143,9 +143,10 @@ impl<T: Transport> Wire<T> {
             // Left by a call that failed: what is typed now must not be added to it.
             self.spoil(config).map_err(Failed::before)?;
         }
+        let typed = padded(line);
         let mut tries = 0;
         loop {
-            match self.type_text(line, config) {
+            match self.type_text(&typed, config) {
                 Ok(()) => break,
                 Err(error) if is_doubt(&error) && tries < config.retries => {
                     tries += 1;
@@ -159,14 +160,52 @@ impl<T: Transport> Wire<T> {
             }
         }
         self.send(b"\r", line).map_err(Failed::after)?;
+        let mut reader = Self::reader(config);
+        if self.checks_echo(config) && !self.hears_line_end(&mut reader, line, config)? {
+            // The line may still be open at the other end. An empty line would complete whatever
+            // its damaged end has made of it.
+            self.spoil(config).map_err(Failed::after)?;
+            let wait = config.reply_timeout;
+            return Err(Failed::after(self.silence(
+                line,
+                "the echo of its end",
+                "",
+                wait,
+            )));
+        }
         self.half_typed = false;
         let reply = self
-            .read_reply(line, timeout, config)
+            .read_on(reader, line, timeout, config)
             .map_err(Failed::after)?;
         if reply.ending == Ending::Question && is_boot_question(&reply.text) {
             return Err(Failed::after(self.restart(&reply.text)));
         }
         Ok(reply)
+    }
+
+    /// Returns `true` if typed lines are compared with their echo.
+    pub(super) fn checks_echo(&self, config: &ClientConfig) -> bool {
+        self.echo == Some(true) && config.check_echo
+    }
+
+    /// Waits until the end of a line has come back, and keeps what comes with it in `reader`.
+    fn hears_line_end(
+        &mut self,
+        reader: &mut ReplyReader,
+        line: &str,
+        config: &ClientConfig,
+    ) -> Result<bool, Failed> {
+        let wait = config.reply_timeout;
+        for _ in 0..FILLERS {
+            let Some(bytes) = self.receive(wait, line).map_err(Failed::after)? else {
+                return Ok(false);
+            };
+            reader.push(&bytes);
+            if bytes.iter().any(|byte| matches!(byte, b'\r' | b'\n')) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Reads away unasked output and keeps its messages.
@@ -197,7 +236,7 @@ impl<T: Transport> Wire<T> {
     fn type_text(&mut self, text: &str, config: &ClientConfig) -> Result<(), ArmError> {
         self.half_typed = true;
         self.send(text.as_bytes(), text)?;
-        if self.echo != Some(true) || !config.check_echo {
+        if !self.checks_echo(config) {
             return Ok(());
         }
         let patience = config.patience().saturating_mul(1 + text.len() as u32 / 16);
@@ -237,7 +276,17 @@ impl<T: Transport> Wire<T> {
         timeout: Duration,
         config: &ClientConfig,
     ) -> Result<Reply, ArmError> {
-        let mut reader = Self::reader(config);
+        self.read_on(Self::reader(config), sent, timeout, config)
+    }
+
+    /// Continues a reply of which `reader` holds the beginning.
+    fn read_on(
+        &mut self,
+        mut reader: ReplyReader,
+        sent: &str,
+        timeout: Duration,
+        config: &ClientConfig,
+    ) -> Result<Reply, ArmError> {
         let until = self.line.clock().saturating_add(timeout);
         let at_the_latest =
             until.saturating_add(config.reply_timeout.max(config.quiet.saturating_mul(4)));
@@ -379,5 +428,16 @@ impl<T: Transport> Wire<T> {
             expected: expected.to_owned(),
             heard: heard.to_owned(),
         }
+    }
+}
+
+/// Returns a command with a blank at its end, so that a doubled or changed last character cannot
+/// make another name or number of its last word.
+fn padded(line: &str) -> String {
+    let command = line.starts_with(|c: char| c.is_ascii_alphabetic()) && line.contains(' ');
+    if command && line.ends_with(|c: char| c.is_ascii_alphanumeric()) {
+        format!("{line} ")
+    } else {
+        line.to_owned()
     }
 }

@@ -469,7 +469,7 @@ fn what_passes_is_written_down() {
     client.set_speed(30.0).unwrap();
     let written = String::from_utf8(client.into_line().into_transcript()).unwrap();
     assert!(
-        written.ends_with("< SPEED 30\n> SPEED 30\n< ^M\n> \n> ."),
+        written.ends_with("< SPEED 30 \n> SPEED 30 \n< ^M\n> \n> ."),
         "{written}"
     );
 }

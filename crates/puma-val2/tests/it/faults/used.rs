@@ -1,0 +1,120 @@
+//! Faults on the line of a client that has moved the arm before: the controller holds old goals.
+
+use puma_val2::{
+    ArmError, ClientConfig, Emulator, Joint, JointDelta, Joints, Manipulator, MoveWay, Profile,
+    PumaParams, Val2Client,
+};
+
+use crate::faults::harness::{STEP, Subject, Tally, client, config};
+use crate::faults::line::{Damage, FaultyLine, Way};
+
+fn silent() -> Profile {
+    Profile {
+        echo: false,
+        ..Profile::val2()
+    }
+}
+
+/// A move whose controller holds the goal of an earlier one, 60 degrees away.
+fn used(profile: Profile, way: MoveWay) -> Subject<'static> {
+    Subject {
+        name: "move_by after other moves",
+        prepare: &|client| {
+            client
+                .move_by(JointDelta::of(Joint::J1, -60_f64.to_radians()))
+                .unwrap();
+            let emulator = client.line_mut().inner.emulator_mut();
+            emulator.place_arm(Subject::READY);
+            client.joints().unwrap();
+        },
+        ..Subject::moving(profile, way)
+    }
+}
+
+#[test]
+fn a_flipped_bit_never_moves_the_arm_to_an_old_goal() {
+    let mut sum = Tally::default();
+    for (profile, way) in [
+        (Profile::val2(), MoveWay::Automatic),
+        (Profile::val2(), MoveWay::Point),
+        (Profile::val2_strict_miz(), MoveWay::Automatic),
+        (silent(), MoveWay::Automatic),
+    ] {
+        for bit in 0..8 {
+            let to = used(profile.clone(), way);
+            sum.add(&to.strike_everywhere(Way::ToController, &|_| Damage::Flipped(bit)));
+            let from = Subject {
+                stride: 17,
+                ..used(profile.clone(), way)
+            };
+            sum.add(&from.strike_everywhere(Way::FromController, &|_| Damage::Flipped(bit)));
+        }
+        for damage in [Damage::Lost, Damage::Doubled] {
+            let to = used(profile.clone(), way);
+            sum.add(&to.strike_everywhere(Way::ToController, &|_| damage));
+        }
+    }
+    sum.show("used client, single characters");
+    assert!(sum.recovered * 10 > sum.injected * 9, "{sum:?}");
+}
+
+#[test]
+fn a_flipped_bit_never_guides_a_guarded_move_to_an_old_goal() {
+    let mut sum = Tally::default();
+    for bit in 0..8 {
+        let guarded = Subject {
+            act: &|client, strike| {
+                client.arm_proximity(1001).unwrap();
+                strike(client.line_mut());
+                let outcome = client.move_by(STEP);
+                client.disarm_proximity().unwrap();
+                outcome
+            },
+            ..used(Profile::val2(), MoveWay::Automatic)
+        };
+        sum.add(&guarded.strike_everywhere(Way::ToController, &|_| Damage::Flipped(bit)));
+    }
+    sum.show("used client under guard, single characters");
+    assert!(sum.recovered * 10 > sum.injected * 9, "{sum:?}");
+}
+
+#[test]
+fn a_refusal_by_noise_does_not_switch_ppoint_off() {
+    let mut client = client(Profile::val2(), MoveWay::Automatic);
+    let line = "DO MOVE #PPOINT(";
+    client
+        .line_mut()
+        .strike(Way::ToController, line.len() - 2, Damage::Flipped(0));
+    client.line_mut().struck = false;
+    client.move_by(STEP).unwrap();
+    assert!(client.line().struck);
+    let before = client.line().inner.traffic().0;
+    client.move_by(STEP).unwrap();
+    let typed = client.line().inner.traffic().0 - before;
+    assert!(typed < 60, "{typed} characters: a move by POINT");
+}
+
+#[test]
+fn without_an_echo_motions_by_one_line_are_refused_unsent() {
+    for way in [MoveWay::Drive, MoveWay::Ppoint] {
+        let line = FaultyLine::new(Emulator::new(PumaParams::unimation(), silent()));
+        let mut client = Val2Client::connect(line, config(way)).unwrap();
+        client.calibrate().unwrap();
+        let refused = client.move_by(STEP).unwrap_err();
+        assert!(refused.to_string().contains("POINT"), "{refused}");
+        assert!(matches!(refused, ArmError::Setting { .. }));
+        assert_eq!(client.line().inner.emulator().joints(), Joints::READY);
+    }
+    let config = ClientConfig {
+        check_echo: false,
+        ..config(MoveWay::Automatic)
+    };
+    let line = FaultyLine::new(Emulator::new(PumaParams::unimation(), Profile::val2()));
+    let mut client = Val2Client::connect(line, config).unwrap();
+    client.calibrate().unwrap();
+    client.move_by(STEP).unwrap();
+    assert!(matches!(
+        client.drive(Joint::J1, 0.1, 100.0),
+        Err(ArmError::Setting { .. })
+    ));
+}
