@@ -180,8 +180,8 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Returns `true` for an error that may be the line's fault. Where nothing is echoed a refusal of
-    /// the words may be, too.
+    /// Returns `true` for an error that may be the line's fault. Where nothing is echoed, a refusal
+    /// of the words may be, too.
     pub(super) fn is_doubtful(&self, error: &ArmError) -> bool {
         is_doubt(error) || !self.wire.checks_echo(&self.config) && names_no_place(error)
     }

@@ -32,18 +32,15 @@ impl<T: Transport> Val2Client<T> {
     ) -> Result<(), Failed> {
         let mut tries = 0;
         loop {
-            let outcome = self
-                .define_point_once(name, values, fits)
-                .and_then(|shown| {
-                    // Where nothing is echoed the name itself may have been damaged: a name that shows
-                    // what it has shown before is right, a new one is shown again.
-                    let proven =
-                        self.wire.checks_echo(&self.config) || self.points.contains_key(name);
-                    if !proven {
-                        self.show_point(name, fits)?;
-                    }
-                    Ok(shown)
-                });
+            let mut outcome = self.define_point_once(name, values, fits);
+            // Where nothing is echoed the name itself may have been damaged. A name that has shown
+            // its values of before is right; a new one is shown again.
+            let proven = self.wire.checks_echo(&self.config) || self.points.contains_key(name);
+            if let Ok(shown) = outcome
+                && !proven
+            {
+                outcome = self.show_point(name, fits).map(|()| shown);
+            }
             match outcome {
                 Err(failed) if self.is_doubtful(&failed.error) && tries < self.config.retries => {
                     tries += 1;
