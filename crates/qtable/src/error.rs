@@ -85,7 +85,8 @@ pub enum Error {
     /// A reward that is NaN or infinite. Typical cause: a division by a distance that became zero.
     #[error(
         "the reward of action {} in state {} is {reward}: it must be finite",
-        action.0, state.0
+        action.0,
+        state.0
     )]
     RewardNotFinite {
         /// The state the action was taken in.
@@ -98,7 +99,8 @@ pub enum Error {
     /// A value that is NaN or infinite, or that a cached table cannot hold as `f32`.
     #[error(
         "the value of action {} in state {} would be {value}: it must be finite",
-        action.0, state.0
+        action.0,
+        state.0
     )]
     ValueNotFinite {
         /// The state.

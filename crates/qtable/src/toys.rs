@@ -3,7 +3,8 @@
 //! [Gymnasium](https://gymnasium.farama.org/environments/toy_text/), and a chain whose optimum has
 //! a closed form.
 //!
-//! Each is a [`ModelEnvironment`], so that a learned table can be compared with the optimum:
+//! Each is a [`ModelEnvironment`](crate::ModelEnvironment), so that a learned table can be compared
+//! with the optimum:
 //!
 //! ```
 //! use qtable::toys;

@@ -15,9 +15,8 @@ use crate::table::QTable;
 use crate::validated::validated;
 
 validated! {
-    /// n-step Q-learning:
-    /// `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n max over b of Q(sn,b) -
-    /// Q(s0,a0))`.
+    /// n-step Q-learning: `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n max over b of
+    /// Q(sn,b) - Q(s0,a0))`.
     ///
     /// A return is closed early when the episode ends, and, after Watkins (1989), before an
     /// exploratory action: what comes after it is not what the greedy policy would have met.

@@ -8,7 +8,7 @@ use crate::step::{Action, State, Step};
 /// A problem with finitely many states and actions.
 ///
 /// An episode starts with [`reset`](Environment::reset) and goes on with
-/// [`step`](Environment::step) until the status is other than [`Status::Continuing`]; then only
+/// [`step`](Environment::step) until the status is other than `Continuing`; then only
 /// `reset` may follow. All randomness comes from the generator handed in, so that the same seed
 /// gives the same episode.
 ///

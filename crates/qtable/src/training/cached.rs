@@ -29,8 +29,9 @@ const DRIFT: f64 = 30.0;
 /// While T stands still the distribution is that of [`Boltzmann`] to single precision and 24 random
 /// bits: no probability is off by more than `1e-6 + 1e-8` for each action of the row, and an action
 /// of a probability below 6e-8 may never be drawn. A change of the temperature rebuilds all
-/// weights: use [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions
-/// [`Boltzmann`] itself is faster.
+/// weights, so it is made in blocks of many actions:
+/// [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions [`Boltzmann`]
+/// itself is faster.
 #[derive(Clone, Debug)]
 pub struct CachedBoltzmann {
     actions: usize,
@@ -50,8 +51,7 @@ struct Shape {
     block_shift: u32,
 }
 
-/// Data of a state. Here and below the alignment is that of a cache line, so that no vector lies
-/// across two of them.
+/// Data of a state, aligned so that no vector lies across two cache lines.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 struct Head {

@@ -22,10 +22,7 @@ proptest! {
             }
         }
         if masked {
-            let offered = |state: State, action: Action| {
-                (state.0 + action.0) % 2 == 0 || action.0 == 1
-            };
-            let mask = ActionMask::new(4, 3, offered);
+            let mask = ActionMask::new(4, 3, |s, a| (s.0 + a.0) % 2 == 0 || a.0 == 1);
             table.set_mask(Some(mask.unwrap())).unwrap();
         }
         // What a mask forbids keeps its value.

@@ -213,7 +213,7 @@ fn answer(observation: usize, reward: f64, status: Status) -> Step {
 }
 
 #[test]
-fn learners_bootstrap_through_truncation_not_termination() {
+fn learners_bootstrap_through_truncation_only() {
     for (status, wanted) in [
         (Status::Terminated, 1.0),
         (Status::Truncated, 1.0 + 0.5 * 8.0),

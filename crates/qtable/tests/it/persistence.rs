@@ -206,7 +206,7 @@ fn what_is_wide_in_memory_and_short_on_disk_comes_back() {
 }
 
 #[test]
-fn a_text_that_is_not_there_is_not_allocated() {
+fn a_claimed_text_that_is_not_there_is_refused() {
     for claimed in [1u64 << 25, 1 << 32, 1 << 44, u64::MAX] {
         let payload = [&[253u8][..], &claimed.to_le_bytes()].concat();
         match decode::<String>("k", &sealed(2, "k", "", &payload)) {

@@ -77,12 +77,12 @@ proptest! {
                 let (state, action) = (State(state), Action(action));
                 let allowed = table.allows(state, action);
                 prop_assert_eq!(table.set(state, action, f64::from(value)).is_ok(), allowed);
-                let value = |action| table.value(state, action);
-                let better = |best: Option<Action>, action| match best {
-                    Some(best) if value(best) >= value(action) => Some(best),
+                let q = |action| table.value(state, action);
+                let offered = table.offered(state);
+                let best = offered.fold(None, |best: Option<Action>, action| match best {
+                    Some(best) if q(best) >= q(action) => Some(best),
                     _ => Some(action),
-                };
-                let best = table.offered(state).fold(None, better);
+                });
                 prop_assert_eq!(Some(table.best(state)), best);
             }
         }
@@ -125,11 +125,11 @@ proptest! {
             prop_assert!(value < high || bin == goal || value.is_infinite());
         }
         for (bin, &edge) in edges.iter().enumerate() {
-            let expected = if bin == goal { goal } else { bin + 1 };
-            prop_assert_eq!(intervals.index(edge).unwrap(), expected);
+            let wanted = if bin == goal { goal } else { bin + 1 };
+            prop_assert_eq!(intervals.index(edge).unwrap(), wanted);
         }
-        let middle = Intervals::new(&[0.0]).unwrap();
-        let product = Product::new(vec![intervals.clone(), middle, intervals]).unwrap();
+        let halves = Intervals::new(&[0.0]).unwrap();
+        let product = Product::new(vec![intervals.clone(), halves, intervals]).unwrap();
         for state in (0..product.states()).map(State) {
             let bins = product.bins(state);
             prop_assert_eq!(product.state(&bins).unwrap(), state);

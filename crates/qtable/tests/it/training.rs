@@ -165,7 +165,7 @@ impl Policy for Wild {
 }
 
 #[test]
-fn an_action_outside_the_table_never_reaches_the_environment() {
+fn a_choice_outside_the_table_is_refused() {
     let mut chain = toys::chain(4).unwrap();
     let learner = QLearning::new(constant(0.5), 0.9).unwrap();
     let mut training = Training::new(&chain, QTable::new(4, 2).unwrap(), learner, Wild).unwrap();
