@@ -12,7 +12,7 @@ use crate::limits::JointLimits;
 use crate::limits::check_steps;
 use crate::sight::camera_model::CameraModel;
 
-/// Settings of a [`Hybrid`].
+/// Settings of a [`Hybrid`](crate::Hybrid).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct HybridSettings {
@@ -21,7 +21,8 @@ pub struct HybridSettings {
     /// Expected errors of the nominal model.
     pub prior: Prior,
     /// Fraction of the prior uncertainty added back when a saved belief is loaded, 0..=1 (default
-    /// 0.2). Larger values re-learn a knocked camera sooner; see [`Hybrid::with_belief`].
+    /// 0.2). Larger values re-learn a knocked camera sooner; see
+    /// [`Hybrid::with_belief`](crate::Hybrid::with_belief).
     pub drift: f64,
     /// Features of the ball at the goal (default (103.5, 78, 33)).
     pub goal: Features,
