@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         } = found.curve;
         writeln!(
             out,
-            "center ({x:.1}, {y:.1}), half-axes {major:.1} and {minor:.1}, turned by {:.1} degrees; \
-             {:.0} % of its pixels are edges",
+            "center ({x:.1}, {y:.1}), half-axes {major:.1} and {minor:.1}, turned by {:.1} \
+             degrees; {:.0} % of its pixels are edges",
             angle.to_degrees(),
             100.0 * found.beta
         )?;

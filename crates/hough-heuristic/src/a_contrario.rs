@@ -25,7 +25,6 @@ use image::GrayImage;
 pub use config::AContrarioConfig;
 pub use measurement::{Effort, Measurement};
 
-use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::error::ConfigError;
@@ -34,7 +33,8 @@ use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
 use measure::Measured;
-use polar::{Polar, Ring};
+use measurement::{circle_of, is_same};
+use polar::Polar;
 use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
 use search::{Outline, Search};
@@ -48,21 +48,21 @@ use search::{Outline, Search};
 /// Morel, 2000; for circles Akinlar and Topal, 2013). Small is good.
 ///
 /// **Search.** The paper's idea stays: draw edge points, solve for the circle, check the image
-/// itself, keep no accumulator. The draws are *pairs* of points on one row or column whose gradients
-/// mirror one another, on the frame halved several times, smallest size first. An edge that no
-/// circle explains is followed for a few pixels, and the circle of that *arc* is tried too. A circle
-/// whose outline runs along edges is fitted and becomes a candidate.
+/// itself, keep no accumulator. The draws are *pairs* of points on one row or column whose
+/// gradients mirror one another, on the frame halved several times, smallest size first. An edge
+/// that no circle explains is followed for a few pixels, and the circle of that *arc* is tried too.
+/// A circle whose outline runs along edges is fitted and becomes a candidate.
 ///
 /// **Proof.** A candidate is examined at the size where its radius is 12 to 24 px (smaller ones at
 /// the full size; in noise from 4.5 px on), at twice that size if there is one (in noise also at
 /// four times) and, in doubt, at half of it; the best result counts. On each of 64 rays across the
-/// outline, the strongest edge along it is sought within a third of the radius (3 to 8 px) on either
-/// side. Under the model of chance that edge lies anywhere in the window, so it lies within the
-/// tolerance (a quarter or half a pixel, in noise up to 1.2 px) with a known probability, however
-/// textured the picture. The NFA is the number of distinguishable circles in the frame times
-/// Hoeffding's bound on the probability of so many edges on the outline. Samples that overlap count
-/// in part, a ray without any edge counts a quarter, and a circle of which more than a tenth lies
-/// outside the frame has a thousandfold NFA.
+/// outline, the strongest edge along it is sought within a third of the radius (3 to 8 px) on
+/// either side. Under the model of chance that edge lies anywhere in the window, so it lies within
+/// the tolerance (a quarter or half a pixel, in noise up to 1.2 px) with a known probability,
+/// however textured the picture. The NFA is the number of distinguishable circles in the frame
+/// times Hoeffding's bound on the probability of so many edges on the outline. Samples that overlap
+/// count in part, a ray without any edge counts a quarter, and a circle of which more than a tenth
+/// lies outside the frame has a thousandfold NFA.
 ///
 /// **Score.** `c / (c + 1)`, where `c` is minus the decimal logarithm of the NFA, or 0 if that is
 /// negative. 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in
@@ -71,9 +71,9 @@ use search::{Outline, Search};
 /// wheels, holes, fingertips and letters are round and score high. Lamps do not: an edge with an
 /// overexposed bright side does not count if the light falls off around it.
 ///
-/// **Measurement.** The circle is followed down to the full size (in strong noise to half of it) and
-/// fitted there, weighted by the slope. The inward bias that blur gives a ball that darkens towards
-/// its limb is removed.
+/// **Measurement.** The circle is followed down to the full size (in strong noise to half of it)
+/// and fitted there, weighted by the slope. The inward bias that blur gives a ball that darkens
+/// towards its limb is removed.
 ///
 /// ```
 /// use hough_heuristic::image::{GrayImage, Luma};
@@ -366,7 +366,8 @@ impl CircleDetector for AContrario {
     }
 }
 
-/// Returns the circles of a single frame with radii of `min_radius..=max_radius` pixels, best first.
+/// Returns the circles of a single frame with radii of `min_radius..=max_radius` pixels, best
+/// first.
 ///
 /// Runs [`AContrario`] with its default settings, which report up to 32 circles. For a stream of
 /// frames build a detector once.
@@ -411,21 +412,6 @@ const ROUNDING: f32 = 0.3;
 const RADII: usize = 12;
 /// Noise above which the larger circles are measured at half the size of the frame, gray levels.
 const NOISY: f32 = 15.0;
-
-/// Returns `true` if two circles belong to one thing.
-fn is_same(a: &Circle, b: &Circle) -> bool {
-    let off = ((a.x - b.x).powi(2) + (a.y - b.y).powi(2)).sqrt();
-    let (small, large) = (a.radius.min(b.radius), a.radius.max(b.radius));
-    off < 0.5 * small && large - small < 0.4 * large
-}
-
-fn circle_of(ring: &Ring) -> Circle {
-    Circle {
-        x: ring.x.into(),
-        y: ring.y.into(),
-        radius: ring.r.into(),
-    }
-}
 
 /// Runs both, each on a thread of its own if `apart` and the feature `parallel` are set.
 fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {

@@ -28,27 +28,27 @@
 //!
 //! # Detectors
 //!
-//! * [`AContrario`]: for photographs. It finds an unknown number of circles, each with its number of
-//!   false alarms and standard errors, in a bounded number of draws. It goes beyond the paper.
+//! * [`AContrario`]: for photographs. It finds an unknown number of circles, each with its number
+//!   of false alarms and standard errors, in a bounded number of draws. It goes beyond the paper.
 //!   [`detect_circles`] calls it for a single frame.
 //! * [`Heuristic`]: the detector of the paper that this project follows (section 2.1), a random
 //!   search whose only memory is the edges.
 //! * [`RandomizedHough`] and [`StandardHough`]: the two transforms that the paper compares it with.
 //!   All three accept circles by one rule ([`Acceptance`]), so that only the search differs.
-//! * [`CurveSearch`]: the paper's algorithm for any [`Curve`] given by n pixels, such as [`Line`] and
-//!   [`Ellipse`].
+//! * [`CurveSearch`]: the paper's algorithm for any [`Curve`] given by n pixels, such as [`Line`]
+//!   and [`Ellipse`].
 //!
 //! # Edges
 //!
-//! [`Canny`] is the crate's own operator: fused integer passes, sub-pixel positions, thresholds that
-//! rise with the frame's noise. `ImageprocCanny` (feature `imageproc`) wraps that of the crate
+//! [`Canny`] is the crate's own operator: fused integer passes, sub-pixel positions, thresholds
+//! that rise with the frame's noise. `ImageprocCanny` (feature `imageproc`) wraps that of the crate
 //! `imageproc`. [`EdgeMap::from_image`] takes the edges of any other.
 //!
 //! # Frames
 //!
 //! A [`FrameSource`] delivers frames: `ImageFiles` (feature `files`, on by default) from files and
-//! folders, [`FrameStream`] from any reader, so also from a camera through a pipe. A frame in memory
-//! whose rows are padded becomes a [`GrayImage`](image::GrayImage) by
+//! folders, [`FrameStream`] from any reader, so also from a camera through a pipe. A frame in
+//! memory whose rows are padded becomes a [`GrayImage`](image::GrayImage) by
 //! [`FlatSamples`](image::FlatSamples).
 //!
 //! # Conventions
@@ -64,10 +64,10 @@
 //! # Limitations
 //!
 //! [`AContrario`] finds everything round: lamps, wheels and letters too. The other detectors go by
-//! the belonging β, the share of the circle's pixels that are edges, whatever the direction of those
-//! edges. Where edges cover more than a tenth of the picture, as in grass or gravel, chance lifts β
-//! above any useful θ. A sphere far off the optical axis projects to an ellipse, which a larger
-//! `tolerance` accepts up to a point.
+//! the belonging β, the share of the circle's pixels that are edges, whatever the direction of
+//! those edges. Where edges cover more than a tenth of the picture, as in grass or gravel, chance
+//! lifts β above any useful θ. A sphere far off the optical axis projects to an ellipse, which a
+//! larger `tolerance` accepts up to a point.
 
 mod a_contrario;
 mod acceptance;

@@ -1,5 +1,6 @@
 //! The results of the detector beside its detections.
 
+use super::polar::Ring;
 use crate::circle::Circle;
 
 /// A circle found by [`AContrario`](crate::AContrario), with its standard errors.
@@ -34,4 +35,19 @@ pub struct Effort {
     pub looks: u64,
     /// `true` if the budget ended the search, so that there may be more circles.
     pub ended_by_budget: bool,
+}
+
+/// Returns `true` if two circles belong to one thing.
+pub(super) fn is_same(a: &Circle, b: &Circle) -> bool {
+    let off = ((a.x - b.x).powi(2) + (a.y - b.y).powi(2)).sqrt();
+    let (small, large) = (a.radius.min(b.radius), a.radius.max(b.radius));
+    off < 0.5 * small && large - small < 0.4 * large
+}
+
+pub(super) fn circle_of(ring: &Ring) -> Circle {
+    Circle {
+        x: ring.x.into(),
+        y: ring.y.into(),
+        radius: ring.r.into(),
+    }
 }

@@ -4,6 +4,7 @@
 use image::{GrayImage, Luma};
 use proptest::prelude::*;
 
+use super::polar::Ring;
 use super::*;
 
 /// A ball of some radius in noise, with bars across.

@@ -3,8 +3,8 @@
 use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{
     AContrario, AContrarioConfig, Acceptance, Canny, CannyConfig, Circle, CircleDetector,
-    Heuristic, HeuristicConfig, ImageprocCanny, RandomizedHough, RandomizedHoughConfig, Region,
-    Sampling, StandardHough, StandardHoughConfig,
+    Heuristic, HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Region, Sampling,
+    StandardHough, StandardHoughConfig,
 };
 
 use circle_scenes::scene::{Scene, same};
@@ -303,10 +303,11 @@ fn what_lies_in_the_buffers_does_not_matter() {
     }
 }
 
+#[cfg(feature = "imageproc")]
 #[test]
 fn any_edge_detector_will_do() {
     let (frame, balls) = SCENE.render();
-    let edges = ImageprocCanny::new(30.0, 70.0).unwrap();
+    let edges = hough_heuristic::ImageprocCanny::new(30.0, 70.0).unwrap();
     let found = Heuristic::new(heuristic(ACCEPT, Sampling::Near), edges)
         .unwrap()
         .detect(&frame)
