@@ -145,7 +145,10 @@ impl FromStr for BallDetector {
 
 /// Error for a name that no detector has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no detector {0:?}; there are {names}", names = BallDetector::ALL.map(BallDetector::name).join(", "))]
+#[error(
+    "there is no detector {0:?}; there are {names}",
+    names = BallDetector::ALL.map(BallDetector::name).join(", ")
+)]
 pub struct UnknownDetector(String);
 
 /// Returns a scene of a bright ball over a dark wooden table with boxes and tape on it.

@@ -190,7 +190,8 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         }
         if unshown > 0 {
             say!(
-                "{level}: in {unshown} of {} cells the ball between the jaws is out of the camera's \
+                "{level}: in {unshown} of {} cells the ball between the jaws is out of the \
+                 camera's \
                  view; the goal there is the untaught one",
                 options.draws
             );

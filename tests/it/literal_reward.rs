@@ -74,14 +74,16 @@ fn equation_5_cycles_and_mended_it_centres() {
     let literal = Reward::centering_literal();
     let (arrives, most) = best_centering(&literal);
     println!(
-        "Eq. 5: the best policy arrives from {:.0} % of the columns, a column is worth up to {most:.0} (arriving: 100)",
+        "Eq. 5: the best policy arrives from {:.0} % of the columns, a column is worth up to \
+         {most:.0} (arriving: 100)",
         100.0 * arrives
     );
     assert!(arrives < 0.005 && most > 100.0, "{arrives} {most}");
 
     let (arrives, most) = best_centering(&literal.mended());
     println!(
-        "Eq. 5, mended: it arrives from {:.0} %, a column is worth up to {most:.0} (arriving: 1000)",
+        "Eq. 5, mended: it arrives from {:.0} %, a column is worth up to {most:.0} (arriving: \
+         1000)",
         100.0 * arrives
     );
     assert!(arrives > 0.999 && most < 1000.001, "{arrives} {most}");
@@ -168,8 +170,10 @@ fn equation_6_divides_by_zero_and_mended_it_approaches() {
     let (cycling, worth, none) = best(&floored);
     let (arriving, kept, _) = best(&literal.mended());
     println!(
-        "Eq. 6: of 400000 moves between whole pixels {infinite} pay infinitely much; floored, the best policy arrives from {:.0} % and \
-         is worth {worth:.0} (arriving: 100); mended, it arrives from {:.0} % and is worth {kept:.0}",
+        "Eq. 6: of 400000 moves between whole pixels {infinite} pay infinitely much; floored, the \
+         best policy arrives from {:.0} % and \
+         is worth {worth:.0} (arriving: 100); mended, it arrives from {:.0} % and is worth \
+         {kept:.0}",
         100.0 * cycling,
         100.0 * arriving
     );

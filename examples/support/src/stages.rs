@@ -58,7 +58,8 @@ impl fmt::Display for Stages {
         write!(
             f,
             "per move, ms of CPU: edges and circle {:.2}, decision {:.3}, serial line {:.2}; \
-             waiting for the arm {:.2} ms; rendering {:.2} ms of CPU, which a camera would not need \
+             waiting for the arm {:.2} ms; rendering {:.2} ms of CPU, which a camera would not \
+             need \
              ({} moves)",
             each(spent.detect),
             each(spent.decide),

@@ -179,9 +179,9 @@ impl TrialCell {
     }
 
     /// Shows the goal on the arm: the ball is put between the open jaws, the grip's turn of `JT5`
-    /// is taken back, and the camera looks a few times. If the ball is not well in view, shorter and
-    /// longer turns are tried, then turns of `JT4` before them. `None` if no turn brings the ball
-    /// into view.
+    /// is taken back, and the camera looks a few times. If the ball is not well in view, shorter
+    /// and longer turns are tried, then turns of `JT4` before them. `None` if no turn brings the
+    /// ball into view.
     ///
     /// Both are turns of the wrist, which move jaws and camera alike wherever the arm stands.
     ///
