@@ -242,7 +242,7 @@ impl Failures {
 /// A controller in the comparison.
 enum Rival {
     Servo(Law, f64),
-    Learned(Learned),
+    Learned(Box<Learned>),
     Untaught,
     /// The hybrid, which learns each cell first.
     Hybrid,
@@ -282,7 +282,7 @@ fn rivals(options: &Options) -> Result<Vec<(&'static str, Rival)>, Box<dyn Error
     ];
     let servos = servos.map(|(name, law, gain)| (name, Rival::Servo(law, gain)));
     let learned = learned(options)?.into_iter();
-    let learned = learned.map(|(name, learned)| (name, Rival::Learned(learned)));
+    let learned = learned.map(|(name, learned)| (name, Rival::Learned(Box::new(learned))));
     let hybrids = [
         ("hybrid, untaught", Rival::Untaught),
         ("hybrid", Rival::Hybrid),

@@ -5,6 +5,7 @@ mod budget;
 mod candidate;
 mod config;
 mod directions;
+mod ellipse;
 mod fit;
 mod halve;
 mod level;
@@ -14,8 +15,11 @@ mod partners;
 mod polar;
 mod proof;
 mod prover;
+mod refute;
+mod report;
 mod search;
 mod strongest;
+mod thin;
 mod track;
 #[cfg(test)]
 mod twins;
@@ -28,16 +32,15 @@ pub use measurement::{Effort, Measurement};
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::error::ConfigError;
-use budget::{Budget, MEASURING, Stage};
+use budget::{Budget, Stage};
 use candidate::Collected;
 use directions::UnitCircle;
 use level::Level;
-use measure::Measured;
-use measurement::{circle_of, is_same};
-use polar::Polar;
+use polar::{Polar, Ring};
 use proof::{Proof, log10};
 use prover::{Prover, Pyramid, Size};
 use search::{Outline, Search};
+use thin::Thinning;
 
 /// An *a contrario* detector: finds an unknown number of circles, each with the number of false
 /// alarms that bounds its chance origin, and with the standard errors of its measurement.
@@ -55,21 +58,31 @@ use search::{Outline, Search};
 ///
 /// **Proof.** A candidate is examined at the size where its radius is 12 to 24 px (smaller ones at
 /// the full size; in noise from 4.5 px on), at twice that size if there is one (in noise also at
-/// four times) and, in doubt, at half of it; the best result counts. On each of 64 rays across the
-/// outline, the strongest edge along it is sought within a third of the radius (3 to 8 px) on
-/// either side. Under the model of chance that edge lies anywhere in the window, so it lies within
-/// the tolerance (a quarter or half a pixel, in noise up to 1.2 px) with a known probability,
-/// however textured the picture. The NFA is the number of distinguishable circles in the frame
-/// times Hoeffding's bound on the probability of so many edges on the outline. Samples that overlap
-/// count in part, a ray without any edge counts a quarter, and a circle of which more than a tenth
-/// lies outside the frame has a thousandfold NFA.
+/// four times) and, in doubt, at half of it and in a narrow window; the best result counts. On each
+/// of 64 rays across the outline, the strongest edge along it is sought within a third of the
+/// radius (3 to 8 px) on either side. Under the model of chance that edge lies anywhere in the
+/// window, so it lies within the tolerance (a quarter or half a pixel, in noise and on soft edges
+/// up to 1.2 px) with a known probability, however textured the picture. The NFA is the number of
+/// distinguishable circles in the frame times Hoeffding's bound on the probability of so many edges
+/// on the outline. Samples that overlap count in part, a ray without any edge counts a quarter, and
+/// a circle of which more than a tenth lies outside the frame has a thousandfold NFA.
 ///
 /// **Score.** `c / (c + 1)`, where `c` is minus the decimal logarithm of the NFA, or 0 if that is
 /// negative. 0.5 stands for at most one false alarm in 10 frames of pure chance, 0.67 for one in
-/// 100, 0.8 for one in 10,000. The bound is loose: 3 of 500 rendered frames without a circle, half
-/// of them noisy, gave one with a score of 0.5 or more. Real frames contain more than chance:
+/// 100, 0.8 for one in 10,000. The bound is loose. Real frames contain more than chance:
 /// wheels, holes, fingertips and letters are round and score high. Lamps do not: an edge with an
-/// overexposed bright side does not count if the light falls off around it.
+/// overexposed inner side does not count if the light falls off around it.
+///
+/// **Evidence against.** Parts of other things are round as well. A ray without the outline refutes
+/// the circle if both sides of it have the level of the thing or both that of the ground, or if the
+/// outline goes on off the circle there. A thing in front excuses a gap: at its borders the levels
+/// change along the outline. Each per cent of refuted rays takes three per cent of `c`. A circle is
+/// dropped if an ellipse or a polygon explains the edges better, if most of the gap has no edge at
+/// all, or if the frame cuts the circle and little of the rest is seen.
+///
+/// **Several circles.** Circles may lie inside one another and across one another. Each must be
+/// proven by edges that no surer circle explains, and its outline must differ from any other by 3
+/// px and 4 % of the radius.
 ///
 /// **Measurement.** The circle is followed down to the full size (in strong noise to half of it)
 /// and fitted there, weighted by the slope. The inward bias that blur gives a ball that darkens
@@ -105,6 +118,8 @@ pub struct AContrario {
     proofs: Vec<Proof>,
     measurements: Vec<Measurement>,
     found: Vec<Detection>,
+    /// The outlines that were measured.
+    reported: Vec<Ring>,
     budget: Budget,
     /// The part of the frame that [`AContrario::track`] searches.
     window: GrayImage,
@@ -129,6 +144,7 @@ impl AContrario {
             proofs: Vec::new(),
             measurements: Vec::new(),
             found: Vec::new(),
+            reported: Vec::new(),
             budget: Budget::default(),
             window: GrayImage::default(),
             config,
@@ -145,7 +161,9 @@ impl AContrario {
         Effort {
             draws: self.budget.draws,
             looks: self.budget.looks,
+            proven: self.budget.proven,
             ended_by_budget: self.budget.spent,
+            ended_by_count: self.budget.left_out,
         }
     }
 
@@ -154,6 +172,7 @@ impl AContrario {
     fn find(&mut self, frame: &GrayImage, radii: (f64, f64)) {
         self.proofs.clear();
         self.measurements.clear();
+        self.reported.clear();
         self.collected.clear(CANDIDATES);
         self.budget = Budget::default();
         if frame.width() < LEAST_SIDE || frame.height() < LEAST_SIDE {
@@ -218,21 +237,22 @@ impl AContrario {
         let smallest = pyramid.depth();
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
         let contrast = self.config.contrast as f32;
-        let edges_of = |depth: usize, Edges { maxima, level }: &mut Edges| {
+        let edges_of = |depth: usize, edges: &mut Edges| {
+            let Edges {
+                maxima,
+                thinning,
+                level,
+            } = edges;
             let gray = pyramid.gray(depth);
-            let pixels = gray.width * gray.height;
             let noise = noise / (1 << depth) as f32 + ROUNDING;
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
-            let points = maxima.find(
-                gray.pixels,
-                gray.width,
-                threshold,
-                pixels / PIXELS_PER_POINT,
-            );
+            let points = maxima.find(gray.pixels, gray.width, threshold, usize::MAX);
+            let points = thinning.strongest(points, (gray.width, gray.height));
             level.fill(gray.width, gray.height, points);
         };
         let mut search = |depth: usize, level: &mut Level| {
             let scale = (1 << depth) as f32;
+            self.budget.begin_size(depth == finest);
             for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
                 let ring = proof.in_frame().shrunk(scale);
                 self.outline
@@ -284,65 +304,8 @@ impl AContrario {
             if self.budget.is_late() || self.budget.is_over(Stage::Proofs) {
                 break;
             }
-            prover.prove(candidate, &mut self.budget.looks);
-        }
-    }
-
-    /// Measures the best of the proven circles, each place once.
-    fn report(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
-        let pyramid = Pyramid {
-            frame,
-            sizes: &self.sizes[..self.depth],
-        };
-        self.proofs
-            .sort_unstable_by(|a, b| b.certainty.total_cmp(&a.certainty));
-        for proof in &self.proofs {
-            let score = proof.score();
-            if score < self.config.min_score || self.measurements.len() == self.config.max_circles {
-                break;
-            }
-            let rough = circle_of(&proof.in_frame());
-            if self
-                .measurements
-                .iter()
-                .any(|other| is_same(&rough, &other.circle))
-            {
-                continue;
-            }
-            if self.budget.is_over(Stage::Measurements) {
-                break;
-            }
-            self.budget.looks += MEASURING;
-            let measured = widest(Measuring {
-                pyramid,
-                proof,
-                circle: &self.circle,
-                polar: &mut self.polar,
-                noise,
-            });
-            let scale = (1 << proof.depth) as f32;
-            let measured = measured.unwrap_or_else(|| Measured::roughly(proof.in_frame(), scale));
-            let mut circle = circle_of(&measured.ring);
-            let fits = (radii.0..=radii.1).contains(&circle.radius);
-            if self.config.min_radius >= self.config.max_radius {
-                circle.radius = self.config.max_radius;
-            }
-            let placed = self
-                .config
-                .region
-                .as_ref()
-                .is_none_or(|region| region.holds(&circle));
-            if fits && placed {
-                self.measurements.push(Measurement {
-                    circle,
-                    score,
-                    log_false_alarms: -f64::from(proof.certainty),
-                    centre_error: measured.centre_error.into(),
-                    radius_error: measured.radius_error.into(),
-                    axis_ratio: measured.axis_ratio().into(),
-                    visible: proof.visible.into(),
-                    covered: proof.covered.into(),
-                });
+            if prover.prove(candidate, &mut self.budget.looks).is_some() {
+                self.budget.grant();
             }
         }
     }
@@ -400,8 +363,6 @@ const DEEPEST: usize = 5;
 const LARGE_FRAME: usize = 1_000_000;
 /// The most candidates of a frame.
 const CANDIDATES: usize = 192;
-/// One point of this many pixels may be an edge; of more the strongest are taken.
-const PIXELS_PER_POINT: usize = 12;
 /// Gradient of a step of one gray level.
 const STEP_GAIN: f32 = 2.3;
 /// The threshold in deviations of the noise.
@@ -410,8 +371,6 @@ const NOISE_FACTOR: f32 = 3.5;
 const ROUNDING: f32 = 0.3;
 /// Circles about one place that differ noticeably, at each size.
 const RADII: usize = 12;
-/// Noise above which the larger circles are measured at half the size of the frame, gray levels.
-const NOISY: f32 = 15.0;
 
 /// Runs both, each on a thread of its own if `apart` and the feature `parallel` are set.
 fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
@@ -429,6 +388,7 @@ fn both(apart: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
 #[derive(Clone, Debug)]
 struct Edges {
     maxima: Maxima,
+    thinning: Thinning,
     level: Level,
 }
 
@@ -436,6 +396,7 @@ impl Edges {
     fn new() -> Self {
         Self {
             maxima: Maxima::new(SMOOTHING),
+            thinning: Thinning::default(),
             level: Level::default(),
         }
     }
@@ -459,32 +420,5 @@ impl Vectorized for Searching<'_, '_> {
             .run(self.level, self.collected, self.prover, self.budget);
         self.search
             .follow_arcs(self.level, self.collected, self.prover, self.budget);
-    }
-}
-
-/// The measurement of a proven circle.
-struct Measuring<'a> {
-    pyramid: Pyramid<'a>,
-    proof: &'a Proof,
-    circle: &'a UnitCircle,
-    polar: &'a mut Polar,
-    noise: f32,
-}
-
-impl Vectorized for Measuring<'_> {
-    type Output = Option<Measured>;
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let pyramid = self.pyramid;
-        // The slope over one pixel is lost in noise: over two it is found.
-        let finest = usize::from(self.noise > NOISY).min(self.proof.depth);
-        let frames = (finest..=self.proof.depth)
-            .rev()
-            .map(|depth| pyramid.gray(depth));
-        let scale = (1 << finest) as f32;
-        let (start, noise) = (self.proof.ring, self.noise / scale);
-        measure::measure(frames, self.circle, self.polar, start, noise)
-            .map(|measured| measured.grown(scale))
     }
 }

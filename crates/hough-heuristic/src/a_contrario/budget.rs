@@ -16,6 +16,11 @@ pub(super) const PROOF: u64 = 1500;
 /// Cost of a measurement, in looks.
 pub(super) const MEASURING: u64 = 1500;
 
+/// Looks that each circle found adds: proofs at two sizes, the measurement, and the search.
+const CIRCLE: u64 = 2 * PROOF + MEASURING + 3500;
+/// Draws that go with them.
+const DRAWS_PER_CIRCLE: u64 = 50;
+
 /// The parts of the work, each with looks of its own after those of the parts before it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stage {
@@ -33,9 +38,15 @@ pub(super) struct Budget {
     most_draws: u64,
     /// By [`Stage`].
     most_looks: [u64; 3],
+    /// Looks of the search that may be spent by the end of this size.
+    most_of_size: u64,
     deadline: Option<Instant>,
     /// Set once the deadline has passed.
     late: bool,
+    /// Circles proven beyond doubt.
+    pub(super) proven: u64,
+    /// Set once circles were left out as too many.
+    pub(super) left_out: bool,
     /// Set once any part was cut short.
     pub(super) spent: bool,
 }
@@ -57,10 +68,27 @@ impl Budget {
         }
     }
 
+    /// Makes room for a circle that was found, so that the work grows with their number.
+    pub(super) fn grant(&mut self) {
+        self.proven += 1;
+        self.most_draws += DRAWS_PER_CIRCLE;
+        for most in &mut self.most_looks {
+            *most += CIRCLE;
+        }
+        self.most_of_size += CIRCLE;
+    }
+
+    /// Begins the search of a size, which leaves half of the looks to those after it.
+    pub(super) fn begin_size(&mut self, is_last: bool) {
+        let left = self.most_looks[Stage::Search as usize].saturating_sub(self.looks);
+        self.most_of_size = self.looks + if is_last { left } else { left / 2 };
+    }
+
     /// Returns `true` if this part of the work is to end.
     #[inline(always)]
     pub(super) fn is_over(&mut self, stage: Stage) -> bool {
-        let drawn = matches!(stage, Stage::Search) && self.draws >= self.most_draws;
+        let drawn = matches!(stage, Stage::Search)
+            && (self.draws >= self.most_draws || self.looks >= self.most_of_size);
         let over = drawn || self.late || self.looks >= self.most_looks[stage as usize];
         self.spent |= over;
         over

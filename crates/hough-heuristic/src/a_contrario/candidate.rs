@@ -47,6 +47,18 @@ impl Candidate {
         }
     }
 
+    /// Returns `true` if both have one outline, as far as their sizes tell.
+    fn coincides(&self, other: &Self) -> bool {
+        let off = (self.x - other.x).abs() + (self.y - other.y).abs() + (self.r - other.r).abs();
+        off < 0.03 * self.r.min(other.r) + 0.5 * self.scale.min(other.scale)
+    }
+
+    /// Returns `true` if the circle may be this proven one, met again.
+    fn close(&self, other: &Self) -> bool {
+        let off = (self.x - other.x).abs() + (self.y - other.y).abs() + (self.r - other.r).abs();
+        off < 0.06 * self.r.min(other.r) + 0.75 * self.scale.min(other.scale)
+    }
+
     fn near(&self, other: &Self) -> bool {
         let off = (self.x - other.x).abs() + (self.y - other.y).abs() + (self.r - other.r).abs();
         off < 0.12 * self.r.min(other.r) + 1.0 * self.scale.min(other.scale)
@@ -67,48 +79,103 @@ fn weight(r: f32, support: Support) -> f32 {
 /// The candidates of a frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Collected {
+    /// Those that are not proven beyond doubt.
     pub(super) candidates: Vec<Candidate>,
-    /// The most that are kept.
+    /// The most of them that are kept.
     pub(super) most: usize,
+    /// Those that are, however many.
+    proven: Vec<Candidate>,
 }
 
 impl Collected {
     pub(super) fn clear(&mut self, most: usize) {
         self.candidates.clear();
+        self.proven.clear();
         self.most = most;
     }
 
-    /// Counts a meeting; returns `true` if nearly this circle has been met often enough.
+    /// Counts a meeting; returns `true` if the circle is proven or has been met often enough.
     pub(super) fn is_known(&mut self, circle: &Candidate, budget: &mut Budget) -> bool {
         budget.looks += self.candidates.len() as u64 / 8;
         let known = self.candidates.iter_mut().find(|known| known.near(circle));
+        let often = known.is_some_and(|known| {
+            known.met += 1;
+            known.met > MEETINGS
+        });
+        often || self.is_proven(circle, budget) || self.is_met(circle)
+    }
+
+    /// Returns `true` if the outline of this circle is that of a proven one.
+    pub(super) fn is_proven(&self, circle: &Candidate, budget: &mut Budget) -> bool {
+        budget.looks += self.proven.len() as u64 / 16;
+        self.proven.iter().any(|proven| proven.coincides(circle))
+    }
+
+    /// Counts a meeting with a proven circle; returns `true` after enough of them.
+    fn is_met(&mut self, circle: &Candidate) -> bool {
+        let known = self.proven.iter_mut().find(|known| known.close(circle));
         known.is_some_and(|known| {
             known.met += 1;
             known.met > MEETINGS
         })
     }
 
-    /// Keeps the better of nearly equal candidates; returns its index if it was kept.
-    pub(super) fn add(&mut self, candidate: Candidate, budget: &mut Budget) -> Option<usize> {
+    /// Keeps the better of those that are nearly one; tells whether this one is worth a proof at
+    /// once, as it is if it was kept or if others were in its way, and its place if it has one.
+    pub(super) fn add(
+        &mut self,
+        candidate: Candidate,
+        budget: &mut Budget,
+    ) -> Option<Option<usize>> {
         budget.looks += self.candidates.len() as u64 / 8;
         let better = |known: &Candidate| candidate.weight > known.weight;
-        let place = if let Some(place) = self
+        let near = self
             .candidates
             .iter()
-            .position(|known| known.near(&candidate))
-        {
-            place
-        } else if self.candidates.len() < self.most {
+            .position(|known| known.near(&candidate));
+        if let Some(place) = near {
+            return better(&self.candidates[place]).then(|| {
+                let met = self.candidates[place].met;
+                self.candidates[place] = Candidate { met, ..candidate };
+                Some(place)
+            });
+        }
+        if self.candidates.len() < self.most {
             self.candidates.push(candidate);
-            return Some(self.candidates.len() - 1);
+            return Some(Some(self.candidates.len() - 1));
+        }
+        let weights = self.candidates.iter().map(|known| known.weight).enumerate();
+        let (worst, _) = weights.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        if better(&self.candidates[worst]) {
+            self.candidates[worst] = candidate;
+            Some(Some(worst))
         } else {
-            let weights = self.candidates.iter().map(|known| known.weight).enumerate();
-            weights.min_by(|a, b| a.1.total_cmp(&b.1))?.0
+            Some(None)
+        }
+    }
+
+    /// Moves the candidate at this place, if it has one, to the proven ones, as the circle it
+    /// proved to be; false if that was proven before.
+    pub(super) fn prove(
+        &mut self,
+        place: Option<usize>,
+        candidate: &Candidate,
+        ring: &Ring,
+        budget: &mut Budget,
+    ) -> bool {
+        let proven = Candidate {
+            x: ring.x,
+            y: ring.y,
+            r: ring.r,
+            ..*candidate
         };
-        better(&self.candidates[place]).then(|| {
-            let met = self.candidates[place].met;
-            self.candidates[place] = Candidate { met, ..candidate };
-            place
-        })
+        let is_new = !self.is_proven(&proven, budget);
+        if is_new {
+            if let Some(place) = place {
+                self.candidates.swap_remove(place);
+            }
+            self.proven.push(proven);
+        }
+        is_new
     }
 }

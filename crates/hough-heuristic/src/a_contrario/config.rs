@@ -29,8 +29,8 @@ pub struct AContrarioConfig {
     pub contrast: f64,
     /// Largest number of pairs drawn per million pixels of the frame (default 50000; at least 1).
     /// A frame below 250,000 pixels counts as that many. Each draw brings a budget of 16 looks,
-    /// which bounds all work that depends on the frame's content. Smaller values miss circles amid
-    /// dense texture; larger ones find little more.
+    /// which bounds all work that depends on the frame's content; each circle found adds 50 draws
+    /// and 8,000 looks. Smaller values miss circles amid dense texture.
     pub draws_per_megapixel: u32,
     /// Time limit of the search, milliseconds per million pixels (default None; above 0). With a
     /// time limit the result depends on the speed of the machine. It has no effect on targets

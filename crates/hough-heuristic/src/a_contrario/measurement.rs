@@ -33,21 +33,10 @@ pub struct Effort {
     /// Number of places looked at. The time is about proportional to it, apart from finding the
     /// edges.
     pub looks: u64,
+    /// Number of circles proven beyond doubt. Each of them adds to the budget.
+    pub proven: u64,
     /// `true` if the budget ended the search, so that there may be more circles.
     pub ended_by_budget: bool,
-}
-
-/// Returns `true` if two circles belong to one thing.
-pub(super) fn is_same(a: &Circle, b: &Circle) -> bool {
-    let off = ((a.x - b.x).powi(2) + (a.y - b.y).powi(2)).sqrt();
-    let (small, large) = (a.radius.min(b.radius), a.radius.max(b.radius));
-    off < 0.5 * small && large - small < 0.4 * large
-}
-
-pub(super) fn circle_of(ring: &Ring) -> Circle {
-    Circle {
-        x: ring.x.into(),
-        y: ring.y.into(),
-        radius: ring.r.into(),
-    }
+    /// `true` if more circles were proven than `max_circles`.
+    pub ended_by_count: bool,
 }

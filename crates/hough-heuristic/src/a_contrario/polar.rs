@@ -63,6 +63,8 @@ pub(super) struct Polar {
 
 /// Directions that are worked on together.
 pub(super) const LANES: usize = 8;
+/// The most directions in which slopes are averaged across the outline.
+const MOST_SOFT: usize = 64;
 /// Largest number of directions averaged on either side.
 const MARGIN: usize = 8;
 
@@ -124,6 +126,24 @@ impl Polar {
             row.copy_within(MARGIN..2 * MARGIN, MARGIN + count);
         }
         self.differentiate(ring.r, half.min(MARGIN));
+    }
+
+    /// Averages the outward slopes over three distances.
+    #[inline(always)]
+    pub(super) fn soften(&mut self) {
+        let count = self.rays.min(MOST_SOFT);
+        let mut before = [0.0f32; MOST_SOFT];
+        before[..count].copy_from_slice(&self.outward[..count]);
+        for step in 0..self.steps {
+            let behind = (step + 1).min(self.steps - 1) * self.rays;
+            let at = step * self.rays;
+            for (ray, before) in before[..count].iter_mut().enumerate() {
+                let here = self.outward[at + ray];
+                self.outward[at + ray] =
+                    (*before + here + self.outward[behind + ray]) * (1.0 / 3.0);
+                *before = here;
+            }
+        }
     }
 
     #[inline(always)]

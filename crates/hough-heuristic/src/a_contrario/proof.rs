@@ -22,7 +22,7 @@ const OVERLAP: f32 = 0.85;
 
 /// From here on slopes are averaged along the outline, and the edges of a circle may lie farther
 /// off it, gray levels.
-const NOISE: f32 = 3.0;
+pub(super) const NOISE: f32 = 3.0;
 /// Share of a circle in the frame below which its number of false alarms is multiplied.
 const WHOLE: f32 = 0.9;
 /// Decimal logarithm of that factor.
@@ -31,6 +31,10 @@ const CUT: f32 = 3.0;
 /// since balls darken towards one side.
 const NO_EDGE: f32 = 0.25;
 
+/// From this width on an edge is soft, pixels: of a sharp one it is some two.
+const SOFT: f32 = 3.0;
+/// Certainty that more tolerances cost a soft outline.
+const SOFT_TESTS: f32 = 0.3;
 /// Fewer rays than these do not make a circle.
 const LEAST_NEAR: usize = 20;
 
@@ -51,12 +55,25 @@ pub(super) struct Proof {
     pub(super) covered: f32,
     /// Share of the outline that lies in the frame.
     pub(super) visible: f32,
+    /// A bit for each ray whose strongest edge lies on the outline.
+    pub(super) hits: u64,
+    /// Largest distance of those edges from it, pixels of the level.
+    pub(super) slack: f32,
+    /// The chance of that on one ray.
+    pub(super) chance: f32,
+    /// Rays that count, the samples that they are worth, and the tests made.
+    pub(super) rays: f32,
+    pub(super) samples: f32,
+    pub(super) tests: f32,
+    /// The part of the certainty that the evidence against the circle leaves.
+    pub(super) left: f32,
 }
 
 impl Proof {
     /// Returns `true` if it explains the edge points on it.
     pub(super) fn is_beyond_doubt(&self) -> bool {
-        self.certainty >= 4.0
+        self.certainty >= BEYOND_DOUBT
+            || (self.certainty >= HALF_SURE && self.covered >= ALL_BUT_COVERED)
     }
 
     /// The circle in pixels of the frame.
@@ -64,15 +81,71 @@ impl Proof {
         self.ring.grown((1 << self.depth) as f32)
     }
 
+    /// Takes evidence against the circle into account.
+    pub(super) fn leave(&mut self, left: f32) {
+        self.left = left;
+        self.certainty *= left;
+    }
+
+    /// The certainty without the rays whose edges lie on these circles of the frame.
+    pub(super) fn certainty_beside(
+        &self,
+        rays: Rays<'_>,
+        others: impl Iterator<Item = Ring>,
+    ) -> f32 {
+        let ring = self.in_frame();
+        let slack = self.slack_in_frame();
+        let mut hits = self.hits;
+        for other in others {
+            let (dx, dy) = (ring.x - other.x, ring.y - other.y);
+            let reach = ring.r + other.r + slack;
+            if dx.abs() > reach || dy.abs() > reach {
+                continue;
+            }
+            let apart = (dx * dx + dy * dy).sqrt();
+            if apart > reach || apart + slack < (ring.r - other.r).abs() {
+                continue;
+            }
+            for ray in 0..RAYS {
+                let (x, y) = (dx + ring.r * rays.x[ray], dy + ring.r * rays.y[ray]);
+                let off = (x * x + y * y).sqrt() - other.r;
+                hits &= !(u64::from(off.abs() <= slack) << ray);
+            }
+        }
+        if hits == self.hits {
+            return self.certainty;
+        }
+        let share = hits.count_ones() as f32 / self.rays.max(1.0);
+        self.left * (self.samples * divergence(share, self.chance) - self.tests)
+    }
+
+    /// Largest distance from another outline of edges that belong to it, pixels of the frame.
+    fn slack_in_frame(&self) -> f32 {
+        (self.slack + MORE_SLACK) * (1 << self.depth) as f32
+    }
+
     /// 0..1: the certainty, so that a number of false alarms of 1 in 10 frames gives one half.
     pub(super) fn score(&self) -> f64 {
-        let certainty = f64::from(self.certainty.max(0.0));
-        certainty / (certainty + HALF_SURE)
+        Self::score_of(self.certainty)
+    }
+
+    /// The score of a certainty.
+    pub(super) fn score_of(certainty: f32) -> f64 {
+        let certainty = f64::from(certainty.max(0.0));
+        certainty / (certainty + f64::from(HALF_SURE))
     }
 }
 
 /// The certainty that gives a score of one half.
-const HALF_SURE: f64 = 1.0;
+const HALF_SURE: f32 = 1.0;
+/// From this certainty on a circle explains the edges on it.
+const BEYOND_DOUBT: f32 = 4.0;
+/// So does one of a score of one half and more of which this share is covered, as small ones never
+/// become surer.
+const ALL_BUT_COVERED: f32 = 0.85;
+/// What the outline of another circle may lie farther from an edge that belongs to it, pixels of
+/// the level.
+const MORE_SLACK: f32 = 0.5;
 
 /// Properties of a level that the proof depends on.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +154,34 @@ pub(super) struct Setting {
     pub(super) noise: f32,
     /// Decimal logarithm of the number of circles that might have been tested.
     pub(super) tests: f32,
+    /// Reach of the search where only edges close to the outline count, radii.
+    pub(super) narrow: Option<f32>,
+}
+
+/// Rays on either side over which slopes are averaged, for a ring of this radius.
+#[inline(always)]
+fn half_for(r: f32, noise: f32) -> usize {
+    // Some three pixels where there is noise.
+    let arc = r * std::f32::consts::TAU / RAYS as f32;
+    if noise > NOISE {
+        ((1.5 / arc) as usize).clamp(1, 5)
+    } else {
+        0
+    }
+}
+
+/// The window in which the edges around an outline are sought.
+#[inline(always)]
+pub(super) fn window_for(ring: &Ring, noise: f32) -> Window {
+    let half = half_for(ring.r, noise);
+    let least = (2.0 * noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
+    let reach = ((REACH * ring.r + 0.5) as usize).clamp(LEAST_REACH, MOST_REACH);
+    Window {
+        reach: reach.min((ring.r - 1.5) as usize).max(2),
+        half,
+        least,
+        soft: false,
+    }
 }
 
 #[inline(always)]
@@ -92,23 +193,15 @@ pub(super) fn prove(
     setting: &Setting,
 ) -> Option<Proof> {
     let rays = circle.rays(RAYS);
-    // Slopes are averaged along the outline over some three pixels where there is noise.
-    let arc = start.r * std::f32::consts::TAU / RAYS as f32;
-    let half = if setting.noise > NOISE {
-        ((1.5 / arc) as usize).clamp(1, 5)
-    } else {
-        0
+    let mut window = window_for(&start, setting.noise);
+    let mut wide = Window {
+        reach: FIRST_REACH.min((start.r - 1.5) as usize).max(2),
+        ..window
     };
-    let least = (2.0 * setting.noise / (2.0 * half as f32 + 1.0).sqrt()).max(1.5);
-    let within = |reach: usize| Window {
-        reach: reach.min((start.r - 1.5) as usize).max(2),
-        half,
-        least,
-    };
-    let (wide, window) = (
-        within(FIRST_REACH),
-        within(((REACH * start.r + 0.5) as usize).clamp(LEAST_REACH, MOST_REACH)),
-    );
+    if let Some(narrow) = setting.narrow {
+        window.reach = ((narrow * start.r + 0.5) as usize).clamp(2, window.reach);
+        wide.reach = window.reach;
+    }
     let mut ring = start;
     for round in 0..4 {
         let edges = Edges::around(
@@ -118,8 +211,16 @@ pub(super) fn prove(
             polar,
             if round == 0 { wide } else { window },
         );
-        let foci = if round == 0 {
+        if round == 0 && !window.soft && edges.width(polar) > SOFT {
+            window.soft = true;
+            wide.soft = true;
+        }
+        let foci = if setting.narrow.is_some() {
+            [2.0, 1.5, 1.2]
+        } else if round == 0 {
             [4.0, 3.0, 2.0]
+        } else if window.soft {
+            [3.0, 2.5, 2.0]
         } else {
             [3.0, 2.0, 1.5]
         };
@@ -204,33 +305,38 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
     let mut best = Proof {
         ring,
         certainty: f32::NEG_INFINITY,
+        visible: visible / RAYS as f32,
+        rays,
+        samples: independent,
+        left: 1.0,
         ..Proof::default()
     };
-    let slacks: &[f32] = if setting.noise > NOISE {
+    let slacks: &[f32] = if setting.noise > NOISE || window.soft {
         &[0.25, 0.5, 0.8, 1.2]
     } else {
         &[0.25, 0.5]
     };
     let tests = setting.tests
+        + if window.soft { SOFT_TESTS } else { 0.0 }
         + if visible < WHOLE * RAYS as f32 {
             CUT
         } else {
             0.0
         };
+    best.tests = tests;
     for &slack in slacks {
         let on = |(distance, slope): (&f32, &f32)| *slope > 0.0 && distance.abs() <= slack;
-        let hits = edges
-            .distance
-            .iter()
-            .zip(&edges.slope)
-            .filter(|&edge| on(edge))
-            .count();
+        let mut hits = 0u64;
+        for (ray, edge) in edges.distance.iter().zip(&edges.slope).enumerate() {
+            hits |= u64::from(on(edge)) << ray;
+        }
+        let share = hits.count_ones() as f32;
         let p = (2.0 * slack + 0.2) / (2 * window.reach + 1) as f32;
-        let certainty = independent * divergence(hits as f32 / rays.max(1.0), p) - tests;
+        let certainty = independent * divergence(share / rays.max(1.0), p) - tests;
         if certainty > best.certainty {
             best.certainty = certainty;
-            best.covered = hits as f32 / visible.max(1.0);
-            best.visible = visible / RAYS as f32;
+            best.covered = share / visible.max(1.0);
+            (best.hits, best.slack, best.chance) = (hits, slack, p);
         }
     }
     best

@@ -7,6 +7,8 @@ use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Gray, Polar, Ring};
 use super::proof::{self, Proof, Setting};
+use super::refute;
+use super::strongest::RAYS;
 use crate::edges::{Vectorized, widest};
 
 /// From this radius on a circle is proven at half the size, pixels.
@@ -20,6 +22,15 @@ const NOISY: f32 = 8.0;
 const LEAST_SECOND: f32 = 8.0;
 /// From this certainty on no larger size is asked, but in noise.
 const SURE: f32 = 12.0;
+/// Reach of the search for edges in doubt, and where another outline was found, radii.
+const NARROW: f32 = 0.15;
+const NARROWEST: f32 = 0.1;
+/// Candidates of less certainty are not looked at in a narrow window.
+const LEAST_NARROW: f32 = -3.0;
+/// But for those whose outline runs along edges so far.
+const LEAST_WEIGHT: f32 = 10.0;
+/// Evidence against circles of less certainty is not looked for.
+const LEAST_REFUTED: f32 = 0.5;
 /// Certainty that a second look costs.
 const SECOND_LOOK: f32 = 1.0;
 
@@ -83,7 +94,7 @@ impl Prover<'_> {
         let finest = coarsest.saturating_sub(if self.noise > NOISY { 2 } else { 1 });
         let mut best: Option<Proof> = None;
         for depth in (finest..=coarsest).rev() {
-            let proof = self.prove_at(depth, &candidate.ring(), looks);
+            let proof = self.prove_at(depth, &candidate.ring(), None, looks);
             if proof.is_some_and(|proof| best.is_none_or(|best| proof.certainty > best.certainty)) {
                 best = proof;
             }
@@ -96,15 +107,50 @@ impl Prover<'_> {
             && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32
             && best.is_none_or(|first| !first.is_beyond_doubt())
         {
-            best = better(best, self.prove_at(coarsest + 1, &candidate.ring(), looks));
+            best = better(
+                best,
+                self.prove_at(coarsest + 1, &candidate.ring(), None, looks),
+            );
         }
-        let best = best?;
-        self.proofs.push(best);
-        best.is_beyond_doubt().then(|| best.in_frame())
+        // A second outline close by may have the stronger edges.
+        let certainty = best.map_or(f32::NEG_INFINITY, |proof| proof.certainty);
+        if best.is_none_or(|proof| !proof.is_beyond_doubt())
+            && (certainty >= LEAST_NARROW || candidate.weight >= LEAST_WEIGHT)
+        {
+            let narrow = self.prove_at(finest, &candidate.ring(), Some(NARROW), looks);
+            best = better(best, narrow);
+        }
+        self.conclude(best?, looks)
+    }
+
+    /// Proves a candidate by the edges close to its outline only.
+    pub(super) fn prove_narrowly(
+        &mut self,
+        candidate: &Candidate,
+        looks: &mut u64,
+    ) -> Option<Ring> {
+        let finest = self.depth_for(candidate.r).saturating_sub(1);
+        let proof = self.prove_at(finest, &candidate.ring(), Some(NARROWEST), looks);
+        self.conclude(better(None, proof)?, looks)
+    }
+
+    /// Weighs the evidence against a circle, and keeps the proof.
+    fn conclude(&mut self, mut proof: Proof, looks: &mut u64) -> Option<Ring> {
+        if proof.certainty >= LEAST_REFUTED {
+            proof.leave(self.refute(&proof, looks));
+        }
+        self.proofs.push(proof);
+        proof.is_beyond_doubt().then(|| proof.in_frame())
     }
 
     /// The proof of a circle in pixels of the frame, in the frame that was halved so many times.
-    fn prove_at(&mut self, depth: usize, ring: &Ring, looks: &mut u64) -> Option<Proof> {
+    fn prove_at(
+        &mut self,
+        depth: usize,
+        ring: &Ring,
+        narrow: Option<f32>,
+        looks: &mut u64,
+    ) -> Option<Proof> {
         *looks += PROOF;
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
@@ -116,9 +162,26 @@ impl Prover<'_> {
                 noise: self.noise / scale + 0.3,
                 // Each size has a quarter of the places that the next larger one has.
                 tests: self.tests - 0.602 * depth as f32,
+                narrow,
             },
         })?;
         Some(Proof { depth, ..proof })
+    }
+
+    /// The part of a proof's certainty that the evidence against the circle leaves.
+    fn refute(&mut self, proof: &Proof, looks: &mut u64) -> f32 {
+        *looks += PROOF / 4;
+        let ring = proof.in_frame();
+        let depth = self.depth_for(ring.r);
+        let scale = (1 << depth) as f32;
+        widest(Refuting {
+            gray: self.pyramid.gray(depth),
+            circle: self.circle,
+            polar: self.polar,
+            ring: ring.shrunk(scale),
+            noise: self.noise / scale + 0.3,
+            proof,
+        })
     }
 
     /// Number of halvings of the frame for a circle of this radius.
@@ -138,6 +201,7 @@ impl Prover<'_> {
 fn better(first: Option<Proof>, second: Option<Proof>) -> Option<Proof> {
     let second = second.map(|proof| Proof {
         certainty: proof.certainty - SECOND_LOOK,
+        tests: proof.tests + SECOND_LOOK,
         ..proof
     });
     match (first, second) {
@@ -170,6 +234,28 @@ impl Vectorized for Proving<'_> {
     }
 }
 
+/// The search for evidence against a proven circle.
+struct Refuting<'a> {
+    gray: Gray<'a>,
+    circle: &'a UnitCircle,
+    polar: &'a mut Polar,
+    ring: Ring,
+    noise: f32,
+    proof: &'a Proof,
+}
+
+impl Vectorized for Refuting<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run(self) -> f32 {
+        let rays = self.circle.rays(RAYS);
+        refute::left(
+            self.gray, rays, self.polar, &self.ring, self.noise, self.proof,
+        )
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -196,7 +282,7 @@ mod tests {
                 circle: &circle,
                 polar,
                 start: Ring { x: x + 0.7, y: y - 0.4, r: r + 0.5 },
-                setting: Setting { noise, tests: 5.0 },
+                setting: Setting { noise, tests: 5.0, narrow: None },
             };
             let (wide, plain) = (widest(of(&mut wide)), of(&mut plain).run());
             prop_assert_eq!(format!("{wide:?}"), format!("{plain:?}"));

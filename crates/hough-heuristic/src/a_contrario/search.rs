@@ -395,6 +395,9 @@ impl Search<'_> {
             return false;
         }
         let candidate = Candidate::new(&ring, self.scale, support);
+        if found.is_proven(&candidate, budget) {
+            return false;
+        }
         let Some(place) = found.add(candidate, budget) else {
             return false;
         };
@@ -402,10 +405,24 @@ impl Search<'_> {
             return false;
         }
         // Likely enough to be proven at once; what is proven beyond doubt takes its points along.
-        found.candidates[place].tried = true;
-        let Some(proven) = prover.prove(&candidate, &mut budget.looks) else {
+        if let Some(place) = place {
+            found.candidates[place].tried = true;
+        }
+        let Some(mut proven) = prover.prove(&candidate, &mut budget.looks) else {
             return false;
         };
+        let mut is_new = found.prove(place, &candidate, &proven, budget);
+        if !is_new {
+            // Drawn to the stronger edges of another outline: this one may still be there.
+            let Some(own) = prover.prove_narrowly(&candidate, &mut budget.looks) else {
+                return false;
+            };
+            is_new = found.prove(place, &candidate, &own, budget);
+            proven = own;
+        }
+        if is_new {
+            budget.grant();
+        }
         self.outline.explain(
             self.circle,
             level,

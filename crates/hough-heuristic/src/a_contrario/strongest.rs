@@ -22,6 +22,8 @@ pub(super) struct Window {
     pub(super) half: usize,
     /// The least slope of an edge, gray levels per pixel.
     pub(super) least: f32,
+    /// Set if slopes are averaged across the outline, as is right for soft edges.
+    pub(super) soft: bool,
 }
 
 /// The strongest edge along each ray.
@@ -31,6 +33,8 @@ pub(super) struct Edges {
     pub(super) distance: [f32; RAYS],
     /// Slope without its sign; 0 where there is no edge.
     pub(super) slope: [f32; RAYS],
+    /// 1 where the outside is brighter, else -1.
+    pub(super) sign: [f32; RAYS],
     /// The step of the window that the edge was found at, from 1 on; 0 where there is no edge.
     at: [i32; RAYS],
 }
@@ -45,11 +49,20 @@ impl Edges {
         polar: &mut Polar,
         window: Window,
     ) -> Self {
-        let Window { reach, half, least } = window;
+        let Window {
+            reach,
+            half,
+            least,
+            soft,
+        } = window;
         polar.sample(gray, rays, ring, reach, half);
+        if soft {
+            polar.soften();
+        }
         let mut edges = Self {
             distance: [0.0; RAYS],
             slope: [0.0; RAYS],
+            sign: [1.0; RAYS],
             at: [0; RAYS],
         };
         for (block, at) in edges.at.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
@@ -89,8 +102,51 @@ impl Edges {
             }
             edges.distance[ray] = polar.distance(place);
             edges.slope[ray] = here;
+            edges.sign[ray] = 1f32.copysign(polar.outward[step * RAYS + ray]);
         }
         edges
+    }
+
+    /// The width of the mean profile across the edges at half of its height, pixels; that of the
+    /// window where it does not fall so far within it.
+    #[inline(always)]
+    pub(super) fn width(&self, polar: &Polar) -> f32 {
+        const FAR: usize = 5;
+        let (mut sums, mut counts) = ([0.0f32; 2 * FAR + 1], [0.0f32; 2 * FAR + 1]);
+        for ray in 0..RAYS {
+            let Some(step) = (self.at[ray] as usize).checked_sub(1) else {
+                continue;
+            };
+            for (index, (sum, count)) in sums.iter_mut().zip(&mut counts).enumerate() {
+                let row = (step + index).wrapping_sub(FAR);
+                if row < polar.steps {
+                    *sum += self.sign[ray] * polar.outward[row * RAYS + ray];
+                    *count += 1.0;
+                }
+            }
+        }
+        let mean = |index: usize| sums[index] / f32::max(counts[index], 1.0);
+        let half = 0.5 * mean(FAR);
+        if half <= 0.0 {
+            return 0.0;
+        }
+        let side = |outward: bool| {
+            let at = |steps: usize| if outward { FAR + steps } else { FAR - steps };
+            let (mut before, mut place) = (mean(FAR), FAR as f32);
+            for steps in 1..=FAR {
+                if counts[at(steps)] < 0.25 * counts[FAR] {
+                    break;
+                }
+                let here = mean(at(steps));
+                if here < half {
+                    place = (steps - 1) as f32 + (before - half) / (before - here);
+                    break;
+                }
+                before = here;
+            }
+            place
+        };
+        side(true) + side(false)
     }
 
     /// The gray level `pixels` away from the edge of a ray, on the dark side of it if positive;
@@ -109,10 +165,11 @@ impl Edges {
         polar.gray(row.max(0) as usize, ray)
     }
 
-    /// Returns `true` if an edge lies on the outline and its bright side is overexposed.
+    /// Returns `true` if an edge lies on the outline and its inner side is overexposed.
     #[inline(always)]
     fn is_clipped(&self, polar: &Polar, ray: usize, beyond: usize) -> bool {
         self.slope[ray] > 0.0
+            && self.sign[ray] < 0.0
             && self.distance[ray].abs() <= 1.5
             && self.gray(polar, ray, -2, beyond) >= CLIPPED
     }

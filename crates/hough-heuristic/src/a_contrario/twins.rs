@@ -5,6 +5,7 @@ use image::{GrayImage, Luma};
 use proptest::prelude::*;
 
 use super::polar::Ring;
+use super::report::Measuring;
 use super::*;
 
 /// A ball of some radius in noise, with bars across.
@@ -44,6 +45,7 @@ proptest! {
             level.fill(160, 120, points);
             collected.clear(CANDIDATES);
             let mut budget = Budget::new(&AContrarioConfig::default(), frame.len());
+            budget.begin_size(true);
             let searching = Searching {
                 search: Search {
                     circle: &circle,

@@ -163,7 +163,10 @@ fn discs_are_found_of_which_more_than_half_is_hidden_aslant() {
         let frame = GrayImage::from_fn(320, 240, |x, y| {
             let (x, y) = (f64::from(x) - 160.3, f64::from(y) - 118.7);
             let hidden = (x * dx + y * dy) * std::f64::consts::FRAC_1_SQRT_2 > -0.2 * 40.0;
-            Luma([if x.hypot(y) < 40.0 && !hidden {
+            // A cover of the ground's level would make it a piece of a disc, cut off straight.
+            Luma([if hidden {
+                120
+            } else if x.hypot(y) < 40.0 {
                 40
             } else {
                 200
@@ -268,13 +271,14 @@ fn no_pattern_takes_more_than_the_budget() {
             });
             detector.detect(&frame).unwrap();
             let effort = detector.effort();
-            // The frame counts as one of a quarter of a megapixel.
-            let draws = u64::from(draws_per_megapixel) / 4;
+            // The frame counts as one of a quarter of a megapixel, and each circle adds its own.
+            let draws = u64::from(draws_per_megapixel) / 4 + 50 * effort.proven;
+            let looks = 4 * u64::from(draws_per_megapixel) + 8_000 * effort.proven;
             // What is begun on is finished: the partners of a point, the circle they make, and its
             // proofs.
             assert!(effort.draws <= draws + 6, "{name}: {effort:?}");
-            assert!(effort.looks <= 16 * draws + 20_000, "{name}: {effort:?}");
-            let within = effort.draws < draws && effort.looks < 16 * draws + 12_000;
+            assert!(effort.looks <= looks + 20_000, "{name}: {effort:?}");
+            let within = effort.draws < draws && effort.looks < looks + 14_000;
             assert!(effort.ended_by_budget || within, "{name}: {effort:?}");
         }
     }

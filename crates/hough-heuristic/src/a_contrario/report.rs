@@ -1,0 +1,128 @@
+//! The report: the proven circles that are no second account of another one, measured.
+
+use image::GrayImage;
+
+use super::budget::{MEASURING, Stage};
+use super::directions::UnitCircle;
+use super::measure::{self, Measured};
+use super::polar::{Polar, Ring};
+use super::proof::Proof;
+use super::prover::Pyramid;
+use super::strongest::RAYS;
+use super::{AContrario, Measurement};
+use crate::circle::Circle;
+use crate::edges::{Vectorized, widest};
+
+/// Noise above which the larger circles are measured at half the size of the frame, gray levels.
+const NOISY: f32 = 15.0;
+/// Outlines that differ by less are one, pixels and radii: their errors, and the width of a line.
+const SAME_PIXELS: f32 = 3.0;
+const SAME_SHARE: f32 = 0.04;
+
+impl AContrario {
+    /// Measures the proven circles, the surest first.
+    ///
+    /// A circle must be as sure as the least score demands by the edges that are not on a circle
+    /// reported before it: so that a ring across the outlines of others is not reported, but one
+    /// inside of another is.
+    pub(super) fn report(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
+        let pyramid = Pyramid {
+            frame,
+            sizes: &self.sizes[..self.depth],
+        };
+        let rays = self.circle.rays(RAYS);
+        self.proofs
+            .sort_unstable_by(|a, b| b.certainty.total_cmp(&a.certainty));
+        for proof in &self.proofs {
+            let score = proof.score();
+            if score < self.config.min_score {
+                break;
+            }
+            let others = self.reported.iter().copied();
+            if Proof::score_of(proof.certainty_beside(rays, others)) < self.config.min_score {
+                continue;
+            }
+            // What is proven is reported, measured or not.
+            let measured = if self.budget.is_over(Stage::Measurements) {
+                None
+            } else {
+                self.budget.looks += MEASURING;
+                widest(Measuring {
+                    pyramid,
+                    proof,
+                    circle: &self.circle,
+                    polar: &mut self.polar,
+                    noise,
+                })
+            };
+            let scale = (1 << proof.depth) as f32;
+            let measured = measured.unwrap_or_else(|| Measured::roughly(proof.in_frame(), scale));
+            let is_known = |other: &Ring| is_same(&measured.ring, other);
+            if self.reported.iter().any(is_known) {
+                continue;
+            }
+            let Ring { x, y, r } = measured.ring;
+            let mut circle = Circle {
+                x: x.into(),
+                y: y.into(),
+                radius: r.into(),
+            };
+            let fits = (radii.0..=radii.1).contains(&circle.radius);
+            if self.config.min_radius >= self.config.max_radius {
+                circle.radius = self.config.max_radius;
+            }
+            let region = self.config.region.as_ref();
+            if fits && region.is_none_or(|region| region.holds(&circle)) {
+                if self.measurements.len() == self.config.max_circles {
+                    self.budget.left_out = true;
+                    break;
+                }
+                self.measurements.push(Measurement {
+                    circle,
+                    score,
+                    log_false_alarms: -f64::from(proof.certainty),
+                    centre_error: measured.centre_error.into(),
+                    radius_error: measured.radius_error.into(),
+                    axis_ratio: measured.axis_ratio().into(),
+                    visible: proof.visible.into(),
+                    covered: proof.covered.into(),
+                });
+            }
+            self.reported.push(measured.ring);
+        }
+    }
+}
+
+/// Returns `true` if two outlines are one.
+fn is_same(a: &Ring, b: &Ring) -> bool {
+    let (dx, dy) = (a.x - b.x, a.y - b.y);
+    let off = (dx * dx + dy * dy).sqrt() + (a.r - b.r).abs();
+    off < SAME_PIXELS.max(SAME_SHARE * a.r.min(b.r))
+}
+
+/// The measurement of a proven circle.
+pub(super) struct Measuring<'a> {
+    pub(super) pyramid: Pyramid<'a>,
+    pub(super) proof: &'a Proof,
+    pub(super) circle: &'a UnitCircle,
+    pub(super) polar: &'a mut Polar,
+    pub(super) noise: f32,
+}
+
+impl Vectorized for Measuring<'_> {
+    type Output = Option<Measured>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let pyramid = self.pyramid;
+        // The slope over one pixel is lost in noise: over two it is found.
+        let finest = usize::from(self.noise > NOISY).min(self.proof.depth);
+        let frames = (finest..=self.proof.depth)
+            .rev()
+            .map(|depth| pyramid.gray(depth));
+        let scale = (1 << finest) as f32;
+        let (start, noise) = (self.proof.ring, self.noise / scale);
+        measure::measure(frames, self.circle, self.polar, start, noise)
+            .map(|measured| measured.grown(scale))
+    }
+}
