@@ -12,6 +12,7 @@ mod curves;
 mod detectors;
 mod heuristic;
 mod refusals;
+mod regression;
 #[cfg(feature = "serde")]
 mod serde;
 #[cfg(feature = "files")]

@@ -1,0 +1,327 @@
+//! Kinds of pictures on which circles were missed or made up: each drawn in both polarities, in all
+//! eight orientations of the square, and at whole and half pixels.
+
+use circle_scenes::scene::same;
+use hough_heuristic::image::{GrayImage, Luma, imageops};
+use hough_heuristic::{AContrario, AContrarioConfig, Circle, CircleDetector};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
+
+/// A square picture, drawn as coverage in 4x4 points a pixel.
+struct Picture {
+    side: u32,
+    /// Deviation of the lens, pixels.
+    blur: f32,
+    /// Half of the range of uniform noise.
+    noise: f64,
+}
+
+impl Picture {
+    /// Draws what `grey` says of each point.
+    fn draw(&self, grey: impl Fn(f64, f64) -> f64) -> GrayImage {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+        let frame = GrayImage::from_fn(self.side, self.side, |x, y| {
+            let points = (0..16).map(|k| {
+                let (dx, dy) = (
+                    f64::from(k % 4) / 4.0 - 0.375,
+                    f64::from(k / 4) / 4.0 - 0.375,
+                );
+                grey(f64::from(x) + dx, f64::from(y) + dy)
+            });
+            Luma([(points.sum::<f64>() / 16.0).round() as u8])
+        });
+        let mut frame = imageops::blur(&frame, self.blur.max(0.4));
+        for Luma([grey]) in frame.pixels_mut() {
+            let random = (rng.next_u32() >> 8) as f64 / f64::from(1 << 23) - 1.0;
+            *grey = (f64::from(*grey) + self.noise * random).clamp(0.0, 255.0) as u8;
+        }
+        frame
+    }
+}
+
+const PLAIN: Picture = Picture {
+    side: 200,
+    blur: 0.7,
+    noise: 2.0,
+};
+
+/// The frame in all eight orientations of the square and both polarities, with where a circle of
+/// the frame lies in each.
+fn views(frame: &GrayImage) -> Vec<(GrayImage, impl Fn(&Circle) -> Circle)> {
+    let end = f64::from(frame.width()) - 1.0;
+    let mut views = Vec::new();
+    for view in 0..16 {
+        let mut turned = frame.clone();
+        if view & 1 != 0 {
+            imageops::flip_horizontal_in_place(&mut turned);
+        }
+        for _ in 0..view / 2 % 4 {
+            turned = imageops::rotate90(&turned);
+        }
+        if view >= 8 {
+            imageops::invert(&mut turned);
+        }
+        let place = move |circle: &Circle| {
+            let mut there = *circle;
+            if view & 1 != 0 {
+                there.x = end - there.x;
+            }
+            for _ in 0..view / 2 % 4 {
+                (there.x, there.y) = (end - there.y, there.x);
+            }
+            there
+        };
+        views.push((turned, place));
+    }
+    views
+}
+
+fn detector(min_radius: f64, max_radius: f64) -> AContrario {
+    AContrario::new(AContrarioConfig {
+        min_radius,
+        max_radius,
+        max_circles: 3000,
+        ..AContrarioConfig::default()
+    })
+    .unwrap()
+}
+
+/// Asserts that exactly these circles are found in every view of the frame, to two pixels.
+fn assert_found(name: &str, frame: &GrayImage, circles: &[Circle]) {
+    for (view, (turned, place)) in views(frame).iter().enumerate() {
+        let mut detector = detector(8.0, 95.0);
+        let found = detector.detect(turned).unwrap();
+        assert_eq!(found.len(), circles.len(), "{name}, view {view}: {found:?}");
+        for circle in circles {
+            let there = place(circle);
+            let is_found = found.iter().any(|one| same(&one.circle, &there, 2.0));
+            assert!(is_found, "{name}, view {view}: {there:?} in {found:?}");
+        }
+    }
+}
+
+fn circle(x: f64, y: f64, radius: f64) -> Circle {
+    Circle { x, y, radius }
+}
+
+/// Whether a point lies in a circle.
+fn within(circle: &Circle, x: f64, y: f64) -> bool {
+    (x - circle.x).hypot(y - circle.y) < circle.radius
+}
+
+#[test]
+fn a_lobe_of_a_larger_thing_is_no_circle() {
+    for shift in [0.0, 0.5] {
+        let lobe = circle(80.0 + shift, 100.0, 30.0);
+        let frame = PLAIN.draw(|x, y| {
+            let body = (y - 100.0).abs() < 27.0 && x > lobe.x && x < 180.0;
+            if within(&lobe, x, y) || body {
+                60.0
+            } else {
+                170.0
+            }
+        });
+        assert_found("lobe", &frame, &[]);
+    }
+}
+
+#[test]
+fn a_ball_behind_a_plate_is_a_circle() {
+    for shift in [0.0, 0.5] {
+        let ball = circle(90.0 + shift, 100.0, 36.0);
+        for plate in [95.0, 225.0] {
+            let frame = PLAIN.draw(|x, y| {
+                if x > ball.x + 12.0 && x < 160.0 && (y - 95.0).abs() < 60.0 {
+                    plate
+                } else if within(&ball, x, y) {
+                    50.0
+                } else {
+                    160.0
+                }
+            });
+            assert_found("ball behind a plate", &frame, &[ball]);
+        }
+    }
+}
+
+#[test]
+fn polygons_are_no_circles() {
+    for corners in [3, 4, 5] {
+        for (size, noise) in [(30.0, 2.0), (45.0, 20.0)] {
+            let picture = Picture { noise, ..PLAIN };
+            let frame = picture.draw(|x, y| {
+                let side = |k: i32| {
+                    let turn = std::f64::consts::TAU * f64::from(k) / f64::from(corners) + 0.3;
+                    (x - 100.5) * turn.cos() + (y - 99.0) * turn.sin()
+                };
+                if (0..corners).all(|k| side(k) < 0.8 * size) {
+                    60.0
+                } else {
+                    170.0
+                }
+            });
+            assert_found("polygon", &frame, &[]);
+        }
+    }
+}
+
+#[test]
+fn ovals_are_no_circles() {
+    for (ratio, blur) in [(0.8, 0.7), (0.65, 0.7), (0.75, 2.5)] {
+        for size in [24.0, 55.0] {
+            let frame = Picture { blur, ..PLAIN }.draw(|x, y| {
+                let (u, v) = (x - 101.0, y - 98.5);
+                let (u, v) = (0.8 * u + 0.6 * v, (0.8 * v - 0.6 * u) / ratio);
+                if u.hypot(v) < size { 60.0 } else { 170.0 }
+            });
+            assert_found("oval", &frame, &[]);
+        }
+    }
+}
+
+#[test]
+fn both_outlines_of_a_ring_are_circles() {
+    for (x, outer, inner) in [(100.0, 60.0, 36.0), (99.5, 60.0, 45.0), (100.0, 40.0, 32.0)] {
+        let (outer, inner) = (circle(x, 101.0, outer), circle(x, 101.0, inner));
+        // A washer, and a coin of two metals.
+        for core in [160.0, 225.0] {
+            let frame = PLAIN.draw(|x, y| {
+                if within(&inner, x, y) {
+                    core
+                } else if within(&outer, x, y) {
+                    60.0
+                } else {
+                    160.0
+                }
+            });
+            assert_found("ring", &frame, &[outer, inner]);
+        }
+    }
+}
+
+#[test]
+fn a_disc_before_another_of_its_size_leaves_it_a_circle() {
+    for (dx, dy) in [(28.0, 0.0), (20.0, 20.0), (24.5, 10.5)] {
+        let (front, back) = (circle(90.0, 95.0, 45.0), circle(90.0 + dx, 95.0 + dy, 45.0));
+        let frame = PLAIN.draw(|x, y| {
+            if within(&front, x, y) {
+                220.0
+            } else if within(&back, x, y) {
+                130.0
+            } else {
+                50.0
+            }
+        });
+        assert_found("pair", &frame, &[front, back]);
+    }
+}
+
+#[test]
+fn dark_things_on_a_ground_as_bright_as_can_be_are_found() {
+    for (x, radius) in [(100.0, 10.0), (99.5, 16.0), (100.0, 40.0)] {
+        let disc = circle(x, 102.0, radius);
+        let frame = Picture {
+            noise: 0.0,
+            ..PLAIN
+        }
+        .draw(|x, y| {
+            let part = (x - disc.x).hypot(y - disc.y) / disc.radius;
+            if part < 1.0 {
+                100.0 + 70.0 * part
+            } else {
+                255.0
+            }
+        });
+        // Inverted it is a bright thing on black, which was never a lamp.
+        assert_found("on white", &frame, &[disc]);
+    }
+}
+
+#[test]
+fn discs_out_of_focus_are_found() {
+    for (x, radius, blur) in [(100.0, 12.0, 2.0), (99.5, 20.0, 3.0), (100.0, 30.0, 4.0)] {
+        let disc = circle(x, 101.0, radius);
+        let frame =
+            Picture { blur, ..PLAIN }.draw(|x, y| if within(&disc, x, y) { 180.0 } else { 60.0 });
+        assert_found("out of focus", &frame, &[disc]);
+    }
+}
+
+#[test]
+fn a_disc_of_which_a_third_shows_beside_a_box_is_found() {
+    for shift in [0.0, 0.5] {
+        let disc = circle(90.0 + shift, 100.0, 50.0);
+        let frame = PLAIN.draw(|x, y| {
+            if x > 68.0 && x < 150.0 && (y - 98.0).abs() < 62.0 {
+                115.0
+            } else if within(&disc, x, y) {
+                180.0
+            } else {
+                65.0
+            }
+        });
+        assert_found("behind a box", &frame, &[disc]);
+    }
+}
+
+/// A square grid of discs, and where they are.
+fn discs(count: u32, pitch: f64, radius: f64) -> (GrayImage, Vec<Circle>) {
+    let side = (f64::from(count) * pitch).ceil() as u32;
+    let near = |at: f64| (at / pitch - 0.5).round() * pitch + 0.5 * pitch;
+    let picture = Picture { side, ..PLAIN };
+    let frame = picture.draw(|x, y| {
+        if (x - near(x)).hypot(y - near(y)) < radius {
+            60.0
+        } else {
+            200.0
+        }
+    });
+    let place = |k: u32| (f64::from(k) + 0.5) * pitch;
+    let circles = (0..count * count).map(|k| circle(place(k % count), place(k / count), radius));
+    (frame, circles.collect())
+}
+
+#[test]
+fn hundreds_of_circles_are_all_found() {
+    for (count, pitch, radius) in [(12, 30.0, 12.0), (24, 15.5, 6.0)] {
+        let (frame, circles) = discs(count, pitch, radius);
+        let mut detector = detector(0.8 * radius, 40.0);
+        let found = detector.detect(&frame).unwrap();
+        assert_eq!(found.len(), circles.len());
+        for circle in &circles {
+            assert!(found.iter().any(|one| same(&one.circle, circle, 0.5)));
+        }
+        let effort = detector.effort();
+        assert!(effort.proven as usize >= circles.len() && !effort.ended_by_count);
+    }
+}
+
+#[test]
+fn circles_beyond_the_most_are_left_out_and_told() {
+    let (frame, _) = discs(7, 30.0, 12.0);
+    for (max_circles, all) in [(48, false), (49, true)] {
+        let mut detector = AContrario::new(AContrarioConfig {
+            max_circles,
+            ..AContrarioConfig::default()
+        })
+        .unwrap();
+        assert_eq!(detector.detect(&frame).unwrap().len(), max_circles);
+        assert_eq!(detector.effort().ended_by_count, !all);
+    }
+}
+
+#[test]
+fn thin_lines_are_found_at_all_sizes() {
+    let lines = [
+        circle(100.0, 99.5, 92.0),
+        circle(62.0, 66.0, 28.0),
+        circle(136.0, 62.5, 24.0),
+        circle(64.0, 136.0, 22.0),
+        circle(135.5, 132.0, 30.0),
+    ];
+    let frame = PLAIN.draw(|x, y| {
+        let on = |line: &Circle| ((x - line.x).hypot(y - line.y) - line.radius).abs() < 0.8;
+        if lines.iter().any(on) { 50.0 } else { 190.0 }
+    });
+    assert_found("thin lines", &frame, &lines);
+}
