@@ -563,7 +563,7 @@ fn render_dataset_refuses_shares_sizes_and_kinds_without_sense() {
         ["--size", "768x", "768x"],
         ["--size", "100x8193", "100x8193"],
         ["--kinds", "cell,plain", "plain"],
-        ["--kinds", "round", "benchmark:"],
+        ["--kinds", "round", "camouflage"],
     ] {
         let Some(mut render) = example("render_dataset") else {
             return;
