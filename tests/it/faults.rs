@@ -1,6 +1,5 @@
-//! Faults through the real parts, the rendered camera, the detectors and a controller on a line:
-//! the arm stops, the cause is the last event and a typed error, and what was learned until then is
-//! kept.
+//! Faults of camera, detector, arm and line: the arm stops, the cause is the last event and a typed
+//! error, and the controller keeps what it had learned.
 
 use grasp_agent::{
     Agent, AgentConfig, AgentError, Belief, CameraEye, EventKind, EventLog, GaveUp, Hybrid,
@@ -118,17 +117,17 @@ impl Manipulator for Arm<'_> {
     }
 }
 
+fn occurred(log: &EventLog, what: impl Fn(&EventKind) -> bool) -> bool {
+    log.events.iter().any(|event| what(&event.kind))
+}
+
 /// The error of a run that failed, which is also its last event; the arm stands where it was then,
 /// with the jaws open.
 fn failure(end: Result<RunOutcome, AgentError>, log: &EventLog, rig: &Rig) -> AgentError {
     let error = end.expect_err("a fault");
     let last = log.events.last().expect("an event");
     assert_eq!(last.kind, EventKind::Failed(error.to_string()));
-    assert!(
-        !log.events
-            .iter()
-            .any(|event| event.kind == EventKind::Gripped)
-    );
+    assert!(!occurred(log, |kind| *kind == EventKind::Gripped));
     let off = (rig.pose())() - last.joints;
     assert!(off.0.iter().all(|angle| angle.abs() < 1e-3), "{off:?}");
     error
@@ -173,10 +172,7 @@ fn a_frozen_camera_is_recognised_with_and_without_a_ball() {
         let (end, log) = between.run(&mut rig, &mut agent);
         let error = failure(end, &log, &rig);
         assert!(matches!(error, AgentError::FrozenCamera { .. }), "{error}");
-        let seen = log
-            .events
-            .iter()
-            .any(|event| matches!(event.kind, EventKind::Seen(_)));
+        let seen = occurred(&log, |kind| matches!(kind, EventKind::Seen(_)));
         assert_eq!(seen, ball == IN_VIEW);
     }
 }
@@ -206,11 +202,7 @@ fn a_camera_frozen_at_the_goal_causes_no_grip_in_the_next_run() {
         matches!(error, AgentError::Arm(ArmError::NotReached { .. })),
         "{error}"
     );
-    assert!(
-        log.events
-            .iter()
-            .any(|event| event.kind == EventKind::AtGoal)
-    );
+    assert!(occurred(&log, |kind| *kind == EventKind::AtGoal));
 
     frozen.set(true);
     let (end, log) = between.run(&mut rig, &mut agent);
@@ -239,39 +231,28 @@ fn garbage_frames_show_no_ball_to_any_detector() {
         let (end, log) = between.run(&mut rig, &mut agent);
         let outcome = end.expect("no fault of a device");
         assert_eq!(outcome.gave_up, Some(GaveUp::NotFound), "{kind}");
-        assert!(
-            !log.events
-                .iter()
-                .any(|event| event.kind == EventKind::Gripped)
-        );
+        assert!(!occurred(&log, |kind| *kind == EventKind::Gripped));
         assert!(*agent.controller().belief() == untaught());
     }
 }
 
-/// Sees a circle in every frame, anywhere, and sometimes none that can be.
-struct Liar(Xoshiro256PlusPlus, [Detection; 1]);
+/// A detector that finds a circle at a random place in every frame, or an impossible one.
+struct Liar(Xoshiro256PlusPlus, Vec<Detection>);
 
 impl CircleDetector for Liar {
     fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
         let Self(rng, found) = self;
-        let circle = match rng.random_range(0..10) {
-            0 => Circle {
-                x: f64::NAN,
-                y: 0.0,
-                radius: -1.0,
-            },
-            1 => Circle {
-                x: 1e300,
-                y: -1e300,
-                radius: f64::INFINITY,
-            },
-            _ => Circle {
-                x: rng.random_range(0.0..f64::from(frame.width())),
-                y: rng.random_range(0.0..f64::from(frame.height())),
-                radius: rng.random_range(0.1..400.0),
-            },
+        let [x, y, radius] = match rng.random_range(0..10) {
+            0 => [f64::NAN, 0.0, -1.0],
+            1 => [1e300, -1e300, f64::INFINITY],
+            _ => [
+                rng.random_range(0.0..f64::from(frame.width())),
+                rng.random_range(0.0..f64::from(frame.height())),
+                rng.random_range(0.1..400.0),
+            ],
         };
-        *found = [Detection { circle, score: 1.0 }];
+        let circle = Circle { x, y, radius };
+        *found = vec![Detection { circle, score: 1.0 }];
         Ok(found)
     }
 }
@@ -281,15 +262,7 @@ fn false_circles_never_cause_a_grip() {
     for seed in 0..3 {
         let (mut rig, mut agent) = (rig(BEHIND_THE_ARM), agent());
         let mut between = Between::nothing();
-        let nothing = Detection {
-            circle: Circle {
-                x: 0.0,
-                y: 0.0,
-                radius: 1.0,
-            },
-            score: 0.0,
-        };
-        between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(seed), [nothing]));
+        between.detector = Box::new(Liar(Xoshiro256PlusPlus::seed_from_u64(seed), Vec::new()));
         let (end, log) = between.run(&mut rig, &mut agent);
         let outcome = end.expect("no fault of a device");
         assert!(

@@ -1,8 +1,8 @@
-//! What the rewards of Eq. 5 and 6 ask for, by value iteration: as printed they pay more for going
-//! round than for arriving, and Eq. 6 divides by zero besides (the pole of Eq. 5 lies within its
-//! goal); with denominators floored and the goal kept for ever they ask for the goal.
+//! The best policies under the rewards of Eq. 5 and 6, by value iteration. As printed, the rewards
+//! pay more for cycling than for arriving, and Eq. 6 divides by zero (the pole of Eq. 5 lies within
+//! its goal). With floored denominators and an absorbing goal, the best policies arrive.
 //!
-//! `cargo test --test literal_reward -- --nocapture` prints the figures.
+//! `cargo test --test it literal_reward -- --nocapture` prints the figures.
 
 use example_support::plane::ExactPlane;
 use grasp_agent::{BehaviourPair, BehaviourSpec, Percept, Reward};
@@ -45,28 +45,26 @@ fn centering(reward: &Reward) -> Model {
     .expect("finite rewards")
 }
 
-/// What the best policy under `reward` comes to from all columns outside the goal: how often it
-/// arrives within 60 steps, and the highest value of a state.
-fn best_centering(reward: &Reward) -> (f64, f64) {
-    let spec = BehaviourSpec::centering();
-    let model = centering(reward);
-    let plan = model.value_iteration(GAMMA, 1e-9).expect("converges");
-    let outside: Vec<State> = (0..192)
-        .filter(|x| !spec.at_goal(&at_x(*x)))
-        .map(State)
-        .collect();
-    let start: Vec<(State, f64)> = outside
-        .iter()
-        .map(|state| (*state, 1.0 / outside.len() as f64))
-        .collect();
-    let assessed = ModelEnvironment::new(model, &start)
+/// Returns the share of `starts` from which the best policy of `model` arrives within 60 steps, and
+/// the values of these states.
+fn best(model: Model, starts: &[State]) -> (f64, Vec<f64>) {
+    let plan = model.value_iteration(GAMMA, 1e-7).expect("converges");
+    let share = 1.0 / starts.len() as f64;
+    let drawn: Vec<(State, f64)> = starts.iter().map(|state| (*state, share)).collect();
+    let assessed = ModelEnvironment::new(model, &drawn)
         .and_then(|environment| environment.assess(&plan.table.greedy(), GAMMA, 60))
         .expect("a policy of the model");
-    let most = outside
-        .iter()
-        .map(|state| plan.table.max(*state))
-        .fold(f64::MIN, f64::max);
-    (assessed.success, most)
+    let worth = starts.iter().map(|state| plan.table.max(*state)).collect();
+    (assessed.success, worth)
+}
+
+/// Returns the share of the columns outside the goal from which the best policy under `reward`
+/// arrives, and the highest value of a column.
+fn best_centering(reward: &Reward) -> (f64, f64) {
+    let spec = BehaviourSpec::centering();
+    let outside = (0..192).filter(|x| !spec.at_goal(&at_x(*x))).map(State);
+    let (success, worth) = best(centering(reward), &outside.collect::<Vec<_>>());
+    (success, worth.into_iter().fold(f64::MIN, f64::max))
 }
 
 #[test]
@@ -74,7 +72,7 @@ fn equation_5_cycles_and_mended_it_centres() {
     let literal = Reward::centering_literal();
     let (arrives, most) = best_centering(&literal);
     println!(
-        "Eq. 5: the best policy arrives from {:.0} % of the columns, a column is worth up to \
+        "Eq. 5: the best policy arrives from {:.0} % of the columns; a column is worth up to \
          {most:.0} (arriving: 100)",
         100.0 * arrives
     );
@@ -82,16 +80,16 @@ fn equation_5_cycles_and_mended_it_centres() {
 
     let (arrives, most) = best_centering(&literal.mended());
     println!(
-        "Eq. 5, mended: it arrives from {:.0} %, a column is worth up to {most:.0} (arriving: \
+        "Eq. 5, mended: it arrives from {:.0} %; a column is worth up to {most:.0} (arriving: \
          1000)",
         100.0 * arrives
     );
     assert!(arrives > 0.999 && most < 1000.001, "{arrives} {most}");
 }
 
-/// Approaching as a decision process on its 90 states, estimated from moves tried in the arm's
-/// plane under `reward`, and what the best policy in it comes to: how often it arrives within 60
-/// steps, and how many rewards were infinite with whole pixels.
+/// Estimates approaching as a decision process on its 90 states from moves tried in the arm's plane
+/// under `reward`. Returns the share of states from which the best policy arrives, the mean value
+/// of a state, and the number of rewards that are infinite with whole pixels.
 fn best_approaching(
     plane: &ExactPlane,
     mut rng: Xoshiro256PlusPlus,
@@ -138,22 +136,14 @@ fn best_approaching(
             .observe(state, action, &step)
             .expect("finite rewards");
     }
-    let (model, starts) = (
-        estimate.to_model(reward.lost).expect("a finite reward"),
-        spec.states() as f64,
-    );
-    let plan = model.value_iteration(GAMMA, 1e-6).expect("converges");
-    let start: Vec<(State, f64)> = (0..spec.states())
-        .map(|s| (State(s), 1.0 / starts))
-        .collect();
-    let assessed = ModelEnvironment::new(model, &start)
-        .and_then(|environment| environment.assess(&plan.table.greedy(), GAMMA, 60))
-        .expect("a policy of the model");
-    let mean = (0..spec.states())
-        .map(|s| plan.table.max(State(s)))
-        .sum::<f64>()
-        / starts;
-    (assessed.success, mean, infinite)
+    let model = estimate.to_model(reward.lost).expect("a finite reward");
+    let states: Vec<State> = (0..spec.states()).map(State).collect();
+    let (success, worth) = best(model, &states);
+    (
+        success,
+        worth.iter().sum::<f64>() / states.len() as f64,
+        infinite,
+    )
 }
 
 #[test]
@@ -170,10 +160,9 @@ fn equation_6_divides_by_zero_and_mended_it_approaches() {
     let (cycling, worth, none) = best(&floored);
     let (arriving, kept, _) = best(&literal.mended());
     println!(
-        "Eq. 6: of 400000 moves between whole pixels {infinite} pay infinitely much; floored, the \
-         best policy arrives from {:.0} % and \
-         is worth {worth:.0} (arriving: 100); mended, it arrives from {:.0} % and is worth \
-         {kept:.0}",
+        "Eq. 6: {infinite} of 400000 moves between whole pixels have an infinite reward; floored, \
+         the best policy arrives from {:.0} % and is worth {worth:.0} (arriving: 100); mended, it \
+         arrives from {:.0} % and is worth {kept:.0}",
         100.0 * cycling,
         100.0 * arriving
     );

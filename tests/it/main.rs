@@ -13,7 +13,6 @@ use rand::rngs::Xoshiro256PlusPlus;
 
 mod command_line;
 mod detectors;
-mod emulator_floppy;
 mod end_to_end;
 mod exported_policy;
 mod faults;

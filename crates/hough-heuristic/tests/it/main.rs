@@ -11,6 +11,8 @@ mod any_frame;
 mod curves;
 mod detectors;
 mod heuristic;
+#[cfg(feature = "cli")]
+mod program;
 mod refusals;
 mod regression;
 #[cfg(feature = "serde")]

@@ -16,6 +16,8 @@ mod faults;
 mod interpreter;
 mod oracles;
 mod profiles;
+#[cfg(feature = "cli")]
+mod program;
 #[cfg(all(unix, feature = "serial"))]
 mod pty;
 #[cfg(unix)]
