@@ -257,7 +257,7 @@ impl Rival {
                 let goal = goal.map_or(paper.goal, TaughtGoal::features);
                 Box::new(Servo::new(*law, ServoSettings { goal, ..paper }))
             }
-            (Self::Learned(learned), None) => Box::new(learned.clone()),
+            (Self::Learned(learned), None) => learned.clone(),
             (Self::Learned(learned), Some(goal)) => {
                 Box::new(Retargeted::new(learned.clone(), *goal))
             }

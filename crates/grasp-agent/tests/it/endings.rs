@@ -103,7 +103,7 @@ fn run(
         frame: GrayImage::new(4, 1),
     };
     let end = agent.run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| {
-        log.note(event)
+        log.note(event);
     });
     (end, log)
 }

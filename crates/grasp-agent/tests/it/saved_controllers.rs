@@ -18,7 +18,7 @@ fn run_by(controller: impl Controller) -> String {
     let (mut eye, mut arm, mut sensor) = (cell.clone(), cell.clone(), cell.clone());
     let outcome = agent
         .run_and_learn(&mut eye, &mut arm, &mut sensor, &mut |event| {
-            saved.note(event)
+            saved.note(event);
         })
         .unwrap();
     assert_eq!(outcome.gave_up, None);

@@ -1,6 +1,5 @@
 //! The results of the detector beside its detections.
 
-use super::polar::Ring;
 use crate::circle::Circle;
 
 /// A circle found by [`AContrario`](crate::AContrario), with its standard errors.
