@@ -68,7 +68,7 @@ impl Budget {
         }
     }
 
-    /// Makes room for a circle that was found, so that the work grows with their number.
+    /// Makes space for a circle that was found, so that the work grows with their number.
     pub(super) fn grant(&mut self) {
         self.proven += 1;
         self.most_draws += DRAWS_PER_CIRCLE;

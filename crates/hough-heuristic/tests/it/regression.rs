@@ -17,8 +17,8 @@ struct Picture {
 }
 
 impl Picture {
-    /// Draws what `grey` says of each point.
-    fn draw(&self, grey: impl Fn(f64, f64) -> f64) -> GrayImage {
+    /// Draws what `gray` says of each point.
+    fn draw(&self, gray: impl Fn(f64, f64) -> f64) -> GrayImage {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
         let frame = GrayImage::from_fn(self.side, self.side, |x, y| {
             let points = (0..16).map(|k| {
@@ -26,14 +26,14 @@ impl Picture {
                     f64::from(k % 4) / 4.0 - 0.375,
                     f64::from(k / 4) / 4.0 - 0.375,
                 );
-                grey(f64::from(x) + dx, f64::from(y) + dy)
+                gray(f64::from(x) + dx, f64::from(y) + dy)
             });
             Luma([(points.sum::<f64>() / 16.0).round() as u8])
         });
         let mut frame = imageops::blur(&frame, self.blur.max(0.4));
-        for Luma([grey]) in frame.pixels_mut() {
+        for Luma([gray]) in frame.pixels_mut() {
             let random = (rng.next_u32() >> 8) as f64 / f64::from(1 << 23) - 1.0;
-            *grey = (f64::from(*grey) + self.noise * random).clamp(0.0, 255.0) as u8;
+            *gray = (f64::from(*gray) + self.noise * random).clamp(0.0, 255.0) as u8;
         }
         frame
     }
