@@ -1,7 +1,7 @@
 //! A client moves an emulated arm: calibration, moves, a signal, the hand.
 //!
 //! ```text
-//! cargo run --example emulated_arm
+//! cargo run -p puma-val2 --example emulated_arm
 //! ```
 #![allow(clippy::print_stdout)] // Output of a program.
 

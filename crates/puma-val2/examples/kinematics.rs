@@ -1,7 +1,7 @@
 //! Forward and inverse kinematics: the eight postures that reach one pose of the hand.
 //!
 //! ```text
-//! cargo run --example kinematics
+//! cargo run -p puma-val2 --example kinematics
 //! ```
 #![allow(clippy::print_stdout)] // Output of a program.
 

@@ -1,7 +1,7 @@
 //! An emulated controller on a TCP socket, and a client that connects to it.
 //!
 //! ```text
-//! cargo run --example tcp_emulator
+//! cargo run -p puma-val2 --example tcp_emulator
 //! ```
 #![allow(clippy::print_stdout)] // Output of a program.
 
