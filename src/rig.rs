@@ -172,7 +172,7 @@ impl Rig {
     /// Removes the ball and its holder from the cell, opens the jaws, and moves the arm to `pose`.
     ///
     /// # Errors
-    /// What kept the arm from getting there.
+    /// [`ArmError`] if the arm does not reach the pose.
     pub fn clear_for(&mut self, pose: Joints) -> Result<(), ArmError> {
         self.cell.remove_ball();
         self.arm.set_gripper(Gripper::Open)?;

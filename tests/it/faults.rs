@@ -34,7 +34,7 @@ fn untaught() -> Belief {
 
 type Grabbed = Result<GrayImage, FrameError>;
 
-/// What stands between the parts and the agent.
+/// Layer between the parts and the agent that injects faults.
 struct Between<'a> {
     detector: Box<dyn CircleDetector + 'a>,
     camera: Box<dyn FnMut(Grabbed) -> Grabbed + 'a>,

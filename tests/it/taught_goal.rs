@@ -8,7 +8,7 @@ use grasp_agent::{
 use pipeline_sim::ErrorLevel;
 use puma_val2::Joint;
 
-/// How many of six balls the jaws hold in the end.
+/// Returns the number of balls, of six, that the jaws hold in the end.
 fn held<C: Controller + Clone>(cell: &TrialCell, config: &AgentConfig, controller: &C) -> usize {
     let agent = Agent::with_controller(config.clone(), controller.clone()).expect("sound settings");
     let run = |ball| {

@@ -231,7 +231,7 @@ fn cached_on_two_threads(updates: u64) -> Result<f64> {
     Ok(rates.map_err(|_| "a thread broke off")??)
 }
 
-/// The same problem behind the trait, in episodes of 60 steps.
+/// Implements the problem as an environment, in episodes of 60 steps.
 struct Problem(State);
 
 impl Environment for Problem {

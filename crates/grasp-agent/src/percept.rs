@@ -1,4 +1,4 @@
-//! What is seen: the object in one frame, and the percept that behaviours decide by.
+//! The sighting of an object in one frame, and the percept that behaviours decide by.
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, Joints};

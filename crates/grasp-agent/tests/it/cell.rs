@@ -14,7 +14,7 @@ use grasp_agent::{
     ServoLaw, ServoSettings, Sighting,
 };
 
-/// What can go wrong, and after how many looks or moves.
+/// Faults, with the number of looks or moves before them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fault {
     None,
@@ -42,7 +42,7 @@ pub(crate) enum Fault {
     Near(usize),
     /// The arm's own guard halts it halfway in this move.
     Halted(usize),
-    /// As before, and on the way back.
+    /// It halts on the way there, and on the way back.
     HaltedTwice(usize),
     /// It halts the first three moves that show the ball with a radius above this.
     HaltedNear(f64),
@@ -74,7 +74,7 @@ pub(crate) struct Cell {
     pub(crate) joints: Joints,
     pub(crate) closed: bool,
     pub(crate) held: bool,
-    /// Whether the jaws hold nothing, beside what else goes wrong.
+    /// Set if the jaws hold nothing, beside the fault.
     pub(crate) slippery: bool,
     pub(crate) stops: usize,
     pub(crate) looks: usize,
@@ -94,7 +94,7 @@ impl Cell {
         self.fault = Fault::GripperDead(0);
     }
 
-    /// What the arm says of where it stands.
+    /// Returns the pose that the arm reports.
     fn reported(&self, mut joints: Joints) -> Joints {
         if matches!(self.fault, Fault::Nowhere(after) if self.moves >= after) {
             joints.0[1] = f64::NAN;

@@ -58,8 +58,8 @@ impl ProximitySensor for Sensor {
     }
 }
 
-/// What look number n, from 0, finds; no two frames are the same. More looks than anyone needs are
-/// a panic.
+/// Scripted sightings, by the number of the look from 0. All frames differ; an excess of looks
+/// panics.
 struct Scene {
     looks: u32,
     finds: fn(u32) -> Option<Features>,

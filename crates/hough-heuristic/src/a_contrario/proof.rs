@@ -143,8 +143,7 @@ const BEYOND_DOUBT: f32 = 4.0;
 /// So does one of a score of one half and more of which this share is covered, as small ones never
 /// become surer.
 const ALL_BUT_COVERED: f32 = 0.85;
-/// What the outline of another circle may lie farther from an edge that belongs to it, pixels of
-/// the level.
+/// Additional distance at which an edge still belongs to another circle, pixels of the level.
 const MORE_SLACK: f32 = 0.5;
 
 /// Properties of a level that the proof depends on.

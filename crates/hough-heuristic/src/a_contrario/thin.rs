@@ -18,7 +18,7 @@ pub(super) struct Thinning {
     kept: Vec<Candidate>,
     /// Squared slopes, tile by tile.
     squares: Vec<i32>,
-    /// Where the squares of each tile end.
+    /// End of the squares of each tile.
     ends: Vec<u32>,
     /// The least square that is kept in each tile.
     least: Vec<i32>,

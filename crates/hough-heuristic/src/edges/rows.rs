@@ -350,7 +350,7 @@ fn mask(condition: bool) -> i32 {
     -i32::from(condition)
 }
 
-/// Whether a direction with these absolute components lies within 22.5 degrees of the axis of
+/// Returns `true` for a direction, by its absolute components, within 22.5 degrees of the axis of
 /// `along`.
 #[inline(always)]
 pub(super) fn is_shallow(across: i32, along: i32) -> bool {

@@ -384,8 +384,8 @@ impl Accumulator {
         });
     }
 
-    /// Whether the cell's share is above that of the neighbours before it and not below that of
-    /// those behind.
+    /// Returns `true` if the cell's share is above that of the neighbours before it and not below
+    /// that of those behind.
     fn is_peak(&self, layer: usize, index: usize, rings: &[Ring]) -> bool {
         let size = self.columns * self.rows;
         let (row, column) = (index / self.columns, index % self.columns);

@@ -104,7 +104,7 @@ fn circle(x: f64, y: f64, radius: f64) -> Circle {
     Circle { x, y, radius }
 }
 
-/// Whether a point lies in a circle.
+/// Returns `true` if a point lies in a circle.
 fn within(circle: &Circle, x: f64, y: f64) -> bool {
     (x - circle.x).hypot(y - circle.y) < circle.radius
 }

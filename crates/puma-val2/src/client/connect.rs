@@ -43,7 +43,7 @@ impl<T: Transport> Val2Client<T> {
     /// again.
     ///
     /// # Errors
-    /// As for [`Val2Client::connect`].
+    /// Those of [`Val2Client::connect`].
     pub fn reconnect(&mut self) -> Result<(), ArmError> {
         self.wire.echo = None;
         self.last_known = None;

@@ -22,7 +22,7 @@ impl<T: Transport> GuardedArm<T> {
     /// Arms the guard on [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
     ///
     /// # Errors
-    /// As for [`Val2Client::arm_proximity`].
+    /// Those of [`Val2Client::arm_proximity`].
     pub fn new(mut client: Val2Client<T>) -> Result<Self, ArmError> {
         let signal = client.config().proximity_signal;
         client.arm_proximity(signal)?;

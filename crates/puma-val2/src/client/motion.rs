@@ -58,7 +58,7 @@ impl<T: Transport> Val2Client<T> {
     /// Moves the arm to its upright pose by `READY`, and returns the joint angles afterwards.
     ///
     /// # Errors
-    /// As for [`Manipulator::move_to`](crate::Manipulator::move_to).
+    /// Those of [`Manipulator::move_to`](crate::Manipulator::move_to).
     pub fn ready(&mut self) -> Result<Joints, ArmError> {
         let ready = Joints::READY;
         let means = match self.guard {

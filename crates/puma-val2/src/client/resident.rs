@@ -107,7 +107,7 @@ impl<T: Transport> Resident<'_, T> {
     /// Ends the program; the monitor has its prompt again.
     ///
     /// # Errors
-    /// What the line said.
+    /// [`ArmError`] if the line fails or the controller does not answer.
     pub fn end(mut self) -> Result<(), ArmError> {
         self.finish()
     }

@@ -267,7 +267,8 @@ impl PumaParams {
     /// Returns the nearest joint angles in any of the postures that `allowed` accepts.
     ///
     /// # Errors
-    /// As for [`PumaParams::inverse_near`]; [`Unreachable::NotAllowed`] if no posture is accepted.
+    /// Those of [`PumaParams::inverse_near`], and [`Unreachable::NotAllowed`] if no posture is
+    /// accepted.
     pub(crate) fn inverse_among(
         &self,
         flange: &Isometry3<f64>,

@@ -111,7 +111,7 @@ fn on_socket(
 }
 
 /// Carries out the lines of the panel and keeps the floppy disk's folder up to date until `quit`.
-/// Where the input is closed there is no panel, and the program serves until it is killed.
+/// With a closed standard input there is no panel, and the program serves until it is killed.
 fn attend(server: &EmulatorServer, mut floppy: Option<Floppy>) -> Result<(), Box<dyn Error>> {
     let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || {

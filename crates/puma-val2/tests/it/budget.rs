@@ -1,4 +1,4 @@
-//! What a move costs on a 9600-baud line: characters, and moves per second when the motion itself
+//! Cost of a move on a 9600-baud line: characters, and moves per second when the motion itself
 //! takes no time.
 
 use std::time::Duration;

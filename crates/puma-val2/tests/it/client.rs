@@ -438,8 +438,7 @@ impl puma_val2::Transport for Interrupted {
     }
 }
 
-/// What somebody else says while the client finds out whether there is an echo is not taken for
-/// one.
+/// A message that arrives while the client tests for an echo is not taken for one.
 #[test]
 fn a_message_at_connection_is_no_echo() {
     for echo in [true, false] {

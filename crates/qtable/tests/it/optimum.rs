@@ -1,4 +1,4 @@
-//! How near Q-learning comes to the known optimum of the larger toys and of those with chance.
+//! Distance of Q-learning from the known optimum of the larger and the random toys.
 
 use qtable::{
     Comparison, EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Training, Until, toys,

@@ -29,7 +29,7 @@ pub(crate) fn client(profile: Profile, way: MoveWay) -> Client {
     client
 }
 
-/// What a run of injected faults came to.
+/// Results of a run of injected faults.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
     pub(crate) injected: usize,
@@ -230,7 +230,7 @@ impl<'a> Subject<'a> {
         tally
     }
 
-    /// The same with each of these damages in both directions.
+    /// Injects each of these damages in both directions.
     pub(crate) fn strike_both_ways(&self, damages: &[&dyn Fn(usize) -> Damage]) -> Tally {
         let mut sum = Tally::default();
         for direction in [Way::ToController, Way::FromController] {

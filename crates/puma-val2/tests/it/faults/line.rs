@@ -6,7 +6,7 @@ use std::time::Duration;
 use puma_val2::{Emulator, MemoryLine, Transport};
 use rand::{RngExt, rngs::Xoshiro256PlusPlus};
 
-/// What happens to a character.
+/// Damage to one character.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Damage {
     Lost,
@@ -24,7 +24,7 @@ pub(crate) enum Way {
     FromController,
 }
 
-/// What noise does to one character.
+/// Damages that noise causes.
 pub(crate) const CHARACTERS: [&dyn Fn(usize) -> Damage; 4] = [
     &|_| Damage::Lost,
     &|_| Damage::Doubled,

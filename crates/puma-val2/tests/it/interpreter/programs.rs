@@ -2,7 +2,7 @@
 
 use crate::console::Console;
 
-/// What a program typed, one string a line.
+/// Lines that a program typed.
 fn typed(steps: &str) -> Vec<String> {
     let said = Console::ready().run(steps);
     let end = said

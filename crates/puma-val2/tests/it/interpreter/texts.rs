@@ -170,8 +170,8 @@ fn a_line_longer_than_the_buffer_is_refused_in_every_dialogue() {
     assert_eq!(console.emulator.real("N"), Some(4.0));
 }
 
-/// What is typed while the monitor is busy waits in a buffer of so many characters, line ends
-/// counted; a line that is typed while none waits does not.
+/// A busy monitor buffers typed characters up to its limit, line ends included. A line typed while
+/// the monitor is idle is not counted.
 #[test]
 fn the_input_buffer_holds_what_it_says() {
     let mut console = Console::ready_with(Profile {
