@@ -7,8 +7,9 @@
 
 use std::time::Duration;
 
-use circle_scenes::contest::{DETECTORS, detector};
+use circle_scenes::contest::detector;
 use circle_scenes::scene::Scene;
+use circle_scenes::staged::TRANSFORMS;
 use criterion::{
     BenchmarkGroup, Criterion, criterion_group, criterion_main, measurement::WallTime,
 };
@@ -76,7 +77,7 @@ fn detectors(criterion: &mut Criterion) {
         let config = AContrarioConfig::default();
         let mut a_contrario = AContrario::new(config).expect("usable settings");
         run("a contrario", &mut a_contrario);
-        for name in DETECTORS {
+        for name in TRANSFORMS {
             if name != "SHT" || scene.width <= WIDEST_SHT {
                 let canny = Canny::default();
                 run(

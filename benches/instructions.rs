@@ -13,6 +13,7 @@ use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
 use circle_scenes::contest;
+use circle_scenes::staged::TRANSFORMS;
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{AContrario, AContrarioConfig, Canny, CircleDetector, EdgeDetector};
 
@@ -43,7 +44,7 @@ fn count_all() -> ExitCode {
     }
     println!("{:18} {:22} {:>14}", "scene", "what", "instructions");
     for scene in SCENES {
-        for case in [EDGES, A_CONTRARIO].into_iter().chain(contest::DETECTORS) {
+        for case in [EDGES, A_CONTRARIO].into_iter().chain(TRANSFORMS) {
             if case == SMALL_ONLY && !scene.starts_with("192x144") {
                 continue;
             }

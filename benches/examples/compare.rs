@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use circle_benches::least_cpu_time;
 use circle_scenes::contest;
 use circle_scenes::scene::{Scene, same};
+use circle_scenes::staged::TRANSFORMS;
 use clap::Parser;
 use hough_heuristic::EdgeDetector;
 use plotters::prelude::*;
@@ -56,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse();
     let mut rows = Vec::new();
     for round in contest::rounds() {
-        for detector in contest::DETECTORS {
+        for detector in TRANSFORMS {
             let seeds = if detector == "SHT" {
                 options.slow_seeds
             } else {
@@ -202,7 +203,7 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .y_label_area_size(50)
         .build_cartesian_2d(-0.5..columns - 0.5, (0.02f64..20_000.0).log_scale())?;
     chart.configure_mesh().disable_x_mesh().x_labels(0).draw()?;
-    for (index, detector) in contest::DETECTORS.into_iter().enumerate() {
+    for (index, detector) in TRANSFORMS.into_iter().enumerate() {
         let colour = Palette99::pick(index).to_rgba();
         let points = rows
             .iter()

@@ -27,20 +27,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     let edges = canny.detect_edges(&frame());
     let mut search = CurveSearch::new(CurveSearchConfig::default())?;
     let mut out = std::io::stdout().lock();
-    for found in search.find::<Ellipse>(edges, |ellipse| ellipse.major < 320.0) {
+    for (found, belonging) in search.find::<Ellipse>(edges, |ellipse| ellipse.major < 320.0) {
         let Ellipse {
             x,
             y,
             major,
             minor,
             angle,
-        } = found.curve;
+        } = found;
         writeln!(
             out,
             "center ({x:.1}, {y:.1}), half-axes {major:.1} and {minor:.1}, turned by {:.1} \
              degrees; {:.0} % of its pixels are edges",
             angle.to_degrees(),
-            100.0 * found.beta
+            100.0 * belonging
         )?;
     }
     Ok(())

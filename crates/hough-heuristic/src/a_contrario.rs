@@ -246,7 +246,7 @@ impl AContrario {
             let gray = pyramid.gray(depth);
             let noise = noise / (1 << depth) as f32 + ROUNDING;
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
-            let points = maxima.find(gray.pixels, gray.width, threshold, usize::MAX);
+            let points = maxima.find(gray.pixels, gray.width, threshold);
             let points = thinning.strongest(points, (gray.width, gray.height));
             level.fill(gray.width, gray.height, points);
         };

@@ -2,11 +2,10 @@
 
 use crate::circle::Circle;
 use crate::detect::{Detection, FrameRefused};
-use crate::error::{ConfigError, require, require_radii};
+use crate::error::{
+    ConfigError, require, require_radii, require_share, require_some, require_tolerance,
+};
 use crate::region::Region;
-
-/// The largest tolerance, pixels, for which the counts of near edge pixels fit in a byte.
-pub(crate) const MAX_TOLERANCE: f64 = 8.0;
 
 /// Rules by which the transforms report a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,38 +58,13 @@ impl Acceptance {
     /// # Errors
     /// The first parameter outside its range.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        let &Self {
-            theta,
-            tolerance,
-            min_distance,
-            ..
-        } = self;
-        require(
-            "theta",
-            theta,
-            "between 0 and 1, both excluded",
-            theta > 0.0 && theta < 1.0,
-        )?;
+        require_share("theta", self.theta)?;
         require_radii(self.min_radius, self.max_radius)?;
-        require(
-            "tolerance",
-            tolerance,
-            "0..=8 px",
-            (0.0..=MAX_TOLERANCE).contains(&tolerance),
-        )?;
-        require(
-            "max_circles",
-            self.max_circles as f64,
-            "at least 1",
-            self.max_circles > 0,
-        )?;
-        let usable = min_distance.is_finite() && min_distance >= 0.0;
-        require(
-            "min_distance",
-            min_distance,
-            "finite and at least 0 px",
-            usable,
-        )?;
+        require_tolerance(self.tolerance)?;
+        require_some("max_circles", self.max_circles)?;
+        let distance = self.min_distance;
+        let usable = distance.is_finite() && distance >= 0.0;
+        require("min_distance", distance, "finite and at least 0 px", usable)?;
         self.region.map_or(Ok(()), |region| region.check())
     }
 

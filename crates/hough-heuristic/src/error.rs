@@ -64,10 +64,21 @@ pub(crate) fn require(
     }
 }
 
-/// Checks a number of draws.
-pub(crate) fn require_iterations(iterations: u32) -> Result<(), ConfigError> {
-    let usable = iterations > 0;
-    require("iterations", iterations.into(), "at least 1", usable)
+/// Checks a number of things of which at least one is needed.
+pub(crate) fn require_some(parameter: &'static str, count: usize) -> Result<(), ConfigError> {
+    require(parameter, count as f64, "at least 1", count > 0)
+}
+
+/// Checks a share.
+pub(crate) fn require_share(parameter: &'static str, share: f64) -> Result<(), ConfigError> {
+    let usable = share > 0.0 && share < 1.0;
+    require(parameter, share, "between 0 and 1, both excluded", usable)
+}
+
+/// Checks a tolerance: up to 8 px, the counts of near edge pixels fit in a byte.
+pub(crate) fn require_tolerance(tolerance: f64) -> Result<(), ConfigError> {
+    let usable = (0.0..=8.0).contains(&tolerance);
+    require("tolerance", tolerance, "0..=8 px", usable)
 }
 
 /// Checks a radius range.

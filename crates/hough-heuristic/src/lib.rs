@@ -102,10 +102,9 @@ pub use frame::ImageFiles;
 pub use frame::{FrameError, FrameSource, FrameStream, Y4mWriter};
 pub use image;
 pub use region::Region;
-pub use sampling::Sampling;
 pub use stages::Stages;
 pub use transforms::{
-    CurveSearch, CurveSearchConfig, FoundCurve, Heuristic, HeuristicConfig, RandomizedHough,
+    CurveSearch, CurveSearchConfig, Heuristic, HeuristicConfig, RandomizedHough,
     RandomizedHoughConfig, StandardHough, StandardHoughConfig,
 };
 

@@ -25,7 +25,6 @@ use crate::detect::{CircleDetector, Detection};
 use crate::edges::{Canny, EdgeDetector};
 use crate::frame::{FrameError, FrameSource, ImageFiles};
 use crate::output::{write_png, write_whole};
-use crate::sampling::Sampling;
 use crate::stages::{Stages, with_circles};
 use crate::transforms::{
     Heuristic, HeuristicConfig, RandomizedHough, RandomizedHoughConfig, StandardHough,
@@ -317,19 +316,19 @@ fn detector(options: &Options) -> Result<Box<dyn Staged>, Box<dyn Error>> {
         max_circles: options.max_circles,
         ..Acceptance::default()
     };
-    let heuristic = |sampling| {
+    let heuristic = |anywhere| {
         Heuristic::with_canny(HeuristicConfig {
             accept,
             seed: options.seed,
-            sampling,
+            anywhere,
             ..HeuristicConfig::default()
         })
     };
-    let randomized = |sampling| {
+    let randomized = |anywhere| {
         let config = RandomizedHoughConfig {
             accept,
             seed: options.seed,
-            sampling,
+            anywhere,
             ..RandomizedHoughConfig::default()
         };
         RandomizedHough::new(config, Canny::default())
@@ -350,10 +349,10 @@ fn detector(options: &Options) -> Result<Box<dyn Staged>, Box<dyn Error>> {
             seed: options.seed,
             ..AContrarioConfig::default()
         })?),
-        DetectorName::Heuristic => Box::new(heuristic(Sampling::Near)?),
-        DetectorName::HeuristicAnywhere => Box::new(heuristic(Sampling::Anywhere)?),
-        DetectorName::Rht => Box::new(randomized(Sampling::Near)?),
-        DetectorName::RhtAnywhere => Box::new(randomized(Sampling::Anywhere)?),
+        DetectorName::Heuristic => Box::new(heuristic(false)?),
+        DetectorName::HeuristicAnywhere => Box::new(heuristic(true)?),
+        DetectorName::Rht => Box::new(randomized(false)?),
+        DetectorName::RhtAnywhere => Box::new(randomized(true)?),
         DetectorName::Sht => Box::new(standard(false)?),
         DetectorName::ShtGradient => Box::new(standard(true)?),
     };

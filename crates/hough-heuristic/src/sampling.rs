@@ -12,49 +12,25 @@ use crate::curve::circles_of_radius;
 use crate::edges::EdgePixel;
 use crate::sampling::structure::Structure;
 
-/// Source of the pixels of a draw.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Sampling {
-    /// All from the whole of `D`, as the paper has it. For a circle that owns the share `p` of all
-    /// edge pixels, one draw of three in `p^-3` hits it.
-    Anywhere,
-    /// The first from the whole of `D`; the others from a window around it that is as wide as a
-    /// circle of some radius between the smallest and the largest can reach, the radius drawn anew
-    /// each time (small ones more often: its logarithm is uniform). Beyond the paper; in clutter it
-    /// hits a small ball hundreds of times as often.
-    #[default]
-    Near,
-}
-
-/// A draw that ended the search, or the circle it determines, if it determines one.
-pub(crate) enum Draw {
-    Exhausted,
-    Nothing,
-    Circle(Circle),
-}
-
 /// Draws pixels and solves for the circle: the paper's steps 3a and 3b.
 ///
 /// Three pixels determine a circle. Where only one radius is allowed, two leave the choice between
 /// two circles, of which one is drawn.
 #[derive(Clone, Debug)]
 pub(crate) struct Sampler {
-    sampling: Sampling,
     known_radius: Option<f64>,
-    /// The reaches of [`Sampling::Near`], pixels.
+    /// The reaches of the windows, pixels; empty where pixels come from anywhere.
     reaches: Vec<f64>,
     seed: u64,
     rng: Xoshiro256PlusPlus,
 }
 
 impl Sampler {
-    pub(crate) fn new(sampling: Sampling, accept: &Acceptance, seed: u64) -> Self {
+    pub(crate) fn new(anywhere: bool, accept: &Acceptance, seed: u64) -> Self {
+        let reaches = || reaches(accept.min_radius, accept.max_radius);
         Self {
-            sampling,
             known_radius: accept.known_radius(),
-            reaches: reaches(accept.min_radius, accept.max_radius),
+            reaches: if anywhere { Vec::new() } else { reaches() },
             seed,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
         }
@@ -65,31 +41,25 @@ impl Sampler {
         self.rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
     }
 
-    pub(crate) fn draw(&mut self, structure: &Structure) -> Draw {
-        let circle = match self.known_radius {
-            Some(radius) => self.pixels::<2>(structure).map(|pair| {
-                let side = self.rng.next_u32() as usize % 2;
-                circles_of_radius(pair, radius).map(|both| both[side])
-            }),
-            None => self
-                .pixels::<3>(structure)
-                .map(|triple| Circle::through(&triple)),
+    /// Draws pixels and returns the circle that they determine, if they determine one; none if too
+    /// few pixels are left.
+    pub(crate) fn draw(&mut self, structure: &Structure) -> Option<Option<Circle>> {
+        let Some(radius) = self.known_radius else {
+            let triple: [_; 3] = self.pixels(structure)?;
+            return Some(Circle::through(&triple));
         };
-        match circle {
-            None => Draw::Exhausted,
-            Some(None) => Draw::Nothing,
-            Some(Some(circle)) => Draw::Circle(circle),
-        }
+        let pair = self.pixels(structure)?;
+        let side = self.rng.next_u32() as usize % 2;
+        Some(circles_of_radius(pair, radius).map(|both| both[side]))
     }
 
     fn pixels<const N: usize>(&mut self, structure: &Structure) -> Option<[EdgePixel; N]> {
-        match self.sampling {
-            Sampling::Anywhere => structure.draw_anywhere(&mut self.rng),
-            Sampling::Near => {
-                let reach = self.reaches[self.rng.next_u32() as usize % self.reaches.len()];
-                structure.draw_near(reach, &mut self.rng)
-            }
-        }
+        let reach = (!self.reaches.is_empty())
+            .then(|| self.reaches[self.rng.next_u32() as usize % self.reaches.len()]);
+        let mut pixels = [EdgePixel::default(); N];
+        structure
+            .draw(reach, &mut self.rng, &mut pixels)
+            .then_some(pixels)
     }
 }
 

@@ -2,14 +2,13 @@
 
 mod belonging;
 mod curve_search;
-mod evidence;
 mod fit;
 mod heuristic;
 mod pass;
 mod randomized_hough;
 mod standard_hough;
 
-pub use curve_search::{CurveSearch, CurveSearchConfig, FoundCurve};
+pub use curve_search::{CurveSearch, CurveSearchConfig};
 pub use heuristic::{Heuristic, HeuristicConfig};
 pub use randomized_hough::{RandomizedHough, RandomizedHoughConfig};
 pub use standard_hough::{StandardHough, StandardHoughConfig};

@@ -10,13 +10,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use hough_heuristic::image::GrayImage;
-use hough_heuristic::{
-    AContrario, AContrarioConfig, Acceptance, Canny, CircleDetector, Heuristic, HeuristicConfig,
-    RandomizedHough, RandomizedHoughConfig, Sampling, StandardHough, StandardHoughConfig,
-};
+use hough_heuristic::{AContrario, AContrarioConfig, Acceptance, Canny, CircleDetector};
 
 use circle_scenes::scene::Scene;
-use circle_scenes::staged::Staged;
+use circle_scenes::staged::{Staged, TRANSFORMS, transform};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -49,52 +46,13 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-const ACCEPT: Acceptance = Acceptance {
-    theta: 0.65,
-    tolerance: 1.0,
-    min_radius: 15.0,
-    max_radius: 60.0,
-    max_circles: 8,
-    min_distance: 8.0,
-    region: None,
-    refine: true,
-};
-
-fn detectors() -> Vec<(String, Box<dyn Staged>)> {
-    let canny = Canny::default;
-    let mut all: Vec<(String, Box<dyn Staged>)> = Vec::new();
-    for sampling in [Sampling::Near, Sampling::Anywhere] {
-        let heuristic = HeuristicConfig {
-            accept: ACCEPT,
-            sampling,
-            ..HeuristicConfig::default()
-        };
-        let rht = RandomizedHoughConfig {
-            accept: ACCEPT,
-            sampling,
-            ..RandomizedHoughConfig::default()
-        };
-        all.push((
-            format!("heuristic, {sampling:?}"),
-            Box::new(Heuristic::new(heuristic, canny()).unwrap()),
-        ));
-        all.push((
-            format!("rht, {sampling:?}"),
-            Box::new(RandomizedHough::new(rht, canny()).unwrap()),
-        ));
-    }
-    for gradient in [false, true] {
-        let config = StandardHoughConfig {
-            accept: ACCEPT,
-            gradient,
-            ..StandardHoughConfig::default()
-        };
-        all.push((
-            format!("sht, gradient {gradient}"),
-            Box::new(StandardHough::new(config, canny()).unwrap()),
-        ));
-    }
-    all
+fn detectors() -> [(&'static str, Box<dyn Staged>); 6] {
+    let accept = Acceptance {
+        max_radius: 60.0,
+        max_circles: 8,
+        ..Acceptance::default()
+    };
+    TRANSFORMS.map(|name| (name, transform(name, accept, Canny::default()).unwrap()))
 }
 
 fn frame(width: u32, height: u32, balls: usize, distractors: usize, seed: u64) -> GrayImage {

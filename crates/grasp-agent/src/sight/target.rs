@@ -104,15 +104,14 @@ impl<E: EdgeDetector> Target for EggTarget<E> {
         let found = self.search.find::<Ellipse>(edges, |ellipse| {
             self.minor.contains(&ellipse.minor) && ellipse.major <= self.elongation * ellipse.minor
         });
-        let seen = found.into_iter().find_map(|found| {
-            let ellipse = found.curve;
+        let seen = found.into_iter().find_map(|(ellipse, belonging)| {
             let detection = Detection {
                 circle: Circle {
                     x: ellipse.x,
                     y: ellipse.y,
                     radius: ellipse.minor,
                 },
-                score: found.beta,
+                score: belonging,
             };
             let long_axis = (ellipse.major > LONG * ellipse.minor).then_some(ellipse.angle);
             Some((ellipse, sighting(&detection, long_axis, frame)?))

@@ -1,10 +1,8 @@
 //! Chooses the widest vectors that the machine has.
 //!
-//! The one place of the crate with `unsafe` code: a function compiled for AVX2 may only be called
-//! where AVX2 is there, which the compiler cannot know and the call below makes sure of.
+//! The one module of the crate with `unsafe` code: a function compiled for AVX2 may only be called
+//! where the processor has AVX2, which the call below checks and the compiler cannot.
 #![allow(unsafe_code)]
-
-use super::rows::{self, Candidate, Passes, Rows};
 
 /// Work that is compiled for several widths of vectors: [`run`](Vectorized::run) and the functions
 /// inlined into it (`#[inline(always)]` on both). [`widest`] runs it.
@@ -50,47 +48,4 @@ pub fn widest<W: Vectorized>(work: W) -> W::Output {
 #[target_feature(enable = "avx2")]
 fn with_avx2<W: Vectorized>(work: W) -> W::Output {
     work.run()
-}
-
-/// [`rows::candidates`] by the fastest code for this machine.
-pub(super) fn candidates(
-    passes: &Passes,
-    gray: &[u8],
-    width: usize,
-    rows: &mut Rows,
-    marks: &mut [u8],
-    found: &mut Vec<Candidate>,
-) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the function needs nothing but AVX2, which has just been detected.
-        unsafe { candidates_avx2(passes, gray, width, rows, marks, found) };
-        return;
-    }
-    candidates_baseline(passes, gray, width, rows, marks, found);
-}
-
-/// [`rows::candidates`] for the baseline of the target: SSE2, NEON, or no vectors at all.
-pub(super) fn candidates_baseline(
-    passes: &Passes,
-    gray: &[u8],
-    width: usize,
-    rows: &mut Rows,
-    marks: &mut [u8],
-    found: &mut Vec<Candidate>,
-) {
-    rows::candidates(passes, gray, width, rows, marks, found);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn candidates_avx2(
-    passes: &Passes,
-    gray: &[u8],
-    width: usize,
-    rows: &mut Rows,
-    marks: &mut [u8],
-    found: &mut Vec<Candidate>,
-) {
-    rows::candidates(passes, gray, width, rows, marks, found);
 }

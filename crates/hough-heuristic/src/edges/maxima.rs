@@ -1,18 +1,16 @@
-//! The maxima of the gradient across edges, without hysteresis: what a detector wants that looks
-//! for order itself.
+//! The maxima of the gradient across edges, without hysteresis.
 
-use super::dispatch;
-use super::rows::{Candidate, Passes, Rows, UNITS};
+use super::rows::{Candidate, Finding, Passes, Rows, UNITS};
 use super::smoothing::{noise_gain, smoothing_weights};
+use super::widest;
 
 /// Finds the pixels whose gradient is a maximum across the edge.
 #[derive(Clone, Debug)]
 pub(crate) struct Maxima {
-    passes: Passes,
+    pub(super) passes: Passes,
     noise_gain: f32,
-    rows: Rows,
+    pub(super) rows: Rows,
     candidates: Vec<Candidate>,
-    squares: Vec<i32>,
     #[cfg(feature = "parallel")]
     strips: Vec<Strip>,
 }
@@ -30,7 +28,6 @@ impl Maxima {
             },
             rows: Rows::default(),
             candidates: Vec::new(),
-            squares: Vec::new(),
             #[cfg(feature = "parallel")]
             strips: Vec::new(),
         }
@@ -41,53 +38,52 @@ impl Maxima {
         self.noise_gain
     }
 
-    /// The maxima above `threshold`, in gray levels of Sobel's gradient, row by row, and of more
-    /// than `most` only the strongest; none in a frame below 3x3.
-    pub(crate) fn find(
+    /// The maxima above `threshold`, in gray levels of Sobel's gradient, row by row; none in a
+    /// frame below 3x3.
+    pub(crate) fn find(&mut self, gray: &[u8], width: usize, threshold: f32) -> &[Candidate] {
+        self.passes.low = squared(threshold);
+        if width < 3 || gray.len() < 3 * width {
+            self.candidates.clear();
+            return &self.candidates;
+        }
+        #[cfg(feature = "parallel")]
+        if self.find_in_strips(gray, width) {
+            return &self.candidates;
+        }
+        self.find_at_once(gray, width, &mut [])
+    }
+
+    /// The maxima above the low threshold of a frame of at least 3x3 pixels, marked in `marks` as
+    /// weak or, above the high one, strong.
+    pub(super) fn mark(
         &mut self,
         gray: &[u8],
         width: usize,
-        threshold: f32,
-        most: usize,
+        (low, high): (f32, f32),
+        marks: &mut [u8],
     ) -> &[Candidate] {
-        self.candidates.clear();
-        let height = gray.len().checked_div(width).unwrap_or(0);
-        if width >= 3 && height >= 3 {
-            let threshold = threshold * UNITS;
-            self.passes.low = (threshold * threshold) as i32;
-            #[cfg(feature = "parallel")]
-            let found = self.find_in_strips(gray, width);
-            #[cfg(not(feature = "parallel"))]
-            let found = false;
-            if !found {
-                self.find_at_once(gray, width);
-            }
-        }
-        if self.candidates.len() > most {
-            self.squares.clear();
-            self.squares.extend(
-                self.candidates
-                    .iter()
-                    .map(|candidate| candidate.gradient.square()),
-            );
-            let rank = self.squares.len() - most;
-            let (_, &mut least, _) = self.squares.select_nth_unstable(rank);
-            self.candidates
-                .retain(|candidate| candidate.gradient.square() >= least);
-        }
-        &self.candidates
+        (self.passes.low, self.passes.high) = (squared(low), squared(high));
+        self.find_at_once(gray, width, marks)
     }
 
-    fn find_at_once(&mut self, gray: &[u8], width: usize) {
-        dispatch::candidates(
-            &self.passes,
+    fn find_at_once(&mut self, gray: &[u8], width: usize, marks: &mut [u8]) -> &[Candidate] {
+        self.candidates.clear();
+        widest(Finding {
+            passes: &self.passes,
             gray,
             width,
-            &mut self.rows,
-            &mut [],
-            &mut self.candidates,
-        );
+            rows: &mut self.rows,
+            marks,
+            found: &mut self.candidates,
+        });
+        &self.candidates
     }
+}
+
+/// A threshold as the passes compare it: squared, in units of their own.
+pub(super) fn squared(threshold: f32) -> i32 {
+    let threshold = threshold * UNITS;
+    (threshold * threshold) as i32
 }
 
 /// A part of the rows, with what is needed to work on it.
@@ -126,26 +122,27 @@ impl Maxima {
         let passes = &self.passes;
         self.strips
             .resize_with(count.max(self.strips.len()), Strip::default);
-        let strips = &mut self.strips[..count];
-        strips
-            .par_iter_mut()
-            .enumerate()
-            .for_each(|(index, strip)| {
-                let own = index * height / count..(index + 1) * height / count;
-                let (first, end) = (
-                    own.start.saturating_sub(around),
-                    (own.end + around).min(height),
-                );
-                let part = &gray[first * width..end * width];
-                let Strip { rows, candidates } = strip;
-                candidates.clear();
-                dispatch::candidates(passes, part, width, rows, &mut [], candidates);
-                candidates.retain_mut(|candidate| {
-                    candidate.pixel.y += first as u32;
-                    own.contains(&(candidate.pixel.y as usize))
-                });
+        let strips = self.strips[..count].par_iter_mut().enumerate();
+        strips.for_each(|(index, Strip { rows, candidates })| {
+            let own = index * height / count..(index + 1) * height / count;
+            let first = own.start.saturating_sub(around);
+            let end = (own.end + around).min(height);
+            candidates.clear();
+            widest(Finding {
+                passes,
+                gray: &gray[first * width..end * width],
+                width,
+                rows,
+                marks: &mut [],
+                found: candidates,
             });
-        for strip in strips {
+            candidates.retain_mut(|candidate| {
+                candidate.pixel.y += first as u32;
+                own.contains(&(candidate.pixel.y as usize))
+            });
+        });
+        self.candidates.clear();
+        for strip in &self.strips[..count] {
             self.candidates.extend_from_slice(&strip.candidates);
         }
         true
@@ -171,12 +168,11 @@ mod tests {
             }).collect();
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let (mut strips, mut whole) = (Maxima::new(sigma), Maxima::new(sigma));
-            let low = 20.0 * UNITS;
-            (strips.passes.low, whole.passes.low) = ((low * low) as i32, (low * low) as i32);
+            (strips.passes.low, whole.passes.low) = (squared(20.0), squared(20.0));
             let split = pool.install(|| strips.find_in_strips(&gray, width));
             prop_assert_eq!(split, gray.len() >= 2 * LEAST_STRIP && height >= 2 * LEAST_ROWS);
             if split {
-                whole.find_at_once(&gray, width);
+                whole.find_at_once(&gray, width, &mut []);
                 prop_assert_eq!(&strips.candidates, &whole.candidates);
             }
         }

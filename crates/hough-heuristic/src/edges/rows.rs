@@ -2,10 +2,10 @@
 //!
 //! Everything is integer arithmetic on short rows that stay in the nearest cache, written as plain
 //! loops over slices of one length, which the compiler turns into vector code. The same source is
-//! compiled for the baseline of the target and, in `dispatch`, for wider vectors; the results are
-//! the same by construction, and a test compares both with a plain version.
+//! compiled for the baseline of the target and, by [`widest`](super::widest), for wider vectors; the
+//! results are the same by construction, and a test compares both with a plain version.
 
-use super::{EdgeGradient, EdgePixel};
+use super::{EdgeGradient, EdgePixel, Vectorized};
 
 /// Gray levels are carried in sixteenths from the smoothing on.
 pub(super) const UNITS: f32 = 16.0;
@@ -61,42 +61,54 @@ pub(super) const WEAK: u8 = 1;
 /// See [`WEAK`].
 pub(super) const STRONG: u8 = 2;
 
-/// Lists the candidates of a frame of at least 3x3 pixels row by row, and marks them in `marks`,
-/// which has the frame's size or is empty.
-#[inline(always)]
-pub(super) fn candidates(
-    passes: &Passes,
-    gray: &[u8],
-    width: usize,
-    rows: &mut Rows,
-    marks: &mut [u8],
-    found: &mut Vec<Candidate>,
-) {
-    let height = gray.len() / width;
-    rows.resize(width, passes.weights.len() - 1);
-    let last = height - 1;
-    for y in 0..=height {
-        // Row y is smoothed, then row y - 1 differentiated, then the maxima of row y - 2 found.
-        if y <= last {
-            rows.smooth_row(passes, gray, width, y);
+/// Lists the candidates of a frame of at least 3x3 pixels row by row, and marks them.
+pub(super) struct Finding<'a> {
+    pub(super) passes: &'a Passes,
+    pub(super) gray: &'a [u8],
+    pub(super) width: usize,
+    pub(super) rows: &'a mut Rows,
+    /// The edge image to mark them in, or empty.
+    pub(super) marks: &'a mut [u8],
+    pub(super) found: &'a mut Vec<Candidate>,
+}
+
+impl Vectorized for Finding<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            passes,
+            gray,
+            width,
+            rows,
+            marks,
+            found,
+        } = self;
+        let last = gray.len() / width - 1;
+        rows.resize(width, passes.weights.len() - 1);
+        for y in 0..=last + 1 {
+            // Row y is smoothed, then row y - 1 differentiated, then the maxima of row y - 2 found.
+            if y <= last {
+                rows.smooth_row(passes, gray, width, y);
+            }
+            if y >= 1 {
+                let middle = y - 1;
+                let (above, below) = (middle.saturating_sub(1), y.min(last));
+                let [a, b, c] = [above, middle, below].map(|row| &rows.smooth[row % 3]);
+                differentiate(a, b, c, &mut rows.gradient[middle % 3]);
+            }
+            if y >= 3 {
+                let row = y - 2;
+                let marks = marks.get_mut(row * width..(row + 1) * width);
+                let marks = marks.unwrap_or_default();
+                maxima(passes, &mut rows.gradient, (row, width), marks, found);
+            }
         }
-        if y >= 1 {
-            let middle = y - 1;
-            let (above, below) = (middle.saturating_sub(1), y.min(last));
-            let [a, b, c] = [above, middle, below].map(|row| &rows.smooth[row % 3]);
-            differentiate(a, b, c, &mut rows.gradient[middle % 3]);
+        if !marks.is_empty() {
+            marks[..width].fill(0);
+            marks[last * width..].fill(0);
         }
-        if y >= 3 {
-            let row = y - 2;
-            let marks = marks
-                .get_mut(row * width..(row + 1) * width)
-                .unwrap_or_default();
-            maxima(passes, &mut rows.gradient, (row, width), marks, found);
-        }
-    }
-    if !marks.is_empty() {
-        marks[..width].fill(0);
-        marks[last * width..].fill(0);
     }
 }
 
@@ -211,6 +223,12 @@ impl GradientRow {
         i32::from(most) * i32::from(most) > low
     }
 
+    /// Returns the squared lengths in the block at `x`, a pixel to its left, and one to its right.
+    #[inline(always)]
+    fn squares_around(&self, x: usize) -> [&[i32; BLOCK]; 3] {
+        [x - 1, x, x + 1].map(|x| block(&self.square, x))
+    }
+
     /// Finds the squared lengths, unless they are known.
     #[inline(always)]
     fn square(&mut self) {
@@ -218,18 +236,9 @@ impl GradientRow {
             return;
         }
         self.squared = true;
-        let blocks = self.square.as_chunks_mut::<BLOCK>().0.iter_mut();
-        let gradients = self
-            .x
-            .as_chunks::<BLOCK>()
-            .0
-            .iter()
-            .zip(self.y.as_chunks::<BLOCK>().0);
-        for (squares, (gx, gy)) in blocks.zip(gradients) {
-            *squares = std::array::from_fn(|i| {
-                let (x, y) = (i32::from(gx[i]), i32::from(gy[i]));
-                x * x + y * y
-            });
+        for ((square, &x), &y) in self.square.iter_mut().zip(&self.x).zip(&self.y) {
+            let (x, y) = (i32::from(x), i32::from(y));
+            *square = x * x + y * y;
         }
     }
 }
@@ -273,21 +282,7 @@ fn block_maxima(
     found: &mut Vec<Candidate>,
 ) {
     let (gx, gy) = (block(&b.x, x), block(&b.y, x));
-    let (a0, a1, a2) = (
-        block(&a.square, x - 1),
-        block(&a.square, x),
-        block(&a.square, x + 1),
-    );
-    let (b0, b1, b2) = (
-        block(&b.square, x - 1),
-        block(&b.square, x),
-        block(&b.square, x + 1),
-    );
-    let (c0, c1, c2) = (
-        block(&c.square, x - 1),
-        block(&c.square, x),
-        block(&c.square, x + 1),
-    );
+    let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] = [a, b, c].map(|row| row.squares_around(x));
     let (mut before, mut behind, mut wide) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
     for i in 0..BLOCK {
         let (ax, ay) = (i32::from(gx[i]).abs(), i32::from(gy[i]).abs());
@@ -328,11 +323,11 @@ fn block_maxima(
             bits &= !(0xff << (8 * offset));
             // Always below BLOCK; the remainder spares the checks.
             let i = (8 * eight + offset) % BLOCK;
-            found.push(candidate(
-                (x + i, y),
-                (gx[i], gy[i]),
-                [before[i], b1[i], behind[i]],
-            ));
+            let (x, y) = ((x + i) as u32, y as u32);
+            found.push(Candidate {
+                pixel: EdgePixel { x, y },
+                gradient: EdgeGradient::new(gx[i], gy[i], [before[i], b1[i], behind[i]]),
+            });
         }
     }
 }
@@ -355,15 +350,4 @@ fn mask(condition: bool) -> i32 {
 #[inline(always)]
 pub(super) fn is_shallow(across: i32, along: i32) -> bool {
     (across << 15) < along * TAN_22
-}
-
-#[inline(always)]
-fn candidate((x, y): (usize, usize), (gx, gy): (i16, i16), squares: [i32; 3]) -> Candidate {
-    Candidate {
-        pixel: EdgePixel {
-            x: x as u32,
-            y: y as u32,
-        },
-        gradient: EdgeGradient::new(gx, gy, squares),
-    }
 }

@@ -1,6 +1,6 @@
 //! Frames from a stream of bytes.
 
-use std::io::{self, Read};
+use std::io::{self, BufRead, ErrorKind, Read};
 
 use image::GrayImage;
 
@@ -9,7 +9,7 @@ use crate::error::{ConfigError, require};
 
 /// The longest line of a Y4M header that is read, bytes.
 const MAX_LINE: usize = 1024;
-/// The most pixels of a frame: what a damaged header may not exceed.
+/// The most pixels of a frame: a limit for damaged headers.
 const MAX_PIXELS: u64 = 1 << 28;
 
 /// A [`FrameSource`] over a stream of 8-bit video, so also over a live camera through a pipe.
@@ -27,22 +27,14 @@ pub struct FrameStream<R> {
     reader: R,
     width: u32,
     height: u32,
-    format: Format,
+    /// Bytes of chroma that follow the luma of a Y4M frame; none in a raw stream.
+    chroma: Option<u64>,
     delivered: u64,
     ended: bool,
 }
 
-#[derive(Clone, Copy, Debug)]
-enum Format {
-    /// Luma, row by row, without any header.
-    Raw,
-    /// A line `FRAME`, luma, and so many bytes of chroma.
-    Y4m { chroma: u64 },
-}
-
-impl<R: Read> FrameStream<R> {
-    /// Reads the header of a YUV4MPEG2 (Y4M) stream, of whose frames the luma is taken. Give a
-    /// buffered reader, such as `stdin().lock()`.
+impl<R: BufRead> FrameStream<R> {
+    /// Reads the header of a YUV4MPEG2 (Y4M) stream, of whose frames the luma is taken.
     ///
     /// # Errors
     /// [`FrameError::Failed`] if there is no Y4M header, or one of a format that is not supported;
@@ -54,7 +46,7 @@ impl<R: Read> FrameStream<R> {
             Err(error) => return Err(failed(format!("no header: {error}"))),
         };
         let (width, height, chroma) = parse_header(&header).map_err(failed)?;
-        Ok(Self::new(reader, width, height, Format::Y4m { chroma }))
+        Ok(Self::new(reader, width, height, Some(chroma)))
     }
 
     /// Takes frames of `width` x `height` bytes that follow one another without any header, such as
@@ -68,15 +60,15 @@ impl<R: Read> FrameStream<R> {
             let expected = "at least 1, with at most 2^28 pixels in all";
             require(parameter, side.into(), expected, usable)?;
         }
-        Ok(Self::new(reader, width, height, Format::Raw))
+        Ok(Self::new(reader, width, height, None))
     }
 
-    fn new(reader: R, width: u32, height: u32, format: Format) -> Self {
+    fn new(reader: R, width: u32, height: u32, chroma: Option<u64>) -> Self {
         Self {
             reader,
             width,
             height,
-            format,
+            chroma,
             delivered: 0,
             ended: false,
         }
@@ -86,66 +78,52 @@ impl<R: Read> FrameStream<R> {
     pub fn dimensions(&self) -> (u32, u32) {
         (self.width, self.height)
     }
+
+    /// Reads the luma of a frame; false at the end of the stream.
+    fn read(&mut self, luma: &mut [u8]) -> io::Result<bool> {
+        let Some(chroma) = self.chroma else {
+            // An end before the first byte is the ordinary one.
+            return match self.reader.read_exact(&mut luma[..1]) {
+                Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
+                first => first
+                    .and_then(|()| self.reader.read_exact(&mut luma[1..]))
+                    .map(|()| true),
+            };
+        };
+        match read_line(&mut self.reader)? {
+            None => return Ok(false),
+            Some(line) if line.starts_with(b"FRAME") => {}
+            Some(_) => return Err(invalid("it does not begin with FRAME")),
+        }
+        self.reader.read_exact(luma)?;
+        let skipped = io::copy(&mut Read::take(&mut self.reader, chroma), &mut io::sink())?;
+        if skipped < chroma {
+            return Err(ErrorKind::UnexpectedEof.into());
+        }
+        Ok(true)
+    }
 }
 
-impl<R: Read> FrameSource for FrameStream<R> {
+impl<R: BufRead> FrameSource for FrameStream<R> {
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         if self.ended {
             return Err(FrameError::End);
         }
-        let (reader, format) = (&mut self.reader, self.format);
-        let read = refill(frame, (self.width, self.height), |luma| match format {
-            Format::Raw => read_raw(reader, luma),
-            Format::Y4m { chroma } => read_y4m(reader, luma, chroma),
-        });
+        let read = refill(frame, self.dimensions(), |luma| self.read(luma));
         self.ended = !matches!(read, Ok(true));
+        let number = self.delivered + 1;
         match read {
             Ok(true) => {
-                self.delivered += 1;
+                self.delivered = number;
                 Ok(())
             }
             Ok(false) => Err(FrameError::End),
-            Err(error) => {
-                let number = self.delivered + 1;
-                Err(failed(if error.kind() == io::ErrorKind::UnexpectedEof {
-                    format!("the stream ends in the middle of frame {number}")
-                } else {
-                    format!("frame {number} cannot be read: {error}")
-                }))
-            }
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => Err(failed(format!(
+                "the stream ends in the middle of frame {number}"
+            ))),
+            Err(error) => Err(failed(format!("frame {number} cannot be read: {error}"))),
         }
     }
-}
-
-/// Reads a raw frame; false at the end of the stream.
-fn read_raw(reader: &mut impl Read, luma: &mut [u8]) -> io::Result<bool> {
-    // An end before the first byte is the ordinary one.
-    let Some(first) = read_byte(reader)? else {
-        return Ok(false);
-    };
-    luma[0] = first;
-    reader.read_exact(&mut luma[1..])?;
-    Ok(true)
-}
-
-/// Reads a Y4M frame; false at the end of the stream.
-fn read_y4m(reader: &mut impl Read, luma: &mut [u8], chroma: u64) -> io::Result<bool> {
-    match read_line(reader)? {
-        None => return Ok(false),
-        Some(line) if line.starts_with(b"FRAME") => {}
-        Some(_) => {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidData,
-                "it does not begin with FRAME",
-            ));
-        }
-    }
-    reader.read_exact(luma)?;
-    let skipped = io::copy(&mut reader.by_ref().take(chroma), &mut io::sink())?;
-    if skipped < chroma {
-        return Err(io::ErrorKind::UnexpectedEof.into());
-    }
-    Ok(true)
 }
 
 fn failed(reason: String) -> FrameError {
@@ -153,6 +131,10 @@ fn failed(reason: String) -> FrameError {
         origin: "frame stream".into(),
         reason,
     }
+}
+
+fn invalid(reason: &str) -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, reason)
 }
 
 /// Width, height, and bytes of chroma per frame.
@@ -201,33 +183,15 @@ fn parse_header(line: &[u8]) -> Result<(u32, u32, u64), String> {
 }
 
 /// A line without its end; none at the end of the stream.
-fn read_line(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
+fn read_line(reader: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
     let mut line = Vec::new();
-    loop {
-        match read_byte(reader)? {
-            None if line.is_empty() => return Ok(None),
-            None => return Err(io::ErrorKind::UnexpectedEof.into()),
-            Some(b'\n') => return Ok(Some(line)),
-            Some(_) if line.len() == MAX_LINE => {
-                return Err(io::Error::new(
-                    io::ErrorKind::InvalidData,
-                    "its first line is too long",
-                ));
-            }
-            Some(byte) => line.push(byte),
-        }
-    }
-}
-
-fn read_byte(reader: &mut impl Read) -> io::Result<Option<u8>> {
-    let mut byte = [0];
-    loop {
-        match reader.read(&mut byte) {
-            Ok(0) => return Ok(None),
-            Ok(_) => return Ok(Some(byte[0])),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
+    let mut limited = Read::take(reader, MAX_LINE as u64 + 1);
+    limited.read_until(b'\n', &mut line)?;
+    match line.pop() {
+        None => Ok(None),
+        Some(b'\n') => Ok(Some(line)),
+        Some(_) if line.len() == MAX_LINE => Err(invalid("its first line is too long")),
+        Some(_) => Err(ErrorKind::UnexpectedEof.into()),
     }
 }
 
@@ -321,7 +285,7 @@ mod tests {
         ] {
             assert!(FrameStream::y4m(header.as_bytes()).is_err(), "{header:?}");
         }
-        let endless = io::repeat(b'Y');
+        let endless = io::BufReader::new(io::repeat(b'Y'));
         assert!(FrameStream::y4m(endless).is_err());
     }
 

@@ -27,7 +27,7 @@ pub(crate) struct Structure {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
     pub(crate) pixel: EdgePixel,
-    /// The pixel's place in [`EdgeMap::pixels`](crate::EdgeMap::pixels).
+    /// The pixel's place in the list of the edge map.
     pub(crate) index: u32,
 }
 
@@ -57,47 +57,31 @@ impl Structure {
         self.order();
     }
 
-    /// Draws pixels from the whole of `D`, the paper's step 3a; none if there are not so many.
-    pub(crate) fn draw_anywhere<const N: usize>(
+    /// Draws pixels, the paper's step 3a: the first from the whole of `D`, and the others from there
+    /// too or, with a `reach`, from those within about that distance of the first along each axis.
+    /// Returns `false` if there are not so many.
+    pub(crate) fn draw(
         &self,
+        reach: Option<f64>,
         rng: &mut impl Rng,
-    ) -> Option<[EdgePixel; N]> {
+        pixels: &mut [EdgePixel],
+    ) -> bool {
         let count = self.entries.len() as u64;
-        if count < N as u64 {
-            return None;
+        if self.entries.len() < pixels.len() {
+            return false;
         }
-        Some(std::array::from_fn(|_| {
-            self.entries[below(count, rng)].pixel
-        }))
-    }
-
-    /// Draws one pixel from the whole of `D`, and the others from those within about `reach` of it
-    /// along each axis.
-    pub(crate) fn draw_near<const N: usize>(
-        &self,
-        reach: f64,
-        rng: &mut impl Rng,
-    ) -> Option<[EdgePixel; N]> {
-        if self.entries.len() < N {
-            return None;
+        let anywhere = |rng: &mut _| self.entries[below(count, rng)].pixel;
+        if let [first, others @ ..] = pixels {
+            *first = anywhere(rng);
+            let window = reach.map(|reach| self.window(*first, reach));
+            for pixel in others {
+                *pixel = match &window {
+                    Some(window) => self.pick(window, rng),
+                    None => anywhere(rng),
+                };
+            }
         }
-        let [first] = self.draw_anywhere::<1>(rng)?;
-        let window = self.window(first, reach);
-        let mut pixels = [first; N];
-        for pixel in &mut pixels[1..] {
-            *pixel = self.pick(&window, rng);
-        }
-        Some(pixels)
-    }
-
-    /// Draws one of the pixels within about `reach` of `first`, which is in `D`, along each axis.
-    pub(crate) fn draw_around(
-        &self,
-        first: EdgePixel,
-        reach: f64,
-        rng: &mut impl Rng,
-    ) -> EdgePixel {
-        self.pick(&self.window(first, reach), rng)
+        true
     }
 
     fn window(&self, around: EdgePixel, reach: f64) -> Window {
@@ -209,8 +193,10 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let mut seen = std::collections::HashSet::new();
         for _ in 0..5000 {
-            let [first, second, third] = structure.draw_near(10.0, &mut rng).unwrap();
-            for other in [second, third] {
+            let mut drawn = [at(0, 0); 3];
+            assert!(structure.draw(Some(10.0), &mut rng, &mut drawn));
+            let [first, others @ ..] = drawn;
+            for other in others {
                 assert!(
                     first.x.abs_diff(other.x) < 10 + CELL && first.y.abs_diff(other.y) < 10 + CELL
                 );
@@ -227,7 +213,8 @@ mod tests {
                 .all(|entry| entry.pixel.x >= 50 && pixels[entry.index as usize] == entry.pixel)
         );
         structure.remove(|_| true);
-        assert_eq!(structure.draw_near::<3>(10.0, &mut rng), None);
-        assert_eq!(structure.draw_anywhere::<3>(&mut rng), None);
+        for reach in [None, Some(10.0)] {
+            assert!(!structure.draw(reach, &mut rng, &mut [at(0, 0)]));
+        }
     }
 }

@@ -1,9 +1,49 @@
 //! The checking procedure: how many pixels of an estimated curve are edges.
 
 use crate::circle::Circle;
-use crate::curve::Curve;
-use crate::curve::{longest_outline, round};
-use crate::edges::EdgePixel;
+use crate::curve::{Curve, longest_outline, round};
+use crate::edges::{EdgeMap, EdgePixel};
+use crate::sampling::structure::Structure;
+
+/// The edge pixels of a frame that no curve explains yet.
+#[derive(Clone, Debug)]
+pub(crate) struct Unexplained {
+    pub(crate) structure: Structure,
+    pub(crate) near: NearEdges,
+}
+
+impl Unexplained {
+    pub(crate) fn new(tolerance: f64) -> Self {
+        Self {
+            structure: Structure::default(),
+            near: NearEdges::new(tolerance),
+        }
+    }
+
+    /// Takes in the edges of a frame.
+    pub(crate) fn fill(&mut self, edges: &EdgeMap) {
+        let (width, height) = (edges.width(), edges.height());
+        self.structure.fill(width, height, edges.pixels());
+        self.near.fill(width, height, edges.pixels());
+    }
+
+    /// Takes out the pixels within `band` of the curve.
+    pub(crate) fn explain(&mut self, curve: &impl Curve, band: f64) {
+        let near = &mut self.near;
+        self.structure.remove(|pixel| {
+            let explained = curve.distance(pixel.x.into(), pixel.y.into()) <= band;
+            if explained {
+                near.forget(pixel);
+            }
+            explained
+        });
+    }
+
+    /// The memory it holds, bytes.
+    pub(crate) fn memory(&self) -> usize {
+        self.structure.memory() + self.near.counts.capacity()
+    }
+}
 
 /// Answers for every pixel of a frame whether an edge pixel lies within the tolerance of it.
 ///
@@ -70,41 +110,35 @@ impl NearEdges {
         index(x, y, self.width, self.height).is_some_and(|index| self.counts[index] != 0)
     }
 
-    /// The belonging parameter β of a curve, if it is above `theta`; a curve without pixels has
-    /// none.
-    ///
-    /// Stops counting as soon as the outline is so long that all pixels that can match would not
-    /// do, which changes no answer.
-    pub(crate) fn belonging<C: Curve>(&self, curve: &C, theta: f64) -> Option<f64> {
+    /// The belonging β of a curve, if it is above `theta`; a curve without pixels has none.
+    pub(crate) fn belonging(&self, curve: &impl Curve, theta: f64) -> Option<f64> {
+        // On a longer outline even all pixels that can match would not do.
         let longest = self.most_matched as f64 / theta;
-        let (mut pixels, mut matched) = (0u32, 0u32);
-        let complete = curve.outline(self.width as u32, self.height as u32, |x, y| {
-            pixels += 1;
-            matched += u32::from(self.matches(x, y));
-            f64::from(pixels) <= longest
-        });
-        let beta = f64::from(matched) / f64::from(pixels.max(1));
-        (complete && beta > theta).then_some(beta)
+        self.count(curve, theta, |pixels, _| f64::from(pixels) <= longest)
     }
 
     /// The β of a circle, if it is above `theta`.
-    ///
-    /// Stops counting as soon as the misses rule that out, which changes no answer.
-    pub(crate) fn belonging_above(&self, circle: &Circle, theta: f64) -> Option<f64> {
+    pub(crate) fn belonging_of_circle(&self, circle: &Circle, theta: f64) -> Option<f64> {
         let spare = (1.0 - theta) * longest_outline(circle.radius);
+        self.count(circle, theta, |_, misses| f64::from(misses) <= spare)
+    }
+
+    /// Counts the pixels of a curve and those that miss, for as long as `may_pass` is true of them.
+    #[inline(always)]
+    fn count(
+        &self,
+        curve: &impl Curve,
+        theta: f64,
+        may_pass: impl Fn(u32, u32) -> bool,
+    ) -> Option<f64> {
         let (mut pixels, mut misses) = (0u32, 0u32);
-        let complete = circle.outline(self.width as u32, self.height as u32, |x, y| {
+        let complete = curve.outline(self.width as u32, self.height as u32, |x, y| {
             pixels += 1;
             misses += u32::from(!self.matches(x, y));
-            f64::from(misses) <= spare
+            may_pass(pixels, misses)
         });
         let beta = f64::from(pixels - misses) / f64::from(pixels.max(1));
         (complete && beta > theta).then_some(beta)
-    }
-
-    /// The memory it holds, bytes.
-    pub(crate) fn memory(&self) -> usize {
-        self.counts.capacity()
     }
 
     /// A first look at a few pixels of the outline: false if too few of them match for a circle
@@ -200,13 +234,13 @@ mod tests {
             .collect();
         let mut near = NearEdges::new(0.0);
         near.fill(40, 40, &inside);
-        let beta = near.belonging_above(&circle, 0.1).unwrap();
+        let beta = near.belonging_of_circle(&circle, 0.1).unwrap();
         let expected = inside.len() as f64 / outline.len() as f64;
         assert!((beta - expected).abs() < 1e-12, "{beta} {expected}");
         assert!(expected < 0.6);
         assert_eq!(near.belonging(&circle, 0.1), Some(beta));
         assert_eq!(near.belonging(&circle, expected), None);
-        assert_eq!(near.belonging_above(&circle, expected), None);
+        assert_eq!(near.belonging_of_circle(&circle, expected), None);
     }
 
     #[test]

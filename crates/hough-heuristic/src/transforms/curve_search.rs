@@ -1,12 +1,10 @@
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use super::belonging::NearEdges;
-use crate::acceptance::MAX_TOLERANCE;
+use super::belonging::Unexplained;
 use crate::curve::Curve;
 use crate::edges::{EdgeMap, EdgePixel};
-use crate::error::{ConfigError, require, require_iterations};
-use crate::sampling::structure::Structure;
+use crate::error::{ConfigError, require, require_share, require_some, require_tolerance};
 
 /// The settings of [`CurveSearch`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,16 +40,6 @@ impl Default for CurveSearchConfig {
     }
 }
 
-/// A curve that is present in the edge image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FoundCurve<C> {
-    /// The curve, through n edge pixels.
-    pub curve: C,
-    /// The belonging β: the share of the curve's pixels that are edges, when it was found.
-    pub beta: f64,
-}
-
 /// The algorithm of section 2.1 as it stands there, for any [`Curve`].
 ///
 /// 1. Set the offset θ and the number of iterations ([`CurveSearchConfig`]).
@@ -77,14 +65,13 @@ pub struct FoundCurve<C> {
 /// let edges = EdgeMap::from_image(&edges);
 /// let found = search.find::<Ellipse>(&edges, |ellipse| ellipse.minor > 10.0);
 /// assert_eq!(found.len(), 1);
-/// assert!((found[0].curve.x - 60.0).abs() < 1.5 && found[0].beta > 0.6);
+/// assert!((found[0].0.x - 60.0).abs() < 1.5 && found[0].1 > 0.6);
 /// # Ok::<(), hough_heuristic::ConfigError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct CurveSearch {
     config: CurveSearchConfig,
-    structure: Structure,
-    near: NearEdges,
+    unexplained: Unexplained,
 }
 
 impl CurveSearch {
@@ -93,44 +80,21 @@ impl CurveSearch {
     /// # Errors
     /// [`ConfigError::OutOfRange`] for the first parameter outside its range.
     pub fn new(config: CurveSearchConfig) -> Result<Self, ConfigError> {
-        let CurveSearchConfig {
-            theta, tolerance, ..
-        } = config;
-        require(
-            "theta",
-            theta,
-            "between 0 and 1, both excluded",
-            theta > 0.0 && theta < 1.0,
-        )?;
-        require_iterations(config.iterations)?;
-        require(
-            "tolerance",
-            tolerance,
-            "0..=8 px",
-            (0.0..=MAX_TOLERANCE).contains(&tolerance),
-        )?;
-        require(
-            "max_curves",
-            config.max_curves as f64,
-            "at least 1",
-            config.max_curves > 0,
-        )?;
+        require_share("theta", config.theta)?;
+        require_some("iterations", config.iterations as usize)?;
+        require_tolerance(config.tolerance)?;
+        require_some("max_curves", config.max_curves)?;
         let reach = config.reach.unwrap_or(1.0);
-        require(
-            "reach",
-            reach,
-            "finite and at least 1 px",
-            reach.is_finite() && reach >= 1.0,
-        )?;
+        let usable = reach.is_finite() && reach >= 1.0;
+        require("reach", reach, "finite and at least 1 px", usable)?;
         Ok(Self {
             config,
-            structure: Structure::default(),
-            near: NearEdges::new(tolerance),
+            unexplained: Unexplained::new(config.tolerance),
         })
     }
 
     /// Returns the curves of an edge image for which `admits` is true, in the order in which they
-    /// were found.
+    /// were found, each with its β: the share of its pixels that were edges then.
     ///
     /// The time to check a curve grows with its outline. Let `admits` refuse curves much larger
     /// than the image.
@@ -138,59 +102,30 @@ impl CurveSearch {
         &mut self,
         edges: &EdgeMap,
         admits: impl Fn(&C) -> bool,
-    ) -> Vec<FoundCurve<C>> {
-        let (width, height) = (edges.width(), edges.height());
-        self.structure.fill(width, height, edges.pixels());
-        self.near.fill(width, height, edges.pixels());
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.config.seed);
-        let mut pixels = Vec::with_capacity(C::PARAMETERS);
+    ) -> Vec<(C, f64)> {
+        let Self {
+            config,
+            unexplained,
+        } = self;
+        unexplained.fill(edges);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(config.seed);
+        let mut pixels = vec![EdgePixel::default(); C::PARAMETERS];
         let mut found = Vec::new();
-        for _ in 0..self.config.iterations {
-            if !self.draw(C::PARAMETERS, &mut rng, &mut pixels) {
+        for _ in 0..config.iterations {
+            let drawn = unexplained
+                .structure
+                .draw(config.reach, &mut rng, &mut pixels);
+            if !drawn || found.len() == config.max_curves {
                 break;
             }
             let Some(curve) = C::through(&pixels).filter(&admits) else {
                 continue;
             };
-            let Some(beta) = self.near.belonging(&curve, self.config.theta) else {
-                continue;
-            };
-            let band = self.config.tolerance + 1.5;
-            let near = &mut self.near;
-            self.structure.remove(|pixel| {
-                let explained = curve.distance(pixel.x.into(), pixel.y.into()) <= band;
-                if explained {
-                    near.forget(pixel);
-                }
-                explained
-            });
-            found.push(FoundCurve { curve, beta });
-            if found.len() == self.config.max_curves {
-                break;
+            if let Some(beta) = unexplained.near.belonging(&curve, config.theta) {
+                unexplained.explain(&curve, config.tolerance + 1.5);
+                found.push((curve, beta));
             }
         }
         found
-    }
-
-    /// Draws `count` pixels; false if there are not so many left.
-    fn draw(
-        &self,
-        count: usize,
-        rng: &mut Xoshiro256PlusPlus,
-        pixels: &mut Vec<EdgePixel>,
-    ) -> bool {
-        pixels.clear();
-        if self.structure.entries().len() < count {
-            return false;
-        }
-        while pixels.len() < count {
-            match (self.config.reach, pixels.first()) {
-                (Some(reach), Some(&first)) => {
-                    pixels.push(self.structure.draw_around(first, reach, rng));
-                }
-                _ => pixels.extend(self.structure.draw_anywhere::<1>(rng).into_iter().flatten()),
-            }
-        }
-        true
     }
 }

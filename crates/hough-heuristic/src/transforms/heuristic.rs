@@ -4,13 +4,13 @@
 use image::GrayImage;
 
 use super::belonging::Probes;
-use super::evidence::Evidence;
 use super::pass::Frames;
 use crate::acceptance::Acceptance;
+use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Canny, EdgeDetector};
-use crate::error::{ConfigError, require_iterations};
-use crate::sampling::{Draw, Sampler, Sampling};
+use crate::error::{ConfigError, require_some};
+use crate::sampling::Sampler;
 use crate::stages::Stages;
 
 /// The settings of [`Heuristic`].
@@ -27,8 +27,12 @@ pub struct HeuristicConfig {
     /// Triples drawn at most per frame (default 60000; at least 1). Bounds the time; more finds
     /// fainter and smaller balls amid more clutter.
     pub iterations: u32,
-    /// Source of the draws (default [`Sampling::Near`]).
-    pub sampling: Sampling,
+    /// Draws all pixels from the whole of `D`, as the paper does (default false). For a circle that
+    /// owns the share `p` of all edge pixels, one draw of three in `p^-3` then hits it. Otherwise
+    /// the second and third come from a window around the first that is as wide as a circle of some
+    /// radius in the range can reach, which in clutter hits a small ball hundreds of times as often.
+    /// The radius is drawn anew each time, its logarithm uniform.
+    pub anywhere: bool,
     /// Seed of the draws (default 1). They begin anew with every frame.
     pub seed: u64,
 }
@@ -38,7 +42,7 @@ impl Default for HeuristicConfig {
         Self {
             accept: Acceptance::default(),
             iterations: 60_000,
-            sampling: Sampling::default(),
+            anywhere: false,
             seed: 1,
         }
     }
@@ -59,7 +63,8 @@ impl Default for HeuristicConfig {
 ///
 /// **Beyond the paper.** A hopeless draw is mostly turned away after a look at 8 to 32 pixels of
 /// its outline, which can delay a circle whose β barely exceeds θ but never lets in one that does
-/// not; [`Sampling::Near`]; and the final fit.
+/// not; the windows of
+/// [`HeuristicConfig::anywhere`]; and the final fit.
 ///
 /// The score of a [`Detection`] is β of the circle as reported. It means the same at every radius.
 #[derive(Clone, Debug)]
@@ -86,18 +91,12 @@ impl<E: EdgeDetector> Heuristic<E> {
     /// # Errors
     /// The first parameter outside its range.
     pub fn new(config: HeuristicConfig, edge_detector: E) -> Result<Self, ConfigError> {
-        let HeuristicConfig {
-            accept,
-            iterations,
-            sampling,
-            seed,
-        } = config;
-        require_iterations(iterations)?;
+        require_some("iterations", config.iterations as usize)?;
         Ok(Self {
-            frames: Frames::new(edge_detector, Evidence::new(accept)?),
-            probes: Probes::new(accept.theta),
-            sampler: Sampler::new(sampling, &accept, seed),
-            iterations,
+            frames: Frames::new(edge_detector, config.accept)?,
+            probes: Probes::new(config.accept.theta),
+            sampler: Sampler::new(config.anywhere, &config.accept, config.seed),
+            iterations: config.iterations,
         })
     }
 
@@ -115,21 +114,21 @@ impl<E: EdgeDetector> Heuristic<E> {
 
 impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
     fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
-        let accept = self.frames.evidence.acceptance;
+        let accept = self.frames.accept;
         accept.check_frame(frame.width(), frame.height())?;
         self.sampler.restart();
         Ok(self.frames.run(frame, |pass| {
             for _ in 0..self.iterations {
-                let circle = match self.sampler.draw(&pass.evidence.structure) {
-                    Draw::Exhausted => break,
-                    Draw::Nothing => continue,
-                    Draw::Circle(circle) => circle,
+                let Some(drawn) = self.sampler.draw(&pass.unexplained.structure) else {
+                    break;
                 };
-                if !accept.admits(&circle, pass.found)
-                    || !pass.evidence.near.promising(&circle, &self.probes)
-                {
+                let near = &pass.unexplained.near;
+                let promising = |circle: &Circle| {
+                    accept.admits(circle, pass.found) && near.promising(circle, &self.probes)
+                };
+                let Some(circle) = drawn.filter(promising) else {
                     continue;
-                }
+                };
                 pass.note(circle);
                 if pass.report(circle) && pass.is_complete() {
                     break;

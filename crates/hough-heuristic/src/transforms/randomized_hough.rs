@@ -1,15 +1,17 @@
 //! The randomized Hough transform, the nearer of the paper's two rivals.
 
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
 use image::GrayImage;
 
-use super::evidence::Evidence;
 use super::pass::Frames;
 use crate::acceptance::Acceptance;
 use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Canny, EdgeDetector};
-use crate::error::{ConfigError, require, require_iterations};
-use crate::sampling::{Draw, Sampler, Sampling};
+use crate::error::{ConfigError, require, require_some};
+use crate::sampling::Sampler;
 use crate::stages::Stages;
 
 /// Settings of [`RandomizedHough`].
@@ -27,8 +29,9 @@ pub struct RandomizedHoughConfig {
     /// Side of a cell of the parameter space, pixels, for centre and radius (default 4; 0.5..=64).
     /// Smaller cells are more exact, and triples of one circle agree more rarely.
     pub cell: f64,
-    /// Source of the draws (default [`Sampling::Near`]). [`Sampling::Anywhere`] is Xu and Oja's.
-    pub sampling: Sampling,
+    /// Draws all pixels from the whole of `D`, as Xu and Oja do (default false); otherwise see
+    /// [`HeuristicConfig::anywhere`](crate::HeuristicConfig::anywhere).
+    pub anywhere: bool,
     /// Seed of the draws (default 1). They begin anew with every frame.
     pub seed: u64,
 }
@@ -40,7 +43,7 @@ impl Default for RandomizedHoughConfig {
             iterations: 60_000,
             votes: 2,
             cell: 4.0,
-            sampling: Sampling::default(),
+            anywhere: false,
             seed: 1,
         }
     }
@@ -72,21 +75,14 @@ impl<E: EdgeDetector> RandomizedHough<E> {
     /// # Errors
     /// The first parameter outside its range.
     pub fn new(config: RandomizedHoughConfig, edge_detector: E) -> Result<Self, ConfigError> {
-        let RandomizedHoughConfig {
-            accept,
-            iterations,
-            votes,
-            cell,
-            sampling,
-            seed,
-        } = config;
-        require_iterations(iterations)?;
+        let (votes, cell) = (config.votes, config.cell);
+        require_some("iterations", config.iterations as usize)?;
         require("votes", votes.into(), "2..=255", (2..=255).contains(&votes))?;
         require("cell", cell, "0.5..=64 px", (0.5..=64.0).contains(&cell))?;
         Ok(Self {
-            frames: Frames::new(edge_detector, Evidence::new(accept)?),
-            sampler: Sampler::new(sampling, &accept, seed),
-            cells: Cells::with_capacity_for(iterations),
+            frames: Frames::new(edge_detector, config.accept)?,
+            sampler: Sampler::new(config.anywhere, &config.accept, config.seed),
+            cells: Cells::with_capacity_and_hasher(FORESEEN, BuildHasherDefault::default()),
             config,
         })
     }
@@ -99,8 +95,8 @@ impl<E: EdgeDetector> RandomizedHough<E> {
 
     /// Returns the stages of the last frame that was searched.
     pub fn stages(&self) -> Stages<'_> {
-        let cells = self.cells.slots.len() + self.cells.moved.len();
-        self.frames.stages(size_of::<Cell>() * cells)
+        self.frames
+            .stages(size_of::<(u64, Cell)>() * self.cells.capacity())
     }
 }
 
@@ -122,24 +118,22 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
         let reach = cell.max(2.0 * accept.tolerance + 1.0);
         Ok(self.frames.run(frame, |pass| {
             for _ in 0..iterations {
-                let circle = match self.sampler.draw(&pass.evidence.structure) {
-                    Draw::Exhausted => break,
-                    Draw::Nothing => continue,
-                    Draw::Circle(circle) => circle,
+                let Some(drawn) = self.sampler.draw(&pass.unexplained.structure) else {
+                    break;
                 };
-                if !radii.contains(&circle.radius)
-                    || accept.region.is_some_and(|region| !region.holds(&circle))
-                {
+                let usable = |circle: &Circle| {
+                    radii.contains(&circle.radius)
+                        && accept.region.is_none_or(|region| region.holds(circle))
+                };
+                let mean = drawn
+                    .filter(usable)
+                    .and_then(|circle| vote(&mut self.cells, &circle, cell, votes));
+                let Some(Circle { x, y, radius }) = mean else {
                     continue;
-                }
-                let Some(mean) = self.cells.vote(&circle, cell, votes) else {
-                    continue;
                 };
-                let mean = Circle {
-                    radius: mean.radius.clamp(accept.min_radius, accept.max_radius),
-                    ..mean
-                };
-                if pass.evidence.might_be(&mean) && pass.verify(mean, reach) {
+                let radius = radius.clamp(accept.min_radius, accept.max_radius);
+                let mean = Circle { x, y, radius };
+                if pass.might_be(&mean) && pass.verify(mean, reach) {
                     self.cells.clear();
                     if pass.is_complete() {
                         break;
@@ -150,118 +144,65 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
     }
 }
 
-/// A cell of the parameter space and the circles that voted for it.
+/// The sparse accumulator: the cells of the parameter space that have a vote.
+type Cells = HashMap<u64, Cell, BuildHasherDefault<KeyHasher>>;
+
+/// The cells that memory is set aside for beforehand.
+const FORESEEN: usize = 1 << 13;
+
+/// The sums of the circles that voted for a cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
-    key: u64,
-    /// The cells of earlier frames, and of before a circle was found, have another round.
-    round: u32,
     votes: u32,
     x: f64,
     y: f64,
     radius: f64,
 }
 
-/// The sparse accumulator: a hash table with open addressing that keeps its memory from frame to
-/// frame.
+/// Scatters the keys of neighbouring cells.
 #[derive(Clone, Debug, Default)]
-struct Cells {
-    slots: Vec<Cell>,
-    /// Scratch: the cells in use while the table grows.
-    moved: Vec<Cell>,
-    used: usize,
-    round: u32,
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.write_u64(self.0 << 8 | u64::from(*byte));
+        }
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        let product = key.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 = product ^ product >> 32;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
 }
 
-/// The fewest slots of a table that is not empty.
-const SMALLEST: usize = 1024;
-/// The most votes that memory is set aside for beforehand.
-const FORESEEN: u32 = 1 << 16;
-
-impl Cells {
-    /// A table that asks for no memory until more than this many cells have a vote (or 65536, if
-    /// that is less). What is set aside is not touched, so it costs nothing, before the table grows
-    /// into it.
-    fn with_capacity_for(votes: u32) -> Self {
-        let slots = (2 * (votes.min(FORESEEN) as usize + 1)).next_power_of_two();
-        Self {
-            slots: Vec::with_capacity(slots.max(SMALLEST)),
-            moved: Vec::with_capacity(slots / 4),
-            ..Self::default()
-        }
+/// Counts a vote; the mean of the circles in the cell, which is then emptied, if that was the last
+/// vote it needed.
+fn vote(cells: &mut Cells, circle: &Circle, side: f64, needed: u32) -> Option<Circle> {
+    let cell = cells.entry(key(circle, side)).or_default();
+    cell.votes += 1;
+    cell.x += circle.x;
+    cell.y += circle.y;
+    cell.radius += circle.radius;
+    if cell.votes < needed {
+        return None;
     }
-
-    fn clear(&mut self) {
-        self.used = 0;
-        self.round = self.round.wrapping_add(1);
-        if self.round == 0 {
-            self.slots.fill(Cell::default());
-            self.round = 1;
-        }
-    }
-
-    /// Counts a vote; the mean of the circles in the cell, which is then emptied, if that was the
-    /// last vote it needed.
-    fn vote(&mut self, circle: &Circle, side: f64, needed: u32) -> Option<Circle> {
-        if 2 * (self.used + 1) > self.slots.len() {
-            self.grow();
-        }
-        let key = key(circle, side);
-        let place = self.place(key);
-        let cell = &mut self.slots[place];
-        if cell.round != self.round {
-            *cell = Cell {
-                key,
-                round: self.round,
-                ..Cell::default()
-            };
-            self.used += 1;
-        }
-        cell.votes += 1;
-        cell.x += circle.x;
-        cell.y += circle.y;
-        cell.radius += circle.radius;
-        if cell.votes < needed {
-            return None;
-        }
-        let votes = f64::from(cell.votes);
-        let mean = Circle {
-            x: cell.x / votes,
-            y: cell.y / votes,
-            radius: cell.radius / votes,
-        };
-        *cell = Cell {
-            key,
-            round: self.round,
-            ..Cell::default()
-        };
-        Some(mean)
-    }
-
-    /// Index of the cell with this key, or of the slot for it.
-    fn place(&self, key: u64) -> usize {
-        let mask = self.slots.len() - 1;
-        let mut place = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
-        while self.slots[place].round == self.round && self.slots[place].key != key {
-            place = (place + 1) & mask;
-        }
-        place
-    }
-
-    fn grow(&mut self) {
-        let round = self.round;
-        self.moved.clear();
-        self.moved
-            .extend(self.slots.iter().filter(|cell| cell.round == round));
-        let larger = (2 * self.slots.len()).max(SMALLEST);
-        self.slots.clear();
-        self.slots.resize(larger, Cell::default());
-        for index in 0..self.moved.len() {
-            let cell = self.moved[index];
-            let place = self.place(cell.key);
-            self.slots[place] = cell;
-        }
-    }
+    let Cell {
+        votes,
+        x,
+        y,
+        radius,
+    } = std::mem::take(cell);
+    let votes = f64::from(votes);
+    Some(Circle {
+        x: x / votes,
+        y: y / votes,
+        radius: radius / votes,
+    })
 }
 
 /// The cell of a circle, 21 bits for each parameter. Radii are bounded, and centres that overflow
@@ -276,26 +217,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_growing_table_keeps_its_cells_until_it_is_cleared() {
-        let mut cells = Cells::default();
-        cells.clear();
+    fn a_cell_gives_the_mean_of_its_votes_and_is_emptied() {
         let at = |k: i32| Circle {
             x: f64::from(k % 71) * 4.0 - 40.0,
             y: f64::from(k / 71) * 4.0 + 1.0,
             radius: 20.0,
         };
+        let mut cells = Cells::default();
         for k in 0..3000 {
-            assert_eq!(cells.vote(&at(k), 4.0, 2), None);
+            assert_eq!(vote(&mut cells, &at(k), 4.0, 2), None);
         }
-        let moved = |k| Circle {
-            x: at(k).x + 1.0,
-            ..at(k)
-        };
         for k in 0..1500 {
-            let mean = cells.vote(&moved(k), 4.0, 2).unwrap();
+            let moved = Circle {
+                x: at(k).x + 1.0,
+                ..at(k)
+            };
+            let mean = vote(&mut cells, &moved, 4.0, 2).unwrap();
             assert!((mean.x - at(k).x - 0.5).abs() < 1e-9);
+            assert_eq!(vote(&mut cells, &moved, 4.0, 2), None);
         }
-        cells.clear();
-        assert_eq!(cells.vote(&moved(2000), 4.0, 2), None);
     }
 }

@@ -2,13 +2,12 @@
 
 use image::GrayImage;
 
-use super::evidence::Evidence;
 use super::pass::Frames;
 use crate::acceptance::Acceptance;
 use crate::circle::Circle;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Canny, EdgeDetector};
-use crate::error::{ConfigError, require};
+use crate::error::{ConfigError, require, require_share};
 use crate::stages::Stages;
 
 /// Settings of [`StandardHough`].
@@ -82,10 +81,8 @@ pub struct StandardHough<E = Canny> {
 #[derive(Clone, Debug)]
 struct Ring {
     radius: f64,
-    /// Around the full circle, each cell once, in the order of their direction.
-    cells: Vec<(i32, i32)>,
-    /// The cells from `spread` earlier to `spread` later, so that the arc of a
-    /// direction is in one piece.
+    /// Around the full circle in the order of their direction, each once, then again those of the
+    /// first and before them those of the last directions, so that every arc is in one piece.
     around: Vec<(i32, i32)>,
     /// Number of cells to either side of a direction that its error covers.
     spread: usize,
@@ -112,47 +109,30 @@ struct Peak {
 }
 
 impl<E: EdgeDetector> StandardHough<E> {
-    /// A detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
+    /// Builds a detector on the edges of `edge_detector`, which may be a `Box<dyn EdgeDetector>`.
     ///
     /// # Errors
     /// The first parameter outside its range.
     pub fn new(config: StandardHoughConfig, edge_detector: E) -> Result<Self, ConfigError> {
-        let StandardHoughConfig {
-            accept,
-            cell,
-            direction_error,
-            min_votes,
-            ..
-        } = config;
+        let (cell, error) = (config.cell, config.direction_error);
+        let (min, max) = (config.accept.min_radius, config.accept.max_radius);
         require("cell", cell, "1..=16 px", (1.0..=16.0).contains(&cell))?;
-        let usable = (0.0..=1.0).contains(&direction_error);
-        require("direction_error", direction_error, "0..=1 rad", usable)?;
-        require(
-            "min_votes",
-            min_votes,
-            "between 0 and 1, both excluded",
-            min_votes > 0.0 && min_votes < 1.0,
-        )?;
-        let evidence = Evidence::new(accept)?;
-        let layered = accept.max_radius <= 1000.0 * cell;
+        let usable = (0.0..=1.0).contains(&error);
+        require("direction_error", error, "0..=1 rad", usable)?;
+        require_share("min_votes", config.min_votes)?;
+        let frames = Frames::new(edge_detector, config.accept)?;
         require(
             "max_radius",
-            accept.max_radius,
+            max,
             "at most 1000 cells",
-            layered,
+            max <= 1000.0 * cell,
         )?;
-        let layers = ((accept.max_radius - accept.min_radius) / cell).floor() as u32 + 1;
+        let layers = ((max - min) / cell).floor() as u32;
         Ok(Self {
-            rings: (0..layers)
-                .map(|layer| {
-                    Ring::new(
-                        accept.min_radius + cell * f64::from(layer),
-                        cell,
-                        direction_error,
-                    )
-                })
+            rings: (0..=layers)
+                .map(|layer| Ring::new(min + cell * f64::from(layer), cell, error))
                 .collect(),
-            frames: Frames::new(edge_detector, evidence),
+            frames,
             accumulator: Accumulator::default(),
             peaks: Vec::with_capacity(FORESEEN_PEAKS),
             turns: Vec::new(),
@@ -168,12 +148,8 @@ impl<E: EdgeDetector> StandardHough<E> {
 
     /// Returns the stages of the last frame that was searched.
     pub fn stages(&self) -> Stages<'_> {
-        let rings: usize = self
-            .rings
-            .iter()
-            .map(|ring| size_of::<(i32, i32)>() * (ring.cells.capacity() + ring.around.capacity()))
-            .sum();
-        let memory = rings
+        let cells = self.rings.iter().map(|ring| ring.around.capacity());
+        let memory = size_of::<(i32, i32)>() * cells.sum::<usize>()
             + size_of::<u16>() * self.accumulator.votes.capacity()
             + size_of::<Peak>() * self.peaks.capacity()
             + size_of::<f64>() * self.turns.capacity();
@@ -193,27 +169,21 @@ impl<E: EdgeDetector> StandardHough<E> {
 
     /// Refuses a frame whose accumulator would take too much memory.
     fn check_frame(&self, width: u32, height: u32) -> Result<(), FrameRefused> {
-        let StandardHoughConfig {
-            accept,
-            cell,
-            max_memory,
-            ..
-        } = self.config;
-        accept.check_frame(width, height)?;
+        self.config.accept.check_frame(width, height)?;
+        let side = |pixels: u32| (f64::from(pixels) / self.config.cell).ceil() as u64;
         let layers = self.fitting(width, height) as u64;
-        let side = |pixels: u32| (f64::from(pixels) / cell).ceil() as u64;
-        let cells = side(width)
-            .saturating_mul(side(height))
-            .saturating_mul(layers);
-        let needed = cells.saturating_mul(size_of::<u16>() as u64);
-        if needed <= max_memory {
+        let needed = [side(height), layers, size_of::<u16>() as u64]
+            .into_iter()
+            .fold(side(width), u64::saturating_mul);
+        let limit = self.config.max_memory;
+        if needed <= limit {
             return Ok(());
         }
         Err(FrameRefused::Accumulator {
             frame_width: width,
             frame_height: height,
             needed,
-            limit: max_memory,
+            limit,
         })
     }
 }
@@ -221,6 +191,7 @@ impl<E: EdgeDetector> StandardHough<E> {
 impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
     fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
         self.check_frame(frame.width(), frame.height())?;
+        let rings = &self.rings[..self.fitting(frame.width(), frame.height())];
         let StandardHoughConfig {
             accept,
             cell,
@@ -228,16 +199,9 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             min_votes,
             ..
         } = self.config;
-        let rings = &self.rings[..self.fitting(frame.width(), frame.height())];
         let reach = (1.5 * cell).max(2.0 * accept.tolerance + 1.0);
-        let Self {
-            frames,
-            accumulator,
-            peaks,
-            turns,
-            ..
-        } = self;
-        Ok(frames.run(frame, |pass| {
+        let (accumulator, peaks, turns) = (&mut self.accumulator, &mut self.peaks, &mut self.turns);
+        Ok(self.frames.run(frame, |pass| {
             let edges = pass.edges;
             accumulator.clear(edges.width(), edges.height(), cell, rings.len());
             turns.clear();
@@ -247,14 +211,10 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
             }
             for (layer, ring) in rings.iter().enumerate() {
                 for (index, pixel) in edges.pixels().iter().enumerate() {
-                    let (x, y) = (
-                        (f64::from(pixel.x) / cell) as i32,
-                        (f64::from(pixel.y) / cell) as i32,
-                    );
-                    let mut slice = accumulator.layer(layer);
+                    let at = [pixel.x, pixel.y].map(|at| (f64::from(at) / cell) as i32);
                     match turns.get(index) {
-                        Some(&turn) => slice.vote(x, y, ring.along(turn)),
-                        None => slice.vote(x, y, ring.cells.iter()),
+                        Some(&turn) => accumulator.vote(layer, at, ring.along(turn)),
+                        None => accumulator.vote(layer, at, ring.cells().iter()),
                     }
                 }
             }
@@ -290,48 +250,28 @@ impl Ring {
         let spread =
             (cells.len() as f64 * direction_error / std::f64::consts::TAU).round() as usize;
         let spread = spread.min(cells.len() / 4);
-        let around = cells[cells.len() - spread..]
-            .iter()
-            .chain(&cells)
-            .chain(&cells[..spread])
-            .copied()
-            .collect();
+        let (first, last) = (&cells[..spread], &cells[cells.len() - spread..]);
         Self {
-            around,
+            around: [last, &cells, first].concat(),
             spread,
             // The pixels of the outline, about 5.66 per pixel of radius.
             complete: 4.0 * std::f64::consts::SQRT_2 * radius,
             radius,
-            cells,
         }
+    }
+
+    /// The cells around the full circle, each once.
+    fn cells(&self) -> &[(i32, i32)] {
+        &self.around[self.spread..self.around.len() - self.spread]
     }
 
     /// The cells in the direction of a gradient, given in turns, and in the opposite one.
     fn along(&self, turn: f64) -> impl Iterator<Item = &(i32, i32)> {
-        let count = self.around.len() - 2 * self.spread;
+        let count = self.cells().len();
         [turn, turn + 0.5].into_iter().flat_map(move |turn| {
             let middle = (turn.rem_euclid(1.0) * count as f64) as usize % count;
             &self.around[middle..=middle + 2 * self.spread]
         })
-    }
-}
-
-/// The votes for the circles of one radius.
-struct Layer<'a> {
-    columns: i32,
-    rows: i32,
-    votes: &'a mut [u16],
-}
-
-impl Layer<'_> {
-    fn vote<'c>(&mut self, x: i32, y: i32, cells: impl Iterator<Item = &'c (i32, i32)>) {
-        for (dx, dy) in cells {
-            let (column, row) = (x + dx, y + dy);
-            if (column as u32) < self.columns as u32 && (row as u32) < self.rows as u32 {
-                let votes = &mut self.votes[row as usize * self.columns as usize + column as usize];
-                *votes = votes.saturating_add(1);
-            }
-        }
     }
 }
 
@@ -343,12 +283,21 @@ impl Accumulator {
         self.votes.resize(self.columns * self.rows * layers, 0);
     }
 
-    fn layer(&mut self, layer: usize) -> Layer<'_> {
-        let size = self.columns * self.rows;
-        Layer {
-            columns: self.columns as i32,
-            rows: self.rows as i32,
-            votes: &mut self.votes[layer * size..][..size],
+    /// Votes for the circles of one radius around a cell.
+    fn vote<'c>(
+        &mut self,
+        layer: usize,
+        [x, y]: [i32; 2],
+        cells: impl Iterator<Item = &'c (i32, i32)>,
+    ) {
+        let (columns, rows) = (self.columns, self.rows);
+        let votes = &mut self.votes[layer * columns * rows..][..columns * rows];
+        for (dx, dy) in cells {
+            let (column, row) = (x + dx, y + dy);
+            if (column as u32) < columns as u32 && (row as u32) < rows as u32 {
+                let votes = &mut votes[row as usize * columns + column as usize];
+                *votes = votes.saturating_add(1);
+            }
         }
     }
 
@@ -374,13 +323,10 @@ impl Accumulator {
             }
         }
         peaks.sort_unstable_by(|a, b| {
-            let place = |peak: &Peak| (peak.circle.radius, peak.circle.y, peak.circle.x);
-            let tie = || {
-                place(a)
-                    .partial_cmp(&place(b))
-                    .unwrap_or(std::cmp::Ordering::Equal)
-            };
-            b.share.total_cmp(&a.share).then_with(tie)
+            let Circle { x, y, radius } = b.circle;
+            let shares = b.share.total_cmp(&a.share);
+            let places = || a.circle.y.total_cmp(&y).then(a.circle.x.total_cmp(&x));
+            shares.then_with(|| a.circle.radius.total_cmp(&radius).then_with(places))
         });
     }
 
@@ -420,18 +366,18 @@ mod tests {
             (4.0, 2.0),
         ] {
             let ring = Ring::new(radius, cell, 0.06);
-            for (a, b) in ring.cells.iter().zip(ring.cells.iter().cycle().skip(1)) {
+            for (a, b) in ring.cells().iter().zip(ring.cells().iter().cycle().skip(1)) {
                 assert!(
                     a != b && (a.0 - b.0).abs() <= 1 && (a.1 - b.1).abs() <= 1,
                     "{radius} {cell}"
                 );
             }
-            let mut sorted = ring.cells.clone();
+            let mut sorted = ring.cells().to_vec();
             sorted.sort_unstable();
             sorted.dedup();
-            assert_eq!(sorted.len(), ring.cells.len(), "{radius} {cell}");
+            assert_eq!(sorted.len(), ring.cells().len(), "{radius} {cell}");
         }
-        assert_eq!(Ring::new(1.0, 16.0, 1.0).cells, [(0, 0)]);
+        assert_eq!(Ring::new(1.0, 16.0, 1.0).cells(), [(0, 0)]);
     }
 
     #[test]

@@ -16,15 +16,7 @@ use circle_scenes::patterns::patterns;
 use circle_scenes::scene::{Scene, same};
 use circle_scenes::simple::{Difficulty, Kind, ONE};
 
-pub(crate) const SCENE: Scene = Scene {
-    width: 240,
-    height: 180,
-    balls: 3,
-    distractors: 4,
-    noise: 3.0,
-    radius: (16.0, 34.0),
-    seed: 5,
-};
+use crate::detectors::SCENE;
 
 pub(crate) fn with(change: impl FnOnce(&mut AContrarioConfig)) -> AContrario {
     let mut config = AContrarioConfig {

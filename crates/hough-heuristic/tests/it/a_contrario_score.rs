@@ -6,7 +6,8 @@ use hough_heuristic::{Circle, CircleDetector, Measurement};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-use crate::a_contrario::{SCENE, plain, with};
+use crate::a_contrario::{plain, with};
+use crate::detectors::SCENE;
 use circle_scenes::scene::{Scene, same};
 
 /// Chance alone gives a number of false alarms of 1/10 or less in at most one frame of ten.

@@ -43,9 +43,9 @@ fn lines_are_found_and_taken_out() {
         .find::<Line>(&map, |_| true);
     assert_eq!(found.len(), 3, "{found:?}");
     for line in truth {
-        assert!(found.iter().any(|f| {
-            let turn = f.curve.cos * line.cos + f.curve.sin * line.sin;
-            turn.abs() > 0.999 && (f.curve.rho - line.rho * turn.signum()).abs() < 2.0
+        assert!(found.iter().any(|(f, _)| {
+            let turn = f.cos * line.cos + f.sin * line.sin;
+            turn.abs() > 0.999 && (f.rho - line.rho * turn.signum()).abs() < 2.0
         }));
     }
 }
@@ -72,16 +72,14 @@ fn circles_and_ellipses_are_found() {
     let circles =
         search.find::<Circle>(&map, |circle| circle.radius > 10.0 && circle.radius < 80.0);
     assert_eq!(circles.len(), 1, "{circles:?}");
-    assert!(
-        (circles[0].curve.x - 60.0).abs() < 1.0 && (circles[0].curve.radius - 40.0).abs() < 1.0
-    );
-    assert!(circles[0].beta > 0.8 && circles[0].beta <= 1.0);
+    assert!((circles[0].0.x - 60.0).abs() < 1.0 && (circles[0].0.radius - 40.0).abs() < 1.0);
+    assert!(circles[0].1 > 0.8 && circles[0].1 <= 1.0);
 
     let ellipses = search.find::<Ellipse>(&map, |e| {
         e.minor > 20.0 && e.major < 80.0 && e.minor < 0.7 * e.major
     });
     assert_eq!(ellipses.len(), 1, "{ellipses:?}");
-    let found = ellipses[0].curve;
+    let found = ellipses[0].0;
     assert!(
         (found.x - 120.0).abs() < 2.0 && (found.major - 60.0).abs() < 2.0,
         "{found:?}"

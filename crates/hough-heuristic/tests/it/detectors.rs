@@ -3,12 +3,11 @@
 use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{
     AContrario, AContrarioConfig, Acceptance, Canny, CannyConfig, Circle, CircleDetector,
-    Heuristic, HeuristicConfig, RandomizedHough, RandomizedHoughConfig, Region, Sampling,
-    StandardHough, StandardHoughConfig,
+    RandomizedHough, RandomizedHoughConfig, Region,
 };
 
 use circle_scenes::scene::{Scene, same};
-use circle_scenes::staged::Staged;
+use circle_scenes::staged::{Staged, TRANSFORMS, transform};
 
 /// All detectors with these settings, by name.
 pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetector>)> {
@@ -35,51 +34,11 @@ pub(crate) fn all_on(
     accept: Acceptance,
     edges: CannyConfig,
 ) -> Vec<(&'static str, Box<dyn Staged>)> {
-    let canny = || Canny::new(edges).unwrap();
-    let rht = |sampling| RandomizedHoughConfig {
-        accept,
-        sampling,
-        ..RandomizedHoughConfig::default()
+    let build = |name| {
+        let canny = Canny::new(edges).unwrap();
+        (name, transform(name, accept, canny).unwrap())
     };
-    let sht = |gradient| StandardHoughConfig {
-        accept,
-        gradient,
-        ..StandardHoughConfig::default()
-    };
-    vec![
-        (
-            "heuristic",
-            Box::new(Heuristic::new(heuristic(accept, Sampling::Near), canny()).unwrap()),
-        ),
-        (
-            "anywhere",
-            Box::new(Heuristic::new(heuristic(accept, Sampling::Anywhere), canny()).unwrap()),
-        ),
-        (
-            "rht",
-            Box::new(RandomizedHough::new(rht(Sampling::Near), canny()).unwrap()),
-        ),
-        (
-            "rht anywhere",
-            Box::new(RandomizedHough::new(rht(Sampling::Anywhere), canny()).unwrap()),
-        ),
-        (
-            "sht",
-            Box::new(StandardHough::new(sht(false), canny()).unwrap()),
-        ),
-        (
-            "sht gradient",
-            Box::new(StandardHough::new(sht(true), canny()).unwrap()),
-        ),
-    ]
-}
-
-fn heuristic(accept: Acceptance, sampling: Sampling) -> HeuristicConfig {
-    HeuristicConfig {
-        accept,
-        sampling,
-        ..HeuristicConfig::default()
-    }
+    TRANSFORMS.map(build).into()
 }
 
 pub(crate) const SCENE: Scene = Scene {
@@ -197,7 +156,7 @@ fn a_known_radius_needs_pairs_only() {
         .render();
         let config = RandomizedHoughConfig {
             accept,
-            sampling: Sampling::Anywhere,
+            anywhere: true,
             iterations: 300,
             ..RandomizedHoughConfig::default()
         };
@@ -308,11 +267,8 @@ fn what_lies_in_the_buffers_does_not_matter() {
 fn any_edge_detector_will_do() {
     let (frame, balls) = SCENE.render();
     let edges = hough_heuristic::ImageprocCanny::new(30.0, 70.0).unwrap();
-    let found = Heuristic::new(heuristic(ACCEPT, Sampling::Near), edges)
-        .unwrap()
-        .detect(&frame)
-        .unwrap()
-        .to_vec();
+    let mut detector = transform("heuristic", ACCEPT, edges).unwrap();
+    let found = detector.detect(&frame).unwrap();
     for ball in &balls {
         assert!(
             found.iter().any(|f| same(&f.circle, ball, 0.7)),

@@ -105,56 +105,27 @@ fn the_memory_told_holds_all_tables() {
 
 #[test]
 fn unusable_settings_are_refused() {
-    let rht = RandomizedHoughConfig::default;
-    for config in [
-        RandomizedHoughConfig {
-            iterations: 0,
-            ..rht()
-        },
-        RandomizedHoughConfig { votes: 1, ..rht() },
-        RandomizedHoughConfig { cell: 0.0, ..rht() },
-        RandomizedHoughConfig {
-            accept: Acceptance {
-                theta: 2.0,
-                ..ACCEPT
-            },
-            ..rht()
-        },
-    ] {
-        assert!(
-            RandomizedHough::new(config, Canny::default()).is_err(),
-            "{config:?}"
-        );
+    let rht: [fn(&mut RandomizedHoughConfig); 4] = [
+        |config| config.iterations = 0,
+        |config| config.votes = 1,
+        |config| config.cell = 0.0,
+        |config| config.accept.theta = 2.0,
+    ];
+    for change in rht {
+        let mut config = RandomizedHoughConfig::default();
+        change(&mut config);
+        assert!(RandomizedHough::new(config, Canny::default()).is_err());
     }
-    let sht = StandardHoughConfig::default;
-    for config in [
-        StandardHoughConfig { cell: 0.5, ..sht() },
-        StandardHoughConfig {
-            direction_error: f64::NAN,
-            ..sht()
-        },
-        StandardHoughConfig {
-            min_votes: 0.0,
-            ..sht()
-        },
-        StandardHoughConfig {
-            accept: Acceptance {
-                max_radius: 1e9,
-                ..ACCEPT
-            },
-            ..sht()
-        },
-        StandardHoughConfig {
-            accept: Acceptance {
-                min_radius: 0.0,
-                ..ACCEPT
-            },
-            ..sht()
-        },
-    ] {
-        assert!(
-            StandardHough::new(config, Canny::default()).is_err(),
-            "{config:?}"
-        );
+    let sht: [fn(&mut StandardHoughConfig); 5] = [
+        |config| config.cell = 0.5,
+        |config| config.direction_error = f64::NAN,
+        |config| config.min_votes = 0.0,
+        |config| config.accept.max_radius = 1e9,
+        |config| config.accept.min_radius = 0.0,
+    ];
+    for change in sht {
+        let mut config = StandardHoughConfig::default();
+        change(&mut config);
+        assert!(StandardHough::new(config, Canny::default()).is_err());
     }
 }

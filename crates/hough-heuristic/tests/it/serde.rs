@@ -2,8 +2,7 @@ use std::fmt::Debug;
 
 use hough_heuristic::{
     AContrarioConfig, Acceptance, CannyConfig, Circle, CurveSearchConfig, Detection, Ellipse,
-    Features, FoundCurve, HeuristicConfig, Line, RandomizedHoughConfig, Region, Sampling,
-    StandardHoughConfig,
+    Features, HeuristicConfig, Line, RandomizedHoughConfig, Region, StandardHoughConfig,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -30,23 +29,17 @@ fn what_is_stored_comes_back() {
         circle,
         score: 0.875,
     });
-    comes_back(&FoundCurve {
-        curve: Line {
-            cos: 0.6,
-            sin: 0.8,
-            rho: -7.5,
-        },
-        beta: 0.75,
+    comes_back(&Line {
+        cos: 0.6,
+        sin: 0.8,
+        rho: -7.5,
     });
-    comes_back(&FoundCurve {
-        curve: Ellipse {
-            x: 60.0,
-            y: 45.5,
-            major: 25.0,
-            minor: 15.0,
-            angle: 0.25,
-        },
-        beta: 0.75,
+    comes_back(&Ellipse {
+        x: 60.0,
+        y: 45.5,
+        major: 25.0,
+        minor: 15.0,
+        angle: 0.25,
     });
 }
 
@@ -70,7 +63,7 @@ fn settings_come_back() {
     });
     comes_back(&HeuristicConfig {
         accept,
-        sampling: Sampling::Anywhere,
+        anywhere: true,
         ..HeuristicConfig::default()
     });
     comes_back(&RandomizedHoughConfig {
