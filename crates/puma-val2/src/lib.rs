@@ -114,14 +114,12 @@ mod serve;
 mod transport;
 
 pub use client::{ClientConfig, GuardedArm, Location, MoveWay, Resident, Val2Client};
-pub use emulator::{
-    BootQuestion, Emulator, Event, Fault, Message, Place, Profile, StartPower, TextError,
-};
+pub use emulator::{Emulator, Event, Fault, Message, Place, Profile, TextError};
 pub use error::ArmError;
 pub use joints::{Joint, JointDelta, Joints};
 pub use kinematics::{
-    ArmDynamics, ArmSide, Configuration, DriveTrain, Elbow, Frames, LinkDynamics, PumaParams,
-    Singularity, Solution, Unreachable, Wrist, Xyzoat,
+    ArmDynamics, Configuration, DriveTrain, Frames, LinkDynamics, PumaParams, Singularity,
+    Solution, Unreachable, Xyzoat,
 };
 pub use limits::JointRange;
 pub use manipulator::{Gripper, Manipulator, ProximitySensor};

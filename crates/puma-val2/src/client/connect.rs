@@ -1,9 +1,10 @@
 //! Connection with the monitor, and calibration of the arm.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use crate::client::config::ClientConfig;
-use crate::client::dialogue::{NUDGE, SPOIL, is_boot_question, last_question, shortened, way_out};
+use crate::client::dialogue::{NUDGE, SPOIL, is_boot_question, last_question, way_out};
 use crate::client::number::check_percent;
 use crate::client::reader;
 use crate::client::reader::Ending;
@@ -23,19 +24,14 @@ impl<T: Transport> Val2Client<T> {
     pub fn connect(transport: T, config: ClientConfig) -> Result<Self, ArmError> {
         check(&config)?;
         let mut client = Self {
-            wire: Wire::new(transport),
-            config,
+            wire: Wire::new(transport, config),
             last_known: None,
             points: BTreeMap::new(),
             goal_program: None,
             lacks_ppoint: false,
             guard: None,
         };
-        client.reach_monitor()?;
-        client.find_echo()?;
-        if let Some(percent) = client.config.speed_percent {
-            client.set_speed(percent)?;
-        }
+        client.reconnect()?;
         Ok(client)
     }
 
@@ -45,46 +41,37 @@ impl<T: Transport> Val2Client<T> {
     /// # Errors
     /// Those of [`Val2Client::connect`].
     pub fn reconnect(&mut self) -> Result<(), ArmError> {
-        self.wire.echo = None;
         self.last_known = None;
         self.guard = None;
         self.points.clear();
         self.goal_program = None;
         self.lacks_ppoint = false;
-        self.reach_monitor()?;
+        self.wire.nudge = SPOIL;
+        let outcome = self.find_prompt();
+        self.wire.nudge = NUDGE;
+        outcome?;
         self.find_echo()?;
-        match self.config.speed_percent {
+        match self.wire.config.speed_percent {
             Some(percent) => self.set_speed(percent),
             None => Ok(()),
         }
     }
 
-    fn reach_monitor(&mut self) -> Result<(), ArmError> {
-        self.wire.nudge = SPOIL;
-        let outcome = self.find_prompt();
-        self.wire.nudge = NUDGE;
-        outcome
-    }
-
     fn find_prompt(&mut self) -> Result<(), ArmError> {
-        let begun = self.wire.line.clock();
-        let until = begun.saturating_add(self.config.connect_timeout);
+        let timeout = self.wire.config.connect_timeout;
+        let until = self.wire.after(timeout);
         // Something that is no command and no answer: a half-typed line is spoilt by it, a question
         // asked again.
         self.wire.send(SPOIL, "connecting")?;
-        let (mut questions, mut ways) = (0, 0);
-        loop {
-            let left = until.saturating_sub(self.wire.line.clock());
-            let expected = "the prompt `.` of the VAL monitor or a start-up question";
-            let reply = match self.wire.read_reply("CR", left, &self.config) {
+        let expected = "the prompt `.` of the VAL monitor or a start-up question";
+        let mut ways = 0;
+        for questions in 0.. {
+            let left = self.wire.left(until);
+            let reply = match self.wire.read_reply("CR", left) {
                 Ok(reply) => reply,
                 Err(ArmError::Silence { heard, waited, .. }) if heard.is_empty() => {
-                    return Err(self.wire.silence(
-                        "CR",
-                        expected,
-                        "",
-                        waited.max(self.config.connect_timeout),
-                    ));
+                    let waited = waited.max(timeout);
+                    return Err(self.wire.silence("CR", expected, "", waited));
                 }
                 Err(ArmError::Silence { heard, .. } | ArmError::Garbled { heard, .. }) => {
                     return Err(self.wire.garbled("CR", expected, &heard));
@@ -92,23 +79,19 @@ impl<T: Transport> Val2Client<T> {
                 Err(other) => return Err(other),
             };
             let answer: &[u8] = match reply.ending {
-                Ending::Idle => {
-                    self.wire.half_typed = false;
-                    self.wire.restarted = false;
-                    return Ok(());
-                }
-                Ending::Running if self.config.abort_running_program => b"ABORT\r",
+                Ending::Idle => break,
+                Ending::Running if self.wire.config.abort_running_program => b"ABORT\r",
                 Ending::Running => {
                     let heard = "the prompt of a monitor under which a program runs";
                     return Err(self.wire.garbled("CR", "an idle monitor", heard));
                 }
                 Ending::Question if is_boot_question(&reply.text) => {
                     // Whatever may be the question that erases the memory is answered as that one.
-                    let initializes = last_question(&reply.text).contains("INIT");
-                    let yes = if initializes {
-                        self.config.initialize
+                    let config = &self.wire.config;
+                    let yes = if last_question(&reply.text).contains("INIT") {
+                        config.initialize
                     } else {
-                        self.config.load_from_floppy
+                        config.load_from_floppy
                     };
                     if yes { b"Y\r" } else { b"N\r" }
                 }
@@ -117,50 +100,39 @@ impl<T: Transport> Val2Client<T> {
                     way_out(&reply.text, ways - 1)
                 }
             };
-            questions += 1;
-            if questions > 20 || left.is_zero() {
-                return Err(self.wire.garbled("CR", expected, &shortened(&reply.text)));
+            if questions >= 20 || left.is_zero() {
+                return Err(self.wire.garbled("CR", expected, &reply.text));
             }
             self.wire.send(answer, "connecting")?;
         }
+        self.wire.half_typed = false;
+        self.wire.restarted = false;
+        Ok(())
     }
 
     /// Types a command that does no harm and listens for its echo before the line is ended.
     fn find_echo(&mut self) -> Result<(), ArmError> {
         self.wire.echo = Some(false);
-        for attempt in 0..=self.config.retries {
+        let retries = self.wire.config.retries;
+        for attempt in 0..=retries {
             self.wire.send(b"WHERE", "WHERE")?;
-            let mut buffer = [0; 64];
+            let wait = self.wire.config.quiet.saturating_mul(3);
             let mut heard = Vec::new();
-            let wait = self.config.quiet.saturating_mul(3);
-            loop {
-                match self.wire.line.receive(&mut buffer, wait) {
-                    Ok(Some(count)) => heard.extend_from_slice(&buffer[..count]),
-                    Ok(None) => break,
-                    Err(source) => {
-                        return Err(ArmError::Line {
-                            port: self.wire.port(),
-                            doing: "WHERE".into(),
-                            source,
-                        });
-                    }
-                }
-                if heard.len() >= 5 {
-                    break;
-                }
+            while heard.len() < 5
+                && let Some(bytes) = self.wire.receive(wait, "WHERE")?
+            {
+                heard.extend(bytes);
             }
             self.wire.send(b"\r", "WHERE")?;
-            match self
-                .wire
-                .read_reply("WHERE", self.config.patience(), &self.config)
-            {
+            let patience = self.wire.config.patience();
+            match self.wire.read_reply("WHERE", patience) {
                 Ok(reply) => {
                     // An echo may come late, behind a message that nobody asked for, or damaged.
                     // What looks like neither echo nor silence is listened to again.
                     let said = String::from_utf8_lossy(&heard).to_ascii_uppercase();
                     let echoed = said.contains("WHERE")
                         || reply.text.to_ascii_uppercase().contains("WHERE\r");
-                    let plain = echoed || heard.is_empty() || attempt == self.config.retries;
+                    let plain = echoed || heard.is_empty() || attempt == retries;
                     let answered = Location::parse(&reply.text).is_some()
                         || !reader::messages(&reply.text).is_empty();
                     if answered && plain {
@@ -171,12 +143,11 @@ impl<T: Transport> Val2Client<T> {
                 Err(error) if is_doubt(&error) => {}
                 Err(error) => return Err(error),
             }
-            self.wire.settle(&self.config)?;
+            self.wire.settle()?;
         }
         let expected = "X Y Z O A T and six joint angles";
-        Err(self
-            .wire
-            .garbled("WHERE", expected, "nothing of the kind, several times"))
+        let heard = "nothing of the kind, several times";
+        Err(self.wire.garbled("WHERE", expected, heard))
     }
 
     /// Calibrates the arm: `CALIBRATE`, the answer yes, and the small moves that follow.
@@ -193,16 +164,16 @@ impl<T: Transport> Val2Client<T> {
         loop {
             match self.calibrate_once() {
                 Ok(()) => return Ok(()),
-                Err(error) if is_doubt(&error) && doubts < self.config.retries => {
+                Err(error) if is_doubt(&error) && doubts < self.wire.config.retries => {
                     doubts += 1;
-                    self.wire.settle(&self.config)?;
+                    self.wire.settle()?;
                 }
                 Err(ArmError::Refused { message, .. })
                     if message.to_ascii_uppercase().contains("POWER")
-                        && refusals < self.config.power_retries =>
+                        && refusals < self.wire.config.power_retries =>
                 {
                     refusals += 1;
-                    self.pause(self.config.power_retry_delay)?;
+                    self.pause(self.wire.config.power_retry_delay)?;
                 }
                 Err(error) => return Err(error),
             }
@@ -210,48 +181,27 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn calibrate_once(&mut self) -> Result<(), ArmError> {
-        let patience = self.config.patience();
-        let reply = self
-            .wire
-            .exchange("CAL", patience, &self.config)
-            .map_err(|failed| failed.error)?;
-        self.without_message("CAL", &reply)
-            .map_err(|failed| failed.error)?;
+        let reply = self.say("CAL")?;
+        self.without_message("CAL", &reply)?;
         if reply.ending != Ending::Question {
-            return Err(self
-                .wire
-                .garbled("CAL", "a question", &shortened(&reply.text)));
+            return Err(self.wire.garbled("CAL", "a question", &reply.text));
         }
-        self.command_once("Y", self.config.motion_timeout)
-            .map(drop)
-            .map_err(|failed| failed.error)
+        self.command_once("Y", self.wire.config.motion_timeout)?;
+        Ok(())
     }
 
     /// Lets time pass on the line's own clock. Messages that come meanwhile become notices.
-    pub(super) fn pause(&mut self, time: std::time::Duration) -> Result<(), ArmError> {
-        let until = self.wire.line.clock().saturating_add(time);
+    pub(super) fn pause(&mut self, time: Duration) -> Result<(), ArmError> {
+        let until = self.wire.after(time);
         let mut heard = String::new();
-        loop {
-            let left = until.saturating_sub(self.wire.line.clock());
-            if left.is_zero() {
-                self.wire.notice(&heard);
-                return Ok(());
-            }
-            let mut buffer = [0; 256];
-            match self.wire.line.receive(&mut buffer, left) {
-                Ok(Some(count)) if heard.len() < self.config.reply_limit => {
-                    heard.push_str(&String::from_utf8_lossy(&buffer[..count]));
-                }
-                Ok(_) => {}
-                Err(source) => {
-                    return Err(ArmError::Line {
-                        port: self.wire.port(),
-                        doing: "waiting".into(),
-                        source,
-                    });
-                }
+        while !self.wire.left(until).is_zero() {
+            let bytes = self.wire.receive(self.wire.left(until), "waiting")?;
+            if heard.len() < self.wire.config.reply_limit {
+                heard.push_str(&String::from_utf8_lossy(&bytes.unwrap_or_default()));
             }
         }
+        self.wire.notice(&heard);
+        Ok(())
     }
 }
 

@@ -42,7 +42,7 @@ impl<T: Transport> Val2Client<T> {
                 return Ok(location);
             }
             match doubt {
-                Some(doubt) if tries < self.config.retries && !doubt.overdue => tries += 1,
+                Some(doubt) if tries < self.wire.config.retries && !doubt.overdue => tries += 1,
                 Some(doubt) => return Err(doubt.error),
                 None => {
                     let expected = format!("the hand at {hand}");
@@ -60,12 +60,12 @@ impl<T: Transport> Val2Client<T> {
         if let Some(signal) = self.guard {
             return self.run_guarded_once(signal, &[move_to_pose]);
         }
-        if self.wire.checks_echo(&self.config) {
+        if self.wire.checks_echo() {
             let line = format!("DO {move_to_pose}");
-            self.command_once(&line, self.config.motion_timeout)
-                .map(drop)
+            let timeout = self.wire.config.motion_timeout;
+            self.command_once(&line, timeout).map(drop)
         } else {
-            let name = self.config.point_name.clone();
+            let name = self.wire.config.point_name.clone();
             self.define_point(&name, hand.val(), &|shown| {
                 let shown = Xyzoat::from_val(shown.map(|(value, _)| value));
                 let (off, turned) = apart(&hand.pose(), &shown.pose());

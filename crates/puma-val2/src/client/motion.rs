@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::client::config::MoveWay;
-use crate::client::number::{check_percent, degrees, plain};
+use crate::client::number::{check_percent, plain};
 use crate::client::val2_client::Val2Client;
 use crate::client::wire::{Failed, is_doubt};
 use crate::error::ArmError;
@@ -70,19 +70,17 @@ impl<T: Transport> Val2Client<T> {
 
     pub(super) fn move_joints_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
         let moving = delta.0.iter().filter(|d| d.abs() >= STILL).count();
-        let means = match self.config.way {
+        let means = match self.wire.config.way {
             _ if self.guard.is_some() => self.coordinated(),
             MoveWay::Drive => Means::Drive(100.0),
-            MoveWay::Automatic if moving == 1 && self.wire.checks_echo(&self.config) => {
-                Means::Drive(100.0)
-            }
+            MoveWay::Automatic if moving == 1 && self.wire.checks_echo() => Means::Drive(100.0),
             _ => self.coordinated(),
         };
         self.relative(delta, means)
     }
 
     pub(super) fn move_joints_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let means = match self.config.way {
+        let means = match self.wire.config.way {
             MoveWay::Drive if self.guard.is_none() => Means::Drive(100.0),
             _ => self.coordinated(),
         };
@@ -90,12 +88,10 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn coordinated(&self) -> Means {
-        match self.config.way {
+        match self.wire.config.way {
             _ if self.guard.is_some() => Means::Guarded(None),
             MoveWay::Ppoint => Means::Ppoint,
-            MoveWay::Automatic if self.wire.checks_echo(&self.config) && !self.lacks_ppoint => {
-                Means::Ppoint
-            }
+            MoveWay::Automatic if self.wire.checks_echo() && !self.lacks_ppoint => Means::Ppoint,
             _ => Means::Point,
         }
     }
@@ -109,7 +105,7 @@ impl<T: Transport> Val2Client<T> {
             None => self.where_()?.joints,
         };
         let target = start + delta;
-        self.config.params.check(&target)?;
+        self.wire.config.params.check(&target)?;
         if delta.0.iter().all(|d| d.abs() < STILL) {
             return self.where_().map(|location| location.joints);
         }
@@ -117,7 +113,7 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn absolute(&mut self, target: Joints, means: Means) -> Result<Joints, ArmError> {
-        self.config.params.check(&target)?;
+        self.wire.config.params.check(&target)?;
         // Only `DRIVE` has to know where it starts.
         let start = match (means, self.last_known()) {
             (Means::Drive(_), None) => self.where_()?.joints,
@@ -141,7 +137,7 @@ impl<T: Transport> Val2Client<T> {
             if let Err(failed) = &outcome
                 && means == Means::Ppoint
                 && !failed.maybe_done
-                && self.config.way == MoveWay::Automatic
+                && self.wire.config.way == MoveWay::Automatic
                 && names_no_place(&failed.error)
             {
                 // The refusal may be the line's fault.
@@ -150,7 +146,7 @@ impl<T: Transport> Val2Client<T> {
                     means = Means::Point;
                     continue;
                 }
-                if tries < self.config.retries {
+                if tries < self.wire.config.retries {
                     tries += 1;
                     continue;
                 }
@@ -158,24 +154,16 @@ impl<T: Transport> Val2Client<T> {
             let doubt = self.doubt(outcome)?;
             let stands = self.stand(target).map_err(|error| self.lost(error))?;
             let stands = self.check_guard(stands, doubt.is_some())?;
-            let (joint, off) = furthest(&stands, &target);
-            if off <= self.config.tolerance {
+            if furthest(&stands, &target).1 <= self.wire.config.tolerance {
                 return Ok(stands);
             }
             match doubt {
-                Some(doubt) if tries < self.config.retries && !doubt.overdue => {
+                Some(doubt) if tries < self.wire.config.retries && !doubt.overdue => {
                     tries += 1;
                     from = stands;
                 }
                 Some(doubt) => return Err(doubt.error),
-                None => {
-                    return Err(ArmError::NotReached {
-                        port: self.wire.port(),
-                        joint,
-                        wanted_degrees: degrees(&target, joint),
-                        reported_degrees: degrees(&stands, joint),
-                    });
-                }
+                None => return Err(self.not_reached(target, stands)),
             }
         }
     }
@@ -183,13 +171,13 @@ impl<T: Transport> Val2Client<T> {
     /// Returns `true` for an error that may be the line's fault. Where nothing is echoed, a refusal
     /// of the words may be, too.
     pub(super) fn is_doubtful(&self, error: &ArmError) -> bool {
-        is_doubt(error) || !self.wire.checks_echo(&self.config) && names_no_place(error)
+        is_doubt(error) || !self.wire.checks_echo() && names_no_place(error)
     }
 
     /// Refuses a motion by one line that nothing can be compared with.
     fn check_means(&self, means: Means) -> Result<(), ArmError> {
         let one_line = matches!(means, Means::Drive(_) | Means::Ppoint);
-        if !one_line || self.wire.checks_echo(&self.config) {
+        if !one_line || self.wire.checks_echo() {
             return Ok(());
         }
         Err(ArmError::Setting {
@@ -220,21 +208,19 @@ impl<T: Transport> Val2Client<T> {
             Err(failed) if self.is_doubtful(&failed.error) => failed.error,
             Err(failed) => return Err(self.given_up(failed)),
         };
-        let limit = self.config.motion_timeout;
+        let limit = self.wire.config.motion_timeout;
         let overdue = matches!(error, ArmError::Silence { waited, .. } if waited >= limit);
         if overdue {
             let _ = self.panic_stop();
         } else {
-            self.wire
-                .settle(&self.config)
-                .map_err(|error| self.lost(error))?;
+            self.wire.settle().map_err(|error| self.lost(error))?;
         }
         Ok(Some(Doubt { error, overdue }))
     }
 
     /// Commands the motion. `Ok` says that the controller took all its parts.
     fn set_off(&mut self, from: Joints, target: Joints, means: Means) -> Result<(), Failed> {
-        let patience = self.config.motion_timeout;
+        let patience = self.wire.config.motion_timeout;
         match means {
             Means::Drive(speed) => {
                 let mut under_way = false;
@@ -244,11 +230,10 @@ impl<T: Transport> Val2Client<T> {
                         let by = plain(by.to_degrees());
                         let line = format!("DO DRIVE {},{by},{}", joint.number(), plain(speed));
                         // Whatever becomes of this one, those before it have moved the arm.
-                        self.command_once(&line, patience)
-                            .map_err(|failed| Failed {
-                                maybe_done: failed.maybe_done || under_way,
-                                ..failed
-                            })?;
+                        self.command_once(&line, patience).map_err(|mut failed| {
+                            failed.maybe_done |= under_way;
+                            failed
+                        })?;
                         under_way = true;
                     }
                 }
@@ -260,7 +245,7 @@ impl<T: Transport> Val2Client<T> {
             }
             Means::Point => {
                 self.define_goal(&target)?;
-                self.move_to_point("MOVE", &format!("#{}", self.config.point_name))
+                self.move_to_point("MOVE", &format!("#{}", self.wire.config.point_name))
             }
             Means::Guarded(speed) => {
                 self.define_goal(&target)?;
@@ -272,18 +257,14 @@ impl<T: Transport> Val2Client<T> {
 
     /// Reads the position until the arm is at `target` or stands elsewhere.
     fn stand(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let until = self
-            .wire
-            .line
-            .clock()
-            .saturating_add(self.config.motion_timeout);
+        let until = self.wire.after(self.wire.config.motion_timeout);
         let mut before = self.where_()?.joints;
         let mut equal = 0;
         loop {
-            if furthest(&before, &target).1 <= self.config.tolerance.min(AS_SENT) {
+            if furthest(&before, &target).1 <= self.wire.config.tolerance.min(AS_SENT) {
                 return Ok(before);
             }
-            if self.wire.line.clock() >= until {
+            if self.wire.left(until).is_zero() {
                 self.panic_stop()?;
                 return self.where_().map(|location| location.joints);
             }
@@ -301,19 +282,30 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
+    pub(super) fn not_reached(&self, target: Joints, stands: Joints) -> ArmError {
+        let joint = furthest(&stands, &target).0;
+        ArmError::NotReached {
+            port: self.wire.port(),
+            joint,
+            wanted_degrees: target[joint].to_degrees(),
+            reported_degrees: stands[joint].to_degrees(),
+        }
+    }
+
     /// Ends a move after a refusal, a restart or a broken line. The arm's position is still read if
     /// that is possible.
     fn given_up(&mut self, failed: Failed) -> ArmError {
-        match failed.error {
-            error @ ArmError::Refused { .. } => {
-                // A part of the motion may have been made before.
-                match self.stand_anywhere() {
-                    Ok(_) => error,
-                    Err(_) => self.lost(error),
-                }
-            }
-            error if failed.maybe_done => self.lost(error),
-            error => error,
+        let refused = matches!(failed.error, ArmError::Refused { .. });
+        // A part of the motion may have been made before a refusal.
+        let lost = if refused {
+            self.stand_anywhere().is_err()
+        } else {
+            failed.maybe_done
+        };
+        if lost {
+            self.lost(failed.error)
+        } else {
+            failed.error
         }
     }
 
@@ -340,23 +332,23 @@ impl<T: Transport> Val2Client<T> {
     }
 }
 
-/// Returns `true` if a refusal is about the words and not about the arm: the place is not
-/// understood.
+/// Words of refusals that are about the arm and not about the line typed.
+const OF_THE_ARM: [&str; 6] = [
+    "RANGE",
+    "CLOSE",
+    "POWER",
+    "CALIBRATED",
+    "ENVELOPE",
+    "EXECUTING",
+];
+
+/// Returns `true` if a refusal is about the words: the place is not understood.
 fn names_no_place(error: &ArmError) -> bool {
     let ArmError::Refused { message, .. } = error else {
         return false;
     };
     let message = message.to_ascii_uppercase();
-    ![
-        "RANGE",
-        "CLOSE",
-        "POWER",
-        "CALIBRATED",
-        "ENVELOPE",
-        "EXECUTING",
-    ]
-    .iter()
-    .any(|word| message.contains(word))
+    !OF_THE_ARM.iter().any(|word| message.contains(word))
 }
 
 /// Returns the joint that is furthest off, and its distance in radians.

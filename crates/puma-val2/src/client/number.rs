@@ -1,7 +1,6 @@
 //! Numbers in commands and messages.
 
 use crate::error::ArmError;
-use crate::joints::{Joint, Joints};
 
 pub(super) fn check_percent(percent: f64) -> Result<(), ArmError> {
     if percent > 0.0 && percent <= 327.67 {
@@ -24,9 +23,4 @@ pub(super) fn plain(value: f64) -> String {
     } else {
         text.into()
     }
-}
-
-/// Returns the angle of one joint in degrees, for a message.
-pub(super) fn degrees(joints: &Joints, joint: Joint) -> f64 {
-    joints[joint].to_degrees()
 }

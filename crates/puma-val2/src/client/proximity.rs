@@ -1,11 +1,10 @@
 //! Proximity sensors: reading them, and stopping the arm by them.
 
-use crate::client::dialogue::{NUDGE, shortened};
+use crate::client::dialogue::NUDGE;
 use crate::client::number::plain;
-use crate::client::point::not_done;
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
-use crate::client::wire::{Failed, Reply, is_doubt};
+use crate::client::wire::{Failed, is_doubt};
 use crate::error::ArmError;
 use crate::joints::Joints;
 use crate::manipulator::ProximitySensor;
@@ -43,7 +42,7 @@ impl<T: Transport> Val2Client<T> {
     pub fn arm_proximity(&mut self, signal: u16) -> Result<(), ArmError> {
         self.signal(signal)?;
         self.store_program(HIT, &[format!("{LATCH} = -1"), "HALT".to_owned()])?;
-        let to_goal = format!("MOVE #{}", self.config.point_name);
+        let to_goal = format!("MOVE #{}", self.wire.config.point_name);
         self.store_program(RUN, &guarded_steps(signal, &[to_goal]))?;
         self.command(&format!("DO {LATCH} = 0"))?;
         if self.truth(LATCH)? {
@@ -66,7 +65,7 @@ impl<T: Transport> Val2Client<T> {
     pub(super) fn run_guarded(&mut self, speed: Option<f64>) -> Result<(), Failed> {
         match (speed, self.guard) {
             (Some(speed), Some(signal)) => {
-                let to_goal = format!("MOVE #{}", self.config.point_name);
+                let to_goal = format!("MOVE #{}", self.wire.config.point_name);
                 self.run_guarded_once(signal, &[format!("SPEED {}", plain(speed)), to_goal])
             }
             _ => self.run(&format!("EXECUTE {RUN}")).map(drop),
@@ -79,16 +78,14 @@ impl<T: Transport> Val2Client<T> {
     /// A stored program holds the name then, and its listing has been compared.
     pub(super) fn move_to_point(&mut self, word: &str, name: &str) -> Result<(), Failed> {
         let motion = format!("{word} {name}");
-        if self.wire.checks_echo(&self.config) {
+        if self.wire.checks_echo() {
             let line = format!("DO {motion}");
-            return self
-                .command_once(&line, self.config.motion_timeout)
-                .map(drop);
+            let timeout = self.wire.config.motion_timeout;
+            return self.command_once(&line, timeout).map(drop);
         }
         if self.goal_program.as_ref() != Some(&motion) {
             self.goal_program = None;
-            self.store_program(GOAL, std::slice::from_ref(&motion))
-                .map_err(not_done)?;
+            self.store_program(GOAL, std::slice::from_ref(&motion))?;
             self.goal_program = Some(motion);
         }
         self.run(&format!("EXECUTE {GOAL}")).map(drop)
@@ -100,11 +97,7 @@ impl<T: Transport> Val2Client<T> {
         signal: u16,
         motion: &[String],
     ) -> Result<(), Failed> {
-        self.store_program(ONCE, &guarded_steps(signal, motion))
-            .map_err(|error| Failed {
-                error,
-                maybe_done: false,
-            })?;
+        self.store_program(ONCE, &guarded_steps(signal, motion))?;
         self.run(&format!("EXECUTE {ONCE}")).map(drop)
     }
 
@@ -150,8 +143,8 @@ impl<T: Transport> Val2Client<T> {
             match self.store_once(name, steps) {
                 Err(error) if is_doubt(&error) || matches!(error, ArmError::Refused { .. }) => {
                     // Out of the editor in any case.
-                    self.wire.settle(&self.config)?;
-                    if tries >= self.config.retries || !self.is_doubtful(&error) {
+                    self.wire.settle()?;
+                    if tries >= self.wire.config.retries || !self.is_doubtful(&error) {
                         return Err(error);
                     }
                     tries += 1;
@@ -170,31 +163,20 @@ impl<T: Transport> Val2Client<T> {
         let edit = format!("EDIT {name}");
         for line in std::iter::once(&edit).chain(steps) {
             let reply = self.say(line)?;
-            self.without_message(line, &reply)
-                .map_err(|failed| failed.error)?;
+            self.without_message(line, &reply)?;
             if reply.ending != Ending::Question {
-                let heard = shortened(&reply.text);
-                return Err(self.wire.garbled(line, "the editor's prompt", &heard));
+                return Err(self.wire.garbled(line, "the editor's prompt", &reply.text));
             }
         }
         self.say("E")?;
-        let listed = self
-            .say(&format!("LISTP {name}"))?
-            .text
-            .to_ascii_uppercase();
+        let listed = self.say(&format!("LISTP {name}"))?.text;
+        let listed = listed.to_ascii_uppercase();
         if holds(&listed, steps) {
             return Ok(());
         }
-        let heard = shortened(&listed);
         Err(self
             .wire
-            .garbled(name, "a listing of what was typed", &heard))
-    }
-
-    fn say(&mut self, line: &str) -> Result<Reply, ArmError> {
-        self.wire
-            .exchange(line, self.config.patience(), &self.config)
-            .map_err(|failed| failed.error)
+            .garbled(name, "a listing of what was typed", &listed))
     }
 
     /// Runs a stored program to its end and returns its output. A program that asks for values is
@@ -212,15 +194,13 @@ impl<T: Transport> Val2Client<T> {
         self.wire.nudge = b"";
         let outcome = self.run(&format!("EXECUTE {program}"));
         self.wire.nudge = NUDGE;
-        match outcome {
-            Ok(text) => Ok(text),
-            Err(failed) if failed.maybe_done && is_doubt(&failed.error) => match self.end_program()
-            {
-                Ok(()) => Err(failed.error),
-                Err(error) => Err(self.lost(error)),
-            },
-            Err(failed) => Err(failed.error),
+        let Err(failed) = outcome else {
+            return outcome.map_err(ArmError::from);
+        };
+        if failed.maybe_done && is_doubt(&failed.error) {
+            self.end_program().map_err(|error| self.lost(error))?;
         }
+        Err(failed.error)
     }
 
     /// Aborts the program that runs, if any.
@@ -233,41 +213,38 @@ impl<T: Transport> Val2Client<T> {
     }
 
     fn end_program(&mut self) -> Result<(), ArmError> {
-        let patience = self.config.motion_timeout;
+        let patience = self.wire.config.motion_timeout;
         let mut tries = 0;
         loop {
-            let error = match self.wire.exchange_to_end("ABORT", patience, &self.config) {
+            let error = match self.wire.exchange_to_end("ABORT", patience) {
                 Ok(reply) if reply.ending == Ending::Idle => return Ok(()),
                 Ok(reply) => {
-                    let heard = shortened(&reply.text);
-                    self.wire
-                        .garbled("ABORT", "the idle monitor's prompt", &heard)
+                    let expected = "the idle monitor's prompt";
+                    self.wire.garbled("ABORT", expected, &reply.text)
                 }
-                Err(failed) if is_doubt(&failed.error) => failed.error,
-                Err(failed) => return Err(failed.error),
+                Err(failed) => failed.error,
             };
-            if tries >= self.config.retries {
+            if !is_doubt(&error) || tries >= self.wire.config.retries {
                 return Err(error);
             }
             tries += 1;
             // A program that asks for values is left here.
-            self.wire.settle(&self.config)?;
+            self.wire.settle()?;
         }
     }
 
     /// Runs a program until it ends. A question of the program is an error.
     fn run(&mut self, line: &str) -> Result<String, Failed> {
-        let patience = self.config.motion_timeout;
-        let reply = self.wire.exchange_to_end(line, patience, &self.config)?;
+        let patience = self.wire.config.motion_timeout;
+        let reply = self.wire.exchange_to_end(line, patience)?;
         self.without_message(line, &reply)?;
         if reply.ending == Ending::Question {
-            let heard = shortened(&reply.text);
-            return Err(Failed {
-                error: self
-                    .wire
-                    .garbled(line, "a program that asks for nothing", &heard),
-                maybe_done: true,
-            });
+            let expected = "a program that asks for nothing";
+            return Err(Failed::after(self.wire.garbled(
+                line,
+                expected,
+                &reply.text,
+            )));
         }
         Ok(reply.text)
     }
@@ -319,6 +296,6 @@ fn holds(listing: &str, steps: &[String]) -> bool {
 impl<T: Transport> ProximitySensor for Val2Client<T> {
     /// Reads the input [`ClientConfig::proximity_signal`](crate::ClientConfig::proximity_signal).
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        self.signal(self.config.proximity_signal)
+        self.signal(self.wire.config.proximity_signal)
     }
 }

@@ -1,9 +1,8 @@
 //! A program that stays in the controller and moves the arm as it is told: the fewest characters
 //! per move.
 
-use crate::client::dialogue::shortened;
 use crate::client::motion::{AS_SENT, STILL, furthest};
-use crate::client::number::{degrees, plain};
+use crate::client::number::plain;
 use crate::client::point::shown_values;
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
@@ -47,6 +46,9 @@ const STEPS: [&str; 17] = [
     "20 TYPE \"BYE\"",
 ];
 
+/// Answer of the program to a line.
+const QUESTION: &str = "the program's question";
+
 /// The arm through a program that runs in its controller. While this lives, the monitor is not
 /// used.
 ///
@@ -75,7 +77,7 @@ impl<T: Transport> Val2Client<T> {
     /// [`ArmError::Setting`] on a line without echo, where nothing would check the angles on their
     /// way, and while a proximity guard is armed; otherwise what the line or the controller said.
     pub fn resident(&mut self) -> Result<Resident<'_, T>, ArmError> {
-        if !self.wire.checks_echo(&self.config) || self.guard.is_some() {
+        if !self.wire.checks_echo() || self.guard.is_some() {
             return Err(ArmError::Setting {
                 what: "a resident program",
                 value: "started".into(),
@@ -84,15 +86,11 @@ impl<T: Transport> Val2Client<T> {
         }
         self.store_program(NAME, &STEPS.map(str::to_owned))?;
         let line = format!("EXECUTE {NAME}");
-        let timeout = self.config.patience();
-        let reply = self
-            .wire
-            .exchange_to_end(&line, timeout, &self.config)
-            .map_err(|f| f.error)?;
-        self.without_message(&line, &reply).map_err(|f| f.error)?;
+        let timeout = self.wire.config.patience();
+        let reply = self.wire.exchange_to_end(&line, timeout)?;
+        self.without_message(&line, &reply)?;
         if reply.ending != Ending::Question {
-            let heard = shortened(&reply.text);
-            return Err(self.wire.garbled(&line, "the program's question", &heard));
+            return Err(self.wire.garbled(&line, QUESTION, &reply.text));
         }
         let mut resident = Resident {
             client: self,
@@ -127,12 +125,11 @@ impl<T: Transport> Resident<'_, T> {
             return Ok(());
         }
         let wire = &mut self.client.wire;
-        let config = &self.client.config;
         let mut ending = Ending::Question;
-        for _ in 0..=config.retries {
-            ending = match wire.exchange_to_end(END, config.patience(), config) {
+        for _ in 0..=wire.config.retries {
+            ending = match wire.exchange_to_end(END, wire.config.patience()) {
                 Ok(reply) => reply.ending,
-                Err(failed) if is_doubt(&failed.error) => wire.spoil(config)?.ending,
+                Err(failed) if is_doubt(&failed.error) => wire.spoil()?.ending,
                 Err(failed) => return Err(failed.error),
             };
             if ending == Ending::Idle {
@@ -160,20 +157,14 @@ impl<T: Transport> Resident<'_, T> {
         let mut tries = 0;
         loop {
             let client = &mut *self.client;
-            let timeout = client.config.motion_timeout;
-            let failed = match client.wire.exchange_to_end(answer, timeout, &client.config) {
+            let timeout = client.wire.config.motion_timeout;
+            let failed = match client.wire.exchange_to_end(answer, timeout) {
                 Ok(reply) if reply.ending == Ending::Question => return Ok(reply),
                 Ok(reply) => {
                     // A refused motion ends the program.
-                    let error = match client.without_message(answer, &reply) {
-                        Err(failed) => failed.error,
-                        Ok(()) => {
-                            let heard = shortened(&reply.text);
-                            client
-                                .wire
-                                .garbled(answer, "the program's question", &heard)
-                        }
-                    };
+                    let refused = client.without_message(answer, &reply).err();
+                    let garbled = || client.wire.garbled(answer, QUESTION, &reply.text);
+                    let error = refused.unwrap_or_else(garbled);
                     return Err(self.over(error));
                 }
                 Err(failed) => failed,
@@ -187,7 +178,7 @@ impl<T: Transport> Resident<'_, T> {
             }
             // Also before giving up: what comes next must find the program asking.
             match self.regain() {
-                Ok(Ending::Question) if tries < self.client.config.retries => tries += 1,
+                Ok(Ending::Question) if tries < self.client.wire.config.retries => tries += 1,
                 Ok(Ending::Question) => return Err(failed.error),
                 Ok(_) => return Err(self.over(failed.error)),
                 Err(error) => return Err(self.lost(error)),
@@ -197,19 +188,11 @@ impl<T: Transport> Resident<'_, T> {
 
     /// Waits until the program asks again, or is no more.
     fn regain(&mut self) -> Result<Ending, ArmError> {
-        let client = &mut *self.client;
-        let until = client
-            .wire
-            .line
-            .clock()
-            .saturating_add(client.config.motion_timeout);
-        let mut ending = client.wire.spoil(&client.config)?.ending;
+        let wire = &mut self.client.wire;
+        let until = wire.after(wire.config.motion_timeout);
+        let mut ending = wire.spoil()?.ending;
         while ending == Ending::Running {
-            let left = until.saturating_sub(client.wire.line.clock());
-            ending = client
-                .wire
-                .read_reply("an empty line", left, &client.config)?
-                .ending;
+            ending = wire.read_reply("an empty line", wire.left(until))?.ending;
         }
         Ok(ending)
     }
@@ -217,17 +200,13 @@ impl<T: Transport> Resident<'_, T> {
     /// Gives the program a line and reads the joint angles that it shows, once.
     fn ask(&mut self, answer: &str) -> Result<Joints, ArmError> {
         let mut heard = String::new();
-        for _ in 0..=self.client.config.retries {
+        for _ in 0..=self.client.wire.config.retries {
             let reply = self.give(answer)?;
-            let shown = reply
-                .text
-                .split(['\r', '\n'])
-                .filter_map(shown_values)
-                .next_back();
-            if let Some(values) = shown {
+            let lines = reply.text.split(['\r', '\n']);
+            if let Some(values) = lines.filter_map(shown_values).next_back() {
                 return Ok(Joints::from_degrees(values.map(|(value, _)| value)));
             }
-            heard = shortened(&reply.text);
+            heard = reply.text;
         }
         Err(self.client.wire.garbled(answer, "six joint angles", &heard))
     }
@@ -235,7 +214,7 @@ impl<T: Transport> Resident<'_, T> {
     /// Returns the angles that the program shows twice in a row. The arm moves only while a line
     /// that says so is answered.
     fn stands(&mut self, mut before: Option<Joints>) -> Result<Joints, ArmError> {
-        for _ in 0..self.client.config.retries.saturating_add(3) {
+        for _ in 0..self.client.wire.config.retries.saturating_add(3) {
             let joints = self.ask(WHERE)?;
             if before.is_some_and(|before| furthest(&before, &joints).1 < STILL) {
                 return Ok(joints);
@@ -268,18 +247,12 @@ impl<T: Transport> Resident<'_, T> {
             return Ok(shown);
         }
         let reached = self.stands(Some(shown))?;
-        let (joint, off) = furthest(&reached, &target);
-        if off <= self.client.config.tolerance {
+        if furthest(&reached, &target).1 <= self.client.wire.config.tolerance {
             return Ok(reached);
         }
         // Where it stands is certain, if not where it should.
         self.client.last_known = Some(reached);
-        Err(ArmError::NotReached {
-            port: self.client.wire.port(),
-            joint,
-            wanted_degrees: degrees(&target, joint),
-            reported_degrees: degrees(&reached, joint),
-        })
+        Err(self.client.not_reached(target, reached))
     }
 
     /// Keeps where the arm is known to stand after a call that may have moved it.
@@ -289,18 +262,13 @@ impl<T: Transport> Resident<'_, T> {
     ) -> Result<Joints, ArmError> {
         self.check_alive()?;
         let before = self.client.last_known.take();
-        match call(self) {
-            Ok(joints) => {
-                self.client.last_known = Some(joints);
-                Ok(joints)
-            }
-            Err(ArmError::Unconfirmed { port, cause, .. }) => Err(ArmError::Unconfirmed {
-                port,
-                last_known: before,
-                cause,
-            }),
-            Err(error) => Err(error),
+        let mut outcome = call(self);
+        match &mut outcome {
+            Ok(joints) => self.client.last_known = Some(*joints),
+            Err(ArmError::Unconfirmed { last_known, .. }) => *last_known = before,
+            Err(_) => {}
         }
+        outcome
     }
 }
 
@@ -318,7 +286,7 @@ impl<T: Transport> Manipulator for Resident<'_, T> {
     }
 
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        self.client.config.params.check(&target)?;
+        self.client.wire.config.params.check(&target)?;
         self.kept(|resident| resident.go(target))
     }
 

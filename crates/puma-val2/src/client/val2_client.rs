@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::client::config::ClientConfig;
-use crate::client::dialogue::shortened;
 use crate::client::number::{check_percent, plain};
 use crate::client::reader;
 use crate::client::reader::Ending;
@@ -31,7 +30,6 @@ use crate::transport::Transport;
 #[derive(Debug)]
 pub struct Val2Client<T: Transport> {
     pub(super) wire: Wire<T>,
-    pub(super) config: ClientConfig,
     pub(super) last_known: Option<Joints>,
     /// Values that the controller has shown for points defined by this client, by name. A display
     /// of other values betrays a damaged name.
@@ -47,7 +45,7 @@ pub struct Val2Client<T: Transport> {
 impl<T: Transport> Val2Client<T> {
     /// Returns the settings.
     pub fn config(&self) -> &ClientConfig {
-        &self.config
+        &self.wire.config
     }
 
     /// Returns the line.
@@ -88,11 +86,11 @@ impl<T: Transport> Val2Client<T> {
     pub(super) fn command(&mut self, line: &str) -> Result<String, ArmError> {
         let mut tries = 0;
         loop {
-            match self.command_once(line, self.config.patience()) {
+            match self.command_once(line, self.wire.config.patience()) {
                 Ok(text) => return Ok(text),
-                Err(failed) if is_doubt(&failed.error) && tries < self.config.retries => {
+                Err(failed) if is_doubt(&failed.error) && tries < self.wire.config.retries => {
                     tries += 1;
-                    self.wire.settle(&self.config)?;
+                    self.wire.settle()?;
                 }
                 Err(failed) => return Err(failed.error),
             }
@@ -101,28 +99,32 @@ impl<T: Transport> Val2Client<T> {
 
     /// Carries out a line once. The reply must end with the monitor's prompt and hold no message.
     pub(super) fn command_once(&mut self, line: &str, timeout: Duration) -> Result<String, Failed> {
-        let reply = self.wire.exchange(line, timeout, &self.config)?;
+        let reply = self.wire.exchange(line, timeout)?;
         self.without_message(line, &reply)?;
         if reply.ending == Ending::Question {
-            let heard = shortened(&reply.text);
-            return Err(Failed {
-                error: self.wire.garbled(line, "the monitor's prompt", &heard),
-                maybe_done: true,
-            });
+            let expected = "the monitor's prompt";
+            return Err(Failed::after(self.wire.garbled(
+                line,
+                expected,
+                &reply.text,
+            )));
         }
         Ok(reply.text)
     }
 
-    pub(super) fn without_message(&self, line: &str, reply: &Reply) -> Result<(), Failed> {
+    /// Exchanges a line for a reply that waits for no motion.
+    pub(super) fn say(&mut self, line: &str) -> Result<Reply, ArmError> {
+        let patience = self.wire.config.patience();
+        self.wire.exchange(line, patience).map_err(ArmError::from)
+    }
+
+    pub(super) fn without_message(&self, line: &str, reply: &Reply) -> Result<(), ArmError> {
         match reader::messages(&reply.text).pop() {
             None => Ok(()),
-            Some(message) => Err(Failed {
-                error: ArmError::Refused {
-                    port: self.wire.port(),
-                    sent: line.to_owned(),
-                    message,
-                },
-                maybe_done: false,
+            Some(message) => Err(ArmError::Refused {
+                port: self.wire.port(),
+                sent: line.to_owned(),
+                message,
             }),
         }
     }
@@ -147,10 +149,11 @@ impl<T: Transport> Val2Client<T> {
     pub fn where_(&mut self) -> Result<Location, ArmError> {
         let mut before: Option<Location> = None;
         let mut last_error = None;
-        for _ in 0..self.config.retries.saturating_add(3) {
+        for _ in 0..self.wire.config.retries.saturating_add(3) {
             match self.where_once() {
                 Ok(location) => {
-                    if location.agrees(&self.config.params) || before.is_some_and(|b| b == location)
+                    if location.agrees(&self.wire.config.params)
+                        || before.is_some_and(|b| b == location)
                     {
                         self.last_known = Some(location.joints);
                         return Ok(location);
@@ -159,7 +162,7 @@ impl<T: Transport> Val2Client<T> {
                 }
                 Err(error) if is_doubt(&error) => {
                     last_error = Some(error);
-                    self.wire.settle(&self.config)?;
+                    self.wire.settle()?;
                 }
                 Err(error) => return Err(error),
             }
@@ -170,35 +173,16 @@ impl<T: Transport> Val2Client<T> {
         }))
     }
 
-    pub(super) fn where_once(&mut self) -> Result<Location, ArmError> {
-        let timeout = self.config.patience();
-        let reply = self
-            .wire
-            .exchange("WHERE", timeout, &self.config)
-            .map_err(|failed| failed.error)?;
+    fn where_once(&mut self) -> Result<Location, ArmError> {
+        let reply = self.say("WHERE")?;
         if let Some(location) = Location::parse(&reply.text) {
             // A message beside a whole answer was not meant for it.
             self.wire.notice(&reply.text);
             return Ok(location);
         }
-        self.without_message("WHERE", &reply)
-            .map_err(|failed| failed.error)?;
+        self.without_message("WHERE", &reply)?;
         let expected = "a heading and six numbers each for X Y Z O A T and JT1 to JT6";
-        Err(self
-            .wire
-            .garbled("WHERE", expected, &shortened(&reply.text)))
-    }
-
-    /// Opens or closes the hand and waits until that is done.
-    ///
-    /// # Errors
-    /// Errors of the line or the controller.
-    fn set_hand(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        self.command(match gripper {
-            Gripper::Open => "DO OPENI",
-            Gripper::Closed => "DO CLOSEI",
-        })
-        .map(drop)
+        Err(self.wire.garbled("WHERE", expected, &reply.text))
     }
 
     /// Returns `true` if a signal is on: 1 and up are outputs, 1001 and up inputs.
@@ -217,7 +201,7 @@ impl<T: Transport> Val2Client<T> {
         let line = format!("DO TYPE {condition}");
         let mut before = None;
         let mut heard = String::new();
-        for _ in 0..self.config.retries.saturating_add(3) {
+        for _ in 0..self.wire.config.retries.saturating_add(3) {
             heard = self.command(&line)?;
             let shown = heard
                 .split(['\r', '\n'])
@@ -229,7 +213,7 @@ impl<T: Transport> Val2Client<T> {
             }
             before = shown;
         }
-        Err(self.wire.garbled(&line, "-1 or 0", &shortened(&heard)))
+        Err(self.wire.garbled(&line, "-1 or 0", &heard))
     }
 
     /// Refuses a motion that the armed guard would not watch.
@@ -255,7 +239,7 @@ impl<T: Transport> Val2Client<T> {
         self.wire.send(b"PANIC\rPANIC\r\x03", "PANIC")?;
         // Whatever is said to that, in whichever number of prompts, is of no interest; only a dead
         // line is.
-        match self.wire.settle(&self.config) {
+        match self.wire.settle() {
             Err(error @ ArmError::Line { .. }) => Err(error),
             _ => Ok(()),
         }
@@ -276,7 +260,11 @@ impl<T: Transport> Manipulator for Val2Client<T> {
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        self.set_hand(gripper)
+        self.command(match gripper {
+            Gripper::Open => "DO OPENI",
+            Gripper::Closed => "DO CLOSEI",
+        })
+        .map(drop)
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {

@@ -25,18 +25,23 @@ pub(super) struct Failed {
 }
 
 impl Failed {
-    fn before(error: ArmError) -> Self {
-        Self {
-            error,
-            maybe_done: false,
-        }
+    pub(super) fn after(error: ArmError) -> Self {
+        let maybe_done = true;
+        Self { error, maybe_done }
     }
+}
 
-    fn after(error: ArmError) -> Self {
-        Self {
-            error,
-            maybe_done: true,
-        }
+impl From<ArmError> for Failed {
+    /// A failure before the line took effect.
+    fn from(error: ArmError) -> Self {
+        let maybe_done = false;
+        Self { error, maybe_done }
+    }
+}
+
+impl From<Failed> for ArmError {
+    fn from(failed: Failed) -> Self {
+        failed.error
     }
 }
 
@@ -51,6 +56,7 @@ const FILLERS: usize = 256;
 #[derive(Debug)]
 pub(super) struct Wire<T> {
     pub(super) line: T,
+    pub(super) config: ClientConfig,
     /// The controller echoes; `None` until found out.
     pub(super) echo: Option<bool>,
     /// Messages that came unasked.
@@ -65,9 +71,10 @@ pub(super) struct Wire<T> {
 }
 
 impl<T: Transport> Wire<T> {
-    pub(super) fn new(line: T) -> Self {
+    pub(super) fn new(line: T, config: ClientConfig) -> Self {
         Self {
             line,
+            config,
             echo: None,
             notices: Vec::new(),
             half_typed: false,
@@ -91,113 +98,109 @@ impl<T: Transport> Wire<T> {
     pub(super) fn send(&mut self, bytes: &[u8], doing: &str) -> Result<(), ArmError> {
         #[cfg(feature = "tracing")]
         tracing::trace!(port = self.line.name(), bytes = %bytes.escape_ascii(), "sent");
-        self.line
-            .send(bytes)
-            .map_err(|source| self.broken(doing, source))
+        let sent = self.line.send(bytes);
+        sent.map_err(|source| self.broken(doing, source))
     }
 
     /// Returns what comes within `wait`, at least one byte, or nothing.
-    fn receive(&mut self, wait: Duration, doing: &str) -> Result<Option<Vec<u8>>, ArmError> {
+    pub(super) fn receive(
+        &mut self,
+        wait: Duration,
+        doing: &str,
+    ) -> Result<Option<Vec<u8>>, ArmError> {
         let mut buffer = [0; 512];
-        match self.line.receive(&mut buffer, wait) {
-            Ok(Some(count)) => {
-                #[cfg(feature = "tracing")]
-                tracing::trace!(
-                    port = self.line.name(),
-                    bytes = %buffer[..count].escape_ascii(),
-                    "received"
-                );
-                Ok(Some(buffer[..count].to_vec()))
-            }
-            Ok(None) => Ok(None),
-            Err(source) => Err(self.broken(doing, source)),
+        let received = self.line.receive(&mut buffer, wait);
+        let bytes = received
+            .map_err(|source| self.broken(doing, source))?
+            .map(|count| buffer[..count].to_vec());
+        #[cfg(feature = "tracing")]
+        if let Some(bytes) = &bytes {
+            tracing::trace!(port = self.line.name(), bytes = %bytes.escape_ascii(), "received");
         }
+        Ok(bytes)
     }
 
-    fn reader(config: &ClientConfig) -> ReplyReader {
-        ReplyReader::new(
-            config.reply_limit.max(256),
-            config.idle_prompt,
-            config.run_prompt,
-        )
+    /// Returns the time by the line's clock at which `wait` is over.
+    pub(super) fn after(&self, wait: Duration) -> Duration {
+        self.line.clock().saturating_add(wait)
     }
 
-    /// Returns the error of a controller that asks its start-up questions in mid-session.
-    fn restart(&mut self, text: &str) -> ArmError {
+    /// Returns the time that is left until `until`.
+    pub(super) fn left(&self, until: Duration) -> Duration {
+        until.saturating_sub(self.line.clock())
+    }
+
+    fn reader(&self) -> ReplyReader {
+        let ClientConfig {
+            idle_prompt,
+            run_prompt,
+            ..
+        } = self.config;
+        ReplyReader::new(self.reply_limit(), idle_prompt, run_prompt)
+    }
+
+    fn reply_limit(&self) -> usize {
+        self.config.reply_limit.max(256)
+    }
+
+    /// Returns the reply, or the error of a controller that asks its start-up questions in
+    /// mid-session.
+    fn not_restarted(&mut self, reply: Reply) -> Result<Reply, ArmError> {
+        if reply.ending != Ending::Question || !is_boot_question(&reply.text) {
+            return Ok(reply);
+        }
         self.restarted = true;
-        ArmError::Restarted {
+        Err(ArmError::Restarted {
             port: self.port(),
-            heard: shortened(text),
-        }
+            heard: shortened(&reply.text),
+        })
     }
 
     /// Types `line` at a prompt or question, ends it and reads the reply for up to `timeout`.
-    pub(super) fn exchange(
-        &mut self,
-        line: &str,
-        timeout: Duration,
-        config: &ClientConfig,
-    ) -> Result<Reply, Failed> {
-        self.take_unasked(config).map_err(Failed::before)?;
+    pub(super) fn exchange(&mut self, line: &str, timeout: Duration) -> Result<Reply, Failed> {
+        self.take_unasked()?;
         if self.half_typed {
             // Left by a call that failed: what is typed now must not be added to it.
-            self.spoil(config).map_err(Failed::before)?;
+            self.spoil()?;
         }
         let typed = padded(line);
         let mut tries = 0;
-        loop {
-            match self.type_text(&typed, config) {
-                Ok(()) => break,
-                Err(error) if is_doubt(&error) && tries < config.retries => {
-                    tries += 1;
-                    let reply = self.spoil(config).map_err(Failed::before)?;
-                    if reply.ending == Ending::Question {
-                        // The dialogue that the line belongs to has to begin again.
-                        return Err(Failed::before(error));
-                    }
-                }
-                Err(error) => return Err(Failed::before(error)),
+        while let Err(error) = self.type_text(&typed) {
+            tries += 1;
+            // At a question the dialogue that the line belongs to has to begin again.
+            let again = is_doubt(&error)
+                && tries <= self.config.retries
+                && self.spoil()?.ending != Ending::Question;
+            if !again {
+                return Err(error.into());
             }
         }
-        self.send(b"\r", line).map_err(Failed::after)?;
-        let mut reader = Self::reader(config);
-        if self.checks_echo(config) && !self.hears_line_end(&mut reader, line, config)? {
+        self.end_line(line, timeout).map_err(Failed::after)
+    }
+
+    fn end_line(&mut self, line: &str, timeout: Duration) -> Result<Reply, ArmError> {
+        self.send(b"\r", line)?;
+        let mut reader = self.reader();
+        if self.checks_echo() && !self.hears_line_end(&mut reader, line)? {
             // The line may still be open at the other end. An empty line would complete whatever
             // its damaged end has made of it.
-            self.spoil(config).map_err(Failed::after)?;
-            let wait = config.reply_timeout;
-            return Err(Failed::after(self.silence(
-                line,
-                "the echo of its end",
-                "",
-                wait,
-            )));
+            self.spoil()?;
+            return Err(self.silence(line, "the echo of its end", "", self.config.reply_timeout));
         }
         self.half_typed = false;
-        let reply = self
-            .read_on(reader, line, timeout, config)
-            .map_err(Failed::after)?;
-        if reply.ending == Ending::Question && is_boot_question(&reply.text) {
-            return Err(Failed::after(self.restart(&reply.text)));
-        }
-        Ok(reply)
+        let reply = self.read_on(reader, line, timeout)?;
+        self.not_restarted(reply)
     }
 
     /// Returns `true` if typed lines are compared with their echo.
-    pub(super) fn checks_echo(&self, config: &ClientConfig) -> bool {
-        self.echo == Some(true) && config.check_echo
+    pub(super) fn checks_echo(&self) -> bool {
+        self.echo == Some(true) && self.config.check_echo
     }
 
     /// Waits until the end of a line has come back, and keeps what comes with it in `reader`.
-    fn hears_line_end(
-        &mut self,
-        reader: &mut ReplyReader,
-        line: &str,
-        config: &ClientConfig,
-    ) -> Result<bool, Failed> {
-        let wait = config.reply_timeout;
+    fn hears_line_end(&mut self, reader: &mut ReplyReader, line: &str) -> Result<bool, ArmError> {
         for _ in 0..FILLERS {
-            let Some(bytes) = self.receive(wait, line).map_err(Failed::after)? else {
+            let Some(bytes) = self.receive(self.config.reply_timeout, line)? else {
                 return Ok(false);
             };
             reader.push(&bytes);
@@ -209,8 +212,8 @@ impl<T: Transport> Wire<T> {
     }
 
     /// Reads away unasked output and keeps its messages.
-    fn take_unasked(&mut self, config: &ClientConfig) -> Result<(), ArmError> {
-        let mut reader = Self::reader(config);
+    fn take_unasked(&mut self) -> Result<(), ArmError> {
+        let mut reader = self.reader();
         // A line that never falls silent is left to the echo check.
         for _ in 0..64 {
             match self.receive(Duration::ZERO, "listening")? {
@@ -218,8 +221,9 @@ impl<T: Transport> Wire<T> {
                 None => break,
             }
         }
-        if reader.ending() == Some(Ending::Question) && is_boot_question(reader.text()) {
-            return Err(self.restart(reader.text()));
+        if let Some(ending) = reader.ending() {
+            let text = reader.text().to_owned();
+            self.not_restarted(Reply { text, ending })?;
         }
         self.notice(reader.text());
         Ok(())
@@ -233,34 +237,33 @@ impl<T: Transport> Wire<T> {
 
     /// Sends the text and, where there is an echo, waits until it has come back unchanged. The line
     /// is not ended.
-    fn type_text(&mut self, text: &str, config: &ClientConfig) -> Result<(), ArmError> {
+    fn type_text(&mut self, text: &str) -> Result<(), ArmError> {
         self.half_typed = true;
         self.send(text.as_bytes(), text)?;
-        if !self.checks_echo(config) {
+        if !self.checks_echo() {
             return Ok(());
         }
-        let patience = config.patience().saturating_mul(1 + text.len() as u32 / 16);
-        let until = self.line.clock().saturating_add(patience);
+        let patience = self.config.patience();
+        let until = self.after(patience.saturating_mul(1 + text.len() as u32 / 16));
         let mut heard = Vec::new();
         let mut fillers = 0;
         while heard.len() < text.len() {
-            let Some(bytes) = self.receive(config.reply_timeout, text)? else {
+            let Some(bytes) = self.receive(self.config.reply_timeout, text)? else {
                 break;
             };
-            let count = bytes.len();
-            let before = heard.len();
+            let (before, count) = (heard.len(), bytes.len());
             heard.extend(bytes.into_iter().filter(|b| !matches!(b, 0 | 0x07)));
             fillers += count - (heard.len() - before);
-            if fillers > FILLERS || self.line.clock() >= until {
+            if fillers > FILLERS || self.left(until).is_zero() {
                 break;
             }
         }
         if heard.eq_ignore_ascii_case(text.as_bytes()) {
             return Ok(());
         }
-        let heard_text = shortened(&String::from_utf8_lossy(&heard));
+        let heard_text = String::from_utf8_lossy(&heard);
         if heard.len() < text.len() && fillers <= FILLERS {
-            return Err(self.silence(text, "its echo", &heard_text, config.reply_timeout));
+            return Err(self.silence(text, "its echo", &heard_text, self.config.reply_timeout));
         }
         Err(self.garbled(text, "its echo", &heard_text))
     }
@@ -270,13 +273,8 @@ impl<T: Transport> Wire<T> {
     /// After a silence of `config.reply_timeout` an empty line is sent. It brings back a lost
     /// prompt, and a busy controller answers it later. A line that says too much, or never falls
     /// silent, is given up.
-    pub(super) fn read_reply(
-        &mut self,
-        sent: &str,
-        timeout: Duration,
-        config: &ClientConfig,
-    ) -> Result<Reply, ArmError> {
-        self.read_on(Self::reader(config), sent, timeout, config)
+    pub(super) fn read_reply(&mut self, sent: &str, timeout: Duration) -> Result<Reply, ArmError> {
+        self.read_on(self.reader(), sent, timeout)
     }
 
     /// Continues a reply of which `reader` holds the beginning.
@@ -285,43 +283,40 @@ impl<T: Transport> Wire<T> {
         mut reader: ReplyReader,
         sent: &str,
         timeout: Duration,
-        config: &ClientConfig,
     ) -> Result<Reply, ArmError> {
-        let until = self.line.clock().saturating_add(timeout);
-        let at_the_latest =
-            until.saturating_add(config.reply_timeout.max(config.quiet.saturating_mul(4)));
+        let ClientConfig {
+            quiet,
+            reply_timeout,
+            ..
+        } = self.config;
+        let until = self.after(timeout);
+        let at_the_latest = until.saturating_add(reply_timeout.max(quiet.saturating_mul(4)));
         let mut taken = 0;
         loop {
             let ending = reader.ending();
-            let left = until.saturating_sub(self.line.clock());
+            let left = self.left(until);
             let wait = match ending {
-                Some(_) => config.quiet,
-                None => config.reply_timeout.min(left).max(Duration::from_millis(1)),
+                Some(_) => quiet,
+                None => reply_timeout.min(left).max(Duration::from_millis(1)),
             };
             if let Some(bytes) = self.receive(wait, sent)? {
                 reader.push(&bytes);
                 taken += bytes.len();
-                if reader.overflowed() || taken > config.reply_limit.max(256) {
-                    return Err(self.garbled(
-                        sent,
-                        "a reply of bounded length",
-                        &shortened(reader.text()),
-                    ));
+                if reader.overflowed() || taken > self.reply_limit() {
+                    return Err(self.garbled(sent, "a reply of bounded length", reader.text()));
                 }
-                if left.is_zero() && ending.is_none() || self.line.clock() >= at_the_latest {
-                    return Err(self.garbled(sent, "a reply that ends", &shortened(reader.text())));
+                if left.is_zero() && ending.is_none() || self.left(at_the_latest).is_zero() {
+                    return Err(self.garbled(sent, "a reply that ends", reader.text()));
                 }
                 continue;
             }
             if let Some(ending) = ending {
-                return Ok(Reply {
-                    text: reader.text().to_owned(),
-                    ending,
-                });
+                let text = reader.text().to_owned();
+                return Ok(Reply { text, ending });
             }
-            if self.line.clock() >= until {
-                let expected = format!("the prompt `{}`", config.idle_prompt);
-                return Err(self.silence(sent, &expected, &shortened(reader.text()), timeout));
+            if self.left(until).is_zero() {
+                let expected = format!("the prompt `{}`", self.config.idle_prompt);
+                return Err(self.silence(sent, &expected, reader.text(), timeout));
             }
             if !self.nudge.is_empty() {
                 self.send(self.nudge, sent)?;
@@ -334,75 +329,62 @@ impl<T: Transport> Wire<T> {
         &mut self,
         line: &str,
         timeout: Duration,
-        config: &ClientConfig,
     ) -> Result<Reply, Failed> {
-        let until = self.line.clock().saturating_add(timeout);
-        let mut reply = self.exchange(line, timeout, config)?;
+        let until = self.after(timeout);
+        let mut reply = self.exchange(line, timeout)?;
         while reply.ending == Ending::Running {
-            let left = until.saturating_sub(self.line.clock());
-            let more = self.read_reply(line, left, config).map_err(Failed::after)?;
+            let more = self.read_reply(line, self.left(until));
+            let more = more.map_err(Failed::after)?;
             reply.text.push_str(&more.text);
             reply.ending = more.ending;
-            if reply.text.len() > config.reply_limit {
-                let heard = shortened(&reply.text);
-                return Err(Failed::after(self.garbled(
-                    line,
-                    "output of bounded length",
-                    &heard,
-                )));
+            if reply.text.len() > self.config.reply_limit {
+                let error = self.garbled(line, "output of bounded length", &reply.text);
+                return Err(Failed::after(error));
             }
         }
         Ok(reply)
     }
 
     /// Makes a half-typed line harmless and reads the reply.
-    pub(super) fn spoil(&mut self, config: &ClientConfig) -> Result<Reply, ArmError> {
+    pub(super) fn spoil(&mut self) -> Result<Reply, ArmError> {
         let doing = "clearing the line";
-        let patience = config.patience();
-        let until = self.line.clock().saturating_add(patience);
-        let mut reader = Self::reader(config);
+        let patience = self.config.patience();
+        let until = self.after(patience);
+        let mut reader = self.reader();
         let mut taken = 0;
-        while let Some(bytes) = self.receive(config.quiet, doing)? {
+        while let Some(bytes) = self.receive(self.config.quiet, doing)? {
             reader.push(&bytes);
             taken += bytes.len();
-            if taken > config.reply_limit.max(256).saturating_mul(2) || self.line.clock() >= until {
-                return Err(self.garbled("an empty line", "silence", &shortened(reader.text())));
+            if taken > self.reply_limit().saturating_mul(2) || self.left(until).is_zero() {
+                return Err(self.garbled("an empty line", "silence", reader.text()));
             }
         }
         self.send(SPOIL, doing)?;
-        let reply = self.read_reply("an empty line", patience, config)?;
+        let reply = self.read_reply("an empty line", patience)?;
         self.half_typed = false;
-        if reply.ending == Ending::Question && is_boot_question(&reply.text) {
-            return Err(self.restart(&reply.text));
-        }
-        Ok(reply)
+        self.not_restarted(reply)
     }
 
     /// Leaves whatever dialogue the line is in, and says no to everything.
-    pub(super) fn settle(&mut self, config: &ClientConfig) -> Result<Ending, ArmError> {
-        let patience = config.patience();
-        let mut reply = self.spoil(config)?;
+    pub(super) fn settle(&mut self) -> Result<Ending, ArmError> {
+        let patience = self.config.patience();
+        let mut reply = self.spoil()?;
         for attempt in 0..8 {
             if reply.ending != Ending::Question {
                 return Ok(reply.ending);
             }
             let answer = way_out(&reply.text, attempt);
             self.send(answer, "leaving a dialogue")?;
-            reply = self.read_reply("a refusal", patience, config)?;
+            reply = self.read_reply("a refusal", patience)?;
             if answer == CANCEL && reply.ending == Ending::Running {
                 // The program that asked would wait for ever.
                 self.send(b"ABORT\r", "leaving a dialogue")?;
-                reply = self.read_reply("ABORT", patience, config)?;
+                reply = self.read_reply("ABORT", patience)?;
             }
-            if reply.ending == Ending::Question && is_boot_question(&reply.text) {
-                return Err(self.restart(&reply.text));
-            }
+            reply = self.not_restarted(reply)?;
         }
-        Err(self.garbled(
-            "an empty line",
-            "the monitor's prompt",
-            "one question after another",
-        ))
+        let heard = "one question after another";
+        Err(self.garbled("an empty line", "the monitor's prompt", heard))
     }
 
     pub(super) fn silence(
@@ -416,7 +398,7 @@ impl<T: Transport> Wire<T> {
             port: self.port(),
             sent: sent.to_owned(),
             expected: expected.to_owned(),
-            heard: heard.to_owned(),
+            heard: shortened(heard),
             waited,
         }
     }
@@ -426,7 +408,7 @@ impl<T: Transport> Wire<T> {
             port: self.port(),
             sent: sent.to_owned(),
             expected: expected.to_owned(),
-            heard: heard.to_owned(),
+            heard: shortened(heard),
         }
     }
 }

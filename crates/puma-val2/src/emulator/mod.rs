@@ -12,4 +12,4 @@ pub use console::files::TextError;
 pub use controller::{Emulator, Event};
 pub use language::place::Place;
 pub use message::{Fault, Message};
-pub use profile::{BootQuestion, Profile, StartPower};
+pub use profile::Profile;

@@ -6,27 +6,6 @@ use std::time::Duration;
 use crate::emulator::message::{Fault, Message};
 use crate::joints::Joints;
 
-/// Question of the start-up dialogue.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BootQuestion {
-    /// Text with its trailing blank.
-    pub text: String,
-    /// `Y` erases programs, locations and variables and sets the speed to 100 %.
-    pub initializes: bool,
-}
-
-/// Arm power at the start of the controller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StartPower {
-    /// Off; [`Emulator::set_arm_power`](super::Emulator::set_arm_power) switches it on.
-    Off,
-    /// On.
-    On,
-    /// Off until `CALIBRATE` is answered with yes, as if an operator pressed the button then. After
-    /// [`Emulator::set_arm_power`](super::Emulator::set_arm_power) power stays as it was set.
-    OnAtCalibration,
-}
-
 /// Behaviour of an emulated controller that may differ from one machine, release or source to
 /// another.
 ///
@@ -37,8 +16,10 @@ pub enum StartPower {
 pub struct Profile {
     /// Name, for messages and for a command line.
     pub name: &'static str,
-    /// Questions at start-up, in order (default: load from floppy, initialize).
-    pub boot: Vec<BootQuestion>,
+    /// Questions at start-up, in order (default: load from floppy, initialize). The answer `Y` to
+    /// one that speaks of initializing erases programs, locations and variables and sets the speed
+    /// to 100 %.
+    pub boot: Vec<String>,
     /// Line printed after them (default: `PUMA 560  VAL-II`); empty for none.
     pub banner: String,
     /// Sends back what is typed (default: yes).
@@ -100,8 +81,10 @@ pub struct Profile {
     /// Ctrl-U deletes the line, DEL and BS a character, Ctrl-S and Ctrl-Q hold and release the
     /// output, Ctrl-O drops it.
     pub control_characters: bool,
-    /// Arm power at start (default: on at calibration).
-    pub start_power: StartPower,
+    /// Arm power at start (default: `None`, off until `CALIBRATE` is answered with yes, as if an
+    /// operator pressed the button then).
+    /// [`Emulator::set_arm_power`](super::Emulator::set_arm_power) presses it at any time.
+    pub start_power: Option<bool>,
     /// Knows its joint angles at start (default: no).
     pub start_calibrated: bool,
     /// Joint angles at start (default: READY).
@@ -142,14 +125,8 @@ impl Profile {
         Self {
             name: "val2",
             boot: vec![
-                BootQuestion {
-                    text: "Load VAL from floppy (Y/N)? ".into(),
-                    initializes: false,
-                },
-                BootQuestion {
-                    text: "Initialize (Y/N)? ".into(),
-                    initializes: true,
-                },
+                "Load VAL from floppy (Y/N)? ".into(),
+                "Initialize (Y/N)? ".into(),
             ],
             banner: "PUMA 560  VAL-II".into(),
             echo: true,
@@ -178,7 +155,7 @@ impl Profile {
             input_buffer: 256,
             step_time: Duration::from_millis(2),
             control_characters: true,
-            start_power: StartPower::OnAtCalibration,
+            start_power: None,
             start_calibrated: false,
             start: Joints::READY,
             nest: Joints::from_degrees([0.0, -215.0, 215.0, 0.0, 0.0, 0.0]),
@@ -207,7 +184,7 @@ impl Profile {
             stop_while_busy: false,
             max_name: 6,
             speed_max: 100.0,
-            start_power: StartPower::On,
+            start_power: Some(true),
             ..Self::val2()
         }
     }

@@ -8,63 +8,31 @@ use nalgebra::Isometry3;
 use crate::joints::{Joint, Joints};
 use crate::kinematics::params::PumaParams;
 
-/// The upper arm as seen from behind: a right or a left arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum ArmSide {
-    /// VAL's `RIGHTY`.
-    Righty,
-    /// VAL's `LEFTY`.
-    Lefty,
-}
-
-/// The elbow above or below the line from shoulder to wrist.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Elbow {
-    /// VAL's `ABOVE`.
-    Above,
-    /// VAL's `BELOW`.
-    Below,
-}
-
-/// The sign of `JT5`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Wrist {
-    /// VAL's `FLIP`: `JT5` negative.
-    Flip,
-    /// VAL's `NOFLIP`: `JT5` positive or zero.
-    NoFlip,
-}
-
-/// One of the eight postures that reach a pose.
+/// One of the eight postures that reach a pose, in VAL's words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Configuration {
-    /// Right or left arm.
-    pub side: ArmSide,
-    /// Elbow up or down.
-    pub elbow: Elbow,
-    /// Sign of `JT5`.
-    pub wrist: Wrist,
+    /// A right arm as seen from behind, `RIGHTY`; otherwise `LEFTY`.
+    pub righty: bool,
+    /// The elbow above the line from shoulder to wrist, `ABOVE`; otherwise `BELOW`.
+    pub above: bool,
+    /// `JT5` negative, `FLIP`; otherwise `NOFLIP`.
+    pub flip: bool,
+}
+
+impl Configuration {
+    /// Returns the three words as one array, in the order of the fields.
+    pub(crate) fn parts(self) -> [bool; 3] {
+        [self.righty, self.above, self.flip]
+    }
 }
 
 impl fmt::Display for Configuration {
     /// VAL's words: `RIGHTY ABOVE NOFLIP`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let side = match self.side {
-            ArmSide::Righty => "RIGHTY",
-            ArmSide::Lefty => "LEFTY",
-        };
-        let elbow = match self.elbow {
-            Elbow::Above => "ABOVE",
-            Elbow::Below => "BELOW",
-        };
-        let wrist = match self.wrist {
-            Wrist::Flip => "FLIP",
-            Wrist::NoFlip => "NOFLIP",
-        };
+        let side = if self.righty { "RIGHTY" } else { "LEFTY" };
+        let elbow = if self.above { "ABOVE" } else { "BELOW" };
+        let wrist = if self.flip { "FLIP" } else { "NOFLIP" };
         write!(f, "{side} {elbow} {wrist}")
     }
 }
@@ -161,18 +129,16 @@ impl PumaParams {
         let raised = lever.atan2(self.a2 + k);
         let mut found = [EMPTY; 8];
         let mut places = found.iter_mut();
-        for side in [ArmSide::Righty, ArmSide::Lefty] {
-            let (sign, x, t1, ahead) = match side {
-                ArmSide::Righty => (1.0, -forward, azimuth + lateral - PI, PI - elevation),
-                ArmSide::Lefty => (-1.0, forward, azimuth - lateral, elevation),
+        for righty in [true, false] {
+            let (x, t1, ahead) = if righty {
+                (-forward, azimuth + lateral - PI, PI - elevation)
+            } else {
+                (forward, azimuth - lateral, elevation)
             };
             let c1 = (p.x * x + p.y * self.d2) / radius2;
             let s1 = (p.y * x - p.x * self.d2) / radius2;
-            for elbow in [Elbow::Above, Elbow::Below] {
-                let up = match elbow {
-                    Elbow::Above => sign,
-                    Elbow::Below => -sign,
-                };
+            for above in [true, false] {
+                let up = if righty == above { 1.0 } else { -1.0 };
                 let n = up * lever;
                 let t3 = if up > 0.0 {
                     bend_above
@@ -204,15 +170,18 @@ impl PumaParams {
                     let straight = (0.0, if w22 > 0.0 { 0.0 } else { PI }, w10.atan2(w11));
                     [straight, (PI, straight.1, straight.2 + PI)]
                 };
-                for (wrist, (t4, t5, t6)) in [(Wrist::NoFlip, (t4, t5, t6)), (Wrist::Flip, flipped)]
-                {
-                    let solution = Solution {
-                        joints: Joints([t1, t2, t3, t4, t5, t6].map(wrap)),
-                        configuration: Configuration { side, elbow, wrist },
+                let wrists = [(false, (t4, t5, t6)), (true, flipped)];
+                for ((flip, (t4, t5, t6)), place) in wrists.into_iter().zip(places.by_ref()) {
+                    let configuration = Configuration {
+                        righty,
+                        above,
+                        flip,
                     };
-                    if let Some(place) = places.next() {
-                        *place = solution;
-                    }
+                    let joints = Joints([t1, t2, t3, t4, t5, t6].map(wrap));
+                    *place = Solution {
+                        joints,
+                        configuration,
+                    };
                 }
             }
         }
@@ -221,25 +190,11 @@ impl PumaParams {
 
     /// Returns the posture of `joints`.
     pub fn configuration(&self, joints: &Joints) -> Configuration {
-        let t5 = joints.0[4];
         let righty = self.wrist_ahead(joints) <= 0.0;
-        let lever = self.elbow_lever(joints);
         Configuration {
-            side: if righty {
-                ArmSide::Righty
-            } else {
-                ArmSide::Lefty
-            },
-            elbow: if (lever >= 0.0) == righty {
-                Elbow::Above
-            } else {
-                Elbow::Below
-            },
-            wrist: if wrap(t5) < 0.0 {
-                Wrist::Flip
-            } else {
-                Wrist::NoFlip
-            },
+            righty,
+            above: (self.elbow_lever(joints) >= 0.0) == righty,
+            flip: wrap(joints.0[4]) < 0.0,
         }
     }
 
@@ -346,9 +301,9 @@ impl PumaParams {
 const EMPTY: Solution = Solution {
     joints: Joints([0.0; 6]),
     configuration: Configuration {
-        side: ArmSide::Righty,
-        elbow: Elbow::Above,
-        wrist: Wrist::NoFlip,
+        righty: true,
+        above: true,
+        flip: false,
     },
 };
 

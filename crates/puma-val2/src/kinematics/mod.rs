@@ -12,7 +12,7 @@ pub(crate) mod xyzoat;
 pub use drive_train::DriveTrain;
 pub use dynamics::{ArmDynamics, LinkDynamics};
 pub use frames::Frames;
-pub use inverse::{ArmSide, Configuration, Elbow, Solution, Unreachable, Wrist};
+pub use inverse::{Configuration, Solution, Unreachable};
 pub use jacobian::Singularity;
 pub use params::PumaParams;
 pub use xyzoat::Xyzoat;

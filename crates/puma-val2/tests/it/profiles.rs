@@ -4,37 +4,27 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use puma_val2::{
-    BootQuestion, ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, MemoryLine,
-    Message, Profile, PumaParams, StartPower, Val2Client,
+    ClientConfig, Emulator, Gripper, JointDelta, Joints, Manipulator, MemoryLine, Message, Profile,
+    PumaParams, Val2Client,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 fn random_profile(random: &mut Xoshiro256PlusPlus) -> Profile {
     let mut yes = |chance: f64| random.random_bool(chance);
     let mut boot = Vec::new();
-    let question = |text: &str, initializes| BootQuestion {
-        text: text.into(),
-        initializes,
-    };
     if yes(0.6) {
-        boot.push(question(
-            if yes(0.5) {
-                "Load VAL from floppy (Y/N)? "
-            } else {
-                "Load VAL-II from floppy (Y/N)?"
-            },
-            false,
-        ));
+        let mark = if yes(0.5) { "VAL" } else { "VAL-II" };
+        let blank = if mark == "VAL" { " " } else { "" };
+        boot.push(format!("Load {mark} from floppy (Y/N)?{blank}"));
     }
     if yes(0.7) {
-        boot.push(question(
-            if yes(0.5) {
-                "Initialize (Y/N)? "
-            } else {
-                "INITIALIZE (Y/N)?\r\n"
-            },
-            true,
-        ));
+        let ask = yes(0.5);
+        let text = if ask {
+            "Initialize (Y/N)? "
+        } else {
+            "INITIALIZE (Y/N)?\r\n"
+        };
+        boot.push(text.to_owned());
     }
     if yes(0.2) {
         boot.reverse();
@@ -67,11 +57,7 @@ fn random_profile(random: &mut Xoshiro256PlusPlus) -> Profile {
         react_at_monitor: yes(0.5),
         control_characters: yes(0.7),
         messages,
-        start_power: if yes(0.5) {
-            StartPower::On
-        } else {
-            StartPower::OnAtCalibration
-        },
+        start_power: yes(0.5).then_some(true),
         baud: yes(0.4).then_some(9600),
         line_time: if yes(0.4) {
             Duration::from_millis(40)

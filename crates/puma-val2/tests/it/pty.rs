@@ -88,7 +88,7 @@ fn real_time_takes_the_time_of_the_motion() {
     };
     let profile = Profile {
         start_calibrated: true,
-        start_power: puma_val2::StartPower::On,
+        start_power: Some(true),
         ..Profile::val2()
     };
     let server =

@@ -10,7 +10,6 @@ use crate::emulator::language::place::Place;
 use crate::emulator::machine::job::Job;
 use crate::emulator::machine::memory::Memory;
 use crate::emulator::message::{Fault, Message};
-use crate::emulator::profile::StartPower;
 use crate::joints::Joints;
 
 impl Emulator {
@@ -52,8 +51,8 @@ impl Emulator {
 
     pub(crate) fn boot(&mut self, question: usize) {
         match self.profile.boot.get(question) {
-            Some(asked) => {
-                let text = asked.text.clone();
+            Some(text) => {
+                let text = text.clone();
                 self.terminal.resume();
                 self.mode = Mode::Boot(question);
                 self.print(&text);
@@ -139,7 +138,9 @@ impl Emulator {
         }
         let mode = std::mem::replace(&mut self.mode, Mode::Monitor);
         if line.too_long {
-            return self.line_too_long(mode);
+            // The beginning without its end may mean something else.
+            self.refuse(Message::LineTooLong.into());
+            return self.ask_again(mode);
         }
         let line = line.text.as_str();
         match mode {
@@ -153,47 +154,39 @@ impl Emulator {
         }
     }
 
-    /// Refuses a line without its end: the beginning may mean something else.
-    fn line_too_long(&mut self, mode: Mode) {
-        self.refuse(Message::LineTooLong.into());
+    /// Prints the question or prompt of a dialogue once more.
+    fn ask_again(&mut self, mode: Mode) {
         match mode {
             Mode::Boot(question) => self.boot(question),
             Mode::Monitor => self.prompt(),
             Mode::Confirm(confirm) => self.ask(confirm),
             Mode::Change { key, place } => self.ask_change(key, place),
             Mode::Editor(editing) => self.editor_prompt(editing),
-            Mode::Answer(variables) => self.ask_again(variables),
+            Mode::Answer(_) => {
+                self.mode = mode;
+                self.terminal.resume();
+                self.print("? ");
+            }
             Mode::Busy => self.mode = Mode::Busy,
         }
     }
 
-    fn ask_again(&mut self, variables: Vec<Variable>) {
-        self.mode = Mode::Answer(variables);
-        self.terminal.resume();
-        self.print("? ");
+    fn ask_yes_or_no(&mut self, mode: Mode) {
+        let text = self.profile.text(Message::AnswerYesOrNo).to_owned();
+        self.print_line(&text);
+        self.ask_again(mode);
     }
 
     fn answer_boot(&mut self, question: usize, line: &str) {
-        match yes_or_no(line) {
-            None => {
-                let text = self.profile.text(Message::AnswerYesOrNo).to_owned();
-                self.print_line(&text);
-                self.boot(question);
-            }
-            Some(yes) => {
-                if yes
-                    && self
-                        .profile
-                        .boot
-                        .get(question)
-                        .is_some_and(|q| q.initializes)
-                {
-                    self.forget_everything();
-                    self.arm.monitor_speed = 100.0;
-                }
-                self.boot(question + 1);
-            }
+        let Some(yes) = yes_or_no(line) else {
+            return self.ask_yes_or_no(Mode::Boot(question));
+        };
+        let asked = self.profile.boot.get(question);
+        if yes && asked.is_some_and(|text| text.to_ascii_uppercase().contains("INIT")) {
+            self.forget_everything();
+            self.arm.monitor_speed = 100.0;
         }
+        self.boot(question + 1);
     }
 
     pub(crate) fn ask(&mut self, confirm: Confirm) {
@@ -206,11 +199,7 @@ impl Emulator {
 
     fn answer_confirm(&mut self, confirm: Confirm, line: &str) {
         match yes_or_no(line) {
-            None => {
-                let text = self.profile.text(Message::AnswerYesOrNo).to_owned();
-                self.print_line(&text);
-                self.ask(confirm);
-            }
+            None => self.ask_yes_or_no(Mode::Confirm(confirm)),
             Some(false) => self.prompt(),
             Some(true) => self.confirmed(confirm),
         }
@@ -296,17 +285,19 @@ impl Emulator {
             }
             Err(fault) => {
                 self.refuse(fault);
-                self.ask_again(variables);
+                self.ask_again(Mode::Answer(variables));
             }
         }
     }
 
+    /// Returns `true` if arm power comes on by itself for a calibration.
+    pub(crate) fn powers_up_to_calibrate(&self) -> bool {
+        self.profile.start_power.is_none() && !self.panel_used
+    }
+
     /// Moves every joint a little to find the index pulses of the encoders.
     fn calibrate(&mut self) {
-        if !self.arm.power
-            && self.profile.start_power == StartPower::OnAtCalibration
-            && !self.panel_used
-        {
+        if self.powers_up_to_calibrate() {
             self.switch_power(true);
         }
         if !self.arm.power {

@@ -10,95 +10,109 @@ use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments, val
 use crate::emulator::language::scope::Scope;
 use crate::emulator::machine::job::Job;
 use crate::emulator::message::{Fault, Message};
-use crate::emulator::profile::StartPower;
 use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Command {
-    Abort,
-    Base,
-    Calibrate,
-    Copy,
-    Delete(Option<Kind>),
-    Directory,
-    Disable,
-    Do,
-    Edit,
-    Enable,
-    Execute,
-    FileDelete,
-    FileDirectory,
-    Format,
-    Here,
-    Io,
-    ListLocations,
-    ListPrograms,
-    ListReals,
-    Load(Option<Kind>),
-    Next,
-    Panic,
-    Point,
-    Proceed,
-    Rename,
-    Reset,
-    Retry,
-    Signal,
-    Speed,
-    Status,
-    Store(Option<Kind>),
-    Switch,
-    Tool,
-    Where,
-    Zero,
+/// Work of a command.
+#[derive(Clone, Copy)]
+enum Work {
+    /// Returns lines to print; the command takes no arguments.
+    Show(fn(&Emulator) -> Vec<String>),
+    /// Prints the lines about the names typed, or about all.
+    List(fn(&Emulator, &[String]) -> Result<Vec<String>, Fault>),
+    /// Reads its arguments, of which none may be left, and does something. The prompt follows.
+    Does(fn(&mut Emulator, &mut Cursor<'_>) -> Result<(), Fault>),
+    /// Does something that brings its own prompt or question.
+    Asks(fn(&mut Emulator, &mut Cursor<'_>) -> Result<(), Fault>),
 }
 
+use Work::{Asks, Does, List, Show};
+
 /// Commands; `true` for those that may be given while a program runs.
-const COMMANDS: [(&str, (Command, bool)); 43] = [
-    ("ABORT", (Command::Abort, true)),
-    ("BASE", (Command::Base, false)),
-    ("CALIBRATE", (Command::Calibrate, false)),
-    ("COPY", (Command::Copy, true)),
-    ("DELETE", (Command::Delete(None), false)),
-    ("DELETEL", (Command::Delete(Some(Kind::Place)), false)),
-    ("DELETEP", (Command::Delete(Some(Kind::Program)), false)),
-    ("DELETER", (Command::Delete(Some(Kind::Real)), false)),
-    ("DIRECTORY", (Command::Directory, true)),
-    ("DISABLE", (Command::Disable, true)),
-    ("DO", (Command::Do, false)),
-    ("EDIT", (Command::Edit, false)),
-    ("ENABLE", (Command::Enable, true)),
-    ("EXECUTE", (Command::Execute, false)),
-    ("FDELETE", (Command::FileDelete, true)),
-    ("FDIRECTORY", (Command::FileDirectory, true)),
-    ("FORMAT", (Command::Format, false)),
-    ("HERE", (Command::Here, true)),
-    ("IO", (Command::Io, true)),
-    ("LISTL", (Command::ListLocations, true)),
-    ("LISTP", (Command::ListPrograms, true)),
-    ("LISTR", (Command::ListReals, true)),
-    ("LOAD", (Command::Load(None), true)),
-    ("LOADL", (Command::Load(Some(Kind::Place)), true)),
-    ("LOADP", (Command::Load(Some(Kind::Program)), true)),
-    ("LOADR", (Command::Load(Some(Kind::Real)), true)),
-    ("NEXT", (Command::Next, false)),
-    ("PANIC", (Command::Panic, true)),
-    ("POINT", (Command::Point, false)),
-    ("PROCEED", (Command::Proceed, false)),
-    ("RENAME", (Command::Rename, false)),
-    ("RESET", (Command::Reset, true)),
-    ("RETRY", (Command::Retry, false)),
-    ("SIGNAL", (Command::Signal, true)),
-    ("SPEED", (Command::Speed, true)),
-    ("STATUS", (Command::Status, true)),
-    ("STORE", (Command::Store(None), true)),
-    ("STOREL", (Command::Store(Some(Kind::Place)), true)),
-    ("STOREP", (Command::Store(Some(Kind::Program)), true)),
-    ("STORER", (Command::Store(Some(Kind::Real)), true)),
-    ("SWITCH", (Command::Switch, true)),
-    ("TOOL", (Command::Tool, true)),
-    ("WHERE", (Command::Where, true)),
+const COMMANDS: [(&str, (bool, Work)); 43] = [
+    ("ABORT", (true, Asks(|e, c| e.abort(c, false)))),
+    ("BASE", (false, Does(Emulator::base))),
+    ("CALIBRATE", (false, Asks(Emulator::ask_calibration))),
+    ("COPY", (true, Does(|e, c| e.rename(c, true)))),
+    ("DELETE", (false, Asks(|e, c| e.delete(None, c)))),
+    (
+        "DELETEL",
+        (false, Asks(|e, c| e.delete(Some(Kind::Place), c))),
+    ),
+    (
+        "DELETEP",
+        (false, Asks(|e, c| e.delete(Some(Kind::Program), c))),
+    ),
+    (
+        "DELETER",
+        (false, Asks(|e, c| e.delete(Some(Kind::Real), c))),
+    ),
+    (
+        "DIRECTORY",
+        (true, Show(|e| e.memory.programs.keys().cloned().collect())),
+    ),
+    ("DISABLE", (true, Does(|e, c| e.set_switch(c, false)))),
+    (
+        "DO",
+        (
+            false,
+            Asks(|e, c| e.do_instruction(&Instruction::parse(c)?)),
+        ),
+    ),
+    ("EDIT", (false, Asks(Emulator::edit))),
+    ("ENABLE", (true, Does(|e, c| e.set_switch(c, true)))),
+    ("EXECUTE", (false, Does(Emulator::execute))),
+    ("FDELETE", (true, Asks(Emulator::delete_file))),
+    (
+        "FDIRECTORY",
+        (true, Show(|e| e.floppy.keys().cloned().collect())),
+    ),
+    (
+        "FORMAT",
+        (false, Asks(|e, c| e.ask_sure(c, Confirm::Format))),
+    ),
+    ("HERE", (true, Asks(Emulator::here_dialogue))),
+    ("IO", (true, Show(Emulator::signal_lines))),
+    ("LISTL", (true, List(Emulator::location_lines))),
+    ("LISTP", (true, List(Emulator::program_lines))),
+    ("LISTR", (true, List(Emulator::real_lines))),
+    ("LOAD", (true, Does(|e, c| e.load(None, c)))),
+    ("LOADL", (true, Does(|e, c| e.load(Some(Kind::Place), c)))),
+    ("LOADP", (true, Does(|e, c| e.load(Some(Kind::Program), c)))),
+    ("LOADR", (true, Does(|e, c| e.load(Some(Kind::Real), c)))),
+    (
+        "NEXT",
+        (false, Does(|e, c| e.resume_program(c, false, true))),
+    ),
+    ("PANIC", (true, Asks(|e, c| e.abort(c, true)))),
+    ("POINT", (false, Asks(Emulator::point))),
+    (
+        "PROCEED",
+        (false, Does(|e, c| e.resume_program(c, false, false))),
+    ),
+    ("RENAME", (false, Does(|e, c| e.rename(c, false)))),
+    ("RESET", (true, Does(Emulator::reset))),
+    (
+        "RETRY",
+        (false, Does(|e, c| e.resume_program(c, true, false))),
+    ),
+    ("SIGNAL", (true, Does(Emulator::set_signals))),
+    ("SPEED", (true, Does(Emulator::set_speed))),
+    ("STATUS", (true, Show(Emulator::status_lines))),
+    ("STORE", (true, Does(|e, c| e.store(None, c)))),
+    ("STOREL", (true, Does(|e, c| e.store(Some(Kind::Place), c)))),
+    (
+        "STOREP",
+        (true, Does(|e, c| e.store(Some(Kind::Program), c))),
+    ),
+    ("STORER", (true, Does(|e, c| e.store(Some(Kind::Real), c)))),
+    ("SWITCH", (true, Show(Emulator::switch_lines))),
+    ("TOOL", (true, Does(Emulator::tool))),
+    ("WHERE", (true, Show(Emulator::where_lines))),
 ];
+
+/// Erases everything; no abbreviation of it is accepted.
+const ZERO: (bool, Work) = (false, Asks(|e, c| e.ask_sure(c, Confirm::Zero)));
 
 impl Emulator {
     /// Carries out a line typed at the monitor.
@@ -122,140 +136,110 @@ impl Emulator {
         let Token::Name(name) = first else {
             return Err(Message::IllegalCommand.into());
         };
-        // `ZERO` erases everything: no abbreviation of it is accepted.
-        let (command, while_running) = if name == "ZERO" {
-            (Command::Zero, false)
+        let (while_running, work) = if name == "ZERO" {
+            ZERO
         } else {
-            keyword(name, &COMMANDS, Message::IllegalCommand)?
+            *keyword(name, &COMMANDS, Message::IllegalCommand)?
         };
         let running = self.job.as_ref().is_some_and(Job::is_program);
         if running && !while_running {
             return Err(Message::Busy.into());
         }
-        self.carry_out_command(command, &mut cursor)
-    }
-
-    fn carry_out_command(
-        &mut self,
-        command: Command,
-        cursor: &mut Cursor<'_>,
-    ) -> Result<(), Fault> {
-        match command {
-            Command::Where => {
+        let cursor = &mut cursor;
+        let lines = match work {
+            Asks(asks) => return asks(self, cursor),
+            Does(does) => does(self, cursor).map(|()| Vec::new())?,
+            Show(show) => {
                 cursor.expect_end()?;
-                self.show_where();
+                show(self)
             }
-            Command::Here => {
-                let name = PlaceName::parse(cursor)?;
+            List(list) => {
+                let name = |c: &mut Cursor<'_>| PlaceName::parse(c)?.key(&self.scope());
+                let names = cursor.rest(|c| c.list(name))?.unwrap_or_default();
                 cursor.expect_end()?;
-                let (key, place) = (name.key(&self.scope())?, self.here(name.precision));
-                self.memory.set_place(key.clone(), place, &self.profile)?;
-                self.ask_change(key, place);
-                return Ok(());
+                list(self, &names)?
             }
-            Command::Point => return self.point(cursor),
-            Command::Do => {
-                let instruction = Instruction::parse(cursor)?;
-                return self.do_instruction(&instruction);
-            }
-            Command::Calibrate => {
-                cursor.expect_end()?;
-                if !self.arm.power
-                    && (self.panel_used || self.profile.start_power != StartPower::OnAtCalibration)
-                {
-                    return Err(Message::ArmPowerOff.into());
-                }
-                self.ask(Confirm::Calibrate);
-                return Ok(());
-            }
-            Command::Speed => {
-                let percent = Expr::parse(cursor)?.value(&self.scope())?;
-                cursor.expect_end()?;
-                if percent <= 0.0 {
-                    return Err(Message::InvalidArgument.into());
-                }
-                self.arm.monitor_speed = percent.clamp(0.01, self.profile.speed_max.max(0.01));
-            }
-            Command::Base => {
-                let shift = arguments(cursor)?;
-                cursor.expect_end()?;
-                self.need_standing_arm()?;
-                let shift = values(&shift, &self.scope())?;
-                self.set_base(shift);
-            }
-            Command::Tool => {
-                let tool = if cursor.at_end() {
-                    None
-                } else {
-                    Some(PlaceExpr::parse(cursor)?)
-                };
-                cursor.expect_end()?;
-                self.need_standing_arm()?;
-                let scope = self.scope();
-                let tool = tool.map(|t| t.transformation(&scope)).transpose()?;
-                self.arm.frames.tool = tool.unwrap_or_default();
-            }
-            Command::Signal => {
-                let scope = self.scope();
-                let mut numbers = vec![Expr::parse(cursor)?.value(&scope)?];
-                while cursor.sign(",") {
-                    numbers.push(Expr::parse(cursor)?.value(&scope)?);
-                }
-                cursor.expect_end()?;
-                for number in numbers {
-                    self.command_signal(number)?;
-                }
-            }
-            Command::Reset => {
-                cursor.expect_end()?;
-                self.signals.reset_outputs();
-            }
-            Command::Enable | Command::Disable => {
-                self.set_switch(cursor, command == Command::Enable)?;
-            }
-            Command::Execute => return self.execute(cursor),
-            Command::Abort | Command::Panic => {
-                cursor.expect_end()?;
-                return self.abort(command == Command::Panic);
-            }
-            Command::Proceed | Command::Retry | Command::Next => {
-                cursor.expect_end()?;
-                self.resume_program(command == Command::Retry, command == Command::Next)?;
-            }
-            Command::Zero => {
-                cursor.expect_end()?;
-                self.ask(Confirm::Zero);
-                return Ok(());
-            }
-            Command::Format => {
-                cursor.expect_end()?;
-                self.ask(Confirm::Format);
-                return Ok(());
-            }
-            Command::Delete(kind) => return self.delete(kind, cursor),
-            Command::FileDelete => {
-                let name = cursor.name()?;
-                cursor.expect_end()?;
-                if !self.floppy.contains_key(&name) {
-                    return Err(Message::File.into());
-                }
-                self.ask(Confirm::Delete(vec![(Kind::File, name)]));
-                return Ok(());
-            }
-            Command::Rename | Command::Copy => self.rename(cursor, command == Command::Copy)?,
-            Command::Edit => return self.edit(cursor),
-            Command::Store(kind) => self.store(kind, cursor)?,
-            Command::Load(kind) => self.load(kind, cursor)?,
-            Command::Directory
-            | Command::FileDirectory
-            | Command::Io
-            | Command::ListLocations
-            | Command::ListPrograms
-            | Command::ListReals
-            | Command::Status
-            | Command::Switch => self.list(command, cursor)?,
+        };
+        for line in lines {
+            self.print_line(&line);
         }
         self.prompt();
+        Ok(())
+    }
+
+    fn ask_sure(&mut self, cursor: &Cursor<'_>, confirm: Confirm) -> Result<(), Fault> {
+        cursor.expect_end()?;
+        self.ask(confirm);
+        Ok(())
+    }
+
+    fn ask_calibration(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        cursor.expect_end()?;
+        if !self.arm.power && !self.powers_up_to_calibrate() {
+            return Err(Message::ArmPowerOff.into());
+        }
+        self.ask(Confirm::Calibrate);
+        Ok(())
+    }
+
+    /// Carries out `HERE name`, which shows the location and asks for changes.
+    fn here_dialogue(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let name = PlaceName::parse(cursor)?;
+        cursor.expect_end()?;
+        let (key, place) = (name.key(&self.scope())?, self.here(name.precision));
+        self.memory.set_place(key.clone(), place, &self.profile)?;
+        self.ask_change(key, place);
+        Ok(())
+    }
+
+    fn set_speed(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let percent = Expr::parse(cursor)?.value(&self.scope())?;
+        cursor.expect_end()?;
+        if percent <= 0.0 {
+            return Err(Message::InvalidArgument.into());
+        }
+        self.arm.monitor_speed = percent.clamp(0.01, self.profile.speed_max.max(0.01));
+        Ok(())
+    }
+
+    fn base(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let shift = arguments(cursor)?;
+        cursor.expect_end()?;
+        self.need_standing_arm()?;
+        let shift = values(&shift, &self.scope())?;
+        self.set_base(shift);
+        Ok(())
+    }
+
+    fn tool(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let tool = cursor.rest(PlaceExpr::parse)?;
+        cursor.expect_end()?;
+        self.need_standing_arm()?;
+        let scope = self.scope();
+        let tool = tool.map(|t| t.transformation(&scope)).transpose()?;
+        self.arm.frames.tool = tool.unwrap_or_default();
+        Ok(())
+    }
+
+    fn set_signals(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let numbers = Expr::parse_list(cursor)?;
+        cursor.expect_end()?;
+        self.command_signals(&numbers)
+    }
+
+    fn reset(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        cursor.expect_end()?;
+        self.signals.reset_outputs();
+        Ok(())
+    }
+
+    fn delete_file(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let name = cursor.name()?;
+        cursor.expect_end()?;
+        if !self.floppy.contains_key(&name) {
+            return Err(Message::File.into());
+        }
+        self.ask(Confirm::Delete(vec![(Kind::File, name)]));
         Ok(())
     }
 
@@ -269,11 +253,7 @@ impl Emulator {
     /// Carries out `POINT name [= expression]`. A new location starts as zero.
     fn point(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let name = PlaceName::parse(cursor)?;
-        let to = if cursor.sign("=") {
-            Some(PlaceExpr::parse(cursor)?)
-        } else {
-            None
-        };
+        let to = cursor.after_sign("=", PlaceExpr::parse)?;
         cursor.expect_end()?;
         let scope = self.scope();
         let key = name.key(&scope)?;
@@ -321,12 +301,12 @@ impl Emulator {
         let cycles = u32::try_from(cycles).ok();
         self.start_program(&name, cycles, step as usize - 1, false)?;
         self.executed_last = Some(name);
-        self.prompt();
         Ok(())
     }
 
     /// Carries out `ABORT`, which slows the arm down, or `PANIC`, which stops it at once.
-    fn abort(&mut self, at_once: bool) -> Result<(), Fault> {
+    fn abort(&mut self, cursor: &Cursor<'_>, at_once: bool) -> Result<(), Fault> {
+        cursor.expect_end()?;
         if at_once && self.arm.moving() {
             self.arm.break_off(self.now, self.profile.stop_time / 4);
         }
@@ -346,25 +326,11 @@ impl Emulator {
 
     /// Carries out `DELETE` and its letter forms, which take one kind.
     fn delete(&mut self, kind: Option<Kind>, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
-        let mut found = Vec::new();
-        loop {
-            let name = PlaceName::parse(cursor)?;
-            let key = name.key(&self.scope())?;
-            let kinds = match kind {
-                Some(kind) => vec![kind],
-                None => vec![Kind::Program, Kind::Place, Kind::Real],
-            };
-            let there = kinds.into_iter().find(|kind| match kind {
-                Kind::Program => self.memory.programs.contains_key(&key),
-                Kind::Place => self.memory.places.contains_key(&key),
-                Kind::Real => self.memory.reals.contains_key(&key),
-                Kind::File => self.floppy.contains_key(&key),
-            });
-            found.push((there.ok_or(Message::UndefinedValue)?, key));
-            if !cursor.sign(",") {
-                break;
-            }
-        }
+        let found = cursor.list(|c| {
+            let key = PlaceName::parse(c)?.key(&self.scope())?;
+            let there = self.memory.kind_of(&key, kind);
+            Ok((there.ok_or(Message::UndefinedValue)?, key))
+        })?;
         cursor.expect_end()?;
         self.ask(Confirm::Delete(found));
         Ok(())
@@ -379,11 +345,7 @@ impl Emulator {
         let old = cursor.name()?;
         cursor.expect_end()?;
         self.profile.check_name(&new)?;
-        let program = self
-            .memory
-            .programs
-            .get(&old)
-            .ok_or(Message::UndefinedProgram)?;
+        let program = self.memory.program(&old)?;
         if self.memory.programs.contains_key(&new) {
             return Err(Message::InvalidArgument.into());
         }

@@ -1,120 +1,75 @@
 //! Arithmetic expressions: parsing and evaluation. Truth is -1, falsehood 0.
 
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+
 use crate::emulator::language::lexer::{Cursor, Token};
 use crate::emulator::language::place_expr::PlaceExpr;
 use crate::emulator::language::scope::Scope;
 use crate::emulator::message::{Fault, Message};
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Expr {
     Number(f64),
     Variable(Variable),
     Negate(Box<Expr>),
     Not(Box<Expr>),
-    Binary(Operator, Box<Expr>, Box<Expr>),
-    Call(Function, Vec<Expr>),
-    OfPlaces(PlaceFunction, Vec<PlaceExpr>),
+    Binary(fn(f64, f64) -> f64, Box<Expr>, Box<Expr>),
+    Call(fn(&[f64]) -> f64, Vec<Expr>),
+    OfPlaces(fn(&[Vector3<f64>]) -> f64, Vec<PlaceExpr>),
+    /// `SIG`: all of these signals are as their signs say.
+    Signals(Vec<Expr>),
 }
 
 /// Real variable, possibly an element of an array.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Variable {
     pub(crate) name: String,
     pub(crate) index: Option<Box<Expr>>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Operator {
-    Or,
-    Xor,
-    And,
-    Equal,
-    Unequal,
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    Modulo,
-    Power,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Function {
-    Abs,
-    Atan2,
-    Cos,
-    Fraction,
-    Int,
-    Max,
-    Min,
-    Pi,
-    Sig,
-    Sign,
-    Sin,
-    Sqr,
-    Sqrt,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PlaceFunction {
-    Distance,
-    Dx,
-    Dy,
-    Dz,
-}
-
-const FUNCTIONS: [(&str, Function); 12] = [
-    ("ABS", Function::Abs),
-    ("ATAN2", Function::Atan2),
-    ("COS", Function::Cos),
-    ("FRACT", Function::Fraction),
-    ("INT", Function::Int),
-    ("MAX", Function::Max),
-    ("MIN", Function::Min),
-    ("SIG", Function::Sig),
-    ("SIGN", Function::Sign),
-    ("SIN", Function::Sin),
-    ("SQR", Function::Sqr),
-    ("SQRT", Function::Sqrt),
+/// Functions of numbers, with the least and the greatest number of arguments.
+const FUNCTIONS: [(&str, [usize; 2], fn(&[f64]) -> f64); 11] = [
+    ("ABS", [1, 1], |v| v[0].abs()),
+    ("ATAN2", [2, 2], |v| v[0].atan2(v[1]).to_degrees()),
+    ("COS", [1, 1], |v| v[0].to_radians().cos()),
+    ("FRACT", [1, 1], |v| v[0].fract()),
+    ("INT", [1, 1], |v| v[0].trunc()),
+    ("MAX", [1, 99], |v| v.iter().copied().fold(v[0], f64::max)),
+    ("MIN", [1, 99], |v| v.iter().copied().fold(v[0], f64::min)),
+    ("SIGN", [1, 1], |v| if v[0] < 0.0 { -1.0 } else { 1.0 }),
+    ("SIN", [1, 1], |v| v[0].to_radians().sin()),
+    ("SQR", [1, 1], |v| v[0] * v[0]),
+    ("SQRT", [1, 1], |v| v[0].sqrt()),
 ];
 
-const PLACE_FUNCTIONS: [(&str, PlaceFunction); 4] = [
-    ("DISTANCE", PlaceFunction::Distance),
-    ("DX", PlaceFunction::Dx),
-    ("DY", PlaceFunction::Dy),
-    ("DZ", PlaceFunction::Dz),
+/// Functions of the positions of locations, with the number of locations.
+const PLACE_FUNCTIONS: [(&str, usize, fn(&[Vector3<f64>]) -> f64); 4] = [
+    ("DISTANCE", 2, |p| (p[1] - p[0]).norm()),
+    ("DX", 1, |p| p[0].x),
+    ("DY", 1, |p| p[0].y),
+    ("DZ", 1, |p| p[0].z),
 ];
 
-/// Binary operators and their binding strengths, loosest first.
-const OPERATORS: [(&str, Operator, u8); 24] = [
-    ("OR", Operator::Or, 1),
-    ("XOR", Operator::Xor, 1),
-    ("AND", Operator::And, 2),
-    ("==", Operator::Equal, 4),
-    ("EQ", Operator::Equal, 4),
-    ("<>", Operator::Unequal, 4),
-    ("NE", Operator::Unequal, 4),
-    ("<=", Operator::LessEqual, 4),
-    ("=<", Operator::LessEqual, 4),
-    ("LE", Operator::LessEqual, 4),
-    (">=", Operator::GreaterEqual, 4),
-    ("=>", Operator::GreaterEqual, 4),
-    ("GE", Operator::GreaterEqual, 4),
-    ("<", Operator::Less, 4),
-    ("LT", Operator::Less, 4),
-    (">", Operator::Greater, 4),
-    ("GT", Operator::Greater, 4),
-    ("=", Operator::Equal, 4),
-    ("+", Operator::Add, 5),
-    ("-", Operator::Subtract, 5),
-    ("*", Operator::Multiply, 6),
-    ("/", Operator::Divide, 6),
-    ("MOD", Operator::Modulo, 6),
-    ("^", Operator::Power, 8),
+/// Binary operators in all their spellings, and their binding strengths, loosest first.
+#[allow(clippy::float_cmp)] // VAL's `==` compares as the controller does.
+const OPERATORS: [(&[&str], u8, fn(f64, f64) -> f64); 15] = [
+    (&["OR"], 1, |a, b| truth(is_true(a) || is_true(b))),
+    (&["XOR"], 1, |a, b| truth(is_true(a) != is_true(b))),
+    (&["AND"], 2, |a, b| truth(is_true(a) && is_true(b))),
+    (&["==", "EQ", "="], 4, |a, b| truth(a == b)),
+    (&["<>", "NE"], 4, |a, b| truth(a != b)),
+    (&["<=", "=<", "LE"], 4, |a, b| truth(a <= b)),
+    (&[">=", "=>", "GE"], 4, |a, b| truth(a >= b)),
+    (&["<", "LT"], 4, |a, b| truth(a < b)),
+    (&[">", "GT"], 4, |a, b| truth(a > b)),
+    (&["+"], 5, |a, b| a + b),
+    (&["-"], 5, |a, b| a - b),
+    (&["*"], 6, |a, b| a * b),
+    (&["/"], 6, |a, b| a / b),
+    (&["MOD"], 6, |a, b| a % b),
+    (&["^"], 8, f64::powf),
 ];
 
 /// Binding strengths of `NOT` and of the sign.
@@ -134,13 +89,18 @@ impl Expr {
         }
     }
 
+    /// Parses one expression or more between commas.
+    pub(crate) fn parse_list(cursor: &mut Cursor<'_>) -> Result<Vec<Self>, Fault> {
+        cursor.list(Self::parse)
+    }
+
     fn parse_from(cursor: &mut Cursor<'_>, loosest: u8) -> Result<Self, Fault> {
         cursor.descend()?;
         let mut left = Self::parse_operand(cursor)?;
-        while let Some(&(_, operator, binds)) = cursor.peek().and_then(|token| {
-            OPERATORS.iter().find(|(text, _, _)| match token {
-                Token::Sign(sign) => sign == text,
-                Token::Name(name) => name == text,
+        while let Some(&(_, binds, operator)) = cursor.peek().and_then(|token| {
+            OPERATORS.iter().find(|(spellings, _, _)| match token {
+                Token::Sign(sign) => spellings.contains(sign),
+                Token::Name(name) => spellings.contains(&name.as_str()),
                 _ => false,
             })
         }) {
@@ -158,9 +118,10 @@ impl Expr {
     fn parse_operand(cursor: &mut Cursor<'_>) -> Result<Self, Fault> {
         match cursor.next() {
             Some(Token::Number(number)) => Ok(Self::Number(*number)),
-            Some(Token::Sign("-")) => Ok(Self::Negate(Box::new(Self::parse_from(
-                cursor, SIGN_BINDS,
-            )?))),
+            Some(Token::Sign("-")) => {
+                let inner = Self::parse_from(cursor, SIGN_BINDS)?;
+                Ok(Self::Negate(Box::new(inner)))
+            }
             Some(Token::Sign("+")) => Self::parse_from(cursor, SIGN_BINDS),
             Some(Token::Sign("(")) => {
                 let inner = Self::parse(cursor)?;
@@ -177,54 +138,36 @@ impl Expr {
             "NOT" => return Ok(Self::Not(Box::new(Self::parse_from(cursor, NOT_BINDS)?))),
             "TRUE" | "ON" => return Ok(Self::Number(-1.0)),
             "FALSE" | "OFF" => return Ok(Self::Number(0.0)),
-            "PI" => return Ok(Self::Call(Function::Pi, Vec::new())),
+            "PI" => return Ok(Self::Number(PI)),
             _ => {}
         }
-        if cursor.sign("(") {
-            if let Some((_, function)) = PLACE_FUNCTIONS.iter().find(|(word, _)| *word == name) {
-                let mut places = vec![PlaceExpr::parse(cursor)?];
-                while cursor.sign(",") {
-                    places.push(PlaceExpr::parse(cursor)?);
-                }
-                cursor.expect_sign(")")?;
-                let wanted = if *function == PlaceFunction::Distance {
-                    2
-                } else {
-                    1
-                };
-                if places.len() != wanted {
-                    return Err(Message::InvalidArgument.into());
-                }
-                return Ok(Self::OfPlaces(*function, places));
-            }
-            let (_, function) = FUNCTIONS
-                .iter()
-                .find(|(word, _)| *word == name)
-                .ok_or(Message::InvalidArgument)?;
-            let mut arguments = Vec::new();
-            if !cursor.sign(")") {
-                arguments.push(Self::parse(cursor)?);
-                while cursor.sign(",") {
-                    arguments.push(Self::parse(cursor)?);
-                }
-                cursor.expect_sign(")")?;
-            }
-            let fits = match function {
-                Function::Atan2 => arguments.len() == 2,
-                Function::Max | Function::Min | Function::Sig => !arguments.is_empty(),
-                _ => arguments.len() == 1,
-            };
-            return if fits {
-                Ok(Self::Call(*function, arguments))
-            } else {
-                Err(Message::InvalidArgument.into())
-            };
+        if !cursor.sign("(") {
+            return Ok(Self::Variable(Variable {
+                name: name.to_owned(),
+                index: parse_index(cursor)?,
+            }));
         }
-        let index = parse_index(cursor)?;
-        Ok(Self::Variable(Variable {
-            name: name.to_owned(),
-            index,
-        }))
+        if let Some(&(_, count, function)) = PLACE_FUNCTIONS.iter().find(|f| f.0 == name) {
+            let places = cursor.list(PlaceExpr::parse)?;
+            if places.len() != count {
+                return Err(Message::InvalidArgument.into());
+            }
+            cursor.expect_sign(")")?;
+            return Ok(Self::OfPlaces(function, places));
+        }
+        let arguments = Self::parse_list(cursor)?;
+        cursor.expect_sign(")")?;
+        if name == "SIG" {
+            return Ok(Self::Signals(arguments));
+        }
+        let fits = |f: &&(&str, [usize; 2], _)| {
+            f.0 == name && (f.1[0]..=f.1[1]).contains(&arguments.len())
+        };
+        let found = FUNCTIONS
+            .iter()
+            .find(fits)
+            .ok_or(Message::InvalidArgument)?;
+        Ok(Self::Call(found.2, arguments))
     }
 
     pub(crate) fn value(&self, scope: &dyn Scope) -> Result<f64, Fault> {
@@ -234,20 +177,29 @@ impl Expr {
             Self::Negate(inner) => -inner.value(scope)?,
             Self::Not(inner) => truth(!is_true(inner.value(scope)?)),
             Self::Binary(operator, left, right) => {
-                operator.apply(left.value(scope)?, right.value(scope)?)?
+                operator(left.value(scope)?, right.value(scope)?)
             }
             Self::Call(function, arguments) => {
-                let values = arguments
-                    .iter()
-                    .map(|a| a.value(scope))
-                    .collect::<Result<Vec<_>, _>>()?;
-                function.apply(&values, scope)?
+                let values: Result<Vec<_>, _> = arguments.iter().map(|a| a.value(scope)).collect();
+                function(&values?)
             }
-            Self::OfPlaces(function, places) => function.apply(places, scope)?,
+            Self::OfPlaces(function, places) => {
+                let position = |p: &PlaceExpr| Ok(p.transformation(scope)?.translation.vector);
+                let positions: Result<Vec<_>, Fault> = places.iter().map(position).collect();
+                1000.0 * function(&positions?)
+            }
+            Self::Signals(signals) => {
+                let mut all = true;
+                for signal in signals {
+                    all &= scope.signal(signal.value(scope)?)?;
+                }
+                truth(all)
+            }
         };
         if value.is_finite() {
             Ok(value)
         } else {
+            // A division by zero or the root of a negative number among them.
             Err(Message::ArithmeticError.into())
         }
     }
@@ -288,91 +240,17 @@ pub(crate) fn key(name: &str, index: Option<&Expr>, scope: &dyn Scope) -> Result
 /// Converts to a whole number within bounds.
 pub(crate) fn whole(value: f64, min: i32, max: i32) -> Result<i32, Fault> {
     let rounded = value.trunc();
-    if rounded >= f64::from(min) && rounded <= f64::from(max) {
+    if (f64::from(min)..=f64::from(max)).contains(&rounded) {
         // In range, so the conversion is exact.
-        Ok(rounded as i32)
-    } else {
-        Err(Message::InvalidArgument.into())
+        return Ok(rounded as i32);
     }
+    Err(Message::InvalidArgument.into())
 }
 
-pub(crate) fn truth(condition: bool) -> f64 {
+fn truth(condition: bool) -> f64 {
     if condition { -1.0 } else { 0.0 }
 }
 
 pub(crate) fn is_true(value: f64) -> bool {
     value != 0.0
-}
-
-impl Operator {
-    #[allow(clippy::float_cmp)] // VAL's `==` compares as the controller does.
-    fn apply(self, a: f64, b: f64) -> Result<f64, Fault> {
-        Ok(match self {
-            Self::Or => truth(is_true(a) || is_true(b)),
-            Self::Xor => truth(is_true(a) != is_true(b)),
-            Self::And => truth(is_true(a) && is_true(b)),
-            Self::Equal => truth(a == b),
-            Self::Unequal => truth(a != b),
-            Self::Less => truth(a < b),
-            Self::LessEqual => truth(a <= b),
-            Self::Greater => truth(a > b),
-            Self::GreaterEqual => truth(a >= b),
-            Self::Add => a + b,
-            Self::Subtract => a - b,
-            Self::Multiply => a * b,
-            Self::Divide | Self::Modulo if b == 0.0 => return Err(Message::ArithmeticError.into()),
-            Self::Divide => a / b,
-            Self::Modulo => a % b,
-            Self::Power => a.powf(b),
-        })
-    }
-}
-
-impl Function {
-    fn apply(self, values: &[f64], scope: &dyn Scope) -> Result<f64, Fault> {
-        let first = values.first().copied().unwrap_or_default();
-        Ok(match self {
-            Self::Abs => first.abs(),
-            Self::Atan2 => first.atan2(values[1]).to_degrees(),
-            Self::Cos => first.to_radians().cos(),
-            Self::Fraction => first.fract(),
-            Self::Int => first.trunc(),
-            Self::Max => values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            Self::Min => values.iter().copied().fold(f64::INFINITY, f64::min),
-            Self::Pi => std::f64::consts::PI,
-            Self::Sig => {
-                let mut all = true;
-                for &value in values {
-                    all &= scope.signal(value)?;
-                }
-                truth(all)
-            }
-            Self::Sign => {
-                if first < 0.0 {
-                    -1.0
-                } else {
-                    1.0
-                }
-            }
-            Self::Sin => first.to_radians().sin(),
-            Self::Sqr => first * first,
-            Self::Sqrt if first < 0.0 => return Err(Message::ArithmeticError.into()),
-            Self::Sqrt => first.sqrt(),
-        })
-    }
-}
-
-impl PlaceFunction {
-    fn apply(self, places: &[PlaceExpr], scope: &dyn Scope) -> Result<f64, Fault> {
-        let first = places[0].transformation(scope)?.translation.vector;
-        Ok(1000.0
-            * match self {
-                Self::Distance => {
-                    (places[1].transformation(scope)?.translation.vector - first).norm()
-                }
-                Self::Dx => first.x,
-                Self::Dy => first.y,
-                Self::Dz => first.z,
-            })
-    }
 }

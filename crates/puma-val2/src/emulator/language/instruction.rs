@@ -4,10 +4,9 @@ use crate::emulator::language::expr::{Expr, Variable};
 use crate::emulator::language::lexer::{Cursor, Token, keyword};
 use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments};
 use crate::emulator::message::{Fault, Message};
-use crate::kinematics::inverse::{ArmSide, Elbow, Wrist};
 use crate::manipulator::Gripper;
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Instruction {
     /// An empty line or a comment.
     Remark,
@@ -38,7 +37,8 @@ pub(crate) enum Instruction {
         to: Gripper,
         at_once: bool,
     },
-    Posture(Posture),
+    /// A word of posture: the part of the `Configuration` and its value.
+    Posture(usize, bool),
     Speed {
         value: Expr,
         unit: SpeedUnit,
@@ -90,13 +90,6 @@ pub(crate) enum Instruction {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Posture {
-    Side(ArmSide),
-    Elbow(Elbow),
-    Wrist(Wrist),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SpeedUnit {
     Percent,
     MillimetresPerSecond,
@@ -104,7 +97,7 @@ pub(crate) enum SpeedUnit {
 }
 
 /// Part of the output of `TYPE`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Item {
     Text(String),
     Value(Expr),
@@ -118,105 +111,79 @@ pub(crate) enum Item {
     Format(Option<(usize, usize)>),
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 enum Word {
-    Plain(fn() -> Instruction),
+    Plain(Instruction),
     Parse(fn(&mut Cursor<'_>) -> Result<Instruction, Fault>),
 }
 
+use Instruction as I;
 use Word::{Parse, Plain};
 
-const WORDS: [(&str, Word); 64] = [
-    (
-        "ABOVE",
-        Plain(|| Instruction::Posture(Posture::Elbow(Elbow::Above))),
-    ),
-    ("ALIGN", Plain(|| Instruction::Align)),
-    ("ANY", Plain(|| Instruction::Any)),
+static WORDS: [(&str, Word); 64] = [
+    ("ABOVE", Plain(I::Posture(1, true))),
+    ("ALIGN", Plain(I::Align)),
+    ("ANY", Plain(I::Any)),
     ("APPRO", Parse(|c| appro(c, false))),
     ("APPROS", Parse(|c| appro(c, true))),
-    ("BASE", Parse(|c| Ok(Instruction::Base(arguments(c)?)))),
-    (
-        "BELOW",
-        Plain(|| Instruction::Posture(Posture::Elbow(Elbow::Below))),
-    ),
-    ("BREAK", Plain(|| Instruction::Break)),
-    ("CALL", Parse(|c| Ok(Instruction::Call(c.name()?)))),
+    ("BASE", Parse(|c| arguments(c).map(I::Base))),
+    ("BELOW", Plain(I::Posture(1, false))),
+    ("BREAK", Plain(I::Break)),
+    ("CALL", Parse(|c| c.name().map(I::Call))),
     ("CASE", Parse(case)),
     ("CLOSE", Parse(|c| hand(c, Gripper::Closed, false))),
     ("CLOSEI", Parse(|c| hand(c, Gripper::Closed, true))),
     ("COARSE", Parse(settling)),
     ("DECOMPOSE", Parse(decompose)),
-    ("DELAY", Parse(|c| Ok(Instruction::Delay(Expr::parse(c)?)))),
+    ("DELAY", Parse(|c| Expr::parse(c).map(I::Delay))),
     ("DEPART", Parse(|c| depart(c, false))),
     ("DEPARTS", Parse(|c| depart(c, true))),
-    ("DO", Plain(|| Instruction::Do)),
-    ("DRAW", Parse(|c| Ok(Instruction::Draw(arguments(c)?)))),
+    ("DO", Plain(I::Do)),
+    ("DRAW", Parse(|c| arguments(c).map(I::Draw))),
     ("DRIVE", Parse(drive)),
-    ("ELSE", Plain(|| Instruction::Else)),
-    ("END", Plain(|| Instruction::End)),
+    ("ELSE", Plain(I::Else)),
+    ("END", Plain(I::End)),
     ("FINE", Parse(settling)),
-    (
-        "FLIP",
-        Plain(|| Instruction::Posture(Posture::Wrist(Wrist::Flip))),
-    ),
+    ("FLIP", Plain(I::Posture(2, true))),
     ("FOR", Parse(for_loop)),
-    ("GOTO", Parse(|c| Ok(Instruction::Goto(label(c)?)))),
+    ("GOTO", Parse(|c| label(c).map(I::Goto))),
     ("GRASP", Parse(|c| hand(c, Gripper::Closed, true))),
-    ("HALT", Plain(|| Instruction::Halt)),
-    (
-        "HERE",
-        Parse(|c| Ok(Instruction::Here(PlaceName::parse(c)?))),
-    ),
+    ("HALT", Plain(I::Halt)),
+    ("HERE", Parse(|c| PlaceName::parse(c).map(I::Here))),
     ("IF", Parse(condition)),
-    (
-        "IGNORE",
-        Parse(|c| Ok(Instruction::Ignore(Expr::parse(c)?))),
-    ),
+    ("IGNORE", Parse(|c| Expr::parse(c).map(I::Ignore))),
     ("INTOFF", Parse(settling)),
     ("INTON", Parse(settling)),
-    (
-        "LEFTY",
-        Plain(|| Instruction::Posture(Posture::Side(ArmSide::Lefty))),
-    ),
+    ("LEFTY", Plain(I::Posture(0, false))),
     ("MOVE", Parse(|c| motion(c, false, false))),
     ("MOVES", Parse(|c| motion(c, true, false))),
     ("MOVEST", Parse(|c| motion(c, true, true))),
     ("MOVET", Parse(|c| motion(c, false, true))),
-    ("NEST", Plain(|| Instruction::Nest)),
-    (
-        "NOFLIP",
-        Plain(|| Instruction::Posture(Posture::Wrist(Wrist::NoFlip))),
-    ),
+    ("NEST", Plain(I::Nest)),
+    ("NOFLIP", Plain(I::Posture(2, false))),
     ("NONULL", Parse(settling)),
     ("NULL", Parse(settling)),
     ("OPEN", Parse(|c| hand(c, Gripper::Open, false))),
     ("OPENI", Parse(|c| hand(c, Gripper::Open, true))),
-    ("PAUSE", Plain(|| Instruction::Pause)),
+    ("PAUSE", Plain(I::Pause)),
     ("PROMPT", Parse(prompt)),
     ("REACT", Parse(|c| react(c, false))),
     ("REACTI", Parse(|c| react(c, true))),
-    ("READY", Plain(|| Instruction::Ready)),
+    ("READY", Plain(I::Ready)),
     ("RELAX", Parse(|c| hand(c, Gripper::Open, false))),
     ("RELAXI", Parse(|c| hand(c, Gripper::Open, true))),
-    ("RESET", Plain(|| Instruction::Reset)),
-    ("RETURN", Plain(|| Instruction::Return)),
-    (
-        "RIGHTY",
-        Plain(|| Instruction::Posture(Posture::Side(ArmSide::Righty))),
-    ),
+    ("RESET", Plain(I::Reset)),
+    ("RETURN", Plain(I::Return)),
+    ("RIGHTY", Plain(I::Posture(0, true))),
     ("SET", Parse(set)),
-    (
-        "SIGNAL",
-        Parse(|c| Ok(Instruction::Signal(expressions(c)?))),
-    ),
+    ("SIGNAL", Parse(|c| Expr::parse_list(c).map(I::Signal))),
     ("SPEED", Parse(speed)),
-    ("STOP", Plain(|| Instruction::Stop)),
-    ("TOOL", Parse(tool)),
+    ("STOP", Plain(I::Stop)),
+    ("TOOL", Parse(|c| c.rest(PlaceExpr::parse).map(I::Tool))),
     ("TYPE", Parse(print)),
-    ("UNTIL", Parse(|c| Ok(Instruction::Until(Expr::parse(c)?)))),
+    ("UNTIL", Parse(|c| Expr::parse(c).map(I::Until))),
     ("VALUE", Parse(value)),
-    ("WAIT", Parse(|c| Ok(Instruction::Wait(Expr::parse(c)?)))),
+    ("WAIT", Parse(|c| Expr::parse(c).map(I::Wait))),
     ("WHILE", Parse(while_loop)),
 ];
 
@@ -236,7 +203,7 @@ impl Instruction {
         } else {
             cursor.next();
             match keyword(name, &WORDS, Message::UnknownInstruction)? {
-                Plain(make) => make(),
+                Plain(instruction) => instruction.clone(),
                 Parse(parse) => parse(cursor)?,
             }
         };
@@ -244,53 +211,51 @@ impl Instruction {
         Ok(instruction)
     }
 
-    /// Returns `true` if the instruction makes sense only among the steps of a program.
-    pub(crate) fn needs_program(&self) -> bool {
+    /// Returns `true` for the first word of a structure that `END` or `UNTIL` closes.
+    pub(crate) fn opens(&self) -> bool {
         matches!(
             self,
-            Self::Goto(_)
-                | Self::IfGoto(..)
-                | Self::IfThen(_)
-                | Self::Else
-                | Self::End
-                | Self::For { .. }
-                | Self::While(_)
-                | Self::Do
-                | Self::Until(_)
-                | Self::Case(_)
-                | Self::Value(_)
-                | Self::Any
-                | Self::Return
-                | Self::Pause
-                | Self::Stop
-                | Self::Halt
+            Self::IfThen(_) | Self::For { .. } | Self::While(_) | Self::Do | Self::Case(_)
         )
+    }
+
+    /// Returns `true` for the last word of a structure.
+    pub(crate) fn closes(&self) -> bool {
+        matches!(self, Self::End | Self::Until(_))
+    }
+
+    /// Returns `true` if the instruction makes sense only among the steps of a program.
+    pub(crate) fn needs_program(&self) -> bool {
+        let branches = matches!(
+            self,
+            Self::Goto(_) | Self::IfGoto(..) | Self::Else | Self::Value(_) | Self::Any
+        );
+        let ends = matches!(self, Self::Return | Self::Pause | Self::Stop | Self::Halt);
+        self.opens() || self.closes() || branches || ends
     }
 }
 
 fn appro(cursor: &mut Cursor<'_>, straight: bool) -> Result<Instruction, Fault> {
     let to = PlaceExpr::parse(cursor)?;
     cursor.expect_sign(",")?;
-    Ok(Instruction::Appro {
+    let distance = Expr::parse(cursor)?;
+    Ok(I::Appro {
         straight,
         to,
-        distance: Expr::parse(cursor)?,
+        distance,
     })
 }
 
 fn depart(cursor: &mut Cursor<'_>, straight: bool) -> Result<Instruction, Fault> {
-    Ok(Instruction::Depart {
-        straight,
-        distance: Expr::parse(cursor)?,
-    })
+    let distance = Expr::parse(cursor)?;
+    Ok(I::Depart { straight, distance })
 }
 
 fn drive(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let joint = Expr::parse(cursor)?;
-    cursor.expect_sign(",")?;
-    let change = Expr::parse(cursor)?;
-    cursor.expect_sign(",")?;
-    Ok(Instruction::Drive([joint, change, Expr::parse(cursor)?]))
+    let three = Expr::parse_list(cursor)?.try_into();
+    three
+        .map(I::Drive)
+        .map_err(|_| Message::InvalidArgument.into())
 }
 
 fn motion(cursor: &mut Cursor<'_>, straight: bool, with_hand: bool) -> Result<Instruction, Fault> {
@@ -301,19 +266,19 @@ fn motion(cursor: &mut Cursor<'_>, straight: bool, with_hand: bool) -> Result<In
     } else {
         None
     };
-    Ok(Instruction::Move { straight, to, hand })
+    Ok(I::Move { straight, to, hand })
 }
 
 fn hand(cursor: &mut Cursor<'_>, to: Gripper, at_once: bool) -> Result<Instruction, Fault> {
     // A servoed hand takes an opening in millimetres; the emulated one is pneumatic and only checks
     // that it is a number.
     Expr::parse_optional(cursor)?;
-    Ok(Instruction::Hand { to, at_once })
+    Ok(I::Hand { to, at_once })
 }
 
 fn settling(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     cursor.word("ALWAYS");
-    Ok(Instruction::Settling)
+    Ok(I::Settling)
 }
 
 fn speed(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
@@ -325,19 +290,12 @@ fn speed(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     } else {
         SpeedUnit::Percent
     };
-    Ok(Instruction::Speed {
+    let always = cursor.word("ALWAYS");
+    Ok(I::Speed {
         value,
         unit,
-        always: cursor.word("ALWAYS"),
+        always,
     })
-}
-
-fn expressions(cursor: &mut Cursor<'_>) -> Result<Vec<Expr>, Fault> {
-    let mut found = vec![Expr::parse(cursor)?];
-    while cursor.sign(",") {
-        found.push(Expr::parse(cursor)?);
-    }
-    Ok(found)
 }
 
 fn react(cursor: &mut Cursor<'_>, at_once: bool) -> Result<Instruction, Fault> {
@@ -348,12 +306,10 @@ fn react(cursor: &mut Cursor<'_>, at_once: bool) -> Result<Instruction, Fault> {
             program = Some(cursor.name()?);
         }
         // The priority orders reactions among each other; only one is served at a time here.
-        if cursor.sign(",") {
-            Expr::parse_optional(cursor)?;
-        }
+        cursor.after_sign(",", Expr::parse_optional)?;
     }
     cursor.word("ALWAYS");
-    Ok(Instruction::React {
+    Ok(I::React {
         at_once,
         signal,
         program,
@@ -363,47 +319,28 @@ fn react(cursor: &mut Cursor<'_>, at_once: bool) -> Result<Instruction, Fault> {
 fn set(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let name = PlaceName::parse(cursor)?;
     cursor.expect_sign("=")?;
-    Ok(Instruction::SetPlace(name, PlaceExpr::parse(cursor)?))
+    Ok(I::SetPlace(name, PlaceExpr::parse(cursor)?))
 }
 
 fn decompose(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let into = Variable::parse(cursor)?;
     cursor.expect_sign("=")?;
-    Ok(Instruction::Decompose(into, PlaceExpr::parse(cursor)?))
-}
-
-fn tool(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let to = if cursor.at_end() {
-        None
-    } else {
-        Some(PlaceExpr::parse(cursor)?)
-    };
-    Ok(Instruction::Tool(to))
+    Ok(I::Decompose(into, PlaceExpr::parse(cursor)?))
 }
 
 fn print(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let mut items = Vec::new();
-    while !cursor.at_end() {
-        if !items.is_empty() {
-            cursor.expect_sign(",")?;
-        }
-        let item = match cursor.peek() {
-            Some(Token::Text(text)) => {
-                cursor.next();
-                Item::Text(text.clone())
-            }
-            Some(Token::Sign("/")) => {
-                cursor.next();
-                format_item(&cursor.name()?)?
-            }
-            _ => Item::Value(Expr::parse(cursor)?),
-        };
-        items.push(item);
-    }
-    Ok(Instruction::Type(items))
+    let items = cursor.rest(|cursor| cursor.list(print_item))?;
+    Ok(I::Type(items.unwrap_or_default()))
 }
 
-fn format_item(word: &str) -> Result<Item, Fault> {
+fn print_item(cursor: &mut Cursor<'_>) -> Result<Item, Fault> {
+    if let Some(text) = cursor.text() {
+        return Ok(Item::Text(text));
+    }
+    if !cursor.sign("/") {
+        return Expr::parse(cursor).map(Item::Value);
+    }
+    let word = cursor.name()?;
     let number = |text: &str| match text {
         "" => Some(1),
         _ => text.parse::<usize>().ok().filter(|n| *n <= 80),
@@ -424,28 +361,17 @@ fn format_item(word: &str) -> Result<Item, Fault> {
 }
 
 fn prompt(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let text = match cursor.peek() {
-        Some(Token::Text(text)) => {
-            cursor.next();
-            cursor.expect_sign(",")?;
-            Some(text.clone())
-        }
-        _ => None,
-    };
-    let mut variables = vec![Variable::parse(cursor)?];
-    while cursor.sign(",") {
-        variables.push(Variable::parse(cursor)?);
+    let text = cursor.text();
+    if text.is_some() {
+        cursor.expect_sign(",")?;
     }
-    Ok(Instruction::Prompt(text, variables))
+    Ok(I::Prompt(text, cursor.list(Variable::parse)?))
 }
 
-fn label(cursor: &mut Cursor<'_>) -> Result<u32, Fault> {
+/// Parses the number of a step.
+pub(crate) fn label(cursor: &mut Cursor<'_>) -> Result<u32, Fault> {
     match cursor.next() {
-        Some(Token::Number(number))
-            if number.fract() == 0.0 && (0.0..=65535.0).contains(number) =>
-        {
-            Ok(*number as u32)
-        }
+        Some(Token::Number(n)) if n.fract() == 0.0 && (0.0..=65535.0).contains(n) => Ok(*n as u32),
         _ => Err(Message::InvalidArgument.into()),
     }
 }
@@ -453,10 +379,10 @@ fn label(cursor: &mut Cursor<'_>) -> Result<u32, Fault> {
 fn condition(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let condition = Expr::parse(cursor)?;
     if cursor.word("THEN") {
-        return Ok(Instruction::IfThen(condition));
+        return Ok(I::IfThen(condition));
     }
     cursor.expect_word("GOTO")?;
-    Ok(Instruction::IfGoto(condition, label(cursor)?))
+    Ok(I::IfGoto(condition, label(cursor)?))
 }
 
 fn for_loop(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
@@ -465,33 +391,29 @@ fn for_loop(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let from = Expr::parse(cursor)?;
     cursor.expect_word("TO")?;
     let to = Expr::parse(cursor)?;
-    let step = if cursor.word("STEP") {
-        Some(Expr::parse(cursor)?)
-    } else {
-        None
-    };
-    Ok(Instruction::For {
+    let step = cursor.word("STEP").then(|| Expr::parse(cursor));
+    Ok(I::For {
         variable,
         from,
         to,
-        step,
+        step: step.transpose()?,
     })
 }
 
 fn while_loop(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let condition = Expr::parse(cursor)?;
     cursor.expect_word("DO")?;
-    Ok(Instruction::While(condition))
+    Ok(I::While(condition))
 }
 
 fn case(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     let of = Expr::parse(cursor)?;
     cursor.expect_word("OF")?;
-    Ok(Instruction::Case(of))
+    Ok(I::Case(of))
 }
 
 fn value(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let values = expressions(cursor)?;
+    let values = Expr::parse_list(cursor)?;
     cursor.sign(":");
-    Ok(Instruction::Value(values))
+    Ok(I::Value(values))
 }

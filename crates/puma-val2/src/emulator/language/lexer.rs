@@ -111,35 +111,25 @@ impl<'a> Cursor<'a> {
     /// Takes the sign if it comes next.
     pub(crate) fn sign(&mut self, sign: &str) -> bool {
         let is_next = matches!(self.peek(), Some(Token::Sign(s)) if *s == sign);
-        if is_next {
-            self.next();
-        }
-        is_next
+        is_next && self.next().is_some()
     }
 
     /// Takes the word if it comes next.
     pub(crate) fn word(&mut self, word: &str) -> bool {
         let is_next = matches!(self.peek(), Some(Token::Name(n)) if n == word);
-        if is_next {
-            self.next();
-        }
-        is_next
+        is_next && self.next().is_some()
     }
 
     pub(crate) fn expect_sign(&mut self, sign: &str) -> Result<(), Fault> {
-        if self.sign(sign) {
-            Ok(())
-        } else {
-            Err(Message::InvalidArgument.into())
-        }
+        expected(self.sign(sign))
     }
 
     pub(crate) fn expect_word(&mut self, word: &str) -> Result<(), Fault> {
-        if self.word(word) {
-            Ok(())
-        } else {
-            Err(Message::InvalidArgument.into())
-        }
+        expected(self.word(word))
+    }
+
+    pub(crate) fn expect_end(&self) -> Result<(), Fault> {
+        expected(self.at_end())
     }
 
     pub(crate) fn name(&mut self) -> Result<String, Fault> {
@@ -149,31 +139,55 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(crate) fn expect_end(&self) -> Result<(), Fault> {
-        if self.at_end() {
-            Ok(())
-        } else {
-            Err(Message::InvalidArgument.into())
+    /// Takes a text in quotes if it comes next.
+    pub(crate) fn text(&mut self) -> Option<String> {
+        let Some(Token::Text(text)) = self.peek() else {
+            return None;
+        };
+        self.next();
+        Some(text.clone())
+    }
+
+    /// Parses one item or more between commas.
+    pub(crate) fn list<T>(
+        &mut self,
+        item: impl Fn(&mut Self) -> Result<T, Fault>,
+    ) -> Result<Vec<T>, Fault> {
+        let mut found = vec![item(self)?];
+        while self.sign(",") {
+            found.push(item(self)?);
         }
+        Ok(found)
+    }
+
+    /// Parses an item if `sign` comes before it.
+    pub(crate) fn after_sign<T>(
+        &mut self,
+        sign: &str,
+        item: impl Fn(&mut Self) -> Result<T, Fault>,
+    ) -> Result<Option<T>, Fault> {
+        self.sign(sign).then(|| item(self)).transpose()
+    }
+
+    /// Parses an item if anything is left.
+    pub(crate) fn rest<T>(
+        &mut self,
+        item: impl Fn(&mut Self) -> Result<T, Fault>,
+    ) -> Result<Option<T>, Fault> {
+        (!self.at_end()).then(|| item(self)).transpose()
     }
 
     /// Goes one bracket deeper.
     pub(crate) fn descend(&mut self) -> Result<(), Fault> {
         self.depth += 1;
-        if self.depth > DEPTH {
-            return Err(Message::InvalidArgument.into());
-        }
-        Ok(())
+        expected(self.depth <= DEPTH)
     }
 
     /// Takes an operator, which makes what is parsed one deeper.
     pub(crate) fn operator(&mut self) -> Result<(), Fault> {
         self.next();
         self.operators += 1;
-        if self.operators > OPERATORS {
-            return Err(Message::InvalidArgument.into());
-        }
-        Ok(())
+        expected(self.operators <= OPERATORS)
     }
 
     pub(crate) fn ascend(&mut self) {
@@ -181,18 +195,22 @@ impl<'a> Cursor<'a> {
     }
 }
 
+fn expected(is_so: bool) -> Result<(), Fault> {
+    is_so.then_some(()).ok_or(Message::InvalidArgument.into())
+}
+
 /// Returns the only entry of `words` that `typed` names or abbreviates.
-pub(crate) fn keyword<T: Copy>(
+pub(crate) fn keyword<'a, T>(
     typed: &str,
-    words: &[(&str, T)],
+    words: &'a [(&str, T)],
     unknown: Message,
-) -> Result<T, Fault> {
+) -> Result<&'a T, Fault> {
     if let Some((_, found)) = words.iter().find(|(word, _)| *word == typed) {
-        return Ok(*found);
+        return Ok(found);
     }
     let mut matching = words.iter().filter(|(word, _)| word.starts_with(typed));
     match (matching.next(), matching.next()) {
-        (Some((_, found)), None) => Ok(*found),
+        (Some((_, found)), None) => Ok(found),
         (None, _) => Err(unknown.into()),
         _ => Err(Message::AmbiguousName.into()),
     }

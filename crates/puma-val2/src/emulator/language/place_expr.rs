@@ -12,7 +12,7 @@ use crate::joints::Joints;
 use crate::kinematics::xyzoat::Xyzoat;
 
 /// Name of a location: `P1`, `#P1`, `P[3]`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct PlaceName {
     pub(crate) precision: bool,
     pub(crate) name: String,
@@ -43,10 +43,10 @@ impl PlaceName {
 }
 
 /// Location expression: terms joined by `:`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct PlaceExpr(Vec<Term>);
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 enum Term {
     Named(PlaceName),
     Trans([Option<Expr>; 6]),
@@ -113,14 +113,8 @@ impl Term {
                     }
                     "INVERSE" => Self::Inverse(Box::new(PlaceExpr::parse(cursor)?)),
                     "FRAME" => {
-                        let a = PlaceExpr::parse(cursor)?;
-                        cursor.expect_sign(",")?;
-                        let b = PlaceExpr::parse(cursor)?;
-                        cursor.expect_sign(",")?;
-                        let c = PlaceExpr::parse(cursor)?;
-                        cursor.expect_sign(",")?;
-                        let d = PlaceExpr::parse(cursor)?;
-                        Self::Frame(Box::new([a, b, c, d]))
+                        let of = cursor.list(PlaceExpr::parse)?.try_into();
+                        Self::Frame(Box::new(of.map_err(|_| Message::InvalidArgument)?))
                     }
                     _ => return Err(Message::InvalidArgument.into()),
                 };

@@ -1,17 +1,17 @@
 //! A stored program: its steps, and which step each control word leads to.
 
-use crate::emulator::language::instruction::Instruction;
+use crate::emulator::language::instruction::{Instruction, label};
 use crate::emulator::language::lexer::{Cursor, Token, tokens};
 use crate::emulator::message::{Fault, Message};
 
 /// Stored program.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Program {
     pub(crate) steps: Vec<Step>,
 }
 
 /// Line of a program.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Step {
     pub(crate) label: Option<u32>,
     /// Text in listings.
@@ -24,16 +24,9 @@ impl Step {
     pub(crate) fn parse(line: &str) -> Result<Self, Fault> {
         let tokens = tokens(line)?;
         let mut cursor = Cursor::new(&tokens);
-        let mut label = None;
-        if let Some(Token::Number(number)) = cursor.peek() {
-            if number.fract() != 0.0 || !(0.0..=65535.0).contains(number) {
-                return Err(Message::InvalidArgument.into());
-            }
-            label = Some(*number as u32);
-            cursor.next();
-        }
+        let labelled = matches!(cursor.peek(), Some(Token::Number(_)));
         Ok(Self {
-            label,
+            label: labelled.then(|| label(&mut cursor)).transpose()?,
             text: upper_case(line.trim()),
             instruction: Instruction::parse(&mut cursor)?,
         })
@@ -72,18 +65,10 @@ impl Program {
     pub(crate) fn next_part(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, later) in self.steps.iter().enumerate().skip(step + 1) {
-            match later.instruction {
-                Instruction::IfThen(_)
-                | Instruction::For { .. }
-                | Instruction::While(_)
-                | Instruction::Do
-                | Instruction::Case(_) => depth += 1,
-                Instruction::End | Instruction::Until(_) => {
-                    if depth == 0 {
-                        return Ok(i);
-                    }
-                    depth -= 1;
-                }
+            match &later.instruction {
+                word if word.opens() => depth += 1,
+                word if word.closes() && depth > 0 => depth -= 1,
+                word if word.closes() => return Ok(i),
                 Instruction::Else | Instruction::Value(_) | Instruction::Any if depth == 0 => {
                     return Ok(i);
                 }
@@ -96,10 +81,7 @@ impl Program {
     /// Returns the `END` or `UNTIL` of the structure of `step`.
     pub(crate) fn end_of(&self, step: usize) -> Result<usize, Fault> {
         let mut at = self.next_part(step)?;
-        while !matches!(
-            self.steps[at].instruction,
-            Instruction::End | Instruction::Until(_)
-        ) {
+        while !self.steps[at].instruction.closes() {
             at = self.next_part(at)?;
         }
         Ok(at)
@@ -109,18 +91,10 @@ impl Program {
     pub(crate) fn head_of(&self, step: usize) -> Result<usize, Fault> {
         let mut depth = 0;
         for (i, earlier) in self.steps.iter().enumerate().take(step).rev() {
-            match earlier.instruction {
-                Instruction::End | Instruction::Until(_) => depth += 1,
-                Instruction::IfThen(_)
-                | Instruction::For { .. }
-                | Instruction::While(_)
-                | Instruction::Do
-                | Instruction::Case(_) => {
-                    if depth == 0 {
-                        return Ok(i);
-                    }
-                    depth -= 1;
-                }
+            match &earlier.instruction {
+                word if word.closes() => depth += 1,
+                word if word.opens() && depth > 0 => depth -= 1,
+                word if word.opens() => return Ok(i),
                 _ => {}
             }
         }
@@ -133,11 +107,7 @@ impl Program {
         let mut open: Vec<&Instruction> = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             let fits = match &step.instruction {
-                head @ (Instruction::IfThen(_)
-                | Instruction::For { .. }
-                | Instruction::While(_)
-                | Instruction::Do
-                | Instruction::Case(_)) => {
+                head if head.opens() => {
                     open.push(head);
                     true
                 }

@@ -4,12 +4,11 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::emulator::language::instruction::{Posture, SpeedUnit};
+use crate::emulator::language::instruction::SpeedUnit;
 use crate::emulator::language::place::Place;
 use crate::emulator::machine::motion::{Motion, Pace};
 use crate::emulator::message::{Fault, Message};
 use crate::emulator::profile::Profile;
-use crate::emulator::profile::StartPower;
 use crate::joints::{Joint, Joints};
 use crate::kinematics::drive_train::DriveTrain;
 use crate::kinematics::frames::Frames;
@@ -28,7 +27,8 @@ pub(crate) struct Arm {
     pub(crate) frames: Frames,
     pub(crate) gripper: Gripper,
     gripper_next: Option<Gripper>,
-    postures_next: Vec<Posture>,
+    /// Words of posture for the next motion: right arm, elbow above, wrist flipped.
+    postures_next: [Option<bool>; 3],
     keeps_posture: bool,
     /// Percent.
     pub(crate) monitor_speed: f64,
@@ -85,12 +85,12 @@ impl Arm {
             joints: drives.map_or(profile.start, |d| d.quantized(&profile.start)),
             drives,
             motion: None,
-            power: profile.start_power == StartPower::On,
+            power: profile.start_power == Some(true),
             calibrated: profile.start_calibrated,
             frames: Frames::default(),
             gripper: Gripper::Open,
             gripper_next: None,
-            postures_next: Vec::new(),
+            postures_next: [None; 3],
             keeps_posture: profile.keeps_posture,
             monitor_speed: 100.0,
             program_speed: Speed::FULL,
@@ -162,7 +162,7 @@ impl Arm {
     /// Forgets the words that apply to the next motion.
     pub(crate) fn forget_words(&mut self) {
         self.gripper_next = None;
-        self.postures_next.clear();
+        self.postures_next = [None; 3];
         self.next_speed = None;
     }
 
@@ -170,10 +170,9 @@ impl Arm {
         self.gripper_next = Some(to);
     }
 
-    pub(crate) fn set_posture_next(&mut self, posture: Posture) {
-        if self.postures_next.len() < 16 {
-            self.postures_next.push(posture);
-        }
+    /// Asks for a part of the next motion's [`Configuration`].
+    pub(crate) fn set_posture_next(&mut self, part: usize, value: bool) {
+        self.postures_next[part] = Some(value);
     }
 
     pub(crate) fn set_speed_next(&mut self, speed: Speed) {
@@ -214,7 +213,7 @@ impl Arm {
         if let Some(gripper) = self.gripper_next.take() {
             self.gripper = gripper;
         }
-        self.postures_next.clear();
+        self.postures_next = [None; 3];
         self.motion = Some(motion);
     }
 
@@ -240,33 +239,19 @@ impl Arm {
             Place::PrecisionPoint(joints) => return Ok(*joints),
             Place::Transformation(pose) => pose,
         };
-        let words = &self.postures_next;
-        let asked = |c: Configuration| {
-            words
-                .iter()
-                .rev()
-                .fold([None; 3], |[side, elbow, wrist], word| match *word {
-                    Posture::Side(s) => [side.or(Some(s == c.side)), elbow, wrist],
-                    Posture::Elbow(e) => [side, elbow.or(Some(e == c.elbow)), wrist],
-                    Posture::Wrist(w) => [side, elbow, wrist.or(Some(w == c.wrist))],
-                })
-        };
-        let now = self.params.configuration(&self.joints);
+        let now = self.params.configuration(&self.joints).parts();
         let [side_open, wrist_open] = self.between_postures();
-        let keeps = |c: Configuration| {
-            let [side, elbow, wrist] = asked(c);
-            side.unwrap_or(side_open || c.side == now.side)
-                && elbow.unwrap_or(side_open || c.elbow == now.elbow)
-                && wrist.unwrap_or(wrist_open || c.wrist == now.wrist)
+        let fits = |c: Configuration, open: [bool; 3]| {
+            let kept = |i: usize| open[i] || c.parts()[i] == now[i];
+            (0..3).all(|i| self.postures_next[i].map_or(kept(i), |asked| asked == c.parts()[i]))
         };
-        let obeys = |c: Configuration| asked(c).iter().all(|fits| fits.unwrap_or(true));
-        self.reach(pose, &self.joints, keeps).or_else(|fault| {
-            if self.keeps_posture {
-                Err(fault)
-            } else {
-                self.reach(pose, &self.joints, obeys).map_err(|_| fault)
-            }
-        })
+        let keeps = |c| fits(c, [side_open, side_open, wrist_open]);
+        let reached = self.reach(pose, &self.joints, keeps);
+        if self.keeps_posture {
+            return reached;
+        }
+        let obeys = |c| fits(c, [true; 3]);
+        reached.or_else(|fault| self.reach(pose, &self.joints, obeys).map_err(|_| fault))
     }
 
     /// Returns `true` for side and wrist if the arm stands so near to the border between two
@@ -364,16 +349,7 @@ impl Arm {
     pub(crate) fn aligned(&self) -> Place {
         let hand = self.hand(&self.destination());
         let axis = hand * Vector3::z();
-        let (nearest, _) = axis
-            .iter()
-            .enumerate()
-            .fold((0, 0.0), |(best, size), (i, v)| {
-                if v.abs() > size {
-                    (i, v.abs())
-                } else {
-                    (best, size)
-                }
-            });
+        let nearest = axis.iamax();
         let mut wanted = Vector3::zeros();
         wanted[nearest] = if axis[nearest] < 0.0 { -1.0 } else { 1.0 };
         let turn = UnitQuaternion::rotation_between(&axis, &wanted).unwrap_or_default();

@@ -24,41 +24,30 @@ impl Emulator {
         let scope = self.scope();
         Ok(match instruction {
             Instruction::Goto(label) => Flow::Jump(program.labelled(*label)?),
-            Instruction::IfGoto(condition, label) => {
-                if is_true(condition.value(&scope)?) {
-                    Flow::Jump(program.labelled(*label)?)
-                } else {
-                    Flow::Next
-                }
+            Instruction::IfGoto(condition, label) if is_true(condition.value(&scope)?) => {
+                Flow::Jump(program.labelled(*label)?)
             }
-            Instruction::IfThen(condition) => {
-                if is_true(condition.value(&scope)?) {
-                    Flow::Next
-                } else {
-                    Flow::Jump(program.next_part(at)? + 1)
-                }
+            Instruction::IfThen(condition) if !is_true(condition.value(&scope)?) => {
+                Flow::Jump(program.next_part(at)? + 1)
             }
-            Instruction::Else => Flow::Jump(program.end_of(at)? + 1),
-            Instruction::While(condition) => {
-                if is_true(condition.value(&scope)?) {
-                    Flow::Next
-                } else {
-                    Flow::Jump(program.end_of(at)? + 1)
-                }
+            Instruction::While(condition) if !is_true(condition.value(&scope)?) => {
+                Flow::Jump(program.end_of(at)? + 1)
             }
-            Instruction::Do => Flow::Next,
-            Instruction::Until(condition) => {
-                if is_true(condition.value(&scope)?) {
-                    Flow::Next
-                } else {
-                    Flow::Jump(program.head_of(at)? + 1)
-                }
+            Instruction::Until(condition) if !is_true(condition.value(&scope)?) => {
+                Flow::Jump(program.head_of(at)? + 1)
+            }
+            Instruction::IfGoto(..)
+            | Instruction::IfThen(_)
+            | Instruction::While(_)
+            | Instruction::Until(_)
+            | Instruction::Do => Flow::Next,
+            Instruction::Else | Instruction::Value(_) | Instruction::Any => {
+                Flow::Jump(program.end_of(at)? + 1)
             }
             Instruction::Case(of) => {
                 let of = of.value(&scope)?;
                 Flow::Jump(self.branch(&program, at, of)?)
             }
-            Instruction::Value(_) | Instruction::Any => Flow::Jump(program.end_of(at)? + 1),
             Instruction::For {
                 variable,
                 from,
@@ -73,9 +62,8 @@ impl Emulator {
                 }
                 frame.loops.retain(|l| l.head != at);
                 let end = program.end_of(at)?;
-                let empty = if step > 0.0 { from > to } else { from < to };
                 self.memory.set_real(key.clone(), from, &self.profile)?;
-                if empty {
+                if passed(from, to, step) {
                     Flow::Jump(end + 1)
                 } else {
                     frame.loops.push(Loop {
@@ -98,11 +86,7 @@ impl Emulator {
                         let turn = &frame.loops[index];
                         let next = scope.real(&turn.key)? + turn.step;
                         let key = turn.key.clone();
-                        let over = if turn.step > 0.0 {
-                            next > turn.to
-                        } else {
-                            next < turn.to
-                        };
+                        let over = passed(next, turn.to, turn.step);
                         if over {
                             frame.loops.remove(index);
                         }
@@ -140,4 +124,9 @@ impl Emulator {
             at = program.next_part(at)?;
         }
     }
+}
+
+/// Returns `true` if a loop's variable is beyond its last value.
+fn passed(value: f64, to: f64, step: f64) -> bool {
+    if step > 0.0 { value > to } else { value < to }
 }

@@ -90,7 +90,7 @@ impl Emulator {
                 self.note(Event::Gripper(*to));
                 return Ok(Flow::Wait(Wait::Until(self.now + self.profile.hand_time)));
             }
-            Instruction::Posture(posture) => self.arm.set_posture_next(*posture),
+            Instruction::Posture(part, value) => self.arm.set_posture_next(*part, *value),
             Instruction::Speed {
                 value,
                 unit,
@@ -103,12 +103,7 @@ impl Emulator {
                     self.arm.set_speed_next(speed);
                 }
             }
-            Instruction::Signal(numbers) => {
-                let numbers = numbers.iter().map(number).collect::<Result<Vec<_>, _>>()?;
-                for value in numbers {
-                    self.command_signal(value)?;
-                }
-            }
+            Instruction::Signal(numbers) => self.command_signals(numbers)?,
             Instruction::Reset => self.signals.reset_outputs(),
             Instruction::Wait(condition) => {
                 if !is_true(number(condition)?) {
@@ -252,13 +247,17 @@ impl Emulator {
         self.arm.frames.base = nalgebra::Isometry3::from_parts(shift.into(), turn);
     }
 
-    pub(crate) fn command_signal(&mut self, value: f64) -> Result<(), Fault> {
-        let number = whole(value, -9999, 9999).map_err(|_| Message::IllegalSignal)?;
-        self.signals.command(number)?;
-        self.note(Event::Output {
-            signal: number.unsigned_abs() as u16,
-            on: number > 0,
-        });
+    /// Sets outputs, all of whose numbers have a value.
+    pub(crate) fn command_signals(&mut self, numbers: &[Expr]) -> Result<(), Fault> {
+        let values: Result<Vec<_>, _> = numbers.iter().map(|n| n.value(&self.scope())).collect();
+        for value in values? {
+            let number = whole(value, -9999, 9999).map_err(|_| Message::IllegalSignal)?;
+            self.signals.command(number)?;
+            self.note(Event::Output {
+                signal: number.unsigned_abs() as u16,
+                on: number > 0,
+            });
+        }
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 use crate::emulator::controller::{Emulator, Event};
 use crate::emulator::language::expr::{Expr, is_true};
 use crate::emulator::language::instruction::Instruction;
+use crate::emulator::language::lexer::Cursor;
 use crate::emulator::language::program::Program;
 use crate::emulator::machine::arm::Speed;
 use crate::emulator::message::{Fault, Message};
@@ -55,7 +56,7 @@ pub(crate) struct Loop {
     pub(crate) step: f64,
 }
 
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub(crate) enum Wait {
     Nothing,
     /// Until the arm stands.
@@ -163,12 +164,7 @@ impl Emulator {
     }
 
     pub(crate) fn frame(&self, name: &str, step: usize) -> Result<Frame, Fault> {
-        let program = self
-            .memory
-            .programs
-            .get(name)
-            .ok_or(Message::UndefinedProgram)?
-            .clone();
+        let program = self.memory.program(name)?.clone();
         program.check().map_err(|_| Message::ControlStructure)?;
         if step > program.steps.len() {
             return Err(Message::InvalidArgument.into());
@@ -183,7 +179,13 @@ impl Emulator {
 
     /// Continues a program that was paused, aborted or refused, at its next step or (`again`) at
     /// the one it stopped in.
-    pub(crate) fn resume_program(&mut self, again: bool, single: bool) -> Result<(), Fault> {
+    pub(crate) fn resume_program(
+        &mut self,
+        cursor: &Cursor<'_>,
+        again: bool,
+        single: bool,
+    ) -> Result<(), Fault> {
+        cursor.expect_end()?;
         let mut job = self.paused.take().ok_or(Message::NotRunning)?;
         if again && let Some(frame) = job.frames.last_mut() {
             frame.step = frame.step.saturating_sub(1);
@@ -218,16 +220,12 @@ impl Emulator {
             Flow::Wait(wait) => job.wait = wait,
             _ => {}
         }
-        if job.wait == Wait::Nothing && self.arm.moving() {
-            if !self.profile.do_blocks {
+        if matches!(job.wait, Wait::Nothing) {
+            if !self.arm.moving() || !self.profile.do_blocks {
                 self.prompt();
                 return Ok(());
             }
             job.wait = Wait::Motion;
-        }
-        if job.wait == Wait::Nothing {
-            self.prompt();
-            return Ok(());
         }
         self.hold_terminal();
         self.job = Some(job);

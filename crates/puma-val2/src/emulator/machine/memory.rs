@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::emulator::console::mode::Kind;
 use crate::emulator::language::place::Place;
 use crate::emulator::language::program::Program;
 use crate::emulator::message::{Fault, Message};
@@ -16,6 +17,23 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
+    pub(crate) fn program(&self, name: &str) -> Result<&Arc<Program>, Fault> {
+        self.programs
+            .get(name)
+            .ok_or(Message::UndefinedProgram.into())
+    }
+
+    /// Returns the kind of what `key` names, among all kinds or only `kind`.
+    pub(crate) fn kind_of(&self, key: &str, kind: Option<Kind>) -> Option<Kind> {
+        let there = [
+            (Kind::Program, self.programs.contains_key(key)),
+            (Kind::Place, self.places.contains_key(key)),
+            (Kind::Real, self.reals.contains_key(key)),
+        ];
+        let fits = |(k, is_there): &(Kind, bool)| *is_there && kind.is_none_or(|kind| kind == *k);
+        there.into_iter().find(fits).map(|(kind, _)| kind)
+    }
+
     pub(crate) fn set_place(
         &mut self,
         key: String,

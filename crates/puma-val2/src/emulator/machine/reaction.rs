@@ -38,7 +38,7 @@ impl Emulator {
         let called = self.frame(&name, 0);
         if let Some(job) = &self.job
             && job.kind == JobKind::Program
-            && job.wait == Wait::Answer
+            && matches!(job.wait, Wait::Answer)
             && called.is_ok()
         {
             // The terminal is the monitor's again until the values are asked for anew.
