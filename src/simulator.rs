@@ -82,7 +82,7 @@ impl Simulator {
     /// Learns `spec` in this simulator with the paper's settings ([`LearningSettings::paper`]).
     ///
     /// With `trials`, percepts to start from, the best table of the second half of the run is kept
-    /// ([`grasp_agent::learn`]); without, the last one.
+    /// ([`BehaviourSpec::learn`]); without, the last one.
     ///
     /// # Errors
     /// No actions to learn from, or a reward that is not a number (the literal Eq. 5 and 6 divide
@@ -98,6 +98,6 @@ impl Simulator {
         let simulate = |percept: &Percept, delta: &JointDelta| self.predict(percept, delta);
         let start = |rng: &mut dyn Rng| self.start(rng);
         let config = LearningSettings::paper(actions)?;
-        grasp_agent::learn(spec, simulate, start, trials, &config, rng, on_progress)
+        spec.learn(simulate, start, trials, &config, rng, on_progress)
     }
 }

@@ -13,8 +13,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, Retargeted,
-    SavedRun, Servo, ServoLaw as Law, ServoSettings, TaughtGoal,
+    Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, SavedRun, Servo,
+    ServoLaw as Law, ServoSettings, TaughtGoal,
 };
 use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
 use puma_grasp::{BallDetector, Simulator};
@@ -258,9 +258,7 @@ impl Rival {
                 Box::new(Servo::new(*law, ServoSettings { goal, ..paper }))
             }
             (Self::Learned(learned), None) => learned.clone(),
-            (Self::Learned(learned), Some(goal)) => {
-                Box::new(Retargeted::new(learned.clone(), *goal))
-            }
+            (Self::Learned(learned), Some(goal)) => Box::new((**learned).clone().shown(goal)),
             (Self::Untaught | Self::Hybrid, _) => Box::new(new_hybrid(goal).frozen()),
         }
     }

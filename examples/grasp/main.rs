@@ -125,7 +125,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             .then(|| OnlineLearning::careful(options.seed.wrapping_add(run as u64)));
         let learned = &mut agent.controller_mut().inner;
         if let Some(settings) = learning {
-            *learned = learned.clone().learning(settings);
+            *learned = learned.clone().learning(settings)?;
         }
         let saved = SavedRun::before(&agent);
         let mut record = RunRecord::new((ball.centre.coords * 1000.0).into(), saved);

@@ -120,7 +120,7 @@ fn one_arm(
     let cell = TrialCell::draw(level, 50 + seed)?.without_bodies();
     let mut scores = vec![score(&cell, &learned, Some(only_x))?];
     let config = cell.agent_config();
-    let learning = learned.learning(OnlineLearning::careful(seed));
+    let learning = learned.learning(OnlineLearning::careful(seed))?;
     let mut agent = Agent::with_controller(config, learning)?;
     let (mut made, mut ball, mut idle) = (0, 0, 0);
     for moves in MOVES {

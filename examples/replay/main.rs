@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use grasp_agent::{Replayed, RunEvent, SavedRun};
+use grasp_agent::{AgentError, RunEvent, SavedRun};
 
 use example_support::program::ended;
 use example_support::say;
@@ -40,11 +40,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let (mut others, mut unread) = (0, 0);
     for file in &options.files {
         // The other files can still be replayed.
-        let (saved, replayed) = match read(file) {
-            Ok(read) => read,
+        let saved = match read(file) {
+            Ok(saved) => saved,
             Err(error) => {
                 unread += 1;
-                eprintln!("{error}");
+                eprintln!("{}: {error}", file.display());
                 continue;
             }
         };
@@ -55,26 +55,28 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             }
         }
         let name = file.display();
-        match replayed {
-            Replayed::Same(end) => {
-                let end = match end {
-                    Ok(outcome) => outcome.gave_up.map_or_else(
-                        || "grasped (verified by camera only)".into(),
-                        |reason| reason.to_string(),
-                    ),
-                    Err(cause) => cause,
-                };
-                say!("{name}: the same {} events; {end}", events.len());
-            }
-            Replayed::Differs { event, then, now } => {
+        let end = match saved.replay() {
+            Ok(outcome) => outcome.gave_up.map_or_else(
+                || "grasped (verified by camera only)".into(),
+                |reason| reason.to_string(),
+            ),
+            Err(AgentError::Replay { event, then, now }) => {
                 others += 1;
-                let told = |event: Option<RunEvent<'static>>| {
-                    event.as_ref().map_or("the end".into(), told)
+                let told = |event: Option<Box<RunEvent<'static>>>| {
+                    event.as_deref().map_or("the end".into(), told)
                 };
                 say!("{name}: another course from event {event} on");
                 say!("  then: {}\n  now:  {}", told(then), told(now));
+                continue;
             }
-        }
+            Err(error @ (AgentError::SavedRun(_) | AgentError::Config(_))) => {
+                unread += 1;
+                eprintln!("{name}: {error}");
+                continue;
+            }
+            Err(cause) => cause.to_string(),
+        };
+        say!("{name}: the same {} events; {end}", events.len());
     }
     let files = options.files.len();
     match (others, unread) {
@@ -88,13 +90,10 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Reads a run and replays it.
-fn read(file: &Path) -> Result<(SavedRun, Replayed), String> {
-    let named = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-    let text = std::fs::read_to_string(file).map_err(|error| named(&error))?;
-    let saved = SavedRun::from_json(&text).map_err(|error| named(&error))?;
-    let replayed = saved.replay().map_err(|error| named(&error))?;
-    Ok((saved, replayed))
+/// Reads a run.
+fn read(file: &Path) -> Result<SavedRun, Box<dyn Error>> {
+    let text = std::fs::read_to_string(file)?;
+    Ok(SavedRun::from_json(&text)?)
 }
 
 /// Formats an event: its cycle, its kind, and the pose of the arm.

@@ -12,7 +12,7 @@ use grasp_agent::hough_heuristic::Features;
 use grasp_agent::puma_val2::{Joint, JointDelta};
 use grasp_agent::qtable::rand::rngs::Xoshiro256PlusPlus;
 use grasp_agent::qtable::rand::{Rng, RngExt, SeedableRng};
-use grasp_agent::{BehaviourSpec, LearningSettings, Percept, learn};
+use grasp_agent::{BehaviourSpec, LearningSettings, Percept};
 
 /// A camera on a turntable: a degree of the first joint moves the ball by four units in x. `None`
 /// if the ball has left the image.
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let spec = BehaviourSpec::centering();
     let settings = LearningSettings::paper(50_000)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    let lesson = learn(spec, simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
+    let lesson = spec.learn(simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
     for record in lesson.curve.iter().step_by(10) {
         let success = record.success_share.unwrap_or(0.0);
         println!("{:6} actions: goal reached in {success:.2}", record.actions);

@@ -1,35 +1,6 @@
-//! Validation of settings on deserialization.
+//! Checks of single settings.
 
-/// Implements `Deserialize` for settings with a method `check`, which is called on what was read.
-macro_rules! checked {
-    ($type:ident { $($field:ident: $kind:ty),* $(,)? }) => {
-        #[cfg(feature = "serde")]
-        impl<'de> serde::Deserialize<'de> for $type {
-            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                #[derive(serde::Deserialize)]
-                struct Read {
-                    $($field: $kind),*
-                }
-                let Read { $($field),* } = serde::Deserialize::deserialize(from)?;
-                let read = Self { $($field),* };
-                read.check().map_err(serde::de::Error::custom)?;
-                Ok(read)
-            }
-        }
-    };
-    ($type:ident($kind:ty)) => {
-        #[cfg(feature = "serde")]
-        impl<'de> serde::Deserialize<'de> for $type {
-            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                let read = Self(<$kind as serde::Deserialize>::deserialize(from)?);
-                read.check().map_err(serde::de::Error::custom)?;
-                Ok(read)
-            }
-        }
-    };
-}
-
-pub(crate) use checked;
+use hough_heuristic::Features;
 
 /// Checks that the quantity called `name` is a size.
 pub(crate) fn above_zero(name: &str, value: f64) -> Result<(), String> {
@@ -37,4 +8,13 @@ pub(crate) fn above_zero(name: &str, value: f64) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("{name} is {value}; it must be finite and above 0"))
+}
+
+/// Checks that a ball can have these features.
+pub(crate) fn check_goal(goal: &Features) -> Result<(), String> {
+    let Features { x, y, r } = *goal;
+    if !(x.is_finite() && y.is_finite()) {
+        return Err(format!("the goal is at {x}, {y}, which is not finite"));
+    }
+    above_zero("the radius of the goal", r)
 }

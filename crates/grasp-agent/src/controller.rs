@@ -1,11 +1,9 @@
 //! The trait of everything that decides how the arm moves while the ball is in view.
 
-#[cfg(feature = "serde")]
-use std::sync::Arc;
-
 use puma_val2::{JointDelta, Joints};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
-#[cfg(feature = "serde")]
 use crate::error::BehaviourError;
 use crate::limits::JointLimits;
 use crate::percept::Sighting;
@@ -107,7 +105,6 @@ pub trait Controller {
 
     /// Returns the controller as data, from which a [`SavedRun`](crate::SavedRun) makes it again;
     /// `None` for controllers that cannot be saved.
-    #[cfg(feature = "serde")]
     fn save(&self) -> Option<SavedController> {
         None
     }
@@ -126,15 +123,13 @@ impl<C: Controller + ?Sized> Controller for Box<C> {
         (**self).describe()
     }
 
-    #[cfg(feature = "serde")]
     fn save(&self) -> Option<SavedController> {
         (**self).save()
     }
 }
 
 /// Reason why a run ended without a grip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum GaveUp {
     /// The ball is in view from none of the search poses, or of the first
@@ -166,37 +161,20 @@ impl std::fmt::Display for GaveUp {
 }
 
 /// A controller as data: its kind, and the settings and knowledge of that kind.
-#[cfg(feature = "serde")]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SavedController {
     kind: String,
-    data: Arc<dyn Data>,
+    data: serde_json::Value,
 }
 
-/// Data that is written only when it is asked for.
-#[cfg(feature = "serde")]
-trait Data: std::fmt::Debug + Send + Sync {
-    fn json(&self) -> serde_json::Result<serde_json::Value>;
-}
-
-#[cfg(feature = "serde")]
-impl<T: serde::Serialize + std::fmt::Debug + Send + Sync> Data for T {
-    fn json(&self) -> serde_json::Result<serde_json::Value> {
-        serde_json::to_value(self)
-    }
-}
-
-#[cfg(feature = "serde")]
 impl SavedController {
-    /// Creates the data of a controller of this `kind`.
-    pub fn new(
-        kind: &str,
-        data: impl serde::Serialize + std::fmt::Debug + Send + Sync + 'static,
-    ) -> Self {
-        Self {
+    /// Creates the data of a controller of this `kind`; `None` for data that JSON cannot hold, such
+    /// as maps whose keys are no text.
+    pub fn new(kind: &str, data: impl Serialize) -> Option<Self> {
+        Some(Self {
             kind: kind.into(),
-            data: Arc::new(data),
-        }
+            data: serde_json::to_value(data).ok()?,
+        })
     }
 
     /// Returns the kind.
@@ -208,37 +186,9 @@ impl SavedController {
     ///
     /// # Errors
     /// [`BehaviourError::Text`] for data of another type, or that the type refuses.
-    pub fn data<T: serde::de::DeserializeOwned>(&self) -> Result<T, BehaviourError> {
-        let read = self.data.json().and_then(serde_json::from_value);
-        read.map_err(|error| BehaviourError::Text {
+    pub fn data<T: DeserializeOwned>(&self) -> Result<T, BehaviourError> {
+        T::deserialize(&self.data).map_err(|error| BehaviourError::Text {
             what: format!("controller of kind {:?}: {error}", self.kind),
         })
-    }
-}
-
-/// A [`SavedController`] as it is written.
-#[cfg(feature = "serde")]
-#[derive(serde::Serialize, serde::Deserialize)]
-struct Written {
-    kind: String,
-    data: serde_json::Value,
-}
-
-#[cfg(feature = "serde")]
-impl serde::Serialize for SavedController {
-    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let written = Written {
-            kind: self.kind.clone(),
-            data: self.data.json().map_err(serde::ser::Error::custom)?,
-        };
-        serde::Serialize::serialize(&written, to)
-    }
-}
-
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for SavedController {
-    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let Written { kind, data } = serde::Deserialize::deserialize(from)?;
-        Ok(Self::new(&kind, data))
     }
 }

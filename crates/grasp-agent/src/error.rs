@@ -3,6 +3,8 @@
 use hough_heuristic::FrameError;
 use puma_val2::{ArmError, Joint};
 
+use crate::run::event::RunEvent;
+
 /// Reason why a behaviour could not be made, learned, saved or loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -34,16 +36,9 @@ pub enum BehaviourError {
         /// Name of the behaviour asked for.
         name: String,
     },
-    /// A setting of learning at work is out of its range.
-    #[error("{quantity} of learning at work is {value}; it must be {allowed}")]
-    Learning {
-        /// Name of the setting.
-        quantity: &'static str,
-        /// Value that was given.
-        value: f64,
-        /// Values allowed.
-        allowed: &'static str,
-    },
+    /// Settings cannot work.
+    #[error("settings: {0}")]
+    Settings(String),
     /// Training failed: settings out of range, or a reward that is not a number.
     #[error("training: {0}")]
     Training(#[from] qtable::Error),
@@ -54,9 +49,14 @@ pub enum BehaviourError {
         what: String,
     },
     /// A file cannot be written or read, or is damaged.
-    #[cfg(feature = "serde")]
     #[error(transparent)]
     File(#[from] qtable::FileError),
+}
+
+impl From<String> for BehaviourError {
+    fn from(fault: String) -> Self {
+        Self::Settings(fault)
+    }
 }
 
 /// Reason why a run was broken off. The arm has been told to stop.
@@ -84,6 +84,10 @@ pub enum AgentError {
     Replay {
         /// Index of the first event that differs.
         event: usize,
+        /// That event in the log; `None` if the log has ended before.
+        then: Option<Box<RunEvent<'static>>>,
+        /// That event in the replay; `None` if the replay has ended before.
+        now: Option<Box<RunEvent<'static>>>,
     },
     /// The arm reports an angle that is not finite.
     #[error("the arm reports an angle of {joint} that is not finite")]

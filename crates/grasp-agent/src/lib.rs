@@ -8,8 +8,8 @@
 //! arm when something comes too near.
 //!
 //! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`].
-//!   [`learn`] learns its table in any simulator; a [`Behaviour`] is both together. A
-//!   [`BehaviourPair`] holds the specifications of centering and approaching.
+//!   [`BehaviourSpec::learn`] learns its table in any simulator, and [`BehaviourTask`] makes it an
+//!   environment of `qtable`; a [`Behaviour`] is both together. A [`BehaviourPair`] holds the specifications of centering and approaching.
 //! * A [`Controller`] decides on joint moves: [`Learned`] (the paper's two behaviours), [`Servo`]
 //!   (the alternatives that the paper names), [`Hybrid`] (a servo that calibrates its own
 //!   [`CameraModel`]), [`Retargeted`] (any of them with a goal that was shown on the arm), or one
@@ -26,10 +26,10 @@
 //! | target search | [`Search`] | next pose to look from | no |
 //! | recovery of a lost target | [`Search`] | next pose to look from | no |
 //! | gripper activation | inside the agent | ball in the jaws or not | yes |
-//! | constant control of the approach | [`Supervision`] ([`Guard`]) | move accepted or not | no |
+//! | constant control of the approach | [`Supervision`] | move accepted or not | no |
 //!
-//! The modules do not know each other. An [`Agent`] is in one [`Phase`] at a time, and every
-//! transition is a [`RunEvent`], named at the arrows:
+//! The modules do not know each other. An [`Agent`] is in one phase at a time, and every transition
+//! is a [`RunEvent`], named at the arrows:
 //!
 //! ```text
 //!              Reaching             AtGoal, Cornered            Grasped
@@ -72,12 +72,12 @@ pub use nalgebra;
 pub use puma_val2;
 pub use qtable;
 
-pub use behaviour::learning::{LearningSettings, Lesson, learn};
+pub use behaviour::learning::{LearningSettings, Lesson};
 pub use behaviour::policy::Behaviour;
 pub use behaviour::preset::BehaviourPair;
 pub use behaviour::reward::{Reward, RewardTerm};
 pub use behaviour::spec::{BehaviourSpec, GoalInterval, JointSteps};
-#[cfg(feature = "serde")]
+pub use behaviour::task::BehaviourTask;
 pub use controller::SavedController;
 pub use controller::{Controller, Decision, Feedback, GaveUp, Request};
 pub use controllers::hybrid::belief::{Belief, Prior};
@@ -86,19 +86,17 @@ pub use controllers::hybrid::settings::HybridSettings;
 pub use controllers::learned::{Learned, OnlineLearning};
 pub use controllers::servo::controller::{Servo, ServoLaw};
 pub use controllers::servo::settings::ServoSettings;
-pub use controllers::taught_goal::{Retargeted, TaughtGoal};
+pub use controllers::taught_goal::TaughtGoal;
 pub use error::{AgentError, BehaviourError};
 pub use limits::JointLimits;
 pub use percept::{Input, Percept, Sighting};
 pub use record::log::EventLog;
-#[cfg(feature = "serde")]
-pub use record::saved_run::{Replayed, SavedRun};
+pub use record::saved_run::SavedRun;
 pub use run::agent::Agent;
 pub use run::config::AgentConfig;
-pub use run::event::{EventKind, Order, Phase, RunEvent, RunOutcome};
-pub use run::search::{Search, Viewpoint};
-pub use run::supervision::{Guard, Supervision, Verdict};
-pub use sight::arm_plane::ArmPlane;
+pub use run::event::{EventKind, RunEvent, RunOutcome};
+pub use run::search::Search;
+pub use run::supervision::Supervision;
 pub use sight::camera_model::CameraModel;
 pub use sight::eye::{CameraEye, Eye};
 pub use sight::target::{EggTarget, Target};

@@ -1,15 +1,11 @@
 //! Working limits: the ranges that a task keeps the joints in, and its longest steps.
 
 use puma_val2::{Joint, JointDelta, Joints};
-
-use crate::checked::checked;
+use serde::{Deserialize, Serialize};
 
 /// Range that a task keeps each joint in, radians (low, high), `JT1` first; both ends included.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointLimits(pub [(f64, f64); 6]);
-
-checked!(JointLimits([(f64, f64); 6]));
 
 impl JointLimits {
     /// Largest turns of `JT1` to `JT3` in one move of the paper's behaviours (section 3.1),
@@ -97,7 +93,6 @@ impl JointLimits {
 }
 
 /// Checks the longest steps of a continuous controller, `JT1` first.
-#[cfg(feature = "serde")]
 pub(crate) fn check_steps(steps: &[f64; 3]) -> Result<(), String> {
     let mut steps = Joint::ALL.into_iter().zip(steps);
     steps.try_for_each(|(joint, most)| {

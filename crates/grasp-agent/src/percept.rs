@@ -2,10 +2,10 @@
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, Joints};
+use serde::{Deserialize, Serialize};
 
 /// An object found in one frame, the ball for example.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sighting {
     /// Centre and radius of its outline, feature units (192x144).
     pub features: Features,
@@ -61,8 +61,7 @@ impl Percept {
 }
 
 /// One quantity of a [`Percept`]; behaviours build their states from these.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Input {
     /// Horizontal centre, feature units.
     X,

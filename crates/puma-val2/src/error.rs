@@ -147,4 +147,7 @@ pub enum ArmError {
         /// Values that are allowed.
         allowed: &'static str,
     },
+    /// A fault of another kind of arm, in its own words.
+    #[error("{0}")]
+    Other(String),
 }

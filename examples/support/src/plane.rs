@@ -5,8 +5,8 @@
 //! theta 3) is the whole state. Centering has nothing to do here.
 
 use grasp_agent::{
-    ArmPlane, Behaviour, BehaviourError, BehaviourSpec, CameraModel, JointLimits, LearningSettings,
-    Lesson, Percept,
+    Behaviour, BehaviourError, BehaviourSpec, CameraModel, JointLimits, LearningSettings, Lesson,
+    Percept,
 };
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, SightRule, Workspace};
@@ -89,16 +89,15 @@ impl ExactPlane {
 
     /// Returns what is perceived after the move, `None` when the ball is lost.
     pub fn after(&self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
-        self.model
-            .after(percept, delta, &JointLimits::paper())
+        self.model.approaching(JointLimits::paper())(percept, delta)
             .filter(|after| self.sight.sees_features(&after.features))
     }
 
     /// Learns `spec` here with the paper's settings. With `trials` the table that does best from
-    /// them is kept ([`grasp_agent::learn`]).
+    /// them is kept ([`BehaviourSpec::learn`]).
     ///
     /// # Errors
-    /// Those of [`grasp_agent::learn`].
+    /// Those of [`BehaviourSpec::learn`].
     pub fn learn(
         &self,
         spec: BehaviourSpec,
@@ -107,14 +106,14 @@ impl ExactPlane {
         rng: &mut dyn Rng,
         on_progress: &mut dyn FnMut(&Record),
     ) -> Result<Lesson, BehaviourError> {
-        let mut plane = ArmPlane::new(&self.model, JointLimits::paper());
+        let mut plane = self.model.approaching(JointLimits::paper());
         let simulate = |percept: &Percept, delta: &JointDelta| {
-            let after = plane.after(percept, delta)?;
+            let after = plane(percept, delta)?;
             self.sight.sees_features(&after.features).then_some(after)
         };
         let start = |rng: &mut dyn Rng| self.start(rng);
         let config = LearningSettings::paper(actions)?;
-        grasp_agent::learn(spec, simulate, start, trials, &config, rng, on_progress)
+        spec.learn(simulate, start, trials, &config, rng, on_progress)
     }
 }
 

@@ -68,93 +68,98 @@ impl LearningSettings {
     }
 }
 
-/// Learns `spec` in a simulator: `simulate` returns the percept after a move, `None` if the ball is
-/// lost, and `start` draws the percept that an episode begins with.
-///
-/// With `trials`, the best of the tables met on the way is kept. In the second half of the run, at
-/// every record of the learning curve, the greedy policy is tried in the simulator from each of
-/// them. The table that needs the fewest steps stays, without the actions that lost the ball in a
-/// trial. Otherwise the last table is kept; on coarse states it is never at rest, since each update
-/// may lose a way here and find one there.
-///
-/// ```
-/// use grasp_agent::hough_heuristic::Features;
-/// use grasp_agent::puma_val2::{Joint, JointDelta};
-/// use grasp_agent::qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
-/// use grasp_agent::{BehaviourSpec, LearningSettings, Percept, learn};
-///
-/// fn main() -> Result<(), Box<dyn std::error::Error>> {
-///     // A degree of the first joint moves the ball by four units.
-///     let simulate = |percept: &Percept, delta: &JointDelta| {
-///         let mut next = *percept;
-///         next.features.x += 4.0 * delta[Joint::J1].to_degrees();
-///         (0.0..192.0).contains(&next.features.x).then_some(next)
-///     };
-///     let start = |rng: &mut dyn Rng| Percept {
-///         features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
-///         theta3: 0.0,
-///     };
-///     let settings = LearningSettings::paper(20_000)?;
-///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-///     let spec = BehaviourSpec::centering();
-///     let lesson = learn(spec, simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
-///     assert!(lesson.curve.last().and_then(|record| record.success_share) > Some(0.9));
-///     Ok(())
-/// }
-/// ```
-///
-/// # Errors
-/// A reward that is not a number: the literal Eq. 5 and 6 divide by zero on their targets.
-pub fn learn(
-    spec: BehaviourSpec,
-    mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
-    mut start: impl FnMut(&mut dyn Rng) -> Percept,
-    trials: &[Percept],
-    settings: &LearningSettings,
-    rng: &mut dyn Rng,
-    on_progress: &mut dyn FnMut(&Record),
-) -> Result<Lesson, BehaviourError> {
-    /// Parts from record to record in which α and the temperature stand still.
-    const BLOCKS: u64 = 5;
-    let (gamma, actions) = (settings.gamma, settings.actions);
-    let every = settings.record_every.clamp(1, actions.max(1));
-    let alpha = along_lines(&settings.alpha, every, actions)?;
-    let temperature = along_lines(&settings.temperature, every, actions)?;
-    let mut training = Training::new(
-        &BehaviourTask::new(&spec, gamma, &mut simulate, &mut start),
-        QTable::new(spec.states(), spec.actions())?,
-        QLearning::new(alpha, gamma)?,
-        Boltzmann::new(temperature)?,
-    )?
-    .with_episode_limit(settings.episode_limit)?;
-    let mut best: Option<(usize, u64, QTable)> = None;
-    while training.actions() < actions {
-        let part = every.min(actions - training.actions());
-        let to = training.actions() + part;
-        training = training.with_record_every(part)?;
-        let mut task = BehaviourTask::new(&spec, gamma, &mut simulate, &mut start);
-        training.run_in_blocks(&mut task, Until::Actions(to), BLOCKS, rng, |record, _| {
-            on_progress(record);
-            ControlFlow::Continue(())
-        })?;
-        training.end_episode();
-        if !trials.is_empty() && 2 * to > actions {
-            let behaviour = Behaviour::new(spec.clone(), training.table().clone())?;
-            let fewest = best.as_ref().map_or(usize::MAX, |(fewest, ..)| *fewest);
-            let (tried, without) = without_losses(trials, behaviour, fewest, &mut simulate)?;
-            if tried.steps < fewest {
-                best = Some((tried.steps, to, without));
+impl BehaviourSpec {
+    /// Learns the behaviour in a simulator: `simulate` returns the percept after a move, `None` if the ball is
+    /// lost, and `start` draws the percept that an episode begins with.
+    ///
+    /// With `trials`, the best of the tables met on the way is kept. In the second half of the run, at
+    /// every record of the learning curve, the greedy policy is tried in the simulator from each of
+    /// them. The table that needs the fewest steps stays, without the actions that lost the ball in a
+    /// trial. Otherwise the last table is kept; on coarse states it is never at rest, since each update
+    /// may lose a way here and find one there.
+    ///
+    /// ```
+    /// use grasp_agent::hough_heuristic::Features;
+    /// use grasp_agent::puma_val2::{Joint, JointDelta};
+    /// use grasp_agent::qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
+    /// use grasp_agent::{BehaviourSpec, LearningSettings, Percept};
+    ///
+    /// fn main() -> Result<(), Box<dyn std::error::Error>> {
+    ///     // A degree of the first joint moves the ball by four units.
+    ///     let simulate = |percept: &Percept, delta: &JointDelta| {
+    ///         let mut next = *percept;
+    ///         next.features.x += 4.0 * delta[Joint::J1].to_degrees();
+    ///         (0.0..192.0).contains(&next.features.x).then_some(next)
+    ///     };
+    ///     let start = |rng: &mut dyn Rng| Percept {
+    ///         features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
+    ///         theta3: 0.0,
+    ///     };
+    ///     let settings = LearningSettings::paper(20_000)?;
+    ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    ///     let spec = BehaviourSpec::centering();
+    ///     let lesson = spec.learn(simulate, start, &[], &settings, &mut rng, &mut |_| ())?;
+    ///     assert!(lesson.curve.last().and_then(|record| record.success_share) > Some(0.9));
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`BehaviourError::Settings`] for a specification that cannot be run, and a reward that is not a
+    /// number: the literal Eq. 5 and 6 divide by zero on their targets.
+    pub fn learn(
+        self,
+        mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,
+        mut start: impl FnMut(&mut dyn Rng) -> Percept,
+        trials: &[Percept],
+        settings: &LearningSettings,
+        rng: &mut dyn Rng,
+        on_progress: &mut dyn FnMut(&Record),
+    ) -> Result<Lesson, BehaviourError> {
+        /// Parts from record to record in which α and the temperature stand still.
+        const BLOCKS: u64 = 5;
+        let spec = self;
+        spec.check()?;
+        let (gamma, actions) = (settings.gamma, settings.actions);
+        let every = settings.record_every.clamp(1, actions.max(1));
+        let alpha = along_lines(&settings.alpha, every, actions)?;
+        let temperature = along_lines(&settings.temperature, every, actions)?;
+        let mut training = Training::new(
+            &BehaviourTask::new(&spec, gamma, &mut simulate, &mut start),
+            QTable::new(spec.states(), spec.actions())?,
+            QLearning::new(alpha, gamma)?,
+            Boltzmann::new(temperature)?,
+        )?
+        .with_episode_limit(settings.episode_limit)?;
+        let mut best: Option<(usize, u64, QTable)> = None;
+        while training.actions() < actions {
+            let part = every.min(actions - training.actions());
+            let to = training.actions() + part;
+            training = training.with_record_every(part)?;
+            let mut task = BehaviourTask::new(&spec, gamma, &mut simulate, &mut start);
+            training.run_in_blocks(&mut task, Until::Actions(to), BLOCKS, rng, |record, _| {
+                on_progress(record);
+                ControlFlow::Continue(())
+            })?;
+            training.end_episode();
+            if !trials.is_empty() && 2 * to > actions {
+                let behaviour = Behaviour::new(spec.clone(), training.table().clone())?;
+                let fewest = best.as_ref().map_or(usize::MAX, |(fewest, ..)| *fewest);
+                let (tried, without) = without_losses(trials, behaviour, fewest, &mut simulate)?;
+                if tried.steps < fewest {
+                    best = Some((tried.steps, to, without));
+                }
             }
         }
+        let curve = training.take_curve();
+        let last = (actions, training.into_parts().0);
+        let (learned_by, table) = best.map_or(last, |(_, by, table)| (by, table));
+        Ok(Lesson {
+            behaviour: Behaviour::new(spec, table)?,
+            curve,
+            learned_by,
+        })
     }
-    let curve = training.take_curve();
-    let last = (actions, training.into_parts().0);
-    let (learned_by, table) = best.map_or(last, |(_, by, table)| (by, table));
-    Ok(Lesson {
-        behaviour: Behaviour::new(spec, table)?,
-        curve,
-        learned_by,
-    })
 }
 
 /// Returns a schedule by straight lines from one record to the next. A schedule by visits stays.
@@ -255,7 +260,6 @@ mod tests {
     use super::*;
     use crate::behaviour::policy::Episode;
     use crate::limits::JointLimits;
-    use crate::sight::arm_plane::ArmPlane;
     use crate::sight::camera_model::CameraModel;
     use hough_heuristic::Features;
 
@@ -287,7 +291,7 @@ mod tests {
         let behaviour = Behaviour::new(spec, table).expect("fits");
 
         let model = CameraModel::paper();
-        let mut plane = ArmPlane::new(&model, JointLimits::paper());
+        let mut plane = model.approaching(JointLimits::paper());
         // Seen is what shows 60 % of its outline.
         let seen = |f: &Features| {
             let inside = (0..360).filter(|degree| {
@@ -298,7 +302,7 @@ mod tests {
             inside.count() >= 216
         };
         let mut simulate = |percept: &Percept, delta: &JointDelta| {
-            let after = plane.after(percept, delta)?;
+            let after = plane(percept, delta)?;
             seen(&after.features).then_some(after)
         };
         let lost_by =

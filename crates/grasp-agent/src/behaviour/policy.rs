@@ -3,37 +3,30 @@
 use puma_val2::JointDelta;
 use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::{Action, Boltzmann, Policy, QLearning, QTable, State, Step};
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::BehaviourSpec;
 use crate::error::BehaviourError;
 use crate::percept::Percept;
 
 /// A learned behaviour: a specification, and the Q-table over its states and actions.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(try_from = "Unchecked")
-)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "(BehaviourSpec, QTable)", into = "(BehaviourSpec, QTable)")]
 pub struct Behaviour {
     spec: BehaviourSpec,
     table: QTable,
 }
 
-/// A [`Behaviour`] as it is read.
-#[cfg(feature = "serde")]
-#[derive(serde::Deserialize)]
-struct Unchecked {
-    spec: BehaviourSpec,
-    table: QTable,
+impl From<Behaviour> for (BehaviourSpec, QTable) {
+    fn from(behaviour: Behaviour) -> Self {
+        (behaviour.spec, behaviour.table)
+    }
 }
 
-#[cfg(feature = "serde")]
-impl TryFrom<Unchecked> for Behaviour {
+impl TryFrom<(BehaviourSpec, QTable)> for Behaviour {
     type Error = BehaviourError;
 
-    fn try_from(Unchecked { spec, table }: Unchecked) -> Result<Self, BehaviourError> {
-        spec.check().map_err(|what| BehaviourError::Text { what })?;
+    fn try_from((spec, table): (BehaviourSpec, QTable)) -> Result<Self, BehaviourError> {
         Self::new(spec, table)
     }
 }
@@ -42,13 +35,13 @@ impl Behaviour {
     /// Joins a specification and a table that was learned for it.
     ///
     /// # Errors
+    /// [`BehaviourError::Settings`] for a specification that cannot be run, and
     /// [`BehaviourError::Shape`] if the table does not have `spec.states()` x `spec.actions()`
     /// entries.
     pub fn new(spec: BehaviourSpec, table: QTable) -> Result<Self, BehaviourError> {
-        let (expected, found) = (
-            (spec.states(), spec.actions()),
-            (table.states(), table.actions()),
-        );
+        spec.check()?;
+        let expected = (spec.states(), spec.actions());
+        let found = (table.states(), table.actions());
         if expected == found {
             return Ok(Self { spec, table });
         }
@@ -167,7 +160,6 @@ impl Behaviour {
     }
 }
 
-#[cfg(feature = "serde")]
 impl Behaviour {
     /// Writes the behaviour to `path`, whole or not at all.
     ///
@@ -195,7 +187,6 @@ impl Behaviour {
     }
 }
 
-#[cfg(feature = "serde")]
 const FILE_KIND: &str = "grasp-agent behaviour";
 
 /// Repetition penalty unless set otherwise, in units of Q.
@@ -246,7 +237,6 @@ impl Episode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    #[cfg(feature = "serde")]
     use crate::behaviour::reward::Reward;
 
     fn behaviour() -> Behaviour {
@@ -294,7 +284,6 @@ mod tests {
         ));
     }
 
-    #[cfg(feature = "serde")]
     #[test]
     fn a_behaviour_is_validated_on_deserialization() {
         let sound = serde_json::to_value(behaviour()).unwrap();
@@ -310,11 +299,10 @@ mod tests {
                 .to_string()
         };
         let larger = serde_json::to_value(BehaviourSpec::approaching()).unwrap();
-        assert!(refused(&|text| text["spec"] = larger.clone()).contains("42x9"));
-        assert!(refused(&|text| text["spec"]["goal"] = serde_json::json!([])).contains("no goal"));
+        assert!(refused(&|text| text[0] = larger.clone()).contains("42x9"));
+        assert!(refused(&|text| text[0]["goal"] = serde_json::json!([])).contains("no goal"));
     }
 
-    #[cfg(feature = "serde")]
     #[test]
     fn a_saved_behaviour_comes_back_and_others_are_refused() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,13 +1,13 @@
 //! Pairs of behaviours: the paper's, and a finer one.
 
 use qtable::Error;
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::reward::Reward;
 use crate::behaviour::spec::{BehaviourSpec, GoalInterval};
 
 /// The two behaviours of a [`Learned`](crate::Learned) controller, as data.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BehaviourPair {
     /// Turns `JT1` by x and r.
     pub centering: BehaviourSpec,

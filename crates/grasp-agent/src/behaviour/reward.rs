@@ -1,6 +1,7 @@
 //! The reward module (section 3.2 of the paper, Eq. 5 and 6).
 
-use crate::checked::checked;
+use serde::{Deserialize, Serialize};
+
 use crate::percept::{Input, Percept};
 
 /// A reward of the paper's form, as data.
@@ -9,8 +10,7 @@ use crate::percept::{Input, Percept};
 /// `weight / |value - target|` over all terms if at least one of them came closer to its target,
 /// and nothing otherwise. With one term (x, 100, 103) this is Eq. 5, with the two terms (y, 20, 78)
 /// and (r, 50, 33) it is Eq. 6.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reward {
     /// Pay for arriving at the goal (default 100).
     pub goal: f64,
@@ -31,8 +31,7 @@ pub struct Reward {
 }
 
 /// One term of a [`Reward`]: `weight / |input - target|`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RewardTerm {
     /// Quantity that should come closer.
     pub input: Input,
@@ -55,14 +54,6 @@ impl RewardTerm {
         (self.input.of(percept) - self.target).abs()
     }
 }
-
-checked!(Reward {
-    goal: f64,
-    lost: f64,
-    terms: Vec<RewardTerm>,
-    floor: f64,
-    absorbing: bool,
-});
 
 impl Reward {
     /// Returns Eq. 5 of the paper as printed.
@@ -99,7 +90,6 @@ impl Reward {
         }
     }
 
-    #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let of_terms = self
             .terms

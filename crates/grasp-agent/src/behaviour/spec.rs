@@ -3,17 +3,16 @@
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta};
 use qtable::{Action, Error, Intervals, Product, State};
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::reward::Reward;
-use crate::checked::checked;
 use crate::percept::{Input, Percept};
 
 /// A behaviour as data, without its table.
 ///
 /// The state is the product of intervals of some inputs; the action is the product of angle steps
 /// of some joints.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BehaviourSpec {
     /// Name, for files and messages.
     pub name: String,
@@ -30,8 +29,7 @@ pub struct BehaviourSpec {
 }
 
 /// Steps that a behaviour can make with one joint.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointSteps {
     /// The joint.
     pub joint: Joint,
@@ -39,12 +37,6 @@ pub struct JointSteps {
     pub degrees: Vec<f64>,
 }
 
-checked!(JointSteps {
-    joint: Joint,
-    degrees: Vec<f64>,
-});
-
-#[cfg(feature = "serde")]
 impl JointSteps {
     fn check(&self) -> Result<(), String> {
         let Self { joint, degrees } = self;
@@ -59,8 +51,7 @@ impl JointSteps {
 }
 
 /// A goal interval of one input, closed at both ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalInterval {
     /// The input.
     pub input: Input,
@@ -69,12 +60,6 @@ pub struct GoalInterval {
     /// Highest value at the goal.
     pub high: f64,
 }
-
-checked!(GoalInterval {
-    input: Input,
-    low: f64,
-    high: f64,
-});
 
 impl GoalInterval {
     /// The paper's goal interval of x, feature units.
@@ -132,15 +117,6 @@ impl GoalInterval {
 const R_EDGES: [f64; 5] = [14.0, 22.0, R.low, R.high, 47.0];
 const Y: GoalInterval = GoalInterval::Y;
 const R: GoalInterval = GoalInterval::R;
-
-checked!(BehaviourSpec {
-    name: String,
-    inputs: Vec<Input>,
-    space: Product,
-    moves: Vec<JointSteps>,
-    goal: Vec<GoalInterval>,
-    reward: Reward,
-});
 
 impl BehaviourSpec {
     /// Returns the paper's centering behaviour: 7 intervals of x by 6 of r (42 states), 9 steps of
@@ -326,7 +302,6 @@ impl BehaviourSpec {
     }
 
     /// Checks that a program could run it.
-    #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let axes = self.space.quantities().len();
         if self.inputs.len() != axes {
@@ -355,7 +330,6 @@ impl BehaviourSpec {
     }
 
     /// Returns the first part in which two specifications differ.
-    #[cfg(feature = "serde")]
     pub(crate) fn difference(&self, other: &Self) -> &'static str {
         match () {
             () if self.name != other.name => "name",

@@ -8,8 +8,10 @@ use rand::Rng;
 use crate::behaviour::spec::BehaviourSpec;
 use crate::percept::Percept;
 
-/// States, actions and rewards of a specification, with the percepts of a simulator.
-pub(crate) struct BehaviourTask<'a, M, S> {
+/// A behaviour as an environment: states, actions and rewards of a specification, with the percepts
+/// of a simulator. Any learner of `qtable` can learn it.
+#[derive(Debug)]
+pub struct BehaviourTask<'a, M, S> {
     spec: &'a BehaviourSpec,
     /// Joint move of each action.
     deltas: Vec<JointDelta>,
@@ -28,8 +30,10 @@ where
     M: FnMut(&Percept, &JointDelta) -> Option<Percept>,
     S: FnMut(&mut dyn Rng) -> Percept,
 {
-    /// Creates the environment; `gamma` is the discount factor, for the value of an absorbing goal.
-    pub(crate) fn new(spec: &'a BehaviourSpec, gamma: f64, simulate: M, start: S) -> Self {
+    /// Creates the environment. `simulate` returns the percept after a move, `None` if the ball is
+    /// lost; `start` draws the percept that an episode begins with; `gamma` is the discount factor,
+    /// for the value of an absorbing goal.
+    pub fn new(spec: &'a BehaviourSpec, gamma: f64, simulate: M, start: S) -> Self {
         let now = Percept {
             features: Features {
                 x: 0.0,

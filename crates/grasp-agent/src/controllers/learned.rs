@@ -1,14 +1,15 @@
 //! The paper's controller: two learned behaviours, frozen or learning at work.
 
-use puma_val2::JointDelta;
+use puma_val2::{JointDelta, Joints};
 use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::rand::{RngExt, SeedableRng};
 use qtable::{Action, Boltzmann, QLearning, Schedule, State, Status, Step};
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
-#[cfg(feature = "serde")]
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
+use crate::controllers::taught_goal::TaughtGoal;
 use crate::error::BehaviourError;
 use crate::percept::{Percept, Sighting};
 
@@ -22,6 +23,7 @@ pub struct Learned {
     centering: Half,
     approaching: Half,
     learning: Option<Learning>,
+    goal: Option<TaughtGoal>,
 }
 
 /// Learning at work: the learner, the policy, and its random numbers.
@@ -36,18 +38,17 @@ struct Learning {
 }
 
 impl Learning {
-    /// Goes on after so many draws; `None` for settings that `qtable` refuses.
-    fn after(settings: OnlineLearning, draws: u64) -> Option<Self> {
+    /// Goes on after so many draws.
+    fn after(settings: OnlineLearning, draws: u64) -> Result<Self, qtable::Error> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
         for _ in 0..draws {
             let _: f64 = rng.random();
         }
-        let alpha = Schedule::constant(settings.alpha).ok()?;
-        let temperature = Schedule::constant(settings.temperature).ok()?;
-        Some(Self {
+        let alpha = Schedule::constant(settings.alpha)?;
+        Ok(Self {
             settings,
-            learner: QLearning::new(alpha, settings.gamma).ok()?,
-            policy: Boltzmann::new(temperature).ok()?,
+            learner: QLearning::new(alpha, settings.gamma)?,
+            policy: Boltzmann::new(Schedule::constant(settings.temperature)?)?,
             rng,
             draws,
         })
@@ -55,87 +56,20 @@ impl Learning {
 }
 
 /// Settings of learning at work.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(try_from = "Untested")
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OnlineLearning {
-    gamma: f64,
-    alpha: f64,
-    temperature: f64,
-    seed: u64,
-}
-
-/// An [`OnlineLearning`] as it is read.
-#[cfg(feature = "serde")]
-#[derive(serde::Deserialize)]
-struct Untested {
-    gamma: f64,
-    alpha: f64,
-    temperature: f64,
-    seed: u64,
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Untested> for OnlineLearning {
-    type Error = BehaviourError;
-
-    fn try_from(untested: Untested) -> Result<Self, BehaviourError> {
-        let Untested {
-            gamma,
-            alpha,
-            temperature,
-            seed,
-        } = untested;
-        Self::new(gamma, alpha, temperature, seed)
-    }
+    /// Discount factor, 0 or above and below 1: at 1 a goal that is kept would be worth infinitely
+    /// much.
+    pub gamma: f64,
+    /// Learning rate, from 0 to 1.
+    pub alpha: f64,
+    /// Boltzmann temperature, units of Q, from 1e-6 to 1e6.
+    pub temperature: f64,
+    /// Seed of the exploration.
+    pub seed: u64,
 }
 
 impl OnlineLearning {
-    /// Creates settings from a discount factor, a learning rate, a Boltzmann temperature in units
-    /// of Q, and the seed of the exploration.
-    ///
-    /// # Errors
-    /// [`BehaviourError::Learning`] for a `gamma` outside 0..1 (at 1 a goal that is kept would be
-    /// worth infinitely much), an `alpha` outside 0..=1, a `temperature` outside 1e-6..=1e6.
-    pub fn new(
-        gamma: f64,
-        alpha: f64,
-        temperature: f64,
-        seed: u64,
-    ) -> Result<Self, BehaviourError> {
-        let sound = [
-            (
-                "gamma",
-                gamma,
-                (0.0..1.0).contains(&gamma),
-                "0 or above, and below 1",
-            ),
-            ("alpha", alpha, (0.0..=1.0).contains(&alpha), "from 0 to 1"),
-            (
-                "temperature",
-                temperature,
-                (1e-6..=1e6).contains(&temperature),
-                "from 1e-6 to 1e6",
-            ),
-        ];
-        match sound.into_iter().find(|(_, _, sound, _)| !sound) {
-            Some((quantity, value, _, allowed)) => Err(BehaviourError::Learning {
-                quantity,
-                value,
-                allowed,
-            }),
-            None => Ok(Self {
-                gamma,
-                alpha,
-                temperature,
-                seed,
-            }),
-        }
-    }
-
     /// Returns settings that do not forget what was learned in simulation: discount factor 0.9,
     /// learning rate 0.1, temperature 0.3.
     pub fn careful(seed: u64) -> Self {
@@ -145,6 +79,27 @@ impl OnlineLearning {
             temperature: 0.3,
             seed,
         }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let Self {
+            gamma,
+            alpha,
+            temperature,
+            ..
+        } = *self;
+        let (name, value, allowed) = if !(0.0..1.0).contains(&gamma) {
+            ("gamma", gamma, "0 or above, and below 1")
+        } else if !(0.0..=1.0).contains(&alpha) {
+            ("alpha", alpha, "from 0 to 1")
+        } else if !(1e-6..=1e6).contains(&temperature) {
+            ("temperature", temperature, "from 1e-6 to 1e6")
+        } else {
+            return Ok(());
+        };
+        Err(format!(
+            "{name} of learning at work is {value}; it must be {allowed}"
+        ))
     }
 }
 
@@ -161,7 +116,22 @@ impl Learned {
             centering: Half::new(centering, Self::CENTERING_KAPPA),
             approaching: Half::new(approaching, Self::APPROACHING_KAPPA),
             learning: None,
+            goal: None,
         }
+    }
+
+    /// Sets a goal that was taught on the arm: the ball is moved in the image so that it shows at
+    /// the goal of the behaviours when it is at the taught one.
+    #[must_use]
+    pub fn shown(mut self, goal: &TaughtGoal) -> Self {
+        self.goal = Some(*goal);
+        self
+    }
+
+    /// Returns what the behaviours perceive of a ball.
+    fn percept(&self, ball: &Sighting, joints: &Joints) -> Percept {
+        let ball = self.goal.map_or(*ball, |goal| goal.as_untaught(ball));
+        Percept::new(ball.features, joints)
     }
 
     /// Sets the repetition penalties: the value subtracted from the Q of an action that was chosen
@@ -188,17 +158,24 @@ impl Learned {
     }
 
     /// Makes the controller learn at work.
-    #[must_use]
-    pub fn learning(mut self, settings: OnlineLearning) -> Self {
-        self.learning = Learning::after(settings, 0);
-        self
+    ///
+    /// # Errors
+    /// [`BehaviourError::Settings`] for a setting out of its range.
+    pub fn learning(self, settings: OnlineLearning) -> Result<Self, BehaviourError> {
+        self.resumed(settings, 0)
     }
 
     /// Goes on learning after so many random numbers.
-    #[cfg(feature = "serde")]
-    pub(crate) fn resumed(mut self, (settings, draws): (OnlineLearning, u64)) -> Self {
-        self.learning = Learning::after(settings, draws);
-        self
+    pub(crate) fn resumed(
+        self,
+        settings: OnlineLearning,
+        draws: u64,
+    ) -> Result<Self, BehaviourError> {
+        settings.check()?;
+        Ok(Self {
+            learning: Some(Learning::after(settings, draws)?),
+            ..self
+        })
     }
 
     /// Stops learning.
@@ -229,7 +206,7 @@ impl Controller for Learned {
         if request.grip {
             return Err(GaveUp::NoMoveLeft);
         }
-        let percept = Percept::new(ball.features, &request.joints);
+        let percept = self.percept(ball, &request.joints);
         let admitted = |delta: JointDelta| request.limits.admit(&(request.joints + delta));
         let turn = self
             .centering
@@ -242,13 +219,14 @@ impl Controller for Learned {
     }
 
     fn notice(&mut self, feedback: &Feedback) {
+        let now = match feedback {
+            Feedback::Seen { ball, joints } => Some(self.percept(ball, joints)),
+            _ => None,
+        };
         for half in [&mut self.centering, &mut self.approaching] {
             match feedback {
                 Feedback::Begin => half.begin(),
-                Feedback::Seen { ball, joints } => {
-                    let now = Percept::new(ball.features, joints);
-                    half.learn(self.learning.as_mut(), Some(&now));
-                }
+                Feedback::Seen { .. } => half.learn(self.learning.as_mut(), now.as_ref()),
                 Feedback::Lost | Feedback::TakenBack => {
                     half.learn(self.learning.as_mut(), None);
                     half.bar_last();
@@ -262,11 +240,10 @@ impl Controller for Learned {
         "learned"
     }
 
-    #[cfg(feature = "serde")]
     fn save(&self) -> Option<SavedController> {
         let learning = self.learning.as_ref();
         let learning = learning.map(|learning| (learning.settings, learning.draws));
-        Some(SavedController::new("learned", (self.clone(), learning)))
+        SavedController::new("learned", (self, learning, self.goal))
     }
 }
 

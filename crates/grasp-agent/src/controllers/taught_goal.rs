@@ -2,11 +2,9 @@
 
 use hough_heuristic::Features;
 use puma_val2::{JointDelta, Joints};
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
-#[cfg(feature = "serde")]
-use crate::controller::SavedController;
-use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::percept::{Input, Sighting};
 
 /// A goal that was shown once on the arm: the features of the ball in the pose from which the grip
@@ -15,50 +13,12 @@ use crate::percept::{Input, Sighting};
 /// The paper's goal intervals (x 99..108, y 74..82, r 32..34) hold for its camera; another camera,
 /// or another mount, shows something else there. To teach the goal, put the ball between the open
 /// jaws, take the grip's turn back, and look. This needs no knowledge of the camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(try_from = "Read")
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaughtGoal {
     untaught: Features,
     taught: Features,
     from: Joints,
     grip: JointDelta,
-}
-
-/// A [`TaughtGoal`] as it is read.
-#[cfg(feature = "serde")]
-#[derive(serde::Deserialize)]
-struct Read {
-    untaught: Features,
-    taught: Features,
-    from: Joints,
-    grip: JointDelta,
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Read> for TaughtGoal {
-    type Error = &'static str;
-
-    fn try_from(
-        Read {
-            untaught,
-            taught,
-            from,
-            grip,
-        }: Read,
-    ) -> Result<Self, Self::Error> {
-        let goal = Self {
-            untaught,
-            taught,
-            from,
-            grip,
-        };
-        goal.checked()
-            .ok_or("a taught goal needs a radius above 0, and finite angles and features")
-    }
 }
 
 impl TaughtGoal {
@@ -82,26 +42,24 @@ impl TaughtGoal {
             y: middle(Input::Y)?,
             r: middle(Input::R)?,
         };
-        Self {
+        let goal = Self {
             untaught,
             taught: seen,
             from,
             grip,
-        }
-        .checked()
+        };
+        goal.check().is_ok().then_some(goal)
     }
 
-    fn checked(self) -> Option<Self> {
-        let Self {
-            untaught,
-            taught,
-            from,
-            grip,
-        } = self;
-        let shows =
-            |f: Features| f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0;
-        let finite = from.0.iter().chain(&grip.0).all(|angle| angle.is_finite());
-        (finite && shows(untaught) && shows(taught)).then_some(self)
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let sound = [self.untaught, self.taught]
+            .iter()
+            .all(|f| f.x.is_finite() && f.y.is_finite() && f.r.is_finite() && f.r > 0.0);
+        let mut angles = self.from.0.iter().chain(&self.grip.0);
+        if sound && angles.all(|angle| angle.is_finite()) {
+            return Ok(());
+        }
+        Err("a taught goal needs a radius above 0, and finite angles and features".into())
     }
 
     /// Returns the features of the ball at the goal.
@@ -140,8 +98,9 @@ impl TaughtGoal {
         intervals.iter().map(moved).collect()
     }
 
-    /// Moves what is seen so that this goal shows where the other one was.
-    fn as_untaught(&self, ball: &Sighting) -> Sighting {
+    /// Moves what is seen so that this goal shows where the one that it replaces was: for a
+    /// controller whose goal is part of its learned knowledge.
+    pub fn as_untaught(&self, ball: &Sighting) -> Sighting {
         let Self {
             untaught, taught, ..
         } = self;
@@ -154,48 +113,6 @@ impl TaughtGoal {
             },
             ..*ball
         }
-    }
-}
-
-/// A controller whose goal is part of its learned knowledge, at work with a [`TaughtGoal`]: the
-/// features that it sees are moved so that the taught goal shows where its own was.
-#[derive(Clone, Debug)]
-pub struct Retargeted<C> {
-    controller: C,
-    goal: TaughtGoal,
-}
-
-impl<C> Retargeted<C> {
-    /// Wraps a controller that was made for the goal that `goal` replaces.
-    pub fn new(controller: C, goal: TaughtGoal) -> Self {
-        Self { controller, goal }
-    }
-}
-
-impl<C: Controller> Controller for Retargeted<C> {
-    fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
-        self.controller
-            .decide(&self.goal.as_untaught(ball), request)
-    }
-
-    fn notice(&mut self, feedback: &Feedback) {
-        self.controller.notice(&match feedback {
-            Feedback::Seen { ball, joints } => Feedback::Seen {
-                ball: self.goal.as_untaught(ball),
-                joints: *joints,
-            },
-            other => *other,
-        });
-    }
-
-    fn describe(&self) -> &str {
-        self.controller.describe()
-    }
-
-    #[cfg(feature = "serde")]
-    fn save(&self) -> Option<SavedController> {
-        let data = (self.controller.save()?, self.goal);
-        Some(SavedController::new("retargeted", data))
     }
 }
 
@@ -246,25 +163,5 @@ mod tests {
         let of = |from, grip| TaughtGoal::new(&intervals, seen, from, grip);
         assert!(of(Joints([f64::NAN; 6]), grip).is_none());
         assert!(of(Joints::default(), JointDelta([f64::INFINITY; 6])).is_none());
-    }
-
-    #[cfg(feature = "serde")]
-    #[test]
-    fn a_goal_is_validated_on_deserialization() {
-        let paper = AgentConfig::paper([Joints::default()]);
-        let seen = Features {
-            x: 90.0,
-            y: 95.0,
-            r: 36.0,
-        };
-        let goal = TaughtGoal::new(&paper.goal, seen, Joints::default(), paper.grip).unwrap();
-        let text = serde_json::to_string(&goal).unwrap();
-        assert_eq!(serde_json::from_str::<TaughtGoal>(&text).unwrap(), goal);
-        for radius in ["0.0", "-36.0"] {
-            let changed = text.replace("36.0", radius);
-            assert_ne!(changed, text);
-            let refused = serde_json::from_str::<TaughtGoal>(&changed).unwrap_err();
-            assert!(refused.to_string().contains("radius"), "{refused}");
-        }
     }
 }

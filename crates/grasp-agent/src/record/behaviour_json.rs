@@ -67,7 +67,6 @@ impl TryFrom<BehaviourJson> for Behaviour {
     fn try_from(json: BehaviourJson) -> Result<Self, BehaviourError> {
         check_format(&json.format, FORMAT)?;
         json.conventions.check()?;
-        json.spec.check().map_err(bad)?;
         Self::new(json.spec, table_of(&json.q)?)
     }
 }

@@ -5,17 +5,18 @@ use std::cell::RefCell;
 use hough_heuristic::FrameError;
 use hough_heuristic::image::{GrayImage, Luma};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
+use serde::{Deserialize, Serialize};
 
 use crate::controller::Controller;
 use crate::error::AgentError;
 use crate::percept::Sighting;
 use crate::run::agent::Agent;
-use crate::run::event::{EventKind, Order, RunEvent, RunOutcome};
+use crate::run::event::{EventKind, RunEvent, RunOutcome};
+use crate::run::state_machine::{STOP, jaws_order};
 use crate::sight::eye::Eye;
 
 /// Events of a run, in order, without the frames.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EventLog {
     /// The events, oldest first.
     pub events: Vec<RunEvent<'static>>,
@@ -27,8 +28,8 @@ impl EventLog {
         self.events.push(event.logged());
     }
 
-    /// Repeats the run with `agent` and the recorded answers of arm, sensors and camera. Returns
-    /// the outcome and the new log, which equals this one for an equal controller.
+    /// Repeats the run with a copy of `agent` and the recorded answers of arm, sensors and camera.
+    /// Returns the outcome and the new log, which equals this one for an equal controller.
     ///
     /// # Errors
     /// [`AgentError::Replay`] at the first event that differs; otherwise the error that the run
@@ -37,15 +38,13 @@ impl EventLog {
         &self,
         agent: &Agent<C>,
     ) -> Result<(RunOutcome, Self), AgentError> {
-        let Played { end, log, differs } = self.play(agent.clone());
-        match (differs, end) {
-            (Some(event), _) => Err(AgentError::Replay { event }),
-            (None, end) => Ok((end?, log)),
-        }
+        self.replay_by(agent.clone())
     }
 
-    /// Repeats the run with `agent` to its end, even if it differs.
-    pub(crate) fn play<C: Controller>(&self, agent: Agent<C>) -> Played {
+    pub(crate) fn replay_by<C: Controller>(
+        &self,
+        agent: Agent<C>,
+    ) -> Result<(RunOutcome, Self), AgentError> {
         let tape = RefCell::new(Tape {
             events: &self.events,
             next: 0,
@@ -56,39 +55,18 @@ impl EventLog {
             &mut Player::new(&tape),
             &mut Player::new(&tape),
             &mut Player::new(&tape),
-            &mut |event| {
-                log.note(event);
-            },
+            &mut |event| log.note(event),
         );
-        let differs = log
-            .events
-            .iter()
-            .zip(&self.events)
-            .position(|(now, then)| !same(now, then));
-        let differs = differs.or((log.events.len() != self.events.len())
-            .then(|| log.events.len().min(self.events.len())));
-        Played { end, log, differs }
-    }
-}
-
-/// A repeated run.
-pub(crate) struct Played {
-    pub(crate) end: Result<RunOutcome, AgentError>,
-    pub(crate) log: EventLog,
-    /// Index of the first event that differs from the record.
-    pub(crate) differs: Option<usize>,
-}
-
-/// Compares two events. A replayed device reports a failure in a text of its own that quotes the
-/// recorded one.
-fn same(now: &RunEvent<'_>, then: &RunEvent<'_>) -> bool {
-    match (&now.kind, &then.kind) {
-        (EventKind::Failed(cause), EventKind::Failed(cause_then)) => {
-            now.cycle == then.cycle
-                && alike(&now.joints, &then.joints)
-                && same_cause(cause, cause_then)
+        let events = log.events.len().max(self.events.len());
+        let [now, then] = [&log, self].map(|log| move |event: usize| log.events.get(event));
+        match (0..events).find(|event| !alike(&now(*event), &then(*event))) {
+            Some(event) => Err(AgentError::Replay {
+                event,
+                then: then(event).cloned().map(Box::new),
+                now: now(event).cloned().map(Box::new),
+            }),
+            None => Ok((end?, log)),
         }
-        _ => alike(now, then),
     }
 }
 
@@ -96,58 +74,6 @@ fn same(now: &RunEvent<'_>, then: &RunEvent<'_>) -> bool {
 /// text.
 fn alike<T: PartialEq + std::fmt::Debug>(now: &T, then: &T) -> bool {
     now == then || format!("{now:?}") == format!("{then:?}")
-}
-
-/// Compares the cause of a failure with the recorded one: equal texts, or the replayed device's
-/// quotation.
-fn same_cause(now: &str, then: &str) -> bool {
-    let quoted =
-        |by: Device| by.failed_in(then) && now == by.silence(failed_then(then)).to_string();
-    now == then || quoted(Device::Camera) || quoted(Device::Arm)
-}
-
-/// Text of a replayed device whose recorded answer was a failure.
-fn failed_then(cause: &str) -> String {
-    format!("this failed then: {cause}")
-}
-
-/// Device that failed.
-#[derive(Clone, Copy)]
-enum Device {
-    Camera,
-    Arm,
-}
-
-impl Device {
-    /// Returns whether `cause` begins like an error of this device.
-    fn failed_in(self, cause: &str) -> bool {
-        let words = self.silence(String::new()).to_string();
-        let begin = words.split_inclusive(": ").next();
-        begin.is_some_and(|begin| cause.starts_with(begin))
-    }
-
-    /// Builds the error of a replayed device without an answer.
-    fn silence(self, reason: String) -> AgentError {
-        match self {
-            Self::Camera => AgentError::Camera(unseen(reason)),
-            Self::Arm => AgentError::Arm(unmoved(reason)),
-        }
-    }
-}
-
-fn unseen(reason: String) -> FrameError {
-    FrameError::Failed {
-        origin: NAME.into(),
-        reason,
-    }
-}
-
-fn unmoved(reason: String) -> ArmError {
-    ArmError::Refused {
-        port: NAME.into(),
-        sent: "an order".into(),
-        message: reason,
-    }
 }
 
 /// Returns a small frame that is distinct for each number. The log holds no frames, only whether
@@ -176,11 +102,28 @@ impl Tape<'_> {
         None
     }
 
-    /// Explains a missing answer: the recorded failure, or the end of the log.
-    fn silence(&self) -> String {
-        match self.events.last().map(|event| &event.kind) {
-            Some(EventKind::Failed(cause)) => failed_then(cause),
-            _ => "the log ends here".into(),
+    /// Returns the recorded failure of the device whose errors begin with `prefix`, or says that the
+    /// record ends.
+    fn silence(&self, prefix: &str) -> String {
+        let fault = match self.events.last().map(|event| &event.kind) {
+            Some(EventKind::Failed(cause)) => cause.strip_prefix(prefix),
+            _ => None,
+        };
+        fault.unwrap_or("the replayed log ends here").to_owned()
+    }
+
+    fn unmoved(&self) -> ArmError {
+        ArmError::Other(self.silence(ARM))
+    }
+
+    fn unseen(&self) -> FrameError {
+        let fault = self.silence(CAMERA);
+        match fault.split_once(": ") {
+            Some((origin, reason)) => FrameError::Failed {
+                origin: origin.into(),
+                reason: reason.into(),
+            },
+            None => FrameError::End,
         }
     }
 
@@ -198,22 +141,24 @@ impl Tape<'_> {
     /// event of its own.
     fn sensors_hold(&self) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
-            Some(EventKind::Failed(cause)) if Device::Arm.failed_in(cause) => {
-                Err(unmoved(self.silence()))
-            }
+            Some(EventKind::Failed(cause)) if cause.starts_with(ARM) => Err(self.unmoved()),
             _ => Ok(()),
         }
     }
 
     /// Fails if the next event says that `order` was not answered. Such an order makes no event
     /// when it succeeds.
-    fn answers(&self, order: Order) -> Result<(), ArmError> {
+    fn answers(&self, order: &str) -> Result<(), ArmError> {
         match self.events.get(self.next).map(|event| &event.kind) {
-            Some(EventKind::Unanswered(then)) if *then == order => Err(unmoved(self.silence())),
+            Some(EventKind::Unanswered(then)) if then == order => Err(self.unmoved()),
             _ => Ok(()),
         }
     }
 }
+
+/// Beginnings of the texts of [`AgentError::Camera`] and [`AgentError::Arm`].
+const CAMERA: &str = "the camera failed: ";
+const ARM: &str = "the arm failed: ";
 
 /// Returns whether an event records an answer of arm or camera. The others follow from those.
 fn is_answer(kind: &EventKind) -> bool {
@@ -241,9 +186,6 @@ struct Player<'a, 'b> {
     frame: GrayImage,
 }
 
-/// Name of the replayed devices in error texts.
-const NAME: &str = "replayed event log";
-
 impl<'a, 'b> Player<'a, 'b> {
     fn new(tape: &'a RefCell<Tape<'b>>) -> Self {
         Self {
@@ -254,10 +196,10 @@ impl<'a, 'b> Player<'a, 'b> {
 
     fn stand(&self) -> Result<Joints, ArmError> {
         let mut tape = self.tape.borrow_mut();
-        match tape.answer() {
-            Some(event) => Ok(event.joints),
-            None => Err(unmoved(tape.silence())),
-        }
+        let event = tape.answer();
+        event
+            .map(|event| event.joints)
+            .ok_or_else(|| tape.unmoved())
     }
 }
 
@@ -271,7 +213,7 @@ impl Manipulator for Player<'_, '_> {
             {
                 Ok(*joints)
             }
-            _ => Err(unmoved(tape.silence())),
+            _ => Err(tape.unmoved()),
         }
     }
 
@@ -285,16 +227,14 @@ impl Manipulator for Player<'_, '_> {
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
         let mut tape = self.tape.borrow_mut();
-        tape.answers(Order::Jaws {
-            close: gripper == Gripper::Closed,
-        })?;
+        tape.answers(jaws_order(gripper))?;
         // Opening the gripper starts the run.
         tape.next_if(&EventKind::Started);
         Ok(())
     }
 
     fn stop(&mut self) -> Result<(), ArmError> {
-        self.tape.borrow().answers(Order::Stop)
+        self.tape.borrow().answers(STOP)
     }
 }
 
@@ -303,7 +243,7 @@ impl ProximitySensor for Player<'_, '_> {
         let mut tape = self.tape.borrow_mut();
         tape.sensors_hold()?;
         // An arm that could not be stopped made no event for what was too near.
-        Ok(tape.next_if(&EventKind::TooNear) || tape.answers(Order::Stop).is_err())
+        Ok(tape.next_if(&EventKind::TooNear) || tape.answers(STOP).is_err())
     }
 }
 
@@ -313,7 +253,7 @@ impl Eye for Player<'_, '_> {
         let ball = match tape.answer().map(|event| event.kind) {
             Some(EventKind::Seen(ball)) => Some(ball),
             Some(EventKind::NotSeen) => None,
-            _ => return Err(unseen(tape.silence())),
+            _ => return Err(tape.unseen()),
         };
         if !tape.next_if(&EventKind::SameFrame) {
             tape.frame = tape.frame.wrapping_add(1);

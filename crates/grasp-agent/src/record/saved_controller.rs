@@ -4,49 +4,54 @@ use crate::controller::{Controller, SavedController};
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::controller::Hybrid;
 use crate::controllers::hybrid::settings::HybridSettings;
-use crate::controllers::learned::Learned;
-use crate::controllers::servo::controller::Servo;
-use crate::controllers::taught_goal::{Retargeted, TaughtGoal};
+use crate::controllers::learned::{Learned, OnlineLearning};
+use crate::controllers::servo::controller::{Servo, ServoLaw};
+use crate::controllers::servo::settings::ServoSettings;
+use crate::controllers::taught_goal::TaughtGoal;
 use crate::error::BehaviourError;
+
+/// Data of a learned controller: behaviours, learning at work with its draws, and a taught goal.
+type LearnedData = (Learned, Option<(OnlineLearning, u64)>, Option<TaughtGoal>);
 
 impl SavedController {
     /// Makes the controller again; a hybrid comes back frozen, as it decides within a run by what
     /// it believed before.
     ///
     /// # Errors
-    /// [`BehaviourError::Text`] for settings that cannot work, and for a kind that is not one of
-    /// this crate's controllers.
+    /// [`BehaviourError::Settings`] for settings that cannot work, [`BehaviourError::Text`] for a
+    /// kind that is not one of this crate's controllers.
     pub fn controller(&self) -> Result<Box<dyn Controller>, BehaviourError> {
-        Ok(match self.kind() {
+        match self.kind() {
             "learned" => {
-                let (learned, learning): (Learned, Option<_>) = self.data()?;
-                Box::new(match learning {
-                    Some(learning) => learned.resumed(learning),
-                    None => learned,
-                })
+                let (mut learned, learning, goal): LearnedData = self.data()?;
+                if let Some((settings, draws)) = learning {
+                    learned = learned.resumed(settings, draws)?;
+                }
+                if let Some(goal) = goal {
+                    goal.check()?;
+                    learned = learned.shown(&goal);
+                }
+                Ok(Box::new(learned))
             }
             "servo" => {
-                let (law, settings) = self.data()?;
-                Box::new(Servo::new(law, settings))
+                let (law, settings): (ServoLaw, ServoSettings) = self.data()?;
+                settings.check()?;
+                Ok(Box::new(Servo::new(law, settings)))
             }
             "hybrid" => {
                 let (settings, belief): (HybridSettings, Belief) = self.data()?;
+                settings.check()?;
+                belief.check()?;
                 // The belief is held as firmly as it was.
                 let settings = HybridSettings {
                     drift: 0.0,
                     ..settings
                 };
-                Box::new(Hybrid::with_belief(settings, belief).frozen())
+                Ok(Box::new(Hybrid::with_belief(settings, belief).frozen()))
             }
-            "retargeted" => {
-                let (controller, goal): (Self, TaughtGoal) = self.data()?;
-                Box::new(Retargeted::new(controller.controller()?, goal))
-            }
-            kind => {
-                return Err(BehaviourError::Text {
-                    what: format!("{kind:?} is not a kind of controller of this crate"),
-                });
-            }
-        })
+            kind => Err(BehaviourError::Text {
+                what: format!("{kind:?} is not a kind of controller of this crate"),
+            }),
+        }
     }
 }

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use crate::controller::{Controller, SavedController};
 use crate::error::{AgentError, BehaviourError};
 use crate::record::behaviour_json::check_format;
-use crate::record::log::{EventLog, Played, numbered};
+use crate::record::log::{EventLog, numbered};
 use crate::run::agent::Agent;
 use crate::run::config::AgentConfig;
-use crate::run::event::{EventKind, RunEvent, RunOutcome};
+use crate::run::event::{RunEvent, RunOutcome};
 use crate::sight::frozen::{FrozenCheck, Shown};
 
 /// One run with everything needed to repeat it and to compare the results.
@@ -37,22 +37,6 @@ pub struct SavedRun {
     controller: Option<SavedController>,
     camera: Camera,
     log: EventLog,
-}
-
-/// Result of a replay.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Replayed {
-    /// Every event was equal; the end was this outcome, or this failure.
-    Same(Result<RunOutcome, String>),
-    /// The runs differ.
-    Differs {
-        /// Index of the first event that differs, from 0.
-        event: usize,
-        /// That event in the saved run; `None` if the saved run has ended before.
-        then: Option<RunEvent<'static>>,
-        /// That event in the replay; `None` if the replay has ended before.
-        now: Option<RunEvent<'static>>,
-    },
 }
 
 /// State of the frozen-camera check before the run. The agent counts equal frames across runs.
@@ -104,12 +88,12 @@ impl SavedRun {
     }
 
     /// Repeats the run with the saved controller and the recorded answers of arm, sensors and
-    /// camera.
+    /// camera. Returns the outcome of the run.
     ///
     /// # Errors
-    /// [`AgentError::Config`] if the settings are invalid, [`AgentError::SavedRun`] if the
-    /// controller cannot be made again.
-    pub fn replay(&self) -> Result<Replayed, AgentError> {
+    /// [`AgentError::SavedRun`] if the controller cannot be made again, and those of
+    /// [`SavedRun::replay_with`].
+    pub fn replay(&self) -> Result<RunOutcome, AgentError> {
         let Some(controller) = &self.controller else {
             let what = "its controller was not saved; replay it with a controller of yours";
             return Err(AgentError::SavedRun(what.into()));
@@ -121,30 +105,16 @@ impl SavedRun {
     /// Repeats the run with this controller and the recorded answers of arm, sensors and camera.
     ///
     /// # Errors
-    /// [`AgentError::Config`] if the settings are invalid.
-    pub fn replay_with(&self, controller: impl Controller) -> Result<Replayed, AgentError> {
+    /// [`AgentError::Config`] if the settings are invalid, [`AgentError::Replay`] at the first
+    /// event that differs; otherwise the error that the run ended with, if any.
+    pub fn replay_with(&self, controller: impl Controller) -> Result<RunOutcome, AgentError> {
         let camera = FrozenCheck {
             from: self.camera.from,
             shown: self.camera.showed.then(|| Shown::Frame(numbered(0))),
             same: self.camera.same,
         };
         let agent = Agent::with_controller(self.config.clone(), controller)?.with_camera(camera);
-        let Played { end, log, differs } = self.log.play(agent);
-        Ok(match differs {
-            // Replayed devices fail with a text of their own; report the recorded one.
-            None => Replayed::Same(end.map_err(|error| match self.log.events.last() {
-                Some(RunEvent {
-                    kind: EventKind::Failed(cause),
-                    ..
-                }) => cause.clone(),
-                _ => error.to_string(),
-            })),
-            Some(event) => Replayed::Differs {
-                event,
-                then: self.log.events.get(event).cloned(),
-                now: log.events.get(event).cloned(),
-            },
-        })
+        Ok(self.log.replay_by(agent)?.0)
     }
 
     /// Returns the run as JSON: format, settings, controller, camera state, and one event per line.
@@ -174,6 +144,7 @@ impl SavedRun {
         let format = check_format(&head.format, FORMAT);
         format.map_err(|error: BehaviourError| AgentError::SavedRun(error.to_string()))?;
         let run: Document = serde_json::from_str(text).map_err(refused)?;
+        run.config.check().map_err(AgentError::SavedRun)?;
         Ok(Self {
             config: run.config,
             controller: run.controller,
@@ -183,7 +154,7 @@ impl SavedRun {
     }
 }
 
-const FORMAT: &str = "grasp-agent run 2";
+const FORMAT: &str = "grasp-agent run 3";
 
 #[derive(Debug, Deserialize)]
 struct Head {

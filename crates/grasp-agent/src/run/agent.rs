@@ -11,7 +11,7 @@ use crate::run::config::AgentConfig;
 use crate::run::event::{RunEvent, RunOutcome};
 use crate::run::search::{PoseSearch, RecoveryMoves, Search};
 use crate::run::state_machine::{Devices, Modules, Run};
-use crate::run::supervision::{Guard, Supervision};
+use crate::run::supervision::Supervision;
 use crate::sight::eye::Eye;
 use crate::sight::frozen::FrozenCheck;
 
@@ -57,7 +57,7 @@ impl<C: Controller> Agent<C> {
                 config.search_again.clone(),
             )),
             recovery: Box::new(RecoveryMoves::new(config.recovery.clone())),
-            supervision: Box::new(Guard::of(&config)),
+            supervision: Box::new(config.clone()),
         };
         Ok(Self {
             config,
@@ -81,7 +81,7 @@ impl<C: Controller> Agent<C> {
         self
     }
 
-    /// Replaces the supervision by [`Guard`].
+    /// Replaces the supervision by the bounds of the settings.
     #[must_use]
     pub fn supervised_by(mut self, supervision: impl Supervision + 'static) -> Self {
         self.modules.supervision = Box::new(supervision);
@@ -109,13 +109,11 @@ impl<C: Controller> Agent<C> {
     }
 
     /// Returns the memory of the last image.
-    #[cfg(feature = "serde")]
     pub(crate) fn camera(&self) -> &FrozenCheck {
         &self.camera
     }
 
     /// Replaces the memory of the last image.
-    #[cfg(feature = "serde")]
     pub(crate) fn with_camera(mut self, camera: FrozenCheck) -> Self {
         self.camera = camera;
         self

@@ -1,15 +1,15 @@
 //! Settings of an agent.
 
 use puma_val2::{Joint, JointDelta, Joints};
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
-use crate::checked::{above_zero, checked};
+use crate::checked::above_zero;
 use crate::controllers::taught_goal::TaughtGoal;
 use crate::limits::JointLimits;
 
 /// Settings of an [`Agent`](crate::Agent).
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AgentConfig {
     /// Poses to search from, at least one (section 2.2 of the paper: six). The nearest one is
     /// tried first.
@@ -81,25 +81,6 @@ pub struct AgentConfig {
     /// single one ends the run.
     pub same_frames: usize,
 }
-
-checked!(AgentConfig {
-    search_poses: Vec<Joints>,
-    search_again: Vec<JointDelta>,
-    goal: Vec<GoalInterval>,
-    grip: JointDelta,
-    grip_across: bool,
-    recovery: Vec<JointDelta>,
-    limits: JointLimits,
-    max_cycles: usize,
-    max_views: usize,
-    looks: usize,
-    approach_radius: f64,
-    approach_growth: f64,
-    lift: Option<JointDelta>,
-    left_behind: f64,
-    reach_tolerance: f64,
-    same_frames: usize,
-});
 
 impl AgentConfig {
     /// Returns the paper's settings with the given search poses, and the defaults where the paper

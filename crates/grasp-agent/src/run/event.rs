@@ -2,28 +2,27 @@
 
 use hough_heuristic::image::GrayImage;
 use puma_val2::{JointDelta, Joints};
+use serde::{Deserialize, Serialize};
 
 use crate::controller::GaveUp;
 use crate::percept::Sighting;
 
 /// One event of a run.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunEvent<'a> {
     /// Moves made since the ball was first seen.
     pub cycle: usize,
     /// Kind of the event, with its data.
     pub kind: EventKind,
     /// Joint angles that the arm reports.
-    #[cfg_attr(feature = "serde", serde(with = "null_for_nan"))]
+    #[serde(with = "null_for_nan")]
     pub joints: Joints,
     /// Frame of a look, for [`EventKind::Seen`] and [`EventKind::NotSeen`]; logs do not keep it.
-    #[cfg_attr(feature = "serde", serde(skip))]
+    #[serde(skip)]
     pub frame: Option<&'a GrayImage>,
 }
 
 /// Joint angles in JSON, which has no NaN: an angle that is not finite becomes `null`.
-#[cfg(feature = "serde")]
 mod null_for_nan {
     use puma_val2::Joints;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -51,46 +50,13 @@ impl RunEvent<'_> {
     }
 }
 
-/// A state of the state machine that is drawn on the [front page](crate#the-state-machine).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Phase {
-    /// The workspace is searched for the ball.
-    Search,
-    /// The ball is in view, and the controller moves the hand to it.
-    Reach,
-    /// A ball that was in view a moment ago is looked for near there.
-    Recover,
-    /// The gripper goes for the ball.
-    Grip,
-    /// The run is over.
-    End,
-}
-
-/// An order to the arm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Order {
-    /// Turn the joints by this.
-    MoveBy(JointDelta),
-    /// Go to this pose.
-    MoveTo(Joints),
-    /// Move the jaws.
-    Jaws {
-        /// `true` to close them, `false` to open them.
-        close: bool,
-    },
-    /// Stop.
-    Stop,
-}
-
 /// Kinds of events.
 ///
-/// Every order to the arm, every answer of arm, sensor and camera and every transition of the state
-/// machine ([`EventKind::enters`]) makes an event, so that the events determine the run
+/// Every order to the arm, every answer of arm, sensor and camera and every transition of the
+/// [state machine](crate#the-state-machine) makes an event, so that the events determine the run
 /// ([`EventLog::replay`](crate::EventLog::replay)). An order that was carried out makes the event
 /// that says so, one that was answered by an error makes [`EventKind::Unanswered`].
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum EventKind {
     /// The run begins. The gripper is open.
@@ -147,7 +113,7 @@ pub enum EventKind {
     /// The run is over without a grip.
     GaveUp(GaveUp),
     /// The arm answered this order with an error; [`EventKind::Failed`] follows.
-    Unanswered(Order),
+    Unanswered(String),
     /// The run is over. Arm or camera failed for this reason, and the arm was told to stop.
     Failed(String),
 }
@@ -180,19 +146,6 @@ impl EventKind {
             Self::Unanswered(_) => "unanswered",
             Self::GaveUp(_) => "gave-up",
             Self::Failed(_) => "failed",
-        }
-    }
-
-    /// Returns the phase that begins with this event, if one does. Every transition of the state
-    /// machine has exactly one such event.
-    pub fn enters(&self) -> Option<Phase> {
-        match self {
-            Self::Searching => Some(Phase::Search),
-            Self::Reaching => Some(Phase::Reach),
-            Self::Lost | Self::Missed => Some(Phase::Recover),
-            Self::AtGoal | Self::Cornered => Some(Phase::Grip),
-            Self::Grasped | Self::GaveUp(_) | Self::Failed(_) => Some(Phase::End),
-            _ => None,
         }
     }
 }

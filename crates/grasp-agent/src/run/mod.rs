@@ -3,7 +3,6 @@
 pub(crate) mod agent;
 pub(crate) mod config;
 pub(crate) mod event;
-pub(crate) mod gripper;
 pub(crate) mod search;
 pub(crate) mod state_machine;
 pub(crate) mod supervision;

@@ -4,16 +4,6 @@ use puma_val2::{JointDelta, Joints};
 
 use crate::percept::Sighting;
 
-/// A pose to look from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Viewpoint {
-    /// Number, for the event log.
-    pub number: usize,
-    /// The pose. A pose outside the working limits is replaced by the nearest one within; one that
-    /// is not finite ends the run with [`AgentError::Viewpoint`](crate::AgentError::Viewpoint).
-    pub pose: Joints,
-}
-
 /// A module that names poses to look from, until the ball is in view: the paper's target search and
 /// its recovery of a lost target (section 2.2).
 ///
@@ -24,7 +14,7 @@ pub struct Viewpoint {
 ///
 /// ```
 /// use grasp_agent::puma_val2::Joints;
-/// use grasp_agent::{Search, Sighting, Viewpoint};
+/// use grasp_agent::{Search, Sighting};
 ///
 /// /// Turns round once, 30 degrees at a time.
 /// #[derive(Clone, Debug, Default)]
@@ -37,11 +27,11 @@ pub struct Viewpoint {
 ///         self.seen = 0;
 ///     }
 ///
-///     fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+///     fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
 ///         let pan = -150.0 + 30.0 * self.seen as f64;
 ///         let pose = Joints::from_degrees([pan, -110.0, 210.0, 0.0, 45.0, 0.0]);
 ///         self.seen += 1;
-///         (self.seen <= 11).then_some(Viewpoint { number: self.seen - 1, pose })
+///         (self.seen <= 11).then_some((self.seen - 1, pose))
 ///     }
 ///
 ///     fn boxed(&self) -> Box<dyn Search> {
@@ -51,23 +41,26 @@ pub struct Viewpoint {
 ///
 /// let mut panorama = Panorama::default();
 /// panorama.begin(&Joints::default(), None);
-/// let first = panorama.next_view(&Joints::default(), false).unwrap();
-/// assert!((first.pose.degrees()[0] + 150.0).abs() < 1e-9);
+/// let (number, pose) = panorama.next_view(&Joints::default(), false).unwrap();
+/// assert!(number == 0 && (pose.degrees()[0] + 150.0).abs() < 1e-9);
 /// ```
 pub trait Search: std::fmt::Debug + Send + Sync {
     /// Begins anew with the arm at `at`. For a recovery, `lost` is the last sighting of the ball
     /// and the pose it was seen from.
     fn begin(&mut self, at: &Joints, lost: Option<(&Sighting, &Joints)>);
 
-    /// Returns the next pose to look from, with the arm at `at`. `barred` is `true` if something
-    /// too near kept the hand from getting to the pose before, so that there was no look.
+    /// Returns the next pose to look from, with the arm at `at`, and its number for the event log.
+    /// `barred` is `true` if something too near kept the hand from getting to the pose before, so
+    /// that there was no look. A pose outside the working limits is replaced by the nearest one
+    /// within; one that is not finite ends the run with
+    /// [`AgentError::Viewpoint`](crate::AgentError::Viewpoint).
     ///
     /// `None` ends a search with [`GaveUp::NotFound`](crate::GaveUp::NotFound), or with
     /// [`GaveUp::Obstructed`](crate::GaveUp::Obstructed) if every way was barred, and leaves a
     /// recovery to the search. A search that never returns `None` ends after
     /// [`AgentConfig::max_views`](crate::AgentConfig::max_views) viewpoints. Each viewpoint of a
     /// recovery costs a cycle of [`AgentConfig::max_cycles`](crate::AgentConfig::max_cycles).
-    fn next_view(&mut self, at: &Joints, barred: bool) -> Option<Viewpoint>;
+    fn next_view(&mut self, at: &Joints, barred: bool) -> Option<(usize, Joints)>;
 
     /// Returns a copy, for copies of an agent: `Box::new(self.clone())`.
     fn boxed(&self) -> Box<dyn Search>;
@@ -92,7 +85,7 @@ pub(crate) struct PoseSearch {
 
 impl PoseSearch {
     /// Creates a search from `poses` and then, for each displacement of `again` in turn, from all
-    /// of them displaced by that. Viewpoints are numbered on from round to round.
+    /// of them displaced by that.
     pub(crate) fn new(poses: impl Into<Vec<Joints>>, again: impl Into<Vec<JointDelta>>) -> Self {
         Self {
             poses: poses.into(),
@@ -118,7 +111,7 @@ impl Search for PoseSearch {
         self.left = self.nearest_last(at);
     }
 
-    fn next_view(&mut self, at: &Joints, _barred: bool) -> Option<Viewpoint> {
+    fn next_view(&mut self, at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
         if self.left.is_empty() && self.round < self.again.len() {
             self.round += 1;
             self.left = self.nearest_last(at);
@@ -128,10 +121,10 @@ impl Search for PoseSearch {
             0 => JointDelta::default(),
             round => self.again[round - 1],
         };
-        Some(Viewpoint {
-            number: self.round * self.poses.len() + pose,
-            pose: self.poses[pose] + beside,
-        })
+        Some((
+            self.round * self.poses.len() + pose,
+            self.poses[pose] + beside,
+        ))
     }
 
     fn boxed(&self) -> Box<dyn Search> {
@@ -165,14 +158,14 @@ impl Search for RecoveryMoves {
         self.next = 0;
     }
 
-    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
         let number = self.next;
         self.next += 1;
         let pose = match number {
             0 => self.from,
             number => self.from + *self.moves.get(number - 1)?,
         };
-        Some(Viewpoint { number, pose })
+        Some((number, pose))
     }
 
     fn boxed(&self) -> Box<dyn Search> {
@@ -194,9 +187,9 @@ mod tests {
     fn all(search: &mut PoseSearch, mut at: Joints) -> Vec<usize> {
         search.begin(&at, None);
         let mut numbers = Vec::new();
-        while let Some(view) = search.next_view(&at, false) {
-            at = view.pose;
-            numbers.push(view.number);
+        while let Some((number, pose)) = search.next_view(&at, false) {
+            at = pose;
+            numbers.push(number);
         }
         numbers
     }
@@ -216,7 +209,7 @@ mod tests {
         search.begin(&pan(20.0), None);
         search.next_view(&pan(20.0), false);
         search.begin(&pan(-80.0), None);
-        assert_eq!(search.next_view(&pan(-80.0), false).unwrap().number, 0);
+        assert_eq!(search.next_view(&pan(-80.0), false).unwrap().0, 0);
     }
 
     #[test]
@@ -226,8 +219,8 @@ mod tests {
         search.begin(&pan(0.0), None);
         search.next_view(&pan(0.0), false);
         let second = search.next_view(&pan(10.0), true).unwrap();
-        assert_eq!((second.number, second.pose), (1, pan(10.0) + beside));
-        assert_eq!(search.next_view(&second.pose, false), None);
+        assert_eq!(second, (1, pan(10.0) + beside));
+        assert_eq!(search.next_view(&second.1, false), None);
     }
 
     #[test]
@@ -250,9 +243,9 @@ mod tests {
             recovery.begin(&Joints::default(), Some((&ball, &joints)));
             let mut next = |barred| recovery.next_view(&Joints::default(), barred);
             let views = [false, false, true].map(|barred| next(barred).unwrap());
-            assert_eq!(views.map(|view| view.number), [0, 1, 2]);
+            assert_eq!(views.map(|view| view.0), [0, 1, 2]);
             let expected = [joints, joints + turn(15.0), joints + turn(-15.0)];
-            assert_eq!(views.map(|view| view.pose), expected);
+            assert_eq!(views.map(|view| view.1), expected);
             assert_eq!(next(false), None);
         }
     }

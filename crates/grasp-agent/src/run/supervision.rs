@@ -6,41 +6,33 @@ use puma_val2::{Joint, Joints};
 use crate::limits::JointLimits;
 use crate::run::config::AgentConfig;
 
-/// Judgement of a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// The arm stands where it was sent.
-    There,
-    /// Something is too near: the arm is stopped and goes back to where it came from.
-    TooNear,
-    /// The arm says that it has moved, but this joint has not arrived: the run is broken off.
-    Stuck(Joint),
-}
-
 /// The paper's constant control of the approach (section 2.2: collisions with unexpected objects,
 /// "or a rapid approach that could damage the camera").
 ///
-/// It moves nothing itself, and keeps its memory from run to run.
-/// [`Agent::supervised_by`](crate::Agent::supervised_by) replaces [`Guard`]. The agent itself
-/// watches the camera: see [`AgentConfig::same_frames`](crate::AgentConfig::same_frames).
+/// It moves nothing itself, and keeps its memory from run to run. The supervision of an agent is its
+/// [`AgentConfig`] unless [`Agent::supervised_by`](crate::Agent::supervised_by) replaces it. The
+/// agent itself watches the camera: see [`AgentConfig::same_frames`].
 ///
 /// ```
 /// use grasp_agent::hough_heuristic::Features;
-/// use grasp_agent::puma_val2::Joints;
-/// use grasp_agent::{Guard, JointLimits, Supervision, Verdict};
+/// use grasp_agent::puma_val2::{Joint, Joints};
+/// use grasp_agent::{AgentConfig, JointLimits, Supervision};
 ///
 /// /// Sends an upper arm back that is less than 30 degrees above the level.
 /// #[derive(Clone, Debug)]
-/// struct Steep(Guard);
+/// struct Steep(AgentConfig);
 ///
 /// impl Supervision for Steep {
 ///     fn limits(&self) -> &JointLimits {
 ///         self.0.limits()
 ///     }
 ///
-///     fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict {
-///         let low = reached.degrees()[1] > -30.0;
-///         self.0.judge_move(target, reached, near || low)
+///     fn is_too_near(&mut self, reached: &Joints, near: bool) -> bool {
+///         near || reached.degrees()[1] > -30.0
+///     }
+///
+///     fn stuck(&mut self, target: &Joints, reached: &Joints) -> Option<Joint> {
+///         self.0.stuck(target, reached)
 ///     }
 ///
 ///     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
@@ -57,9 +49,16 @@ pub trait Supervision: std::fmt::Debug + Send + Sync {
     /// viewpoints are cut to it.
     fn limits(&self) -> &JointLimits;
 
-    /// Judges a move to `target` after which the arm reports to be at `reached`. `near` is `true`
-    /// if the arm was halted by its own guard, or a sensor reports something near now.
-    fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict;
+    /// Returns `true` if the arm, which reports to be at `reached` after a move, has to stop and go
+    /// back. `near` is `true` if its own guard halted it, or a sensor reports something near now.
+    fn is_too_near(&mut self, reached: &Joints, near: bool) -> bool {
+        let _ = reached;
+        near
+    }
+
+    /// Returns the joint that has not arrived in a move to `target` after which the arm reports to
+    /// be at `reached`. The run is then broken off.
+    fn stuck(&mut self, target: &Joints, reached: &Joints) -> Option<Joint>;
 
     /// Returns `true` if a move that took the ball in the image from `before` to `after` came
     /// nearer too fast; the arm then goes back.
@@ -75,41 +74,18 @@ impl Clone for Box<dyn Supervision> {
     }
 }
 
-/// Supervision by the fixed bounds of an [`AgentConfig`].
-#[derive(Clone, Debug)]
-pub struct Guard {
-    limits: JointLimits,
-    approach_radius: f64,
-    approach_growth: f64,
-    reach_tolerance: f64,
-}
-
-impl Guard {
-    /// Creates the guard that an agent with these settings has.
-    pub fn of(config: &AgentConfig) -> Self {
-        Self {
-            limits: config.limits,
-            approach_radius: config.approach_radius,
-            approach_growth: config.approach_growth,
-            reach_tolerance: config.reach_tolerance,
-        }
-    }
-}
-
-impl Supervision for Guard {
+/// Supervision by fixed bounds: `limits`, `reach_tolerance`, `approach_radius` and
+/// `approach_growth`.
+impl Supervision for AgentConfig {
     fn limits(&self) -> &JointLimits {
         &self.limits
     }
 
-    fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict {
-        if near {
-            return Verdict::TooNear;
-        }
+    fn stuck(&mut self, target: &Joints, reached: &Joints) -> Option<Joint> {
         let off = |joint: Joint| (reached[joint] - target[joint]).abs();
-        let stuck = Joint::ALL
+        Joint::ALL
             .into_iter()
-            .find(|joint| off(*joint).is_nan() || off(*joint) > self.reach_tolerance);
-        stuck.map_or(Verdict::There, Verdict::Stuck)
+            .find(|joint| off(*joint).is_nan() || off(*joint) > self.reach_tolerance)
     }
 
     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
@@ -125,23 +101,20 @@ impl Supervision for Guard {
 mod tests {
     use super::*;
 
-    fn guard() -> Guard {
-        Guard::of(&AgentConfig::paper([Joints::default()]))
+    fn config() -> AgentConfig {
+        AgentConfig::paper([Joints::default()])
     }
 
     #[test]
-    fn moves_are_judged_by_sensors_and_by_the_pose_reached() {
+    fn a_joint_that_has_not_arrived_is_stuck() {
         let target = Joints::from_degrees([10.0, -90.0, 180.0, 0.0, 45.0, 0.0]);
-        for (first_three, near, expected) in [
-            ([10.9, -90.0, 180.0], false, Verdict::There),
-            ([10.0, -90.0, 178.5], false, Verdict::Stuck(Joint::J3)),
-            ([10.0, f64::NAN, 180.0], false, Verdict::Stuck(Joint::J2)),
-            // An arm that was halted on its way is not stuck.
-            ([5.0, -90.0, 180.0], true, Verdict::TooNear),
+        for ([j1, j2, j3], expected) in [
+            ([10.9, -90.0, 180.0], None),
+            ([10.0, -90.0, 178.5], Some(Joint::J3)),
+            ([10.0, f64::NAN, 180.0], Some(Joint::J2)),
         ] {
-            let [j1, j2, j3] = first_three;
             let reached = Joints::from_degrees([j1, j2, j3, 0.0, 45.0, 0.0]);
-            assert_eq!(guard().judge_move(&target, &reached, near), expected);
+            assert_eq!(config().stuck(&target, &reached), expected);
         }
     }
 
@@ -160,7 +133,7 @@ mod tests {
             (41.9, 63.0, true),
             (80.0, 63.0, false),
         ] {
-            let judged = guard().is_too_fast(&ball(before), &ball(after));
+            let judged = config().is_too_fast(&ball(before), &ball(after));
             assert_eq!(judged, too_fast, "{before} to {after}");
         }
     }

@@ -1,4 +1,4 @@
-//! Fast exact simulator of approaching, in the plane of the second and third joint.
+//! Exact simulator of approaching, in the plane of the second and third joint.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use puma_val2::{Joint, JointDelta, Joints};
@@ -7,14 +7,26 @@ use crate::limits::JointLimits;
 use crate::percept::Percept;
 use crate::sight::camera_model::CameraModel;
 
-/// Exact simulator of approaching: the percept after a move of `JT2` and `JT3`.
-///
-/// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r, theta
-/// 3) is the whole state. It returns the same as [`CameraModel::after`], to rounding, in a tenth of
-/// the time: both joints turn about parallel axes, and the place of the ball of the last percept is
-/// remembered.
+impl CameraModel {
+    /// Returns an exact simulator of approaching: the percept after a move of `JT2` and `JT3`, in
+    /// the frame or outside it, with `JT5` at 45 degrees. A move of `JT3` out of its limits is not
+    /// made. The percept is `None` if the ball has no image.
+    ///
+    /// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r,
+    /// theta 3) is the whole state.
+    pub fn approaching(
+        &self,
+        limits: JointLimits,
+    ) -> impl FnMut(&Percept, &JointDelta) -> Option<Percept> + use<> {
+        let mut plane = ArmPlane::new(self, limits);
+        move |percept, delta| plane.after(percept, delta)
+    }
+}
+
+/// Arm in the plane of its second and third joint. Both turn about parallel axes, and the place of
+/// the ball of the last percept is remembered: a tenth of the time of the general kinematics.
 #[derive(Clone, Debug)]
-pub struct ArmPlane {
+struct ArmPlane {
     model: CameraModel,
     limits: JointLimits,
     /// Vector from the shoulder to the elbow, in a frame that turns with the upper arm.
@@ -27,8 +39,7 @@ pub struct ArmPlane {
 }
 
 impl ArmPlane {
-    /// Creates the simulator of the arm of `model`, with `JT5` at 45 degrees.
-    pub fn new(model: &CameraModel, limits: JointLimits) -> Self {
+    fn new(model: &CameraModel, limits: JointLimits) -> Self {
         let stretched = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
         let elbow = Vector3::new(model.arm.a2, model.arm.d2, 0.0);
         let from_elbow =
@@ -42,9 +53,7 @@ impl ArmPlane {
         }
     }
 
-    /// Returns the percept after a move, in the frame or outside it. A move of `JT3` out of its
-    /// limits is not made. `None` if the ball has no image.
-    pub fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
+    fn after(&mut self, percept: &Percept, delta: &JointDelta) -> Option<Percept> {
         let turned = delta[Joint::J3];
         let theta3 = percept.theta3 + turned.to_degrees();
         let jt3 = (theta3 + Percept::THETA3_ZERO).to_radians();
@@ -81,6 +90,24 @@ mod tests {
     use super::*;
     use hough_heuristic::Features;
 
+    /// Percept after a move by the general kinematics.
+    fn general(
+        model: &CameraModel,
+        percept: &Percept,
+        delta: &JointDelta,
+        limits: &JointLimits,
+    ) -> Option<Percept> {
+        let jt3 = percept.theta3 + Percept::THETA3_ZERO;
+        let joints = Joints::from_degrees([0.0, -60.0, jt3, 0.0, 45.0, 0.0]);
+        let moved = joints + *delta;
+        let (low, high) = limits.0[Joint::J3.index()];
+        if !(low..=high).contains(&moved[Joint::J3]) {
+            return Some(*percept);
+        }
+        let ball = model.locate(&joints, &percept.features)?;
+        Some(Percept::new(model.view(&moved, &ball)?, &moved))
+    }
+
     #[test]
     fn the_plane_equals_the_camera_model_along_walks_and_jumps() {
         let (model, limits) = (CameraModel::paper(), JointLimits::paper());
@@ -106,7 +133,7 @@ mod tests {
             ]);
             let (quick, slow) = (
                 plane.after(&percept, &delta),
-                model.after(&percept, &delta, &limits),
+                general(&model, &percept, &delta, &limits),
             );
             let (Some(quick), Some(slow)) = (quick, slow) else {
                 assert!(quick.is_none() && slow.is_none());

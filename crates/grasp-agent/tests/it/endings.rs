@@ -8,7 +8,7 @@ use grasp_agent::puma_val2::{
 };
 use grasp_agent::{
     Agent, AgentConfig, AgentError, EventKind, EventLog, Eye, GaveUp, RunEvent, RunOutcome, Search,
-    Servo, Sighting, Viewpoint,
+    Servo, Sighting,
 };
 
 const AT_GOAL: Features = Features {
@@ -124,10 +124,10 @@ impl Search for Once {
         self.named = false;
     }
 
-    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
         let pose = self.pose.filter(|_| !self.named)?;
         self.named = true;
-        Some(Viewpoint { number: 3, pose })
+        Some((3, pose))
     }
 
     fn boxed(&self) -> Box<dyn Search> {
@@ -206,9 +206,8 @@ struct Endless;
 impl Search for Endless {
     fn begin(&mut self, _at: &Joints, _lost: Option<(&Sighting, &Joints)>) {}
 
-    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
-        let pose = pose();
-        Some(Viewpoint { number: 0, pose })
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
+        Some((0, pose()))
     }
 
     fn boxed(&self) -> Box<dyn Search> {

@@ -343,7 +343,6 @@ fn phantoms_cause_no_grip_and_no_pose_out_of_limits() {
     }
 }
 
-#[cfg(feature = "serde")]
 #[test]
 fn behaviours_learned_before_a_fault_are_saved_and_resumed() {
     use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning, qtable::QTable};
@@ -353,7 +352,9 @@ fn behaviours_learned_before_a_fault_are_saved_and_resumed() {
     };
     let pair = BehaviourPair::paper_mended();
     let (centering, approaching) = (blank(&pair.centering), blank(&pair.approaching));
-    let learned = Learned::new(centering, approaching.clone()).learning(OnlineLearning::careful(3));
+    let learned = Learned::new(centering, approaching.clone())
+        .learning(OnlineLearning::careful(3))
+        .unwrap();
     let mut agent = Agent::with_controller(config(), learned).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::LineDead(6));
     let error = cell.run(&mut agent, &mut EventLog::default()).unwrap_err();
@@ -372,7 +373,9 @@ fn behaviours_learned_before_a_fault_are_saved_and_resumed() {
     let fine = Behaviour::load(&path, &BehaviourPair::fine().approaching).unwrap_err();
     assert!(fine.to_string().contains("differs"), "{fine}");
     // On another line it goes on from there.
-    let learned = Learned::new(centering, resumed).learning(OnlineLearning::careful(4));
+    let learned = Learned::new(centering, resumed)
+        .learning(OnlineLearning::careful(4))
+        .unwrap();
     let mut agent = Agent::with_controller(config(), learned).unwrap();
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
     cell.run(&mut agent, &mut EventLog::default()).unwrap();

@@ -7,7 +7,6 @@ use grasp_agent::{
     Agent, CameraModel, Controller, Decision, EventLog, Feedback, GaveUp, Hybrid, HybridSettings,
     JointLimits, Request, Sighting, TaughtGoal,
 };
-#[cfg(feature = "serde")]
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
 
 use crate::cell::{Fault, Shared, config};
@@ -50,7 +49,6 @@ fn the_camera_is_learned_from_moves_alone() {
     );
 }
 
-#[cfg(feature = "serde")]
 #[test]
 fn a_saved_belief_comes_back_and_other_files_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -2,8 +2,7 @@
 
 use grasp_agent::qtable::QTable;
 use grasp_agent::{
-    Agent, Behaviour, BehaviourError, BehaviourSpec, CameraModel, EventKind, EventLog, Learned,
-    OnlineLearning,
+    Agent, Behaviour, BehaviourSpec, CameraModel, EventKind, EventLog, Learned, OnlineLearning,
 };
 
 use crate::cell::{Fault, Shared, config};
@@ -29,8 +28,11 @@ fn learning_goes_on_within_the_limits_until_it_is_frozen() {
             blank(BehaviourSpec::approaching()),
         )
     };
-    let settings = OnlineLearning::new(0.9, 0.1, 10.0, 5).unwrap();
-    let mut agent = Agent::with_controller(config(), new().learning(settings)).unwrap();
+    let settings = OnlineLearning {
+        temperature: 10.0,
+        ..OnlineLearning::careful(5)
+    };
+    let mut agent = Agent::with_controller(config(), new().learning(settings).unwrap()).unwrap();
     let mut log = EventLog::default();
     some_runs(&mut agent, &mut log);
     let moved = |event: &&grasp_agent::RunEvent<'_>| matches!(event.kind, EventKind::Moved(_));
@@ -46,7 +48,7 @@ fn learning_goes_on_within_the_limits_until_it_is_frozen() {
     assert!(*learned.approaching().table() != *new().approaching().table());
 
     // The same seed learns the same.
-    let mut again = Agent::with_controller(config(), new().learning(settings)).unwrap();
+    let mut again = Agent::with_controller(config(), new().learning(settings).unwrap()).unwrap();
     some_runs(&mut again, &mut EventLog::default());
     assert!(again.controller().approaching() == learned.approaching());
 
@@ -69,36 +71,34 @@ fn a_loop_breaker_that_is_none_counts_as_0() {
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let [gamma, alpha, temperature] = [0.9, 0.1, 0.3];
-    let careful = OnlineLearning::new(gamma, alpha, temperature, 3).unwrap();
-    assert_eq!(careful, OnlineLearning::careful(3));
-    assert!(OnlineLearning::new(0.0, 1.0, 1e-6, 0).is_ok());
-    let (nan, infinite) = (f64::NAN, f64::INFINITY);
-    let refused =
-        |gamma, alpha, temperature| match OnlineLearning::new(gamma, alpha, temperature, 0) {
-            Err(BehaviourError::Learning { quantity, .. }) => quantity,
-            other => panic!("{other:?}"),
-        };
-    for bad in [1.0, 1.5, -0.1, nan, infinite] {
-        assert_eq!(refused(bad, alpha, temperature), "gamma", "{bad}");
-    }
-    for bad in [1.1, -0.1, nan, infinite] {
-        assert_eq!(refused(gamma, bad, temperature), "alpha", "{bad}");
-    }
-    for bad in [0.0, -1.0, nan, infinite] {
-        assert_eq!(refused(gamma, alpha, bad), "temperature", "{bad}");
-    }
-}
-
-#[cfg(feature = "serde")]
-#[test]
-fn settings_are_validated_on_deserialization() {
-    let careful = OnlineLearning::careful(3);
-    let json = serde_json::to_string(&careful).unwrap();
-    assert_eq!(
-        serde_json::from_str::<OnlineLearning>(&json).unwrap(),
-        careful
+    let learned = Learned::new(
+        blank(BehaviourSpec::centering()),
+        blank(BehaviourSpec::approaching()),
     );
-    let refused = serde_json::from_str::<OnlineLearning>(&json.replace("0.9", "1.0")).unwrap_err();
-    assert!(refused.to_string().contains("gamma"), "{refused}");
+    type Set = fn(&mut OnlineLearning, f64);
+    let cases: [(&str, Set, [f64; 5]); 3] = [
+        (
+            "gamma",
+            |s, v| s.gamma = v,
+            [1.0, 1.5, -0.1, f64::NAN, f64::INFINITY],
+        ),
+        (
+            "alpha",
+            |s, v| s.alpha = v,
+            [1.1, 2.0, -0.1, f64::NAN, f64::INFINITY],
+        ),
+        (
+            "temperature",
+            |s, v| s.temperature = v,
+            [0.0, 1e7, -1.0, f64::NAN, f64::INFINITY],
+        ),
+    ];
+    for (name, set, values) in cases {
+        for value in values {
+            let mut settings = OnlineLearning::careful(3);
+            set(&mut settings, value);
+            let refused = learned.clone().learning(settings).unwrap_err().to_string();
+            assert!(refused.contains(name), "{value}: {refused}");
+        }
+    }
 }

@@ -13,8 +13,6 @@ mod modules;
 
 mod phases;
 mod rivals;
-#[cfg(feature = "serde")]
 mod saved_controllers;
-#[cfg(feature = "serde")]
 mod settings;
 mod target;

@@ -1,10 +1,10 @@
 //! Other modules in the place of the paper's search, recovery and supervision.
 
 use grasp_agent::hough_heuristic::Features;
-use grasp_agent::puma_val2::Joints;
+use grasp_agent::puma_val2::{Joint, Joints};
 use grasp_agent::{
-    Agent, CameraModel, EventKind, EventLog, GaveUp, Guard, JointLimits, Search, Servo, Sighting,
-    Supervision, Verdict, Viewpoint,
+    Agent, AgentConfig, CameraModel, EventKind, EventLog, GaveUp, JointLimits, Search, Servo,
+    Sighting, Supervision,
 };
 
 use crate::cell::{Fault, Shared, config, servo};
@@ -22,12 +22,9 @@ impl Search for FromThere {
         self.named = false;
     }
 
-    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
         let named = std::mem::replace(&mut self.named, true);
-        (!named).then_some(Viewpoint {
-            number: 7,
-            pose: self.pose,
-        })
+        (!named).then_some((7, self.pose))
     }
 
     fn boxed(&self) -> Box<dyn Search> {
@@ -44,9 +41,8 @@ impl Search for WhereItWas {
         self.0 = lost.map(|(_, from)| *from);
     }
 
-    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<Viewpoint> {
-        let pose = self.0.take()?;
-        Some(Viewpoint { number: 0, pose })
+    fn next_view(&mut self, _at: &Joints, _barred: bool) -> Option<(usize, Joints)> {
+        Some((0, self.0.take()?))
     }
 
     fn boxed(&self) -> Box<dyn Search> {
@@ -57,26 +53,27 @@ impl Search for WhereItWas {
 /// Finds the moves with these numbers too near.
 #[derive(Clone, Debug)]
 struct Nervous {
-    guard: Guard,
+    bounds: AgentConfig,
     moves: usize,
     near: fn(usize) -> bool,
 }
 
 impl Supervision for Nervous {
     fn limits(&self) -> &JointLimits {
-        self.guard.limits()
+        self.bounds.limits()
     }
 
-    fn judge_move(&mut self, target: &Joints, reached: &Joints, near: bool) -> Verdict {
+    fn is_too_near(&mut self, _reached: &Joints, near: bool) -> bool {
         self.moves += 1;
-        if (self.near)(self.moves) {
-            return Verdict::TooNear;
-        }
-        self.guard.judge_move(target, reached, near)
+        near || (self.near)(self.moves)
+    }
+
+    fn stuck(&mut self, target: &Joints, reached: &Joints) -> Option<Joint> {
+        self.bounds.stuck(target, reached)
     }
 
     fn is_too_fast(&mut self, before: &Features, after: &Features) -> bool {
-        self.guard.is_too_fast(before, after)
+        self.bounds.is_too_fast(before, after)
     }
 
     fn boxed(&self) -> Box<dyn Supervision> {
@@ -141,9 +138,12 @@ fn a_recovery_of_ones_own_is_what_is_recovered_by() {
 #[test]
 fn a_supervision_of_ones_own_is_what_takes_moves_back() {
     let log_of = |near| {
-        let guard = Guard::of(&config());
-        let moves = 0;
-        let mut agent = agent().supervised_by(Nervous { guard, moves, near });
+        let (bounds, moves) = (config(), 0);
+        let mut agent = agent().supervised_by(Nervous {
+            bounds,
+            moves,
+            near,
+        });
         let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
         let mut log = EventLog::default();
         cell.run(&mut agent, &mut log).unwrap();

@@ -2,27 +2,50 @@
 
 use std::collections::BTreeSet;
 
-use grasp_agent::{Agent, CameraModel, EventKind, EventLog, Hybrid, HybridSettings, Order, Phase};
+use grasp_agent::{Agent, CameraModel, EventKind, EventLog, Hybrid, HybridSettings};
 
 use crate::cell::{Fault, Shared, config, servo};
 use crate::faults::{end_of, words_from};
 
+/// Phases of the state machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Phase {
+    Search,
+    Reach,
+    Recover,
+    Grip,
+    End,
+}
+use Phase::{End, Grip, Reach, Recover, Search};
+
+/// The phase that begins with an event, if one does.
+fn enters(kind: &EventKind) -> Option<Phase> {
+    Some(match kind {
+        EventKind::Searching => Search,
+        EventKind::Reaching => Reach,
+        EventKind::Lost | EventKind::Missed => Recover,
+        EventKind::AtGoal | EventKind::Cornered => Grip,
+        EventKind::Grasped | EventKind::GaveUp(_) | EventKind::Failed(_) => End,
+        _ => return None,
+    })
+}
+
 /// The transitions in the diagram on the crate's front page.
 const DIAGRAM: [(Phase, Phase); 13] = [
-    (Phase::Search, Phase::Reach),
-    (Phase::Search, Phase::End),
-    (Phase::Reach, Phase::Recover),
-    (Phase::Reach, Phase::Grip),
-    (Phase::Reach, Phase::End),
-    (Phase::Recover, Phase::Reach),
-    (Phase::Recover, Phase::Search),
-    (Phase::Recover, Phase::End),
-    (Phase::Grip, Phase::Reach),
-    (Phase::Grip, Phase::Recover),
-    (Phase::Grip, Phase::Search),
-    (Phase::Grip, Phase::End),
+    (Search, Reach),
+    (Search, End),
+    (Reach, Recover),
+    (Reach, Grip),
+    (Reach, End),
+    (Recover, Reach),
+    (Recover, Search),
+    (Recover, End),
+    (Grip, Reach),
+    (Grip, Recover),
+    (Grip, Search),
+    (Grip, End),
     // Of the fault before the first search.
-    (Phase::End, Phase::End),
+    (End, End),
 ];
 
 const FAULTS: [Fault; 27] = [
@@ -59,20 +82,20 @@ const FAULTS: [Fault; 27] = [
 fn phases(log: &EventLog) -> Vec<Phase> {
     log.events
         .iter()
-        .filter_map(|event| event.kind.enters())
+        .filter_map(|event| enters(&event.kind))
         .collect()
 }
 
 /// The phases in which an event can happen.
 fn belongs_to(kind: &EventKind) -> &'static [Phase] {
     match kind {
-        EventKind::AtSearchPose(_) => &[Phase::Search],
-        EventKind::Recovering(_) => &[Phase::Recover],
-        EventKind::Moved(_) | EventKind::TooFast => &[Phase::Reach],
+        EventKind::AtSearchPose(_) => &[Search],
+        EventKind::Recovering(_) => &[Recover],
+        EventKind::Moved(_) | EventKind::TooFast => &[Reach],
         EventKind::Gripping(_) | EventKind::Gripped | EventKind::Withdrawn | EventKind::Lifted => {
-            &[Phase::Grip]
+            &[Grip]
         }
-        _ => &[Phase::Search, Phase::Reach, Phase::Recover, Phase::Grip],
+        _ => &[Search, Reach, Recover, Grip],
     }
 }
 
@@ -89,9 +112,9 @@ fn every_transition_is_one_of_the_diagram_and_in_the_log() {
             );
             seen.insert((pair[0], pair[1]));
         }
-        assert_eq!(phases.last(), Some(&Phase::End), "{fault:?}");
+        assert_eq!(phases.last(), Some(&End), "{fault:?}");
         assert_eq!(
-            phases.iter().filter(|phase| **phase == Phase::End).count(),
+            phases.iter().filter(|phase| **phase == End).count(),
             1,
             "{fault:?}"
         );
@@ -99,10 +122,9 @@ fn every_transition_is_one_of_the_diagram_and_in_the_log() {
         // that the log is in.
         let mut phase = None;
         for event in &log.events {
-            phase = event.kind.enters().or(phase);
-            let here = phase.is_none_or(|phase| {
-                phase == Phase::End || belongs_to(&event.kind).contains(&phase)
-            });
+            phase = enters(&event.kind).or(phase);
+            let here =
+                phase.is_none_or(|phase| phase == End || belongs_to(&event.kind).contains(&phase));
             assert!(here, "{fault:?}: {:?} in {phase:?}", event.kind);
         }
     }
@@ -125,11 +147,7 @@ fn a_grip_away_from_the_goal_is_in_the_log() {
     );
     let mut log = EventLog::default();
     cell.run(&mut agent, &mut log).unwrap();
-    assert!(
-        phases(&log)
-            .windows(2)
-            .any(|pair| pair == [Phase::Reach, Phase::Grip])
-    );
+    assert!(phases(&log).windows(2).any(|pair| pair == [Reach, Grip]));
 }
 
 #[test]
@@ -145,21 +163,18 @@ fn an_order_that_is_not_answered_is_in_the_log() {
     };
     for after in 0..5 {
         let kind = of(Fault::LineDead(after));
-        let order = matches!(
-            kind,
-            EventKind::Unanswered(Order::MoveTo(_) | Order::MoveBy(_))
-        );
+        let order = matches!(&kind, EventKind::Unanswered(order) if order.starts_with("move to"));
         assert!(order, "{after}: {kind:?}");
     }
     assert_eq!(
         of(Fault::GripperDead(0)),
-        EventKind::Unanswered(Order::Jaws { close: false })
+        EventKind::Unanswered("open the jaws".into())
     );
     assert_eq!(
         of(Fault::GripperDead(1)),
-        EventKind::Unanswered(Order::Jaws { close: true })
+        EventKind::Unanswered("close the jaws".into())
     );
-    assert_eq!(of(Fault::StopDead(3)), EventKind::Unanswered(Order::Stop));
+    assert_eq!(of(Fault::StopDead(3)), EventKind::Unanswered("stop".into()));
     // An arm that says where it stands has answered.
     assert!(matches!(
         of(Fault::StoppedShort(3)),
@@ -191,6 +206,6 @@ fn a_gripper_that_does_not_open_again_is_in_the_log() {
     };
     assert_eq!(
         unanswered.kind,
-        EventKind::Unanswered(Order::Jaws { close: false })
+        EventKind::Unanswered("open the jaws".into())
     );
 }

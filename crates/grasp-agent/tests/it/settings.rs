@@ -1,98 +1,64 @@
-//! Settings that are read by themselves are checked as those of an agent or a saved run are.
+//! Settings that cannot work are refused where they are used, with the reason.
 
-use grasp_agent::{BehaviourPair, CameraModel, HybridSettings, JointLimits, Prior, ServoSettings};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use serde_json::{Value, json};
+use grasp_agent::qtable::QTable;
+use grasp_agent::{Behaviour, BehaviourPair, BehaviourSpec, HybridSettings, ServoSettings};
 
-use crate::cell::config;
+/// A change of settings, and what is said of it.
+type Case<T> = (fn(&mut T), &'static str);
 
-/// `settings` come back as they were written, and are refused with the value at `place` exchanged,
-/// with these words.
-fn refused<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
+fn refused<T: Clone>(
     settings: &T,
-    place: &str,
-    value: Value,
-    said: &str,
+    check: impl Fn(T) -> Result<(), grasp_agent::BehaviourError>,
+    cases: &[Case<T>],
 ) {
-    let mut text = serde_json::to_value(settings).unwrap();
-    assert_eq!(
-        serde_json::from_value::<T>(text.clone()).unwrap(),
-        *settings
-    );
-    *text.pointer_mut(place).expect("a place in it") = value;
-    let refused = serde_json::from_value::<T>(text).unwrap_err().to_string();
-    assert!(
-        refused.contains(said),
-        "{place}: {refused} does not say {said}"
-    );
+    assert!(check(settings.clone()).is_ok());
+    for (change, said) in cases {
+        let mut changed = settings.clone();
+        change(&mut changed);
+        let refused = check(changed).unwrap_err().to_string();
+        assert!(refused.contains(said), "{refused} does not say {said}");
+    }
 }
 
 #[test]
-fn what_cannot_be_used_is_refused_with_the_reason() {
-    let hybrid = HybridSettings::paper();
-    refused(&hybrid, "/drift", json!(-1.0), "drift is -1");
-    refused(&hybrid, "/steps/1", json!(0.0), "longest step of JT2 is 0");
+fn settings_that_cannot_work_are_refused_with_the_reason() {
     refused(
-        &hybrid,
-        "/goal/r",
-        json!(-33.0),
-        "radius of the goal is -33",
-    );
-    refused(&hybrid, "/prior/turn", json!(0.0), "prior is 0");
-    refused(&hybrid, "/nominal/focal", json!(0.0), "focal length is 0");
-    refused(&Prior::by_eye(), "/play", json!(-0.1), "prior is -0.1");
-    let servo = ServoSettings::paper();
-    refused(&servo, "/gain", json!(0.0), "gain is 0");
-    refused(
-        &servo,
-        "/model/ball_radius",
-        json!(0.0),
-        "radius of the ball is 0",
+        &HybridSettings::paper(),
+        |settings| settings.check(),
+        &[
+            (|s| s.drift = -1.0, "drift is -1"),
+            (|s| s.grip_turn = f64::NAN, "grip_turn is NaN"),
+            (|s| s.steps[1] = 0.0, "longest step of JT2 is 0"),
+            (|s| s.goal.r = -33.0, "radius of the goal is -33"),
+            (|s| s.prior.turn = 0.0, "prior is 0"),
+            (|s| s.nominal.focal = 0.0, "focal length is 0"),
+        ],
     );
     refused(
-        &CameraModel::paper(),
-        "/focal",
-        json!(-1.0),
-        "focal length is -1",
-    );
-    refused(
-        &JointLimits::paper(),
-        "/2/0",
-        json!(9.0),
-        "limits of JT3 are 9 to",
-    );
-    refused(&config(), "/looks", json!(0), "looks is 0");
-    refused(
-        &config(),
-        "/goal/1/low",
-        json!(90.0),
-        "goal of Y is from 90 to 82",
-    );
-    refused(
-        &config(),
-        "/approach_growth",
-        json!(0.0),
-        "approach_growth is 0",
+        &ServoSettings::paper(),
+        |settings| settings.check(),
+        &[
+            (|s| s.gain = 0.0, "gain is 0"),
+            (|s| s.model.ball_radius = 0.0, "radius of the ball is 0"),
+            (
+                |s| s.model.mount.rotation.as_mut_unchecked().i = 2.0,
+                "unit quaternion",
+            ),
+        ],
     );
     let BehaviourPair { centering, .. } = BehaviourPair::paper_mended();
-    refused(&centering, "/inputs", json!(["X"]), "1 inputs");
+    let joined = |spec: BehaviourSpec| {
+        let table = QTable::new(42, 9).unwrap();
+        Behaviour::new(spec, table).map(drop)
+    };
     refused(
-        &centering.goal[0],
-        "/low",
-        json!(500.0),
-        "goal of X is from 500",
-    );
-    refused(
-        &centering.moves[0],
-        "/degrees",
-        json!([]),
-        "JT1 has no steps",
-    );
-    refused(
-        &centering.reward,
-        "/floor",
-        json!(-1.0),
-        "floor of its reward is -1",
+        &centering,
+        joined,
+        &[
+            (|s| s.inputs.truncate(1), "1 inputs"),
+            (|s| s.goal[0].low = 500.0, "goal of X is from 500"),
+            (|s| s.moves[0].degrees.clear(), "JT1 has no steps"),
+            (|s| s.reward.floor = -1.0, "floor of its reward is -1"),
+        ],
     );
 }

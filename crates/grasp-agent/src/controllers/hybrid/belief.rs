@@ -3,20 +3,17 @@
 use hough_heuristic::Features;
 use nalgebra::{Matrix3, Point3};
 use puma_val2::Joints;
+use serde::{Deserialize, Serialize};
 
-#[cfg(feature = "serde")]
 use crate::checked::above_zero;
-use crate::checked::checked;
 use crate::controllers::hybrid::parameters::{
     Information, LEARNED, Numbers, corrected, sensitivity, vector,
 };
-#[cfg(feature = "serde")]
 use crate::error::BehaviourError;
 use crate::sight::camera_model::CameraModel;
 
 /// Expected errors of an uncalibrated cell, as standard deviations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
     /// Logarithm of the focal length \[0.3\].
     pub focal: f64,
@@ -32,15 +29,6 @@ pub struct Prior {
     pub play: f64,
 }
 
-checked!(Prior {
-    focal: f64,
-    centre: f64,
-    turn: f64,
-    shift: f64,
-    radius: f64,
-    play: f64,
-});
-
 impl Prior {
     /// Returns the errors of a cell set up by eye: the values in the brackets of the fields.
     pub fn by_eye() -> Self {
@@ -55,7 +43,6 @@ impl Prior {
     }
 
     /// Validates that each standard deviation is above zero.
-    #[cfg(feature = "serde")]
     pub(crate) fn check(&self) -> Result<(), String> {
         let deviations = self.deviations();
         deviations
@@ -84,60 +71,13 @@ impl Prior {
 /// principal point (feature units); rotation of the camera about its x, y and z axes (radians) and
 /// translation along them (metres); logarithm of the ball's radius over the nominal one; backlash
 /// of `JT1`, `JT2` and `JT3` (whole width, radians).
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(try_from = "Unchecked")
-)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
-    mean: Vec<f64>,
-    /// Inverse of the covariance, column by column.
-    information: Vec<f64>,
+    mean: Numbers,
+    /// Inverse of the covariance.
+    information: Information,
     /// Standard deviation of the image noise, feature units.
     noise: f64,
-}
-
-/// Serialized form, before validation.
-#[cfg(feature = "serde")]
-#[derive(serde::Deserialize)]
-struct Unchecked {
-    mean: Vec<f64>,
-    information: Vec<f64>,
-    noise: f64,
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<Unchecked> for Belief {
-    type Error = BehaviourError;
-
-    fn try_from(unchecked: Unchecked) -> Result<Self, BehaviourError> {
-        let Unchecked {
-            mean,
-            information,
-            noise,
-        } = unchecked;
-        let mut numbers = mean.iter().chain(&information);
-        let sound = mean.len() == LEARNED
-            && information.len() == LEARNED * LEARNED
-            && numbers.all(|v| v.is_finite())
-            && noise.is_finite()
-            && noise > 0.0;
-        if sound {
-            Ok(Self {
-                mean,
-                information,
-                noise,
-            })
-        } else {
-            Err(BehaviourError::Text {
-                what:
-                    "a belief needs thirteen finite means, their information matrix, and a noise \
-                       above 0"
-                        .into(),
-            })
-        }
-    }
 }
 
 /// Image noise assumed at first, feature units.
@@ -156,20 +96,20 @@ impl Belief {
 
     pub(crate) fn of(mean: Numbers, information: Information, noise: f64) -> Self {
         Self {
-            mean: mean.as_slice().to_vec(),
-            information: information.as_slice().to_vec(),
+            mean,
+            information,
             noise,
         }
     }
 
     /// Returns the means of the thirteen parameters.
     pub fn mean(&self) -> &[f64] {
-        &self.mean
+        self.mean.as_slice()
     }
 
     /// Returns the standard deviations of the thirteen parameters.
     pub fn deviations(&self) -> Vec<f64> {
-        let covariance = self.information_matrix().try_inverse();
+        let covariance = self.information.try_inverse();
         (0..LEARNED)
             .map(|i| covariance.map_or(f64::INFINITY, |c| c[(i, i)].max(0.0).sqrt()))
             .collect()
@@ -188,14 +128,14 @@ impl Belief {
             return self;
         }
         let change = (prior.deviations() * share).map(|s| s * s);
-        let information = self.information_matrix().try_inverse();
+        let information = self.information.try_inverse();
         let information =
             information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());
         let Some(information) = information.filter(|i| i.iter().all(|v| v.is_finite())) else {
             return self.clone();
         };
         Self::of(
-            self.numbers(),
+            self.mean,
             0.5 * (information + information.transpose()),
             self.noise,
         )
@@ -211,7 +151,7 @@ impl Belief {
         features: &Features,
     ) -> Self {
         const ITERATIONS: usize = 10;
-        let (before, prior) = (self.numbers(), self.information_matrix());
+        let (before, prior) = (self.mean, self.information);
         let view =
             |numbers: &Numbers, ball: &Point3<f64>| corrected(nominal, numbers).view(joints, ball);
         let (mut numbers, mut information) = (before, prior);
@@ -251,32 +191,29 @@ impl Belief {
 
     /// Returns `nominal` with the estimated corrections.
     pub fn corrected(&self, nominal: &CameraModel) -> CameraModel {
-        corrected(nominal, &self.numbers())
+        corrected(nominal, &self.mean)
     }
 
     pub(crate) fn numbers(&self) -> Numbers {
-        Numbers::from_iterator(
-            self.mean
-                .iter()
-                .copied()
-                .chain(std::iter::repeat(0.0))
-                .take(LEARNED),
-        )
+        self.mean
     }
 
-    pub(crate) fn information_matrix(&self) -> Information {
-        let values = self
-            .information
-            .iter()
-            .copied()
-            .chain(std::iter::repeat(0.0));
-        Information::from_iterator(values.take(LEARNED * LEARNED))
+    pub(crate) fn information(&self) -> &Information {
+        &self.information
+    }
+
+    /// Checks that the numbers are finite and the noise is above zero.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let mut numbers = self.mean.iter().chain(&self.information);
+        if !numbers.all(|v| v.is_finite()) {
+            return Err("a number of the belief is not finite".into());
+        }
+        above_zero("the noise of the belief", self.noise)
     }
 }
 
-#[cfg(feature = "serde")]
 impl Belief {
-    const FILE_KIND: &str = "grasp-agent belief/1";
+    const FILE_KIND: &str = "grasp-agent belief/2";
 
     /// Writes the belief to `path`, atomically.
     ///

@@ -4,7 +4,6 @@ use hough_heuristic::Features;
 use nalgebra::{Point3, SMatrix, Vector3};
 use puma_val2::{Joint, JointDelta, Joints};
 
-#[cfg(feature = "serde")]
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::controllers::hybrid::belief::Belief;
@@ -389,10 +388,8 @@ impl Controller for Hybrid {
         "hybrid"
     }
 
-    #[cfg(feature = "serde")]
     fn save(&self) -> Option<SavedController> {
-        let data = (self.settings, self.belief.clone());
-        Some(SavedController::new("hybrid", data))
+        SavedController::new("hybrid", (self.settings, &self.belief))
     }
 }
 

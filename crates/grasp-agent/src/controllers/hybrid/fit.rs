@@ -41,7 +41,7 @@ impl Fit {
         evidence: &[&Evidence],
     ) -> Option<Self> {
         let before = belief.numbers();
-        let prior = belief.information_matrix();
+        let prior = *belief.information();
         let noise = belief.noise();
         let model = corrected(nominal, start);
         let mut numbers = *start;

@@ -1,20 +1,17 @@
 //! Settings of the hybrid controller.
 
 use hough_heuristic::Features;
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
-use crate::checked::checked;
+use crate::checked::check_goal;
 use crate::controllers::hybrid::belief::Prior;
-#[cfg(feature = "serde")]
-use crate::controllers::servo::settings::check_goal;
-use crate::limits::JointLimits;
-#[cfg(feature = "serde")]
-use crate::limits::check_steps;
+use crate::error::BehaviourError;
+use crate::limits::{JointLimits, check_steps};
 use crate::sight::camera_model::CameraModel;
 
 /// Settings of a [`Hybrid`](crate::Hybrid).
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HybridSettings {
     /// Nominal camera and arm.
     pub nominal: CameraModel,
@@ -43,19 +40,6 @@ pub struct HybridSettings {
     pub grip_certainty: f64,
 }
 
-checked!(HybridSettings {
-    nominal: CameraModel,
-    prior: Prior,
-    drift: f64,
-    goal: Features,
-    steps: [f64; 3],
-    caution: f64,
-    memory: usize,
-    grip_turn: f64,
-    grip_aside: f64,
-    grip_certainty: f64,
-});
-
 impl HybridSettings {
     /// Returns the default settings.
     pub fn paper() -> Self {
@@ -73,30 +57,25 @@ impl HybridSettings {
         }
     }
 
-    /// Validates the settings.
-    #[cfg(feature = "serde")]
-    pub(crate) fn check(&self) -> Result<(), String> {
+    /// Checks the settings, for example after they were read from a file.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Settings`] names the setting that cannot work.
+    pub fn check(&self) -> Result<(), BehaviourError> {
         self.nominal.check()?;
         self.prior.check()?;
         check_goal(&self.goal)?;
         check_steps(&self.steps)?;
-        for (name, value) in [
-            ("drift", self.drift),
-            ("caution", self.caution),
-            ("grip_certainty", self.grip_certainty),
+        for (name, value, least) in [
+            ("drift", self.drift, 0.0),
+            ("caution", self.caution, 0.0),
+            ("grip_certainty", self.grip_certainty, 0.0),
+            ("grip_turn", self.grip_turn, f64::MIN),
+            ("grip_aside", self.grip_aside, f64::MIN),
         ] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(format!(
-                    "{name} is {value}; expected a finite number, 0 or more"
-                ));
-            }
-        }
-        for (name, value) in [
-            ("grip_turn", self.grip_turn),
-            ("grip_aside", self.grip_aside),
-        ] {
-            if !value.is_finite() {
-                return Err(format!("{name} is {value}; expected a finite number"));
+            if !(value.is_finite() && value >= least) {
+                let allowed = if least < 0.0 { "" } else { ", 0 or more" };
+                return Err(format!("{name} is {value}; expected a finite number{allowed}").into());
             }
         }
         Ok(())

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 use puma_val2::{JointDelta, Joints};
+use serde::{Deserialize, Serialize};
 
-#[cfg(feature = "serde")]
 use crate::controller::SavedController;
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::controllers::servo::fuzzy::Rules;
@@ -12,8 +12,7 @@ use crate::controllers::servo::settings::ServoSettings;
 use crate::percept::Sighting;
 
 /// Law by which a [`Servo`] computes its moves: the alternatives that the paper names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ServoLaw {
     /// Position-based visual servoing (Hutchinson, Hager, Corke 1996, section V): locates the ball
     /// by the camera model, and removes the error of the arm's pose in joint space.
@@ -159,8 +158,7 @@ impl Controller for Servo {
         }
     }
 
-    #[cfg(feature = "serde")]
     fn save(&self) -> Option<SavedController> {
-        Some(SavedController::new("servo", (self.law, self.settings)))
+        SavedController::new("servo", (self.law, self.settings))
     }
 }

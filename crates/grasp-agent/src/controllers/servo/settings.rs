@@ -1,19 +1,16 @@
 //! Settings of the servo controllers.
 
 use hough_heuristic::Features;
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::spec::GoalInterval;
-#[cfg(feature = "serde")]
-use crate::checked::above_zero;
-use crate::checked::checked;
-use crate::limits::JointLimits;
-#[cfg(feature = "serde")]
-use crate::limits::check_steps;
+use crate::checked::{above_zero, check_goal};
+use crate::error::BehaviourError;
+use crate::limits::{JointLimits, check_steps};
 use crate::sight::camera_model::CameraModel;
 
 /// Settings common to all servo controllers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ServoSettings {
     /// Camera and arm as they are believed to be.
     pub model: CameraModel,
@@ -26,13 +23,6 @@ pub struct ServoSettings {
     /// [`JointLimits::PAPER_STEPS`]).
     pub steps: [f64; 3],
 }
-
-checked!(ServoSettings {
-    model: CameraModel,
-    goal: Features,
-    gain: f64,
-    steps: [f64; 3],
-});
 
 impl ServoSettings {
     /// Pose with the ball at the goal, degrees: the median over reachable balls.
@@ -48,27 +38,20 @@ impl ServoSettings {
         }
     }
 
-    #[cfg(feature = "serde")]
-    fn check(&self) -> Result<(), String> {
-        self.model.check()?;
-        check_goal(&self.goal)?;
-        above_zero("gain", self.gain)?;
-        check_steps(&self.steps)
-    }
-
     /// Returns the settings with another gain.
     #[must_use]
     pub fn with_gain(self, gain: f64) -> Self {
         Self { gain, ..self }
     }
-}
 
-/// Checks that a ball can have these features.
-#[cfg(feature = "serde")]
-pub(crate) fn check_goal(goal: &Features) -> Result<(), String> {
-    let Features { x, y, r } = *goal;
-    if !(x.is_finite() && y.is_finite()) {
-        return Err(format!("the goal is at {x}, {y}, which is not finite"));
+    /// Checks the settings, for example after they were read from a file.
+    ///
+    /// # Errors
+    /// [`BehaviourError::Settings`] names the setting that cannot work.
+    pub fn check(&self) -> Result<(), BehaviourError> {
+        self.model.check()?;
+        check_goal(&self.goal)?;
+        above_zero("gain", self.gain)?;
+        Ok(check_steps(&self.steps)?)
     }
-    above_zero("the radius of the goal", r)
 }

@@ -8,18 +8,21 @@ use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints};
 use crate::controller::{Decision, Feedback};
 use crate::error::AgentError;
 use crate::percept::Sighting;
-use crate::run::event::{EventKind, Order, RunEvent};
-use crate::run::gripper::{Hand, Went};
+use crate::run::event::{EventKind, RunEvent};
 use crate::run::state_machine::Run;
-use crate::run::supervision::Verdict;
 
-impl Hand for Run<'_> {
-    fn joints(&self) -> Joints {
-        self.joints
-    }
+/// Result of an order to move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Went {
+    /// The arm stands where it was sent.
+    There,
+    /// Something was too near; the arm has gone back to where it came from.
+    Back,
+}
 
+impl Run<'_> {
     /// Looks for the ball from where the arm stands, a few times if need be.
-    fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
+    pub(super) fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
         for _ in 0..self.config.looks {
             let ball = self.devices.eye.look()?;
             // A user-supplied detector might find anything.
@@ -51,28 +54,23 @@ impl Hand for Run<'_> {
         Ok(None)
     }
 
-    fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError> {
+    pub(super) fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError> {
         let from = self.joints;
         let answer = self.devices.arm.move_by(delta);
-        let went = self.arrive(Order::MoveBy(delta), answer, from + delta, done)?;
+        let went = self.arrive(answer, from + delta, done)?;
         self.back_if_near(went, from)
     }
 
-    fn go_to(&mut self, target: Joints, done: EventKind) -> Result<Went, AgentError> {
+    pub(super) fn go_to(&mut self, target: Joints, done: EventKind) -> Result<Went, AgentError> {
         let from = self.joints;
         let answer = self.devices.arm.move_to(target);
-        let went = self.arrive(Order::MoveTo(target), answer, target, done)?;
+        let went = self.arrive(answer, target, done)?;
         self.back_if_near(went, from)
     }
 
-    fn set_jaws(&mut self, jaws: Gripper) -> Result<(), AgentError> {
+    pub(super) fn set_jaws(&mut self, jaws: Gripper) -> Result<(), AgentError> {
         let done = self.devices.arm.set_gripper(jaws);
-        self.answered(
-            Order::Jaws {
-                close: jaws == Gripper::Closed,
-            },
-            done,
-        )?;
+        self.answered(jaws_order(jaws), done)?;
         self.closed = jaws == Gripper::Closed;
         if self.closed {
             self.tell(EventKind::Gripped);
@@ -80,7 +78,7 @@ impl Hand for Run<'_> {
         Ok(())
     }
 
-    fn aim(&mut self, seen: &Sighting) -> Option<JointDelta> {
+    pub(super) fn aim(&mut self, seen: &Sighting) -> Option<JointDelta> {
         let request = self.request(true);
         let own = match self.controller.decide(seen, &request) {
             Ok(Decision::Grip(delta)) => Some(delta),
@@ -95,6 +93,17 @@ impl Hand for Run<'_> {
         };
         let admitted = request.limits.admit(&(self.joints + delta));
         admitted.then_some(delta)
+    }
+}
+
+/// Order to stop, in [`EventKind::Unanswered`].
+pub(crate) const STOP: &str = "stop";
+
+/// Returns the order to the jaws, in [`EventKind::Unanswered`].
+pub(crate) fn jaws_order(jaws: Gripper) -> &'static str {
+    match jaws {
+        Gripper::Closed => "close the jaws",
+        Gripper::Open => "open the jaws",
     }
 }
 
@@ -127,8 +136,7 @@ impl Run<'_> {
     /// Goes back the way the arm came. If that is barred too, the arm stays where it is.
     pub(super) fn take_back(&mut self, from: Joints) -> Result<(), AgentError> {
         let answer = self.devices.arm.move_to(from);
-        self.arrive(Order::MoveTo(from), answer, from, EventKind::TakenBack)
-            .map(drop)
+        self.arrive(answer, from, EventKind::TakenBack).map(drop)
     }
 
     fn back_if_near(&mut self, went: Went, from: Joints) -> Result<Went, AgentError> {
@@ -142,7 +150,6 @@ impl Run<'_> {
     /// Stops the arm if something is too near.
     fn arrive(
         &mut self,
-        order: Order,
         answer: Result<Joints, ArmError>,
         target: Joints,
         done: EventKind,
@@ -158,37 +165,36 @@ impl Run<'_> {
             }
             Err(error) => Err(error),
         };
-        let (reached, halted, fault) = self.answered(order, answer)?;
+        let (reached, halted, fault) = self.answered(&format!("move to {target}"), answer)?;
         let stands = self.stand_at(reached);
         self.tell(done);
         stands?;
         let near = halted || self.devices.proximity.object_near()?;
         let supervision = &mut self.modules.supervision;
-        match (supervision.judge_move(&target, &reached, near), fault) {
-            (Verdict::TooNear, _) => {
-                if !halted {
-                    let stopped = self.devices.arm.stop();
-                    self.answered(Order::Stop, stopped)?;
-                }
-                self.tell(EventKind::TooNear);
-                Ok(Went::Back)
+        if supervision.is_too_near(&reached, near) {
+            if !halted {
+                let stopped = self.devices.arm.stop();
+                self.answered(STOP, stopped)?;
             }
-            (_, Some(error)) => Err(error.into()),
-            (Verdict::There, None) => Ok(Went::There),
-            (Verdict::Stuck(joint), None) => Err(ArmError::NotReached {
+            self.tell(EventKind::TooNear);
+            return Ok(Went::Back);
+        }
+        let fault = fault.or_else(|| {
+            let joint = supervision.stuck(&target, &reached)?;
+            Some(ArmError::NotReached {
                 port: "the arm".into(),
                 joint,
                 wanted_degrees: target[joint].to_degrees(),
                 reported_degrees: reached[joint].to_degrees(),
-            }
-            .into()),
-        }
+            })
+        });
+        fault.map_or(Ok(Went::There), |fault| Err(fault.into()))
     }
 
     /// Passes the answer to `order` on, and reports [`EventKind::Unanswered`] for an error.
-    fn answered<T>(&mut self, order: Order, answer: Result<T, ArmError>) -> Result<T, AgentError> {
+    fn answered<T>(&mut self, order: &str, answer: Result<T, ArmError>) -> Result<T, AgentError> {
         if answer.is_err() {
-            self.tell(EventKind::Unanswered(order));
+            self.tell(EventKind::Unanswered(order.into()));
         }
         Ok(answer?)
     }

@@ -1,5 +1,7 @@
 //! A run under way: the state machine, which links the modules and reports every transition.
 
+use std::mem::discriminant;
+
 use hough_heuristic::image::GrayImage;
 use puma_val2::{Gripper, Joints, Manipulator, ProximitySensor};
 
@@ -7,16 +9,19 @@ use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::error::AgentError;
 use crate::percept::{Percept, Sighting};
 use crate::run::config::AgentConfig;
-use crate::run::event::{EventKind, Phase, RunEvent, RunOutcome};
-use crate::run::gripper::{GripEnd, GripperActivation, Hand, Went, is_same_place};
-use crate::run::search::{Search, Viewpoint};
+use crate::run::event::{EventKind, RunEvent, RunOutcome};
+use crate::run::search::Search;
 use crate::run::supervision::Supervision;
 use crate::sight::eye::Eye;
 use crate::sight::frozen::FrozenCheck;
 
 mod acting;
+mod gripping;
 
-/// Number of moves taken back that is too many.
+use acting::Went;
+pub(crate) use acting::{STOP, jaws_order};
+
+/// Number of moves taken back, or of barred ways of the gripper to the ball, that is too many.
 const OFTEN: usize = 3;
 
 /// Modules that a user can replace, beside the controller.
@@ -34,7 +39,7 @@ pub(crate) struct Devices<'a> {
     pub(crate) proximity: &'a mut dyn ProximitySensor,
 }
 
-/// State of the state machine: a [`Phase`] and the data that it begins with.
+/// State of the state machine that the crate documentation draws, and the data that it begins with.
 #[derive(Clone, Copy, Debug)]
 enum State {
     Search,
@@ -63,18 +68,7 @@ enum Gone {
 }
 
 impl State {
-    fn phase(&self) -> Phase {
-        match self {
-            Self::Search => Phase::Search,
-            Self::Reach(_) => Phase::Reach,
-            Self::Recover { .. } => Phase::Recover,
-            Self::Grip { .. } => Phase::Grip,
-            Self::End(_) => Phase::End,
-        }
-    }
-
-    /// Returns the event of entering this state from another phase: the inverse of
-    /// [`EventKind::enters`].
+    /// Returns the event of entering this state from another one.
     fn entry(&self) -> EventKind {
         match *self {
             Self::Search => EventKind::Searching,
@@ -97,7 +91,6 @@ pub(crate) struct Run<'a> {
     config: &'a AgentConfig,
     controller: &'a mut dyn Controller,
     modules: &'a mut Modules,
-    gripper: GripperActivation,
     camera: &'a mut FrozenCheck,
     devices: Devices<'a>,
     observe: &'a mut dyn FnMut(&RunEvent<'_>),
@@ -115,6 +108,10 @@ pub(crate) struct Run<'a> {
     first_seen: Option<Sighting>,
     /// `true` if the ball has shown in more than one place of the image since then.
     wandered: bool,
+    /// Barred ways of the gripper to the ball in this run.
+    barred_grips: usize,
+    /// `true` if the last of them was aimed by the controller.
+    own_barred: bool,
 }
 
 impl<'a> Run<'a> {
@@ -129,7 +126,6 @@ impl<'a> Run<'a> {
         Self {
             config,
             controller,
-            gripper: GripperActivation::new(config, *modules.supervision.limits()),
             modules,
             camera,
             devices,
@@ -143,6 +139,8 @@ impl<'a> Run<'a> {
             barred: 0,
             first_seen: None,
             wandered: false,
+            barred_grips: 0,
+            own_barred: false,
         }
     }
 
@@ -179,7 +177,7 @@ impl<'a> Run<'a> {
                     });
                 }
             };
-            if next.phase() != state.phase() {
+            if discriminant(&next) != discriminant(&state) {
                 self.tell(next.entry());
             }
             if let State::Recover { why, .. } = next {
@@ -203,7 +201,7 @@ impl<'a> Run<'a> {
             let Some(view) = self.modules.search.next_view(&self.joints, barred) else {
                 break;
             };
-            match self.look_from(&view, EventKind::AtSearchPose(view.number))? {
+            match self.look_from(view, EventKind::AtSearchPose(view.0))? {
                 View::Ball(ball) => return Ok(State::Reach(ball)),
                 came => barred = matches!(came, View::Barred),
             }
@@ -218,14 +216,17 @@ impl<'a> Run<'a> {
         Ok(State::End(Some(reason)))
     }
 
-    /// Looks from the pose nearest to that of `view` within the limits.
-    fn look_from(&mut self, view: &Viewpoint, there: EventKind) -> Result<View, AgentError> {
+    /// Looks from the pose nearest to `pose` within the limits.
+    fn look_from(
+        &mut self,
+        (number, pose): (usize, Joints),
+        there: EventKind,
+    ) -> Result<View, AgentError> {
         // A user-supplied search might name anything.
-        if let Some(joint) = view.pose.non_finite() {
-            let number = view.number;
+        if let Some(joint) = pose.non_finite() {
             return Err(AgentError::Viewpoint { number, joint });
         }
-        let target = self.modules.supervision.limits().nearest(&view.pose);
+        let target = self.modules.supervision.limits().nearest(&pose);
         Ok(match self.go_to(target, there)? {
             Went::Back => View::Barred,
             Went::There => self.look()?.map_or(View::Nothing, View::Ball),
@@ -325,80 +326,12 @@ impl<'a> Run<'a> {
                 return Ok(State::End(Some(GaveUp::OutOfCycles)));
             }
             self.cycles += 1;
-            match self.look_from(&view, EventKind::Recovering(view.number))? {
+            match self.look_from(view, EventKind::Recovering(view.0))? {
                 View::Ball(ball) => return Ok(State::Reach(ball)),
                 came => barred = matches!(came, View::Barred),
             }
         }
         Ok(State::Search)
-    }
-
-    /// Activates the gripper and decides how to go on from its result.
-    fn grip(&mut self, seen: &Sighting, at_goal: bool) -> Result<State, AgentError> {
-        let from = self.joints;
-        let (mut gripper, wandered) = (self.gripper.clone(), self.wandered);
-        let end = gripper.activate(self, seen, at_goal, wandered);
-        self.gripper = gripper;
-        let end = end?;
-        if !matches!(
-            end,
-            GripEnd::Unseen | GripEnd::Elsewhere(_) | GripEnd::NoMove(_)
-        ) {
-            self.taken_back = 0;
-        }
-        Ok(match end {
-            GripEnd::Held(ball) => self.end_with(ball, None),
-            GripEnd::Unknown(ball, reason) => self.end_with(ball, Some(reason)),
-            GripEnd::Missed(ball) => {
-                // Sightings in the meantime were not of the ball in its place.
-                self.last_seen = Some(ball);
-                self.controller.notice(&Feedback::Missed);
-                State::Recover {
-                    ball,
-                    from,
-                    why: Gone::Missed,
-                }
-            }
-            GripEnd::Unseen => {
-                self.cycles += 1;
-                lost(*seen, self.joints)
-            }
-            GripEnd::Elsewhere(ball) => {
-                // Costs a cycle: both looks can be at the goal, and no move is made between them.
-                self.cycles += 1;
-                if self.cycles >= self.config.max_cycles {
-                    State::End(Some(GaveUp::OutOfCycles))
-                } else {
-                    State::Reach(ball)
-                }
-            }
-            GripEnd::NoMove(_) if at_goal => State::End(Some(GaveUp::NoMoveLeft)),
-            GripEnd::NoMove(ball) => {
-                if std::mem::take(&mut self.taken_back) >= OFTEN {
-                    State::Search
-                } else {
-                    State::Reach(ball)
-                }
-            }
-            GripEnd::Barred | GripEnd::BarredAgain => {
-                self.controller.notice(&Feedback::Missed);
-                self.cycles += 1;
-                if end == GripEnd::BarredAgain {
-                    return Ok(State::End(Some(GaveUp::Obstructed)));
-                }
-                match self.look()? {
-                    Some(ball) => State::Reach(ball),
-                    None => lost(*seen, self.joints),
-                }
-            }
-        })
-    }
-
-    /// Ends the run with the ball as it was before the jaws closed: sightings in the meantime were
-    /// not of the ball in its place.
-    fn end_with(&mut self, ball: Sighting, gave_up: Option<GaveUp>) -> State {
-        self.last_seen = Some(ball);
-        State::End(gave_up)
     }
 
     fn request(&self, grip: bool) -> Request {
@@ -447,4 +380,10 @@ fn lost(ball: Sighting, from: Joints) -> State {
         from,
         why: Gone::Lost,
     }
+}
+
+/// Returns `true` if two sightings from one pose can be of one ball, given the noise of a camera.
+fn is_same_place(a: &Sighting, b: &Sighting) -> bool {
+    let (a, b) = (a.features, b.features);
+    (a.x - b.x).abs() < 10.0 && (a.y - b.y).abs() < 10.0 && (a.r - b.r).abs() < 6.0
 }
