@@ -28,7 +28,7 @@ fn simulate(percept: &Percept, delta: &JointDelta) -> Option<Percept> {
 fn start(rng: &mut dyn Rng) -> Percept {
     let (x, y, r) = (rng.random_range(0.0..Features::WIDTH), 72.0, 33.0);
     Percept {
-        features: Features { x, y, r },
+        features: Features::new(x, y, r),
         theta3: 0.0,
     }
 }

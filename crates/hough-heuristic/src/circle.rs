@@ -38,6 +38,11 @@ impl Features {
     /// Height of a frame in feature units.
     pub const HEIGHT: f64 = 144.0;
 
+    /// Creates features from a centre and a radius, units.
+    pub const fn new(x: f64, y: f64, r: f64) -> Self {
+        Self { x, y, r }
+    }
+
     /// Returns the features of `circle`, found in a frame `frame_width` pixels wide.
     ///
     /// Pixels are square, so one scale serves both axes. A frame of width 0 has no circles; it

@@ -92,7 +92,7 @@ impl BehaviourSpec {
     ///         (0.0..192.0).contains(&next.features.x).then_some(next)
     ///     };
     ///     let start = |rng: &mut dyn Rng| Percept {
-    ///         features: Features { x: rng.random_range(0.0..192.0), y: 72.0, r: 33.0 },
+    ///         features: Features::new(rng.random_range(0.0..192.0), 72.0, 33.0),
     ///         theta3: 0.0,
     ///     };
     ///     let settings = LearningSettings::paper(20_000)?;
@@ -267,7 +267,7 @@ mod tests {
     fn actions_that_lose_the_ball_in_a_trial_are_removed() {
         let spec = BehaviourSpec::approaching_fine();
         let seen = |y, r| Percept {
-            features: Features { x: 98.7, y, r },
+            features: Features::new(98.7, y, r),
             theta3: 40.0,
         };
         // One state, from whose corner the longest move toward the ball loses it.

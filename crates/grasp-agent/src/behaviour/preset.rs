@@ -109,7 +109,7 @@ mod tests {
             .flat_map(|(x, y)| [32.0, 34.0].map(|r| (x, y, r)))
         {
             let pose = |jt5| Joints::from_degrees([0.0, -53.0, 186.2, 0.0, jt5, 0.0]);
-            let ball = model.locate(&pose(45.0), &Features { x, y, r }).unwrap();
+            let ball = model.locate(&pose(45.0), &Features::new(x, y, r)).unwrap();
             worst = worst.max((model.tool_point(&pose(45.0 - 18.01)) - ball).norm());
         }
         worst

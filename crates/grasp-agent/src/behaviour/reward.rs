@@ -143,7 +143,7 @@ mod tests {
 
     fn percept(x: f64, y: f64, r: f64) -> Percept {
         Percept {
-            features: Features { x, y, r },
+            features: Features::new(x, y, r),
             theta3: 0.0,
         }
     }

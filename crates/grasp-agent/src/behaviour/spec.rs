@@ -81,11 +81,7 @@ impl GoalInterval {
 
     /// Returns the features in the middle of the paper's goal intervals: (103.5, 78, 33).
     pub(crate) fn paper_features() -> Features {
-        Features {
-            x: Self::X.middle(),
-            y: Self::Y.middle(),
-            r: Self::R.middle(),
-        }
+        Features::new(Self::X.middle(), Self::Y.middle(), Self::R.middle())
     }
 
     /// Returns the middle.
@@ -370,7 +366,7 @@ mod tests {
 
     fn percept(x: f64, y: f64, r: f64, theta3: f64) -> Percept {
         Percept {
-            features: Features { x, y, r },
+            features: Features::new(x, y, r),
             theta3,
         }
     }

@@ -35,11 +35,7 @@ where
     /// for the value of an absorbing goal.
     pub fn new(spec: &'a BehaviourSpec, gamma: f64, simulate: M, start: S) -> Self {
         let now = Percept {
-            features: Features {
-                x: 0.0,
-                y: 0.0,
-                r: 0.0,
-            },
+            features: Features::new(0.0, 0.0, 0.0),
             theta3: 0.0,
         };
         Self {

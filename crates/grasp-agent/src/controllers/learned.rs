@@ -12,13 +12,15 @@ use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::controllers::taught_goal::TaughtGoal;
 use crate::error::BehaviourError;
 use crate::percept::{Percept, Sighting};
+use crate::record::policy_json::PolicyJson;
 
 /// The paper's controller (section 3): centering and approaching, each of which chooses for its own
 /// joints in every cycle.
 ///
 /// It is frozen unless [`Learned::learning`] is called. Learning at work is one-step Q-learning by
 /// the rewards of the specifications; moves out of the working limits are never tried.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(into = "PolicyJson", try_from = "PolicyJson")]
 pub struct Learned {
     centering: Half,
     approaching: Half,
@@ -82,18 +84,12 @@ impl OnlineLearning {
     }
 
     fn check(&self) -> Result<(), String> {
-        let Self {
-            gamma,
-            alpha,
-            temperature,
-            ..
-        } = *self;
-        let (name, value, allowed) = if !(0.0..1.0).contains(&gamma) {
-            ("gamma", gamma, "0 or above, and below 1")
-        } else if !(0.0..=1.0).contains(&alpha) {
-            ("alpha", alpha, "from 0 to 1")
-        } else if !(1e-6..=1e6).contains(&temperature) {
-            ("temperature", temperature, "from 1e-6 to 1e6")
+        let (name, value, allowed) = if !(0.0..1.0).contains(&self.gamma) {
+            ("gamma", self.gamma, "0 or above, and below 1")
+        } else if !(0.0..=1.0).contains(&self.alpha) {
+            ("alpha", self.alpha, "from 0 to 1")
+        } else if !(1e-6..=1e6).contains(&self.temperature) {
+            ("temperature", self.temperature, "from 1e-6 to 1e6")
         } else {
             return Ok(());
         };
@@ -142,11 +138,9 @@ impl Learned {
     #[must_use]
     pub fn with_kappa(mut self, centering: f64, approaching: f64) -> Self {
         let sound = |kappa: f64| {
-            if kappa.is_finite() {
-                kappa.max(0.0)
-            } else {
-                0.0
-            }
+            Some(kappa)
+                .filter(|k| k.is_finite() && *k > 0.0)
+                .unwrap_or(0.0)
         };
         (self.centering.kappa, self.approaching.kappa) = (sound(centering), sound(approaching));
         self

@@ -37,11 +37,7 @@ impl TaughtGoal {
             let interval = intervals.iter().find(|interval| interval.input == input)?;
             Some(0.5 * (interval.low + interval.high))
         };
-        let untaught = Features {
-            x: middle(Input::X)?,
-            y: middle(Input::Y)?,
-            r: middle(Input::R)?,
-        };
+        let untaught = Features::new(middle(Input::X)?, middle(Input::Y)?, middle(Input::R)?);
         let goal = Self {
             untaught,
             taught: seen,
@@ -106,11 +102,11 @@ impl TaughtGoal {
         } = self;
         let seen = ball.features;
         Sighting {
-            features: Features {
-                x: seen.x + untaught.x - taught.x,
-                y: seen.y + untaught.y - taught.y,
-                r: seen.r * untaught.r / taught.r,
-            },
+            features: Features::new(
+                seen.x + untaught.x - taught.x,
+                seen.y + untaught.y - taught.y,
+                seen.r * untaught.r / taught.r,
+            ),
             ..*ball
         }
     }
@@ -126,11 +122,7 @@ mod tests {
     fn intervals_and_sightings_move_with_the_goal() {
         let paper = AgentConfig::paper([Joints::default()]);
         let (intervals, grip) = (paper.goal.clone(), paper.grip);
-        let seen = Features {
-            x: 90.0,
-            y: 95.0,
-            r: 36.0,
-        };
+        let seen = Features::new(90.0, 95.0, 36.0);
         let new = |intervals: &[_], seen| TaughtGoal::new(intervals, seen, Joints::default(), grip);
         let goal = new(&intervals, seen).unwrap();
         let moved = goal.intervals(&intervals);
@@ -146,11 +138,7 @@ mod tests {
             (0.0, -4.1, 0.0),
             (0.0, 0.0, -1.2),
         ] {
-            let features = Features {
-                x: seen.x + dx,
-                y: seen.y + dy,
-                r: seen.r + dr,
-            };
+            let features = Features::new(seen.x + dx, seen.y + dy, seen.r + dr);
             let there = Sighting::new(features);
             assert_eq!(
                 holds(&moved, &there),

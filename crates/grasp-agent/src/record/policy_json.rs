@@ -1,7 +1,7 @@
 //! The paper's controller as JSON: two behaviours, their repetition penalty and the joint limits.
 
 use puma_val2::{Joint, PumaParams};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
+use serde::{Deserialize, Serialize};
 
 use crate::behaviour::policy::{Behaviour, LOST_WEIGHT};
 use crate::controllers::learned::Learned;
@@ -11,21 +11,16 @@ use crate::record::behaviour_json::{BehaviourJson, bad, check_format, pretty};
 
 const FORMAT: &str = "grasp-agent policy 1";
 
-/// Serialized form of a [`Learned`] with the limits that it keeps the joints in.
+/// Serialized form of a [`Learned`], with the limits that it keeps the joints in where it is a
+/// document of its own.
 #[derive(Debug, Serialize, Deserialize)]
-struct PolicyJson {
+pub(crate) struct PolicyJson {
     format: String,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     words: Vec<String>,
     /// Lowest and highest angle of each joint, `JT1` first.
-    limits_degrees: [[f64; 2]; 6],
-    #[serde(flatten)]
-    controller: LearnedJson,
-}
-
-/// Serialized form of a [`Learned`].
-#[derive(Debug, Serialize, Deserialize)]
-struct LearnedJson {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    limits_degrees: Option<[[f64; 2]; 6]>,
     loop_breaker: LoopBreaker,
     centering: BehaviourJson,
     approaching: BehaviourJson,
@@ -61,10 +56,9 @@ impl Learned {
     pub fn to_json(&self, limits: &JointLimits) -> String {
         let degrees = |(low, high): (f64, f64)| [low, high].map(|end| rounded(end.to_degrees()));
         pretty(&PolicyJson {
-            format: FORMAT.into(),
             words: WORDS.map(Into::into).into(),
-            limits_degrees: limits.0.map(degrees),
-            controller: self.into(),
+            limits_degrees: Some(limits.0.map(degrees)),
+            ..self.clone().into()
         })
     }
 
@@ -79,30 +73,20 @@ impl Learned {
     /// ([`PumaParams::unimation`]), negative repetition penalties, and another `lost_weight`.
     pub fn from_json(text: &str) -> Result<(Self, JointLimits), BehaviourError> {
         let policy: PolicyJson = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
-        check_format(&policy.format, FORMAT)?;
-        let limits = limits_of(policy.limits_degrees)?;
-        Ok((policy.controller.try_into()?, limits))
+        let limits = policy.limits_degrees;
+        let limits = limits_of(limits.ok_or_else(|| bad("missing field `limits_degrees`"))?)?;
+        Ok((policy.try_into()?, limits))
     }
 }
 
 /// Leaves out the joint limits and learning at work.
-impl Serialize for Learned {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        LearnedJson::from(self).serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for Learned {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let json = LearnedJson::deserialize(deserializer)?;
-        json.try_into().map_err(D::Error::custom)
-    }
-}
-
-impl From<&Learned> for LearnedJson {
-    fn from(learned: &Learned) -> Self {
+impl From<Learned> for PolicyJson {
+    fn from(learned: Learned) -> Self {
         let (centering, approaching) = learned.kappa();
         Self {
+            format: FORMAT.into(),
+            words: Vec::new(),
+            limits_degrees: None,
             loop_breaker: LoopBreaker {
                 centering,
                 approaching,
@@ -114,10 +98,11 @@ impl From<&Learned> for LearnedJson {
     }
 }
 
-impl TryFrom<LearnedJson> for Learned {
+impl TryFrom<PolicyJson> for Learned {
     type Error = BehaviourError;
 
-    fn try_from(json: LearnedJson) -> Result<Self, BehaviourError> {
+    fn try_from(json: PolicyJson) -> Result<Self, BehaviourError> {
+        check_format(&json.format, FORMAT)?;
         let breaker = json.loop_breaker;
         for kappa in [breaker.centering, breaker.approaching] {
             if kappa.is_nan() || kappa < 0.0 {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::controller::{Controller, SavedController};
-use crate::error::{AgentError, BehaviourError};
+use crate::error::AgentError;
 use crate::record::behaviour_json::check_format;
 use crate::record::log::{EventLog, numbered};
 use crate::run::agent::Agent;
@@ -31,7 +31,7 @@ use crate::sight::frozen::{FrozenCheck, Shown};
 ///     Ok(())
 /// }
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SavedRun {
     config: AgentConfig,
     controller: Option<SavedController>,
@@ -142,15 +142,10 @@ impl SavedRun {
         // The format comes first, since another one may lack the other parts.
         let head: Head = serde_json::from_str(text).map_err(refused)?;
         let format = check_format(&head.format, FORMAT);
-        format.map_err(|error: BehaviourError| AgentError::SavedRun(error.to_string()))?;
-        let run: Document = serde_json::from_str(text).map_err(refused)?;
+        format.map_err(|error| AgentError::SavedRun(error.to_string()))?;
+        let run: Self = serde_json::from_str(text).map_err(refused)?;
         run.config.check().map_err(AgentError::SavedRun)?;
-        Ok(Self {
-            config: run.config,
-            controller: run.controller,
-            camera: run.camera,
-            log: run.log,
-        })
+        Ok(run)
     }
 }
 
@@ -159,15 +154,6 @@ const FORMAT: &str = "grasp-agent run 3";
 #[derive(Debug, Deserialize)]
 struct Head {
     format: String,
-}
-
-/// Parts of the JSON.
-#[derive(Debug, Deserialize)]
-struct Document {
-    config: AgentConfig,
-    controller: Option<SavedController>,
-    camera: Camera,
-    log: EventLog,
 }
 
 /// Returns JSON in one line. The documents here have text keys only, so writing cannot fail.

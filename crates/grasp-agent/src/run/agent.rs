@@ -3,9 +3,7 @@
 use hough_heuristic::image::GrayImage;
 use puma_val2::{Manipulator, ProximitySensor};
 
-use crate::behaviour::policy::Behaviour;
 use crate::controller::{Controller, Feedback};
-use crate::controllers::learned::Learned;
 use crate::error::AgentError;
 use crate::run::config::AgentConfig;
 use crate::run::event::{RunEvent, RunOutcome};
@@ -18,30 +16,15 @@ use crate::sight::frozen::FrozenCheck;
 /// The modules of section 2.2 of the paper, and the state machine that links them.
 ///
 /// Rotation and reaching are done by a [`Controller`]: the paper's two learned behaviours
-/// ([`Agent::new`]) or any other ([`Agent::with_controller`]). Search, recovery and supervision
+/// ([`Learned`](crate::Learned)) or any other. Search, recovery and supervision
 /// follow the settings, or are replaced by others: [`Agent::searching_by`],
 /// [`Agent::recovering_by`], [`Agent::supervised_by`].
 #[derive(Clone, Debug)]
-pub struct Agent<C = Learned> {
+pub struct Agent<C> {
     config: AgentConfig,
     controller: C,
     modules: Modules,
     camera: FrozenCheck,
-}
-
-impl Agent {
-    /// Creates an agent with the paper's controller: two learned behaviours, frozen
-    /// ([`Learned::new`]).
-    ///
-    /// # Errors
-    /// [`AgentError::Config`] for settings that cannot work.
-    pub fn new(
-        config: AgentConfig,
-        centering: Behaviour,
-        approaching: Behaviour,
-    ) -> Result<Self, AgentError> {
-        Self::with_controller(config, Learned::new(centering, approaching))
-    }
 }
 
 impl<C: Controller> Agent<C> {

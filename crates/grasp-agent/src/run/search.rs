@@ -232,11 +232,7 @@ mod tests {
     fn recovery_goes_back_to_the_last_sighting_and_moves_from_there() {
         let turn = |degrees: f64| JointDelta::from_degrees([degrees, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let mut recovery = RecoveryMoves::new([turn(15.0), turn(-15.0)]);
-        let ball = Sighting::new(Features {
-            x: 96.0,
-            y: 72.0,
-            r: 20.0,
-        });
+        let ball = Sighting::new(Features::new(96.0, 72.0, 20.0));
         let joints = Joints::from_degrees([30.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
         for _ in 0..2 {
             // Wherever the arm has got to.

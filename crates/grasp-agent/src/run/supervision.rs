@@ -120,11 +120,7 @@ mod tests {
 
     #[test]
     fn an_approach_is_too_fast_near_the_ball_only() {
-        let ball = |r| Features {
-            x: 96.0,
-            y: 72.0,
-            r,
-        };
+        let ball = |r| Features::new(96.0, 72.0, r);
         // Up to the radius of 62 anything, beyond it up to a growth of 1.5, ends included.
         for (before, after, too_fast) in [
             (10.0, 62.0, false),

@@ -113,11 +113,7 @@ mod tests {
         let (model, limits) = (CameraModel::paper(), JointLimits::paper());
         let mut plane = ArmPlane::new(&model, limits);
         let start = Percept {
-            features: Features {
-                x: 98.0,
-                y: 60.0,
-                r: 10.0,
-            },
+            features: Features::new(98.0, 60.0, 10.0),
             theta3: 30.0,
         };
         let (mut percept, mut made) = (start, 0);

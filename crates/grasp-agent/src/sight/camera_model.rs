@@ -106,11 +106,11 @@ impl CameraModel {
             * self.ball_radius
             * (distance2 - self.ball_radius * self.ball_radius).sqrt()
             / tangent2;
-        let features = Features {
-            x: self.centre[0] + scale * p.x,
-            y: self.centre[1] + scale * p.y,
-            r: 0.5 * (major + minor),
-        };
+        let features = Features::new(
+            self.centre[0] + scale * p.x,
+            self.centre[1] + scale * p.y,
+            0.5 * (major + minor),
+        );
         (features.x.is_finite() && features.y.is_finite() && features.r.is_finite())
             .then_some(features)
     }
@@ -174,7 +174,7 @@ mod tests {
             (103.5, 78.0, 33.0),
             (150.0, 20.0, 60.0),
         ] {
-            let features = Features { x, y, r };
+            let features = Features::new(x, y, r);
             let ball = model.locate(&joints, &features).unwrap();
             let seen = model.view(&joints, &ball).unwrap();
             assert!(
@@ -184,14 +184,7 @@ mod tests {
         }
         assert!(
             model
-                .locate(
-                    &joints,
-                    &Features {
-                        x: 96.0,
-                        y: f64::NAN,
-                        r: 10.0
-                    }
-                )
+                .locate(&joints, &Features::new(96.0, f64::NAN, 10.0))
                 .is_none()
         );
         assert!(model.view(&joints, &Point3::new(-5.0, 0.0, 2.0)).is_none());
@@ -202,14 +195,7 @@ mod tests {
         let model = CameraModel::paper();
         let goal = Joints::from_degrees([0.0, -53.0, 186.2, 0.0, 45.0, 0.0]);
         let ball = model
-            .locate(
-                &goal,
-                &Features {
-                    x: 103.5,
-                    y: 78.0,
-                    r: 33.0,
-                },
-            )
+            .locate(&goal, &Features::new(103.5, 78.0, 33.0))
             .unwrap();
         let grip = Joints::from_degrees([0.0, -53.0, 186.2, 0.0, 26.99, 0.0]);
         assert!((model.tool_point(&grip) - ball).norm() < 0.0005);

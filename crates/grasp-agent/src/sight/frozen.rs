@@ -94,11 +94,7 @@ mod tests {
     }
 
     fn ball(x: f64) -> Sighting {
-        Sighting::new(Features {
-            x,
-            y: 70.0,
-            r: 20.0,
-        })
+        Sighting::new(Features::new(x, 70.0, 20.0))
     }
 
     #[test]

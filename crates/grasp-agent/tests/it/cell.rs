@@ -9,9 +9,11 @@ use grasp_agent::nalgebra::Point3;
 use grasp_agent::puma_val2::{
     ArmError, Gripper, Joint, JointDelta, Joints, Manipulator, ProximitySensor,
 };
+use grasp_agent::qtable::QTable;
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, CameraModel, Controller, EventLog, Eye, RunOutcome, Servo,
-    ServoLaw, ServoSettings, Sighting,
+    Agent, AgentConfig, AgentError, Behaviour, BehaviourPair, BehaviourSpec, CameraModel,
+    Controller, EventLog, Eye, Hybrid, HybridSettings, Learned, RunOutcome, Servo, ServoLaw,
+    ServoSettings, Sighting,
 };
 
 /// Faults, with the number of looks or moves before them.
@@ -140,6 +142,11 @@ impl Shared {
         )
     }
 
+    /// The cell of the nominal camera, with a ball in easy reach.
+    pub(crate) fn paper(fault: Fault) -> Self {
+        Self::new(CameraModel::paper(), [0.6, 0.1, -0.1], fault)
+    }
+
     pub(crate) fn run<C: Controller>(
         &self,
         agent: &mut Agent<C>,
@@ -162,6 +169,27 @@ impl Shared {
 /// The plainest controller.
 pub(crate) fn servo() -> Servo {
     Servo::new(ServoLaw::PositionBased, ServoSettings::paper())
+}
+
+pub(crate) fn hybrid() -> Hybrid {
+    Hybrid::new(HybridSettings::paper())
+}
+
+/// A behaviour that has not learned anything yet.
+pub(crate) fn blank(spec: BehaviourSpec) -> Behaviour {
+    let table = QTable::new(spec.states(), spec.actions()).unwrap();
+    Behaviour::new(spec, table).unwrap()
+}
+
+/// The paper's controller before it has learned anything.
+pub(crate) fn learned() -> Learned {
+    let pair = BehaviourPair::paper_mended();
+    Learned::new(blank(pair.centering), blank(pair.approaching))
+}
+
+/// An agent with the settings of [`config`].
+pub(crate) fn agent_of<C: Controller>(controller: C) -> Agent<C> {
+    Agent::with_controller(config(), controller).unwrap()
 }
 
 pub(crate) fn config() -> AgentConfig {
@@ -187,11 +215,8 @@ impl Eye for Shared {
             }
             Fault::ShowsInTheJaws(from) if cell.held => {
                 cell.looks_held += 1;
-                (cell.looks_held > from).then(|| Features {
-                    x: 87.0 + 0.01 * cell.looks as f64,
-                    y: 141.0,
-                    r: 27.0,
-                })
+                (cell.looks_held > from)
+                    .then(|| Features::new(87.0 + 0.01 * cell.looks as f64, 141.0, 27.0))
             }
             Fault::NoFrame(after) if cell.looks > after => {
                 return Err(FrameError::Failed {
@@ -200,11 +225,7 @@ impl Eye for Shared {
                 });
             }
             Fault::FrozenFrame(after) if cell.looks > after => cell.old,
-            Fault::Garbage => Some(Features {
-                x: f64::NAN,
-                y: 1e300,
-                r: -3.0,
-            }),
+            Fault::Garbage => Some(Features::new(f64::NAN, 1e300, -3.0)),
             Fault::PhantomOnce | Fault::PhantomFromThere | Fault::PhantomEverywhere => {
                 let here = cell.joints;
                 let first = *cell.looked_first.get_or_insert(here);
@@ -214,11 +235,7 @@ impl Eye for Shared {
                     _ => true,
                 };
                 // Not the same to the last digit: the camera is not frozen.
-                shows.then(|| Features {
-                    x: 103.5,
-                    y: 78.0 + 0.01 * cell.looks as f64,
-                    r: 33.0,
-                })
+                shows.then(|| Features::new(103.5, 78.0 + 0.01 * cell.looks as f64, 33.0))
             }
             Fault::Restless(most) if cell.looks > most => {
                 return Err(FrameError::Failed {
@@ -226,23 +243,17 @@ impl Eye for Shared {
                     reason: "looked at for too long".into(),
                 });
             }
-            Fault::Restless(_) => Some(Features {
-                x: 103.5,
-                y: [75.0, 91.0][cell.looks % 2],
-                r: 33.0,
-            }),
-            Fault::FalseCircle if cell.looks.is_multiple_of(7) => Some(Features {
-                x: 20.0,
-                y: 30.0,
-                r: 25.0,
-            }),
+            Fault::Restless(_) => Some(Features::new(103.5, [75.0, 91.0][cell.looks % 2], 33.0)),
+            Fault::FalseCircle if cell.looks.is_multiple_of(7) => {
+                Some(Features::new(20.0, 30.0, 25.0))
+            }
             Fault::Phantoms => {
                 let wander = (cell.looks * 37 % 100) as f64;
-                Some(Features {
-                    x: 40.0 + wander,
-                    y: 20.0 + wander,
-                    r: 8.0 + 0.4 * wander,
-                })
+                Some(Features::new(
+                    40.0 + wander,
+                    20.0 + wander,
+                    8.0 + 0.4 * wander,
+                ))
             }
             _ => seen,
         };

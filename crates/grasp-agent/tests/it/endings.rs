@@ -11,16 +11,8 @@ use grasp_agent::{
     Servo, Sighting,
 };
 
-const AT_GOAL: Features = Features {
-    x: 103.0,
-    y: 78.0,
-    r: 33.0,
-};
-const ASIDE: Features = Features {
-    x: 60.0,
-    y: 60.0,
-    r: 20.0,
-};
+const AT_GOAL: Features = Features::new(103.0, 78.0, 33.0);
+const ASIDE: Features = Features::new(60.0, 60.0, 20.0);
 
 /// An arm that goes where it is sent.
 struct Arm(Joints);

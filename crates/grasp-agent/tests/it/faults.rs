@@ -3,11 +3,11 @@
 
 use grasp_agent::puma_val2::{ArmError, Joint, JointDelta};
 use grasp_agent::{
-    Agent, AgentConfig, AgentError, CameraModel, EventKind, EventLog, GaveUp, Hybrid,
-    HybridSettings, RunEvent, Servo, ServoLaw, ServoSettings,
+    Agent, AgentConfig, AgentError, CameraModel, EventKind, EventLog, GaveUp, RunEvent, Servo,
+    ServoLaw, ServoSettings,
 };
 
-use crate::cell::{Fault, Shared, config, servo};
+use crate::cell::{Fault, Shared, agent_of, blank, config, hybrid, servo};
 
 pub(crate) fn end_of(
     fault: Fault,
@@ -16,8 +16,8 @@ pub(crate) fn end_of(
     EventLog,
     Shared,
 ) {
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], fault);
-    let mut agent = Agent::with_controller(config(), servo()).unwrap();
+    let cell = Shared::paper(fault);
+    let mut agent = agent_of(servo());
     let mut log = EventLog::default();
     (cell.run(&mut agent, &mut log), log, cell)
 }
@@ -106,7 +106,7 @@ fn an_arm_that_does_not_say_where_it_stands_is_moved_no_more() {
             "{moves}: {error}"
         );
         assert!(cell.0.borrow().stops > 0 && cell.0.borrow().joints.non_finite().is_none());
-        let before = Agent::with_controller(config(), servo()).unwrap();
+        let before = agent_of(servo());
         let replayed = log.replay(&before).unwrap_err();
         assert_eq!(replayed.to_string(), error.to_string());
     }
@@ -156,8 +156,8 @@ fn too_rapid_an_approach_is_taken_back_and_made_more_slowly() {
     let exceeded = |before: f64, after: f64| after > 20.0 && after > 1.5 * before;
     let mut slow = config();
     (slow.approach_radius, slow.approach_growth) = (20.0, 1.5);
-    let mut agent = Agent::with_controller(slow, Hybrid::new(HybridSettings::paper())).unwrap();
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut agent = Agent::with_controller(slow, hybrid()).unwrap();
+    let cell = Shared::paper(Fault::None);
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
     assert_eq!(outcome.gave_up, None);
@@ -248,7 +248,7 @@ fn an_arm_that_its_own_guard_halts_is_taken_back_and_goes_on() {
 #[test]
 fn a_hybrid_grips_from_where_every_move_is_halted() {
     // The hybrid is halted again and again on its way, and knows by then where the ball is.
-    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let mut agent = agent_of(hybrid());
     for run in 0..10 {
         let y = 0.05 * f64::from(run) - 0.25;
         let cell = Shared::new(CameraModel::paper(), [0.6, y, -0.1], Fault::None);
@@ -289,7 +289,7 @@ fn every_search_begins_with_an_event() {
 
 #[test]
 fn false_circles_do_not_mislead_the_hybrid_for_long() {
-    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let mut agent = agent_of(hybrid());
     let mut reached = 0;
     for run in 0..20 {
         let cell = Shared::new(
@@ -310,7 +310,7 @@ fn false_circles_do_not_mislead_the_hybrid_for_long() {
 
 #[test]
 fn what_was_learned_before_the_line_died_is_kept() {
-    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let mut agent = agent_of(hybrid());
     let untaught = agent.controller().belief().clone();
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::LineDead(3));
     assert!(cell.run(&mut agent, &mut EventLog::default()).is_err());
@@ -345,17 +345,16 @@ fn phantoms_cause_no_grip_and_no_pose_out_of_limits() {
 
 #[test]
 fn behaviours_learned_before_a_fault_are_saved_and_resumed() {
-    use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning, qtable::QTable};
-    let blank = |spec: &grasp_agent::BehaviourSpec| {
-        let table = QTable::new(spec.states(), spec.actions()).unwrap();
-        Behaviour::new(spec.clone(), table).unwrap()
-    };
+    use grasp_agent::{Behaviour, BehaviourPair, Learned, OnlineLearning};
     let pair = BehaviourPair::paper_mended();
-    let (centering, approaching) = (blank(&pair.centering), blank(&pair.approaching));
+    let (centering, approaching) = (
+        blank(pair.centering.clone()),
+        blank(pair.approaching.clone()),
+    );
     let learned = Learned::new(centering, approaching.clone())
         .learning(OnlineLearning::careful(3))
         .unwrap();
-    let mut agent = Agent::with_controller(config(), learned).unwrap();
+    let mut agent = agent_of(learned);
     let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::LineDead(6));
     let error = cell.run(&mut agent, &mut EventLog::default()).unwrap_err();
     assert!(
@@ -376,8 +375,8 @@ fn behaviours_learned_before_a_fault_are_saved_and_resumed() {
     let learned = Learned::new(centering, resumed)
         .learning(OnlineLearning::careful(4))
         .unwrap();
-    let mut agent = Agent::with_controller(config(), learned).unwrap();
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let mut agent = agent_of(learned);
+    let cell = Shared::paper(Fault::None);
     cell.run(&mut agent, &mut EventLog::default()).unwrap();
     assert_ne!(*agent.controller().approaching(), after);
 }
@@ -436,7 +435,7 @@ fn a_camera_that_freezes_at_any_look_brings_about_no_success() {
             );
             cell.0.borrow_mut().slippery = slippery;
             let servo = servo();
-            let mut agent = Agent::with_controller(config(), servo).unwrap();
+            let mut agent = agent_of(servo);
             let mut log = EventLog::default();
             let end = cell.run(&mut agent, &mut log);
             assert!(

@@ -81,7 +81,7 @@ fn false_circles_at_the_goal_are_no_success() {
 fn a_ball_that_is_not_gripped_is_reached_for_again() {
     let mut short = config();
     short.max_cycles = 12;
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
+    let cell = Shared::paper(Fault::Slippery);
     let mut agent = Agent::with_controller(short, servo()).unwrap();
     let mut log = EventLog::default();
     let outcome = cell.run(&mut agent, &mut log).unwrap();
@@ -141,7 +141,7 @@ fn a_ball_at_two_places_in_turn_ends_with_the_cycles() {
 fn end_with(change: impl Fn(&mut AgentConfig)) -> (RunOutcome, Shared) {
     let mut changed = config();
     change(&mut changed);
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let cell = Shared::paper(Fault::None);
     let mut agent = Agent::with_controller(changed, servo()).unwrap();
     (
         cell.run(&mut agent, &mut EventLog::default()).unwrap(),

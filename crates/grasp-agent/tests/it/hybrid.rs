@@ -9,13 +9,13 @@ use grasp_agent::{
 };
 use grasp_agent::{Behaviour, BehaviourSpec, Belief, Prior};
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, agent_of, config, hybrid};
 
 #[test]
 fn the_camera_is_learned_from_moves_alone() {
     let nominal = CameraModel::paper();
     let truth = wrong(1.0);
-    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let mut agent = agent_of(hybrid());
     for run in 0..40 {
         let azimuth = 0.04 * f64::from(run) - 0.8;
         let rho = 0.55 + 0.005 * f64::from(run % 20);
@@ -106,8 +106,8 @@ fn focal(agent: &Agent<Hybrid>) -> (f64, f64) {
 
 #[test]
 fn a_hybrid_with_a_belief_goes_on_learning() {
-    let new = |hybrid| Agent::with_controller(config(), hybrid).unwrap();
-    let mut first = new(Hybrid::new(HybridSettings::paper()));
+    let new = |hybrid| agent_of(hybrid);
+    let mut first = new(hybrid());
     runs(&mut first, wrong(1.0));
     let learned = first.controller().belief().clone();
     let (mean, deviation) = focal(&first);
@@ -157,11 +157,7 @@ fn a_hybrid_with_a_belief_goes_on_learning() {
 
 #[test]
 fn a_ball_that_the_fixed_grip_has_missed_is_aimed_at() {
-    let features = Features {
-        x: 103.5,
-        y: 78.0,
-        r: 33.0,
-    };
+    let features = Features::new(103.5, 78.0, 33.0);
     let ball = Sighting::new(features);
     let joints = Joints::from_degrees([0.0, -55.0, 184.0, 0.0, 45.0, 0.0]);
     let request = Request {
@@ -177,7 +173,7 @@ fn a_ball_that_the_fixed_grip_has_missed_is_aimed_at() {
         Ok(Decision::Grip(delta)) => Some(delta.degrees()),
         _ => None,
     };
-    let mut hybrid = Hybrid::new(HybridSettings::paper());
+    let mut hybrid = hybrid();
     begin(&mut hybrid);
     // One sighting with a camera of which nothing is known: where the ball is, is not certain
     // enough.

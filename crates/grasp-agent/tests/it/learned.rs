@@ -1,16 +1,8 @@
 //! Learning that goes on at work.
 
-use grasp_agent::qtable::QTable;
-use grasp_agent::{
-    Agent, Behaviour, BehaviourSpec, CameraModel, EventKind, EventLog, Learned, OnlineLearning,
-};
+use grasp_agent::{Agent, CameraModel, EventKind, EventLog, Learned, OnlineLearning};
 
-use crate::cell::{Fault, Shared, config};
-
-fn blank(spec: BehaviourSpec) -> Behaviour {
-    let table = QTable::new(spec.states(), spec.actions()).unwrap();
-    Behaviour::new(spec, table).unwrap()
-}
+use crate::cell::{Fault, Shared, agent_of, config, learned};
 
 fn some_runs(agent: &mut Agent<Learned>, log: &mut EventLog) {
     for run in 0..10 {
@@ -22,17 +14,12 @@ fn some_runs(agent: &mut Agent<Learned>, log: &mut EventLog) {
 
 #[test]
 fn learning_goes_on_within_the_limits_until_it_is_frozen() {
-    let new = || {
-        Learned::new(
-            blank(BehaviourSpec::centering()),
-            blank(BehaviourSpec::approaching()),
-        )
-    };
+    let new = learned;
     let settings = OnlineLearning {
         temperature: 10.0,
         ..OnlineLearning::careful(5)
     };
-    let mut agent = Agent::with_controller(config(), new().learning(settings).unwrap()).unwrap();
+    let mut agent = agent_of(new().learning(settings).unwrap());
     let mut log = EventLog::default();
     some_runs(&mut agent, &mut log);
     let moved = |event: &&grasp_agent::RunEvent<'_>| matches!(event.kind, EventKind::Moved(_));
@@ -48,22 +35,19 @@ fn learning_goes_on_within_the_limits_until_it_is_frozen() {
     assert!(*learned.approaching().table() != *new().approaching().table());
 
     // The same seed learns the same.
-    let mut again = Agent::with_controller(config(), new().learning(settings).unwrap()).unwrap();
+    let mut again = agent_of(new().learning(settings).unwrap());
     some_runs(&mut again, &mut EventLog::default());
     assert!(again.controller().approaching() == learned.approaching());
 
     let before = learned.approaching().clone();
-    let mut frozen = Agent::with_controller(config(), learned.frozen()).unwrap();
+    let mut frozen = agent_of(learned.frozen());
     some_runs(&mut frozen, &mut EventLog::default());
     assert!(*frozen.controller().approaching() == before);
 }
 
 #[test]
 fn a_loop_breaker_that_is_none_counts_as_0() {
-    let learned = Learned::new(
-        blank(BehaviourSpec::centering()),
-        blank(BehaviourSpec::approaching()),
-    );
+    let learned = learned();
     for kappa in [f64::INFINITY, f64::NAN, -1.0] {
         assert_eq!(learned.clone().with_kappa(kappa, 7.0).kappa(), (0.0, 7.0));
     }
@@ -71,10 +55,7 @@ fn a_loop_breaker_that_is_none_counts_as_0() {
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let learned = Learned::new(
-        blank(BehaviourSpec::centering()),
-        blank(BehaviourSpec::approaching()),
-    );
+    let learned = learned();
     type Set = fn(&mut OnlineLearning, f64);
     let cases: [(&str, Set, [f64; 5]); 3] = [
         (

@@ -10,9 +10,8 @@ mod hybrid;
 mod learned;
 mod log;
 mod modules;
-
 mod phases;
 mod rivals;
-mod saved_controllers;
+mod saved_runs;
 mod settings;
 mod target;

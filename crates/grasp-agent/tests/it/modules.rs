@@ -7,7 +7,7 @@ use grasp_agent::{
     Sighting, Supervision,
 };
 
-use crate::cell::{Fault, Shared, config, servo};
+use crate::cell::{Fault, Shared, agent_of, config, servo};
 use crate::faults::words_from;
 
 /// Looks from one pose, and from there only.
@@ -82,7 +82,7 @@ impl Supervision for Nervous {
 }
 
 fn agent() -> Agent<Servo> {
-    Agent::with_controller(config(), servo()).unwrap()
+    agent_of(servo())
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn a_viewpoint_out_of_the_limits_is_cut_to_them() {
         pose: Joints::from_degrees([400.0; 6]),
         named: false,
     });
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+    let cell = Shared::paper(Fault::None);
     let mut log = EventLog::default();
     cell.run(&mut agent.clone(), &mut log).unwrap();
     assert!(
@@ -124,7 +124,7 @@ fn a_viewpoint_out_of_the_limits_is_cut_to_them() {
 #[test]
 fn a_recovery_of_ones_own_is_what_is_recovered_by() {
     let mut agent = agent().recovering_by(WhereItWas(None));
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::PhantomOnce);
+    let cell = Shared::paper(Fault::PhantomOnce);
     let mut log = EventLog::default();
     cell.run(&mut agent, &mut log).unwrap();
     let words = words_from(&log, "lost");
@@ -144,7 +144,7 @@ fn a_supervision_of_ones_own_is_what_takes_moves_back() {
             moves,
             near,
         });
-        let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::None);
+        let cell = Shared::paper(Fault::None);
         let mut log = EventLog::default();
         cell.run(&mut agent, &mut log).unwrap();
         assert!(cell.0.borrow().stops > 0);

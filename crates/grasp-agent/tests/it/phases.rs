@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use grasp_agent::{Agent, CameraModel, EventKind, EventLog, Hybrid, HybridSettings};
+use grasp_agent::{CameraModel, EventKind, EventLog};
 
-use crate::cell::{Fault, Shared, config, servo};
+use crate::cell::{Fault, Shared, agent_of, hybrid, servo};
 use crate::faults::{end_of, words_from};
 
 /// Phases of the state machine.
@@ -139,7 +139,7 @@ fn a_grip_away_from_the_goal_is_in_the_log() {
     let words = words_from(&log, "cornered");
     assert_eq!(words[..3], ["cornered", "seen", "reaching"], "{words:?}");
     // The hybrid can aim.
-    let mut agent = Agent::with_controller(config(), Hybrid::new(HybridSettings::paper())).unwrap();
+    let mut agent = agent_of(hybrid());
     let cell = Shared::new(
         CameraModel::paper(),
         [0.6, 0.0, -0.1],
@@ -185,8 +185,8 @@ fn an_order_that_is_not_answered_is_in_the_log() {
 #[test]
 fn a_gripper_that_does_not_open_again_is_in_the_log() {
     let servo = servo();
-    let mut agent = Agent::with_controller(config(), servo).unwrap();
-    let cell = Shared::new(CameraModel::paper(), [0.6, 0.1, -0.1], Fault::Slippery);
+    let mut agent = agent_of(servo);
+    let cell = Shared::paper(Fault::Slippery);
     let mut log = EventLog::default();
     // Once the jaws have closed on nothing the line is cut.
     let end = agent.run_and_learn(

@@ -3,11 +3,11 @@
 use grasp_agent::hough_heuristic::Features;
 use grasp_agent::puma_val2::Joints;
 use grasp_agent::{
-    Agent, CameraModel, Controller, EventLog, Feedback, JointLimits, Request, Servo, ServoLaw,
+    CameraModel, Controller, EventLog, Feedback, JointLimits, Request, Servo, ServoLaw,
     ServoSettings, Sighting,
 };
 
-use crate::cell::{Fault, Shared, config};
+use crate::cell::{Fault, Shared, agent_of};
 
 #[test]
 fn every_rival_reaches_the_ball_with_the_right_model() {
@@ -20,7 +20,7 @@ fn every_rival_reaches_the_ball_with_the_right_model() {
         (20, ServoLaw::LookAhead),
     ];
     for (most, law) in rivals {
-        let mut agent = Agent::with_controller(config(), Servo::new(law, servo)).unwrap();
+        let mut agent = agent_of(Servo::new(law, servo));
         for ball in [[0.6, 0.1, -0.1], [0.55, -0.25, -0.15], [0.7, 0.2, -0.05]] {
             let cell = Shared::new(CameraModel::paper(), ball, Fault::None);
             let outcome = cell.run(&mut agent, &mut EventLog::default()).unwrap();
@@ -37,11 +37,7 @@ fn every_rival_reaches_the_ball_with_the_right_model() {
 
 #[test]
 fn look_ahead_does_not_repeat_a_move_that_went_wrong() {
-    let ball = Sighting::new(Features {
-        x: 60.0,
-        y: 100.0,
-        r: 12.0,
-    });
+    let ball = Sighting::new(Features::new(60.0, 100.0, 12.0));
     let joints = Joints::from_degrees([0.0, -80.0, 200.0, 0.0, 45.0, 0.0]);
     let here = Request {
         joints,

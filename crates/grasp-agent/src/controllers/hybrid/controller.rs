@@ -33,9 +33,16 @@ pub struct Hybrid {
     remembered: Vec<Evidence>,
     /// Set while a remembered run is not yet part of the belief.
     news: bool,
-    current: Evidence,
-    estimate: Option<Estimate>,
     learning: bool,
+    run: Run,
+}
+
+/// State of one run.
+#[derive(Clone, Debug)]
+struct Run {
+    evidence: Evidence,
+    estimate: Option<Estimate>,
+    /// Fraction of the planned moves that is made.
     boldness: f64,
     /// Losses since the last move that kept the ball in view.
     losses: usize,
@@ -43,8 +50,22 @@ pub struct Hybrid {
     doubt: bool,
     /// Remaining sightings for which a ball that has moved counts as moving.
     moving: usize,
-    /// Grips in this run so far; none has held the ball.
+    /// Grips so far; none has held the ball.
     grips: i32,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self {
+            evidence: Evidence::default(),
+            estimate: None,
+            boldness: 1.0,
+            losses: 0,
+            doubt: false,
+            moving: 0,
+            grips: 0,
+        }
+    }
 }
 
 /// Current estimate of ball and camera.
@@ -95,14 +116,8 @@ impl Hybrid {
             belief,
             remembered: Vec::new(),
             news: false,
-            current: Evidence::default(),
-            estimate: None,
             learning: true,
-            boldness: 1.0,
-            losses: 0,
-            doubt: false,
-            moving: 0,
-            grips: 0,
+            run: Run::default(),
         }
     }
 
@@ -141,8 +156,8 @@ impl Hybrid {
     /// Keeps the sightings of one ball in one place as evidence for later runs.
     fn remember(&mut self) {
         // A single sighting determines the ball's place and nothing of the camera.
-        if self.learning && self.current.len() >= 2 {
-            self.remembered.push(self.current.clone());
+        if self.learning && self.run.evidence.len() >= 2 {
+            self.remembered.push(self.run.evidence.clone());
             self.news = true;
             let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
             self.remembered.drain(..forgotten);
@@ -152,6 +167,7 @@ impl Hybrid {
     /// Estimates camera and ball from all sightings of this run.
     fn estimate(&mut self) -> Option<Estimate> {
         let start = self
+            .run
             .estimate
             .as_ref()
             .map_or_else(|| self.belief.numbers(), |e| e.numbers);
@@ -159,7 +175,7 @@ impl Hybrid {
             &self.belief,
             &start,
             &self.settings.nominal,
-            &[&self.current],
+            &[&self.run.evidence],
         )?;
         let ball = fit.balls.last().copied().flatten()?;
         Some(Estimate {
@@ -172,12 +188,12 @@ impl Hybrid {
 
     /// Returns the distance from the expected place, feature units, if the ball has moved.
     fn surprise(&self, seen: &Features) -> Option<f64> {
-        let estimate = self.estimate.as_ref()?;
-        if self.current.len() == 0 {
+        let estimate = self.run.estimate.as_ref()?;
+        if self.run.evidence.len() == 0 {
             return None;
         }
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
-            let links = self.current.links(numbers);
+            let links = self.run.evidence.links(numbers);
             corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
         };
         let Some((expected, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
@@ -201,7 +217,7 @@ impl Hybrid {
         Request { joints, limits, .. }: &Request,
     ) -> Option<JointDelta> {
         let model = &estimate.model;
-        let links = self.current.links(&estimate.numbers);
+        let links = self.run.evidence.links(&estimate.numbers);
         let camera = model.arm.wrist(links.stand()) * model.mount;
         let here = camera.inverse_transform_point(&estimate.ball);
         let goal = model.in_camera(&self.settings.goal)?;
@@ -214,7 +230,7 @@ impl Hybrid {
         let ways = [goal, aside].map(|target| SHARES.map(|share| (target, share)));
         let mut last = None;
         for (target, share) in ways.into_iter().flatten() {
-            let wanted = here + (target - here) * (share * self.boldness);
+            let wanted = here + (target - here) * (share * self.run.boldness);
             let (stand, _) = model.pose_placing(&estimate.ball, &wanted, links.stand());
             let motors = links.motors_for(&stand, joints);
             let delta = self.cut(&motors, joints, limits);
@@ -246,7 +262,7 @@ impl Hybrid {
     /// least `least` units.
     fn stays_in_view(&self, estimate: &Estimate, motors: &Joints, least: f64) -> bool {
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
-            let mut links: Links = self.current.links(numbers);
+            let mut links: Links = self.run.evidence.links(numbers);
             links.follow(motors);
             corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
         };
@@ -264,64 +280,54 @@ impl Hybrid {
 }
 
 impl Hybrid {
-    fn begin(&mut self) {
-        self.current = Evidence::default();
-        self.estimate = None;
-        self.boldness = 1.0;
-        self.losses = 0;
-        self.doubt = false;
-        self.moving = 0;
-        self.grips = 0;
-    }
-
     fn reach(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
         let off = self.surprise(&ball.features);
         let odd = off.is_some();
-        if off.is_some_and(|off| off > FAR_OFF) && !self.doubt && self.moving == 0 {
+        if off.is_some_and(|off| off > FAR_OFF) && !self.run.doubt && self.run.moving == 0 {
             // Possibly a false circle: stay and look again.
-            self.doubt = true;
+            self.run.doubt = true;
             return Some(JointDelta::default());
         }
-        self.doubt = false;
-        self.moving = if odd {
+        self.run.doubt = false;
+        self.run.moving = if odd {
             STILL_MOVING
         } else {
-            self.moving.saturating_sub(1)
+            self.run.moving.saturating_sub(1)
         };
         // Two losses of a ball that should have stayed in view: the estimate is wrong.
-        let mistaken = self.losses >= 2;
+        let mistaken = self.run.losses >= 2;
         if odd || mistaken {
             if !mistaken {
                 self.remember();
             }
-            self.current.forget_sightings();
-            self.estimate = None;
+            self.run.evidence.forget_sightings();
+            self.run.estimate = None;
         }
-        self.current.saw(ball.features);
-        self.estimate = self.estimate();
-        if self.estimate.is_none() {
+        self.run.evidence.saw(ball.features);
+        self.run.estimate = self.estimate();
+        if self.run.estimate.is_none() {
             // The sightings contradict one another: start again from the latest.
-            self.current.forget_sightings();
-            self.current.saw(ball.features);
-            self.estimate = self.estimate();
+            self.run.evidence.forget_sightings();
+            self.run.evidence.saw(ball.features);
+            self.run.estimate = self.estimate();
         }
-        self.plan(self.estimate.as_ref()?, request)
+        self.plan(self.run.estimate.as_ref()?, request)
     }
 
     fn aim(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
-        self.current.saw(ball.features);
-        self.estimate = self.estimate();
-        let estimate = self.estimate.as_ref()?;
+        self.run.evidence.saw(ball.features);
+        self.run.estimate = self.estimate();
+        let estimate = self.run.estimate.as_ref()?;
         let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
             .map(|i| estimate.covariance[(i, i)])
             .sum();
         // The configured grip has missed; accept a less certain aim each time.
-        let enough = self.settings.grip_certainty * 4_f64.powi(self.grips);
-        self.grips = (self.grips + 1).min(10);
+        let enough = self.settings.grip_certainty * 4_f64.powi(self.run.grips);
+        self.run.grips = (self.run.grips + 1).min(10);
         if uncertainty.sqrt() > enough {
             return None;
         }
-        let links = self.current.links(&estimate.numbers);
+        let links = self.run.evidence.links(&estimate.numbers);
         let mut from = *links.stand();
         from.0[Joint::J5.index()] += self.settings.grip_turn;
         from.0[Joint::J4.index()] += self.settings.grip_aside;
@@ -365,20 +371,20 @@ impl Controller for Hybrid {
 
     fn notice(&mut self, feedback: &Feedback) {
         match feedback {
-            Feedback::Begin => self.begin(),
-            Feedback::Arm(joints) => self.current.arm_at(joints),
+            Feedback::Begin => self.run = Run::default(),
+            Feedback::Arm(joints) => self.run.evidence.arm_at(joints),
             Feedback::Seen { .. } => {
-                (self.boldness, self.losses) = ((1.5 * self.boldness).min(1.0), 0);
+                (self.run.boldness, self.run.losses) = ((1.5 * self.run.boldness).min(1.0), 0);
             }
             Feedback::Lost | Feedback::TakenBack => {
-                self.boldness = (0.5 * self.boldness).max(LEAST_BOLDNESS);
-                self.losses += usize::from(*feedback == Feedback::Lost);
+                self.run.boldness = (0.5 * self.run.boldness).max(LEAST_BOLDNESS);
+                self.run.losses += usize::from(*feedback == Feedback::Lost);
             }
             Feedback::Missed => {
                 // The miss may have moved the ball.
                 self.remember();
-                self.current.forget_sightings();
-                self.estimate = None;
+                self.run.evidence.forget_sightings();
+                self.run.estimate = None;
             }
             Feedback::End => self.learn(),
         }
@@ -419,11 +425,7 @@ mod tests {
     #[test]
     fn nan_is_never_evidence() {
         let (limits, grip) = (JointLimits::paper(), false);
-        let features = Features {
-            x: 80.0,
-            y: 60.0,
-            r: 15.0,
-        };
+        let features = Features::new(80.0, 60.0, 15.0);
         let ball = Sighting::new(features);
         let mut hybrid = Hybrid::new(HybridSettings::paper());
         let learned = |hybrid: &mut Hybrid, unseen: bool| {

@@ -1,11 +1,9 @@
 //! Sightings, the poses they were made from, and the links' positions behind the backlash.
 
 use hough_heuristic::Features;
-use nalgebra::Point3;
 use puma_val2::Joints;
 
 use crate::controllers::hybrid::parameters::{Numbers, at};
-use crate::sight::camera_model::CameraModel;
 
 /// Path of the arm in one run, and the sightings of a ball at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -111,9 +109,4 @@ impl Links {
             }
         }))
     }
-}
-
-/// Locates the ball from one sighting.
-pub(crate) fn first_guess(model: &CameraModel, view: &(Joints, Features)) -> Option<Point3<f64>> {
-    model.locate(&view.0, &view.1)
 }

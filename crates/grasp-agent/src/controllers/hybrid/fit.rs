@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, SMatrix, Vector3};
 use puma_val2::Joints;
 
 use crate::controllers::hybrid::belief::Belief;
-use crate::controllers::hybrid::evidence::{Evidence, first_guess};
+use crate::controllers::hybrid::evidence::Evidence;
 use crate::controllers::hybrid::parameters::{
     Information, LEARNED, METRE_STEP, Numbers, STEPS, ThreeBy, WITH_BALL, at, corrected, vector,
 };
@@ -45,14 +45,11 @@ impl Fit {
         let noise = belief.noise();
         let model = corrected(nominal, start);
         let mut numbers = *start;
-        let mut balls: Vec<Option<Point3<f64>>> = evidence
-            .iter()
-            .map(|e| {
-                e.views(start)
-                    .last()
-                    .and_then(|view| first_guess(&model, view))
-            })
-            .collect();
+        let first_guess = |evidence: &&Evidence| {
+            let (joints, features) = *evidence.views(start).last()?;
+            model.locate(&joints, &features)
+        };
+        let mut balls: Vec<_> = evidence.iter().map(first_guess).collect();
         let cost_of = |numbers: &Numbers, balls: &[Option<Point3<f64>>]| {
             let off = numbers - before;
             let own: f64 = evidence
