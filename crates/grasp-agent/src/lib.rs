@@ -8,8 +8,9 @@
 //! arm when something comes too near.
 //!
 //! * A [`BehaviourSpec`] is a behaviour as data: intervals, angle steps, goal and [`Reward`].
-//!   [`BehaviourSpec::learn`] learns its table in any simulator, and [`BehaviourTask`] makes it an
-//!   environment of `qtable`; a [`Behaviour`] is both together. A [`BehaviourPair`] holds the specifications of centering and approaching.
+//!   [`BehaviourSpec::learn`] learns its table in any simulator; a [`Behaviour`] is both together.
+//!   [`BehaviourTask`] is the environment for learners of your own. A [`BehaviourPair`] holds the
+//!   specifications of centering and approaching.
 //! * A [`Controller`] decides on joint moves: [`Learned`] (the paper's two behaviours), [`Servo`]
 //!   (the alternatives that the paper names), [`Hybrid`] (a servo that calibrates its own
 //!   [`CameraModel`]), [`Retargeted`] (any of them with a goal that was shown on the arm), or one

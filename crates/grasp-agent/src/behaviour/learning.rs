@@ -69,14 +69,14 @@ impl LearningSettings {
 }
 
 impl BehaviourSpec {
-    /// Learns the behaviour in a simulator: `simulate` returns the percept after a move, `None` if the ball is
-    /// lost, and `start` draws the percept that an episode begins with.
+    /// Learns the behaviour in a simulator: `simulate` returns the percept after a move, `None` if
+    /// the ball is lost, and `start` draws the percept that an episode begins with.
     ///
-    /// With `trials`, the best of the tables met on the way is kept. In the second half of the run, at
-    /// every record of the learning curve, the greedy policy is tried in the simulator from each of
-    /// them. The table that needs the fewest steps stays, without the actions that lost the ball in a
-    /// trial. Otherwise the last table is kept; on coarse states it is never at rest, since each update
-    /// may lose a way here and find one there.
+    /// With `trials`, the best of the tables met on the way is kept. In the second half of the run,
+    /// at every record of the learning curve, the greedy policy is tried in the simulator from each
+    /// of them. The table that needs the fewest steps stays, without the actions that lost the ball
+    /// in a trial. Otherwise the last table is kept; on coarse states it is never at rest, since
+    /// each update may lose a way here and find one there.
     ///
     /// ```
     /// use grasp_agent::hough_heuristic::Features;
@@ -105,8 +105,8 @@ impl BehaviourSpec {
     /// ```
     ///
     /// # Errors
-    /// [`BehaviourError::Settings`] for a specification that cannot be run, and a reward that is not a
-    /// number: the literal Eq. 5 and 6 divide by zero on their targets.
+    /// [`BehaviourError::Settings`] for a specification that cannot be run, and a reward that is
+    /// not a number: the literal Eq. 5 and 6 divide by zero on their targets.
     pub fn learn(
         self,
         mut simulate: impl FnMut(&Percept, &JointDelta) -> Option<Percept>,

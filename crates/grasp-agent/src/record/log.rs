@@ -102,8 +102,8 @@ impl Tape<'_> {
         None
     }
 
-    /// Returns the recorded failure of the device whose errors begin with `prefix`, or says that the
-    /// record ends.
+    /// Returns the recorded failure of the device whose errors begin with `prefix`, or says that
+    /// the record ends.
     fn silence(&self, prefix: &str) -> String {
         let fault = match self.events.last().map(|event| &event.kind) {
             Some(EventKind::Failed(cause)) => cause.strip_prefix(prefix),

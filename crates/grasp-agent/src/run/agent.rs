@@ -4,6 +4,7 @@ use hough_heuristic::image::GrayImage;
 use puma_val2::{Manipulator, ProximitySensor};
 
 use crate::controller::{Controller, Feedback};
+use crate::controllers::learned::Learned;
 use crate::error::AgentError;
 use crate::run::config::AgentConfig;
 use crate::run::event::{RunEvent, RunOutcome};
@@ -16,11 +17,11 @@ use crate::sight::frozen::FrozenCheck;
 /// The modules of section 2.2 of the paper, and the state machine that links them.
 ///
 /// Rotation and reaching are done by a [`Controller`]: the paper's two learned behaviours
-/// ([`Learned`](crate::Learned)) or any other. Search, recovery and supervision
+/// ([`Learned`]) or any other. Search, recovery and supervision
 /// follow the settings, or are replaced by others: [`Agent::searching_by`],
 /// [`Agent::recovering_by`], [`Agent::supervised_by`].
 #[derive(Clone, Debug)]
-pub struct Agent<C> {
+pub struct Agent<C = Learned> {
     config: AgentConfig,
     controller: C,
     modules: Modules,

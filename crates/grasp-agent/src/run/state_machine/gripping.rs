@@ -87,7 +87,7 @@ impl Run<'_> {
         })
     }
 
-    /// Looks again after something was too near on the way to the ball; the third time ends the run.
+    /// Looks again after a barred way to the ball. The third one ends the run.
     fn after_barred_grip(&mut self, seen: &Sighting) -> Result<State, AgentError> {
         self.controller.notice(&Feedback::Missed);
         self.cycles += 1;
