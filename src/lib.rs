@@ -18,14 +18,14 @@
 //! ```
 //! use puma_grasp::Simulator;
 //! use puma_grasp::grasp_agent::BehaviourSpec;
-//! use puma_grasp::pipeline_sim::{Ball, Cell, ReachForm};
+//! use puma_grasp::pipeline_sim::{Ball, Cell, MoveForm};
 //! use puma_grasp::qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
 //!     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
 //!     let (centering, reaching) = cell.sample_moves(500, 0.5, &mut rng)?;
-//!     let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
+//!     let simulator = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
 //!     let spec = BehaviourSpec::centering();
 //!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, &mut |_| {})?;
 //!     let last = lesson.curve.last();

@@ -1,9 +1,7 @@
 //! The simulator in which both behaviours are learned, as in section 4 of the paper.
 
 use grasp_agent::{BehaviourError, BehaviourSpec, JointLimits, LearningSettings, Lesson, Percept};
-use pipeline_sim::{
-    CentreModel, CentreSample, FitError, Quality, ReachForm, ReachModel, ReachSample,
-};
+use pipeline_sim::{MoveForm, MoveModel, MoveSample, Quality, QuantityError};
 use puma_val2::{Joint, JointDelta};
 use qtable::Record;
 use rand::{Rng, RngExt};
@@ -12,8 +10,8 @@ use rand::{Rng, RngExt};
 /// samples.
 #[derive(Clone, Debug)]
 pub struct Simulator {
-    centre: CentreModel,
-    reach: ReachModel,
+    centre: MoveModel,
+    reach: MoveModel,
     starts: Vec<Percept>,
 }
 
@@ -29,13 +27,13 @@ impl Simulator {
     /// # Errors
     /// Too few samples, or samples that do not determine the model.
     pub fn fit(
-        centering: &[CentreSample],
-        reaching: &[ReachSample],
-        form: ReachForm,
-    ) -> Result<Self, FitError> {
+        centering: &[MoveSample],
+        reaching: &[MoveSample],
+        form: MoveForm,
+    ) -> Result<Self, QuantityError> {
         Ok(Self {
-            centre: CentreModel::fit(centering)?,
-            reach: ReachModel::fit(reaching, form, &ELBOW_EDGES)?,
+            centre: MoveModel::fit(centering, MoveForm::Centering, &[])?,
+            reach: MoveModel::fit(reaching, form, &ELBOW_EDGES)?,
             starts: reaching
                 .iter()
                 .map(|sample| Percept {
@@ -68,10 +66,10 @@ impl Simulator {
         }
         let mut features = percept.features;
         if delta[Joint::J1] != 0.0 {
-            features = self.centre.predict(&features, d1)?;
+            features = self.centre.predict(&features, elbow, [d1, 0.0, 0.0])?;
         }
         if d2 != 0.0 || d3 != 0.0 {
-            features = self.reach.predict(&features, elbow, d2, d3)?;
+            features = self.reach.predict(&features, elbow, [0.0, d2, d3])?;
         }
         Some(Percept {
             features,

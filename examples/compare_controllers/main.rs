@@ -16,7 +16,7 @@ use grasp_agent::{
     Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, SavedRun, Servo,
     ServoLaw as Law, ServoSettings, TaughtGoal,
 };
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
+use pipeline_sim::{Ball, Cell, ErrorLevel, MoveForm};
 use puma_grasp::{BallDetector, Simulator};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -313,8 +313,8 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
-    let rigid = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
-    let linear = Simulator::fit(&centering, &reaching, ReachForm::Linear)?;
+    let rigid = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
+    let linear = Simulator::fit(&centering, &reaching, MoveForm::Linear)?;
     let plane = ExactPlane::new(20_000, &mut rng);
     let anywhere: Vec<Percept> = (0..TRIALS).map(|_| rigid.start(&mut rng)).collect();
     let trials = search_percepts(TRIALS, seed_of(options.seed, &[4]));

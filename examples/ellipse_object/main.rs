@@ -22,7 +22,7 @@ use grasp_agent::{
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse, FrameError};
 use nalgebra::Vector3;
-use pipeline_sim::{ReachForm, Workspace};
+use pipeline_sim::{MoveForm, Workspace};
 use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -96,7 +96,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         ..AgentConfig::paper(workspace.search_poses())
     };
     let (centering, reaching) = rig.cell().get().sample_moves(2_500, 0.5, &mut rng)?;
-    let simulator = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
+    let simulator = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
     let pair = BehaviourPair::paper_mended();
     let learned = learn_both(&simulator, pair, options.seed, &mut rng)?;
     let agent = Agent::with_controller(config.clone(), learned)?;

@@ -6,7 +6,7 @@ use clap::{Parser, ValueEnum};
 use example_support::program::at_least_one;
 use example_support::say;
 use grasp_agent::GoalInterval;
-use pipeline_sim::ReachForm;
+use pipeline_sim::MoveForm;
 use puma_grasp::BallDetector;
 
 /// Learns to reach a ball in simulation, then sees, reaches and grasps balls with a PUMA 560
@@ -92,11 +92,11 @@ impl Options {
     }
 
     /// Returns the form of the regression simulator, by default that of 22 terms.
-    pub(crate) fn form(&self) -> ReachForm {
+    pub(crate) fn form(&self) -> MoveForm {
         match self.simulator {
-            Some(FormName::Linear) => ReachForm::Linear,
-            Some(FormName::Rigid8) => ReachForm::Rigid8,
-            Some(FormName::Rigid22) | None => ReachForm::Rigid22,
+            Some(FormName::Linear) => MoveForm::Linear,
+            Some(FormName::Rigid8) => MoveForm::Rigid8,
+            Some(FormName::Rigid22) | None => MoveForm::Rigid22,
         }
     }
 

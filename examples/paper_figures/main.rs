@@ -16,7 +16,7 @@ use grasp_agent::{
     Percept,
 };
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
+use pipeline_sim::{Ball, Cell, ErrorLevel, MoveForm};
 use puma_grasp::Simulator;
 use qtable::Record;
 use rand::SeedableRng;
@@ -116,8 +116,8 @@ fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
         let plane = ExactPlane::new(20_000, &mut rng);
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
-        let rigid = Simulator::fit(&centering, &reaching, ReachForm::Rigid22)?;
-        let linear = Simulator::fit(&centering, &reaching, ReachForm::Linear)?;
+        let rigid = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
+        let linear = Simulator::fit(&centering, &reaching, MoveForm::Linear)?;
         let literal = BehaviourPair::paper_literal().approaching;
         let (mended, fine) = (
             BehaviourPair::paper_mended(),

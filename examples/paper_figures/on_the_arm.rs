@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt::Write as _;
 
 use grasp_agent::{Agent, AgentConfig, BehaviourPair, GoalInterval, Learned, OnlineLearning};
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm};
+use pipeline_sim::{Ball, Cell, ErrorLevel, MoveForm};
 use puma_grasp::Simulator;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -45,8 +45,8 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
     );
     let mut panels = Vec::new();
     for (name, form) in [
-        ("rigid regression", ReachForm::Rigid22),
-        ("linear regression", ReachForm::Linear),
+        ("rigid regression", MoveForm::Rigid22),
+        ("linear regression", MoveForm::Linear),
     ] {
         let mut lines = Vec::new();
         for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
@@ -105,7 +105,7 @@ pub(crate) fn from_simulation_to_the_arm(seeds: u64) -> Result<Report, Box<dyn E
 /// Returns success in percent and moves per success on one arm: centering at once, then the whole
 /// task after each of [`MOVES`].
 fn one_arm(
-    form: ReachForm,
+    form: MoveForm,
     level: ErrorLevel,
     seed: u64,
 ) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {

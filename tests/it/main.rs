@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use example_support::learning::learn_both;
 use grasp_agent::{Behaviour, BehaviourPair, Learned};
-use pipeline_sim::{Ball, Cell, ReachForm};
+use pipeline_sim::{Ball, Cell, MoveForm};
 use puma_grasp::Simulator;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -30,7 +30,7 @@ fn learned() -> &'static Learned {
         let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng).expect("samples");
         let simulator =
-            Simulator::fit(&centering, &reaching, ReachForm::Rigid22).expect("enough samples");
+            Simulator::fit(&centering, &reaching, MoveForm::Rigid22).expect("enough samples");
         let quality = simulator.quality();
         assert!(quality.iter().all(|output| output.r2 > 0.9), "{quality:?}");
         let pair = BehaviourPair::paper_mended();

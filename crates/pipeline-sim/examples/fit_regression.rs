@@ -10,13 +10,13 @@ use std::error::Error;
 
 use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
-use pipeline_sim::{Ball, Cell, ErrorLevel, ReachForm, ReachModel};
+use pipeline_sim::{Ball, Cell, ErrorLevel, MoveForm, MoveModel};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (_, samples) = cell.sample_moves(2_000, 0.125, &mut rng)?;
-    let model = ReachModel::fit(&samples, ReachForm::Rigid22, &[])?;
+    let model = MoveModel::fit(&samples, MoveForm::Rigid22, &[])?;
     for quality in model.quality() {
         println!(
             "{}: R² {:.4}, error {:.2} units",
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     let sample = &samples[0];
-    let after = model.predict(&sample.before, sample.jt3_degrees, sample.d2, sample.d3);
+    let after = model.predict(&sample.before, sample.jt3_degrees, sample.turns);
     println!(
         "before {:?}\npredicted {after:?}\nobserved {:?}",
         sample.before, sample.after

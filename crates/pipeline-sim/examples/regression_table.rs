@@ -11,35 +11,35 @@ use std::error::Error;
 
 use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
-use pipeline_sim::{Ball, Cell, CentreModel, Quality, ReachForm, ReachModel};
+use pipeline_sim::{Ball, Cell, MoveForm, MoveModel, Quality};
 
 const SAMPLES: usize = 2083;
 const SEEDS: u64 = 20;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let edges = &ReachModel::PAPER_ELBOW_EDGES[..];
+    let edges = &MoveModel::PAPER_ELBOW_EDGES[..];
     println!("{SAMPLES} samples, {SEEDS} fits, errors in feature units");
     for noise in [0.125, 0.5] {
         println!("\nnoise of {noise} units");
         for (name, form, edges) in [
-            ("Linear", ReachForm::Linear, edges),
-            ("Rigid8", ReachForm::Rigid8, edges),
-            ("Rigid22", ReachForm::Rigid22, edges),
-            ("RigidBody", ReachForm::RigidBody, &[]),
+            ("Linear", MoveForm::Linear, edges),
+            ("Rigid8", MoveForm::Rigid8, edges),
+            ("Rigid22", MoveForm::Rigid22, edges),
+            ("RigidBody", MoveForm::RigidBody, &[]),
         ] {
             print(name, |seed| {
                 let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
                 let (_, training) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
                 let (_, fresh) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
-                Ok(ReachModel::fit(&training, form, edges)?.quality_on(&fresh)?)
+                Ok(MoveModel::fit(&training, form, edges)?.quality_on(&fresh)?)
             })?;
         }
         print("centering", |seed| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
             let (training, _) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
             let (fresh, _) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
-            Ok(CentreModel::fit(&training)?.quality_on(&fresh)?)
+            Ok(MoveModel::fit(&training, MoveForm::Centering, &[])?.quality_on(&fresh)?)
         })?;
     }
     Ok(())

@@ -2,10 +2,20 @@
 
 use puma_val2::Joint;
 
-/// A quantity of a cell, a scene or a camera that cannot be used.
+/// A quantity that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QuantityError {
+    /// A number out of the range in which it is usable.
+    #[error("{quantity} must be {allowed}, but is {value}")]
+    Value {
+        /// Name of the quantity.
+        quantity: String,
+        /// Value given.
+        value: f64,
+        /// Values that are usable.
+        allowed: String,
+    },
     /// A range with an end that is not finite, or with its ends the wrong way round.
     #[error("the range of {quantity} must be finite and ascending, but is {low}..{high}")]
     Range {
@@ -15,46 +25,6 @@ pub enum QuantityError {
         low: f64,
         /// Upper end.
         high: f64,
-    },
-    /// A quantity that is NaN or infinite.
-    #[error("{quantity} must be a finite number, but is {value}")]
-    NotFinite {
-        /// Name of the quantity.
-        quantity: String,
-        /// Value given.
-        value: f64,
-    },
-    /// A quantity below zero.
-    #[error("{quantity} must not be below zero, but is {value}")]
-    Negative {
-        /// Name of the quantity.
-        quantity: String,
-        /// Value given.
-        value: f64,
-    },
-    /// A quantity that must be above zero and is not.
-    #[error("{quantity} must be a finite number above zero, but is {value}")]
-    NotPositive {
-        /// Name of the quantity.
-        quantity: String,
-        /// Value given.
-        value: f64,
-    },
-    /// A quantity above the greatest value supported.
-    #[error("{quantity} must be at most {greatest}, but is {value}")]
-    TooLarge {
-        /// Name of the quantity.
-        quantity: String,
-        /// Value given.
-        value: f64,
-        /// Greatest value supported.
-        greatest: f64,
-    },
-    /// Moves that turn more joints than a search over moves can follow.
-    #[error("the moves turn {count} joints; a search can follow one or two")]
-    Joints {
-        /// Number of joints that any of the moves turns.
-        count: usize,
     },
     /// A lens distortion that folds the image over inside the frame: two directions would meet in
     /// one pixel.
@@ -75,6 +45,20 @@ pub enum QuantityError {
         /// Row asked for, pixels.
         y: f64,
     },
+    /// Samples that do not tell all coefficients of a model apart: moves all along one line, or a
+    /// single elbow angle.
+    #[error(
+        "{place}: the samples determine only {rank} of {terms} coefficients; vary the moves and \
+         the poses more"
+    )]
+    Undetermined {
+        /// Part of the model: an elbow interval, or the whole.
+        place: String,
+        /// Numerical rank of the design matrix.
+        rank: usize,
+        /// Number of coefficients.
+        terms: usize,
+    },
     /// A name that is not in a list.
     #[error("unknown name {name:?}; known are {known}")]
     Name {
@@ -85,33 +69,13 @@ pub enum QuantityError {
     },
 }
 
-/// The reason why a ball is not seen.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+/// The reason why a ball is not seen, or why no pose shows it at the goal.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SightError {
-    /// A joint angle that is NaN or infinite.
-    #[error("the angle of {joint} is not a finite number")]
-    JointNotFinite {
-        /// The joint.
-        joint: Joint,
-    },
-    /// A measure of arm, hand, ball or rule that is NaN (or infinite, where it must be finite).
-    #[error("{quantity} must be a finite number, but is {value}")]
-    NotFinite {
-        /// Name of the quantity.
-        quantity: &'static str,
-        /// Value found.
-        value: f64,
-    },
-    /// A ball with a radius that is not above zero, or not finite.
-    #[error("the radius of the ball must be a finite number above zero, but is {radius} m")]
-    BallRadius {
-        /// Radius given, metres.
-        radius: f64,
-    },
-    /// A ball with a centre that is not finite.
-    #[error("the centre of the ball is not finite")]
-    CentreNotFinite,
+    /// An angle, or a measure of arm, mount, ball or rule, that is out of range.
+    #[error(transparent)]
+    Quantity(#[from] QuantityError),
     /// A camera whose centre of projection lies inside the ball.
     #[error(
         "the camera is inside the ball: its centre is {distance:.4} m away, its radius is \
@@ -192,26 +156,6 @@ pub enum SightError {
         /// Least fraction at which a ball counts as seen.
         least: f64,
     },
-}
-
-/// The reason why no pose shows the ball at the goal.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReachError {
-    /// An angle, a coordinate of the ball, or a measure of arm or mount that is NaN or infinite.
-    #[error("{quantity} must be a finite number, but is {value}")]
-    NotFinite {
-        /// Name of the quantity.
-        quantity: &'static str,
-        /// Value found.
-        value: f64,
-    },
-    /// A ball with a radius that is not above zero, or not finite.
-    #[error("the radius of the ball must be a finite number above zero, but is {radius} m")]
-    BallRadius {
-        /// Radius given, metres.
-        radius: f64,
-    },
     /// A camera that shows a ball of this size nowhere at the goal.
     #[error("the camera shows the ball nowhere at the goal")]
     NoView,
@@ -254,111 +198,39 @@ pub enum ReachError {
     },
 }
 
-/// The reason why a regression has no answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FitError {
-    /// Fewer samples than coefficients.
-    #[error("{place}: {got} samples are too few for {needed} coefficients")]
-    TooFewSamples {
-        /// Part of the model: an elbow interval, or the whole.
-        place: String,
-        /// Samples given.
-        got: usize,
-        /// Least number.
-        needed: usize,
-    },
-    /// Samples that do not tell all coefficients apart: moves all along one line, or a single elbow
-    /// angle.
-    #[error(
-        "{place}: the samples determine only {rank} of {terms} coefficients; vary the moves and \
-         the poses more"
-    )]
-    RankDeficient {
-        /// Part of the model.
-        place: String,
-        /// Numerical rank of the design matrix.
-        rank: usize,
-        /// Number of coefficients.
-        terms: usize,
-    },
-    /// A sample that holds a NaN, an infinity, or a radius that is not above zero.
-    #[error("sample {index}: {quantity} is not a usable number ({value})")]
-    NotFinite {
-        /// Position of the sample, from 0.
-        index: usize,
-        /// Name of the quantity.
-        quantity: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// Edges of the elbow intervals that are not finite and strictly ascending.
-    #[error("the elbow edges must be finite and strictly ascending: {edges:?}")]
-    Edges {
-        /// Edges given, degrees.
-        edges: Vec<f64>,
-    },
-    /// A ridge or a power that a refit cannot use.
-    #[error("{what}")]
-    Prior {
-        /// Description of the fault.
-        what: String,
-    },
-}
-
-impl FitError {
-    /// Converts the error of a sample that a model cannot be judged on.
-    pub(crate) fn into_quantity(self) -> QuantityError {
-        let (quantity, value) = match self {
-            Self::NotFinite {
-                index,
-                quantity,
-                value,
-            } => (format!("sample {index}: {quantity}"), value),
-            other => (other.to_string(), f64::NAN),
-        };
-        if value.is_finite() && value <= 0.0 {
-            QuantityError::NotPositive { quantity, value }
-        } else {
-            QuantityError::NotFinite { quantity, value }
-        }
-    }
-}
-
-/// Refuses a ridge out of 0..=1e100.
-pub(crate) fn check_ridge(ridge: f64) -> Result<(), FitError> {
-    if (0.0..=1e100).contains(&ridge) {
+/// Refuses a value that is not usable.
+fn check(
+    usable: bool,
+    quantity: impl Into<String>,
+    value: f64,
+    allowed: impl Into<String>,
+) -> Result<(), QuantityError> {
+    if usable {
         return Ok(());
     }
-    let what = format!("the ridge of a refit must be within 0..=1e100, but is {ridge}");
-    Err(FitError::Prior { what })
+    let (quantity, allowed) = (quantity.into(), allowed.into());
+    Err(QuantityError::Value {
+        quantity,
+        value,
+        allowed,
+    })
 }
 
 /// Refuses a number that is not finite.
 pub(crate) fn finite(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
-    if value.is_finite() {
-        return Ok(());
-    }
-    let quantity = quantity.into();
-    Err(QuantityError::NotFinite { quantity, value })
+    check(value.is_finite(), quantity, value, "a finite number")
 }
 
 /// Refuses a number that is not finite, or below zero.
 pub(crate) fn amount(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
-    let quantity = quantity.into();
-    if value < 0.0 && value.is_finite() {
-        return Err(QuantityError::Negative { quantity, value });
-    }
-    finite(quantity, value)
+    let usable = value.is_finite() && value >= 0.0;
+    check(usable, quantity, value, "a finite number, not below zero")
 }
 
 /// Refuses a number that is not finite, or not above zero.
 pub(crate) fn positive(quantity: impl Into<String>, value: f64) -> Result<(), QuantityError> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    let quantity = quantity.into();
-    Err(QuantityError::NotPositive { quantity, value })
+    let usable = value.is_finite() && value > 0.0;
+    check(usable, quantity, value, "a finite number above zero")
 }
 
 /// Refuses a number above `greatest`.
@@ -367,14 +239,12 @@ pub(crate) fn at_most(
     value: f64,
     greatest: f64,
 ) -> Result<(), QuantityError> {
-    if value <= greatest {
-        return Ok(());
-    }
-    Err(QuantityError::TooLarge {
-        quantity: quantity.into(),
+    check(
+        value <= greatest,
+        quantity,
         value,
-        greatest,
-    })
+        format!("at most {greatest}"),
+    )
 }
 
 /// Refuses a range that is not finite and ascending.

@@ -8,7 +8,7 @@
 //! [`CellCamera`] and [`SimulatedArm`] work on a [`SharedCell`] and implement the traits of
 //! `hough-heuristic` ([`FrameSource`](hough_heuristic::FrameSource)) and `puma-val2`
 //! ([`Manipulator`](puma_val2::Manipulator), [`ProximitySensor`](puma_val2::ProximitySensor)).
-//! [`Cell::sample_moves`] draws the samples to which [`ReachModel`] and [`CentreModel`] are fitted.
+//! [`Cell::sample_moves`] draws the samples to which a [`MoveModel`] is fitted.
 //!
 //! # Conventions
 //!
@@ -41,12 +41,11 @@ pub use datasets::{recipe::Recipe, snapshot::Snapshot};
 pub use devices::arm::SimulatedArm;
 pub use devices::camera::{CellCamera, FeatureCamera};
 pub use devices::shared_cell::{Contacts, SharedCell};
-pub use error::{FitError, QuantityError, ReachError, SightError};
-pub use regression::centre_model::CentreModel;
+pub use error::{QuantityError, SightError};
+pub use regression::form::MoveForm;
+pub use regression::model::MoveModel;
 pub use regression::quality::Quality;
-pub use regression::reach_form::ReachForm;
-pub use regression::reach_model::ReachModel;
-pub use regression::samples::{CentreSample, ReachSample};
+pub use regression::samples::MoveSample;
 pub use render::renderer::Renderer;
 pub use render::scene::{Appearance, Light, Occluder, Scene, Sensor, Shape, Thing};
 pub use render::shot::Shot;

@@ -34,13 +34,7 @@ impl Camera {
     /// assert!((camera.focal_px() / 4.0 - 250.9).abs() < 0.01); // in feature units
     /// ```
     pub fn paper() -> Self {
-        Self {
-            focal_px: 11.5 / 8.8 * 768.0,
-            principal: Point2::new(383.5, 287.5),
-            width: 768,
-            height: 576,
-            distortion: Distortion::default(),
-        }
+        Self::ideal(11.5 / 8.8 * 768.0, Point2::new(383.5, 287.5), 768, 576)
     }
 
     /// Creates a pinhole camera with a lens of `focal_length` metres, a sensor `sensor_width`
@@ -48,8 +42,8 @@ impl Camera {
     /// frame.
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] names the quantity that is not above zero;
-    /// [`QuantityError::TooLarge`] for more than [`Camera::LARGEST_SIDE`].
+    /// [`QuantityError::Value`] names the quantity that is not above zero, or the side that is more
+    /// than [`Camera::LARGEST_SIDE`].
     pub fn pinhole(
         focal_length: f64,
         sensor_width: f64,
@@ -61,19 +55,10 @@ impl Camera {
         frame_size(width, height)?;
         let focal_px = focal_length / sensor_width * f64::from(width);
         positive("focal length (px)", focal_px)?;
-        Ok(Self {
-            focal_px,
-            principal: Point2::new(
-                (f64::from(width) - 1.0) / 2.0,
-                (f64::from(height) - 1.0) / 2.0,
-            ),
-            width,
-            height,
-            distortion: Distortion::default(),
-        })
+        Ok(Self::ideal(focal_px, middle(width, height), width, height))
     }
 
-    /// Creates a pinhole given in pixels, for frames that are drawn and then warped or reduced.
+    /// Creates a pinhole given in pixels.
     pub(crate) fn ideal(focal_px: f64, principal: Point2<f64>, width: u32, height: u32) -> Self {
         Self {
             focal_px,
@@ -87,8 +72,8 @@ impl Camera {
     /// Multiplies the focal length by `factor`.
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] if the factor is not above zero; [`QuantityError::Folds`] if
-    /// a distorted image would fold.
+    /// [`QuantityError::Value`] if the factor is not above zero; [`QuantityError::Folds`] if a
+    /// distorted image would fold.
     pub fn with_focal_factor(self, factor: f64) -> Result<Self, QuantityError> {
         positive("focal factor", factor)?;
         let focal_px = self.focal_px * factor;
@@ -99,7 +84,8 @@ impl Camera {
     /// Moves the principal point to `principal`, pixels.
     ///
     /// # Errors
-    /// [`QuantityError::NotFinite`]; [`QuantityError::Folds`] if a distorted image would fold.
+    /// [`QuantityError::Value`] if it is not finite; [`QuantityError::Folds`] if a distorted image
+    /// would fold.
     pub fn with_principal_point(self, principal: Point2<f64>) -> Result<Self, QuantityError> {
         finite("principal point x (px)", principal.x)?;
         finite("principal point y (px)", principal.y)?;
@@ -110,15 +96,12 @@ impl Camera {
     /// frame of another shape shows more on two sides.
     ///
     /// # Errors
-    /// [`QuantityError::NotPositive`] for a frame without pixels; [`QuantityError::TooLarge`] for
-    /// more than [`Camera::LARGEST_SIDE`]; [`QuantityError::Folds`] if a distorted image would
-    /// fold.
+    /// [`QuantityError::Value`] for a frame without pixels, or with a side of more than
+    /// [`Camera::LARGEST_SIDE`]; [`QuantityError::Folds`] if a distorted image would fold.
     pub fn resized(self, width: u32, height: u32) -> Result<Self, QuantityError> {
         frame_size(width, height)?;
         let scale = (f64::from(width) / f64::from(self.width))
             .min(f64::from(height) / f64::from(self.height));
-        let middle =
-            |w: u32, h: u32| Point2::new((f64::from(w) - 1.0) / 2.0, (f64::from(h) - 1.0) / 2.0);
         let off_middle = self.principal - middle(self.width, self.height);
         Self {
             focal_px: self.focal_px * scale,
@@ -133,8 +116,8 @@ impl Camera {
     /// Replaces the lens distortion.
     ///
     /// # Errors
-    /// [`QuantityError::NotFinite`]; [`QuantityError::Folds`] if the image folds over within the
-    /// frame.
+    /// [`QuantityError::Value`] if it is not finite; [`QuantityError::Folds`] if the image folds
+    /// over within the frame.
     pub fn with_distortion(self, distortion: Distortion) -> Result<Self, QuantityError> {
         let Distortion { k1, k2, k3, p1, p2 } = distortion;
         for (name, value) in [("k1", k1), ("k2", k2), ("k3", k3), ("p1", p1), ("p2", p2)] {
@@ -166,9 +149,8 @@ impl Camera {
     /// Returns the pixel that shows a point of the camera frame; `None` for a point that is not in
     /// front of the camera, or lies beyond the fold of the lens.
     pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
-        (point.z > 0.0)
-            .then(|| self.to_pixel(Point2::new(point.x / point.z, point.y / point.z)))
-            .flatten()
+        let ahead = (point.z > 0.0).then(|| Point2::new(point.x / point.z, point.y / point.z));
+        self.to_pixel(ahead?)
     }
 
     /// Returns the direction, in the camera frame and with z = 1, that is seen at a pixel. Within
@@ -179,9 +161,11 @@ impl Camera {
     /// that is not finite.
     pub fn ray(&self, pixel: Point2<f64>) -> Result<Vector3<f64>, QuantityError> {
         let image = (pixel - self.principal.coords) / self.focal_px;
-        let ideal = self.distortion.undistort(image);
+        let ideal = self
+            .distortion
+            .undistort(image)
+            .filter(|p| (p.x + p.y).is_finite());
         ideal
-            .filter(|p| p.x.is_finite() && p.y.is_finite())
             .map(|p| Vector3::new(p.x, p.y, 1.0))
             .ok_or(QuantityError::NoRay {
                 x: pixel.x,
@@ -212,11 +196,9 @@ impl Camera {
                 angle: outline.angle,
             });
         }
-        ProjectedEllipse::of_outline(|t| self.to_pixel(outline.point(t))).ok_or_else(|| {
-            SightError::BeyondLens {
-                angle: centre.xy().coords.norm().atan2(centre.z),
-            }
-        })
+        let angle = centre.xy().coords.norm().atan2(centre.z);
+        ProjectedEllipse::of_outline(|t| self.to_pixel(outline.point(t)))
+            .ok_or(SightError::BeyondLens { angle })
     }
 
     /// Returns the centre, in the camera frame, of the sphere of `radius` metres whose
@@ -226,11 +208,8 @@ impl Camera {
     /// `None` if `circle` or `radius` is not finite or not above zero, the lens shows nothing at
     /// the circle's centre, or the circle is too large for double precision.
     pub fn sphere_of_circle(&self, circle: &Circle, radius: f64) -> Option<Point3<f64>> {
-        let usable = [circle.x, circle.y].iter().all(|v| v.is_finite())
-            && [circle.radius, radius]
-                .iter()
-                .all(|v| v.is_finite() && *v > 0.0);
-        if !usable {
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        if !(positive(circle.radius) && positive(radius)) {
             return None;
         }
         let ray = self.ray(Point2::new(circle.x, circle.y)).ok()?;
@@ -272,8 +251,6 @@ impl Camera {
             .into_iter()
             .map(|(x, y)| (Point2::new(x, y) - self.principal).norm())
             .fold(0.0, f64::max);
-        // March outward until the image of the ray leaves the frame; there and before, the lens
-        // must not have folded the image over.
         for direction in 0..32 {
             let (sin, cos) = (f64::from(direction) * std::f64::consts::TAU / 32.0).sin_cos();
             let at = |u: f64| Point2::new(u * cos, u * sin);
@@ -281,31 +258,26 @@ impl Camera {
                 let image = self.distortion.distort(at(u));
                 (image.x * cos + image.y * sin) * self.focal_px
             };
-            let (mut last, mut u) = (0.0, 0.0);
-            let step = reach / self.focal_px / 200.0;
-            let mut folds = false;
-            while last < reach && !folds {
-                u += step;
-                let now = out(u);
-                folds = now.is_nan()
-                    || now <= last
-                    || self.distortion.jacobian(at(u)).determinant() <= 0.0;
-                last = now;
+            // Outward until the image of the ray has left the frame, or the lens has folded it.
+            let mut beyond = reach / self.focal_px;
+            while self.distortion.shows(at(beyond)) && out(beyond) < reach {
+                beyond *= 2.0;
             }
-            // The steps may be wider than the fold.
-            if folds || !self.distortion.shows(at(u)) {
-                let (mut shown, mut beyond) = (0.0, u);
-                for _ in 0..60 {
-                    let middle = 0.5 * (shown + beyond);
-                    if self.distortion.shows(at(middle)) {
-                        shown = middle;
-                    } else {
-                        beyond = middle;
-                    }
+            if self.distortion.shows(at(beyond)) {
+                continue;
+            }
+            let mut shown = 0.0;
+            for _ in 0..60 {
+                let middle = 0.5 * (shown + beyond);
+                if self.distortion.shows(at(middle)) {
+                    shown = middle;
+                } else {
+                    beyond = middle;
                 }
-                return Err(QuantityError::Folds {
-                    radius_px: out(shown),
-                });
+            }
+            let radius_px = out(shown);
+            if radius_px < reach {
+                return Err(QuantityError::Folds { radius_px });
             }
         }
         Ok(self)
@@ -347,13 +319,9 @@ pub(crate) fn unit_outline(
     centre: &Point3<f64>,
     radius: f64,
 ) -> Result<ProjectedEllipse, SightError> {
-    if !(radius.is_finite() && radius > 0.0) {
-        return Err(SightError::BallRadius { radius });
-    }
+    positive("the radius of the ball (m)", radius)?;
     let distance2 = centre.coords.norm_squared();
-    if !distance2.is_finite() {
-        return Err(SightError::CentreNotFinite);
-    }
+    finite("the squared distance of the ball (m²)", distance2)?;
     if distance2 <= radius * radius {
         return Err(SightError::Inside {
             distance: distance2.sqrt(),
@@ -382,6 +350,14 @@ pub(crate) fn unit_outline(
             0.0
         },
     })
+}
+
+/// Returns the middle of a frame.
+fn middle(width: u32, height: u32) -> Point2<f64> {
+    Point2::new(
+        (f64::from(width) - 1.0) / 2.0,
+        (f64::from(height) - 1.0) / 2.0,
+    )
 }
 
 /// Refuses a frame without pixels, or one larger than a renderer can hold.

@@ -9,7 +9,7 @@ use crate::cell::camera::Camera;
 use crate::cell::ellipse::ProjectedEllipse;
 use crate::cell::hand::{Capsule, HandShape};
 use crate::cell::sight::SightRule;
-use crate::error::{ReachError, SightError};
+use crate::error::{QuantityError, SightError, finite, positive};
 
 /// Arm, camera on the hand, ball on its holder, table.
 ///
@@ -127,11 +127,9 @@ impl Cell {
     /// condition of [`Cell::sight`] that fails.
     pub fn circle(&self, joints: &Joints) -> Result<Circle, SightError> {
         if let Some(joint) = joints.non_finite() {
-            return Err(SightError::JointNotFinite { joint });
+            finite(format!("the angle of {joint} (rad)"), joints[joint])?;
         }
-        if let Some((quantity, value)) = self.non_finite_measure() {
-            return Err(SightError::NotFinite { quantity, value });
-        }
+        self.check_measures()?;
         let outline = self.project_ball(joints)?;
         self.sight.check(&outline, self.camera.size())?;
         Ok(outline.circle())
@@ -146,12 +144,12 @@ impl Cell {
         Ok(Features::from_circle(&circle, self.camera.size().0))
     }
 
-    /// Returns the first measure that the camera's pose depends on and that is not finite.
-    fn non_finite_measure(&self) -> Option<(&'static str, f64)> {
+    /// Refuses a measure that the camera's pose depends on and that is not finite.
+    fn check_measures(&self) -> Result<(), QuantityError> {
         let (arm, mount) = (&self.params, &self.mount);
         let [a, b, c] = mount.translation.vector.into();
         let [i, j, k, w] = mount.rotation.coords.into();
-        let measures = [
+        for (quantity, value) in [
             ("the arm's length a2 (m)", arm.a2),
             ("the arm's length a3 (m)", arm.a3),
             ("the arm's length d2 (m)", arm.d2),
@@ -159,8 +157,18 @@ impl Cell {
             ("the arm's length d6 (m)", arm.d6),
             ("the place of the camera's mount (m)", a + b + c),
             ("the rotation of the camera's mount", i + j + k + w),
-        ];
-        measures.into_iter().find(|(_, value)| !value.is_finite())
+        ] {
+            finite(quantity, value)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses a ball whose centre is not finite.
+    pub(super) fn check_ball(&self) -> Result<(), QuantityError> {
+        let ball = self.ball.centre;
+        finite("the x coordinate of the ball (m)", ball.x)?;
+        finite("the y coordinate of the ball (m)", ball.y)?;
+        finite("the z coordinate of the ball (m)", ball.z)
     }
 
     /// Returns the point between the finger pads, world frame, metres.
@@ -214,34 +222,21 @@ impl Cell {
     /// ball shows the middle of the goal in y and r and lies in the middle between the jaws.
     ///
     /// # Errors
-    /// [`ReachError`]: a ball, an angle, or a measure of arm or mount that is not finite; a ball
+    /// [`SightError`]: a ball, an angle, or a measure of arm or mount that is not finite; a ball
     /// without size; a camera that cannot show the ball at the goal; a ball out of the arm's reach;
     /// a pose out of the working limits.
-    pub fn goal_pose(&self, jt5_degrees: f64) -> Result<Joints, ReachError> {
+    pub fn goal_pose(&self, jt5_degrees: f64) -> Result<Joints, SightError> {
+        finite("JT5 (degrees)", jt5_degrees)?;
+        self.check_ball()?;
+        self.check_measures()?;
+        positive("the radius of the ball (m)", self.ball.radius)?;
         let ball = self.ball.centre;
-        for (quantity, value) in [
-            ("JT5 (degrees)", jt5_degrees),
-            ("the x coordinate of the ball (m)", ball.x),
-            ("the y coordinate of the ball (m)", ball.y),
-            ("the z coordinate of the ball (m)", ball.z),
-        ] {
-            if !value.is_finite() {
-                return Err(ReachError::NotFinite { quantity, value });
-            }
-        }
-        if let Some((quantity, value)) = self.non_finite_measure() {
-            return Err(ReachError::NotFinite { quantity, value });
-        }
-        let radius = self.ball.radius;
-        if !(radius.is_finite() && radius > 0.0) {
-            return Err(ReachError::BallRadius { radius });
-        }
         // The ball's place in the hand is fixed, so forearm, hand and ball are one rigid link: a
         // two-link arm in the plane.
         let hand = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, jt5_degrees, 0.0]);
         let goal = self
             .ball_showing(&hand, &Self::GOAL)
-            .ok_or(ReachError::NoView)?;
+            .ok_or(SightError::NoView)?;
         let wrist = self.params.wrist(&hand);
         let mut in_hand = wrist.inverse_transform_point(&goal);
         in_hand.y = 0.0;
@@ -252,7 +247,7 @@ impl Cell {
         let rho2 = ball.x * ball.x + ball.y * ball.y;
         let forward2 = rho2 - self.params.d2 * self.params.d2;
         if forward2.is_nan() || forward2 <= 0.0 {
-            return Err(ReachError::BesideWaist {
+            return Err(SightError::BesideWaist {
                 distance: rho2.sqrt(),
                 offset: self.params.d2.abs(),
             });
@@ -264,7 +259,7 @@ impl Cell {
         let a2 = self.params.a2;
         let cos_bend = (distance2 - a2 * a2 - length * length) / (2.0 * a2 * length);
         if cos_bend.is_nan() || cos_bend.abs() > 1.0 {
-            return Err(ReachError::OutOfReach {
+            return Err(SightError::OutOfReach {
                 distance: distance2.sqrt(),
                 least: (a2 - length).abs(),
                 greatest: a2 + length,
@@ -285,7 +280,7 @@ impl Cell {
         ]);
         match self.joint_out_of_limits(&pose) {
             None => Ok(pose),
-            Some(joint) => Err(ReachError::OutOfLimits {
+            Some(joint) => Err(SightError::OutOfLimits {
                 joint,
                 angle: pose[joint],
                 low: self.limits[joint.index()].0,

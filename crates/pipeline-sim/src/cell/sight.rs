@@ -4,7 +4,7 @@ use hough_heuristic::{Circle, Features};
 use nalgebra::Point2;
 
 use crate::cell::ellipse::ProjectedEllipse;
-use crate::error::SightError;
+use crate::error::{SightError, finite};
 
 /// Conditions under which a ball counts as seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,23 +35,29 @@ impl SightRule {
     ///
     /// # Errors
     /// [`SightError::LargerThanView`], [`SightError::Radius`], [`SightError::CentreOutside`] or
-    /// [`SightError::CutOff`] names the condition that fails; [`SightError::NotFinite`] is for a
+    /// [`SightError::CutOff`] names the condition that fails; [`SightError::Quantity`] is for a
     /// rule that holds a NaN.
     pub(crate) fn check(
         &self,
         outline: &ProjectedEllipse,
         size: (u32, u32),
     ) -> Result<(), SightError> {
+        let Self {
+            min_radius,
+            max_radius,
+            min_share,
+        } = *self;
         for (quantity, value) in [
-            ("the smallest radius seen (units)", self.min_radius),
-            ("the greatest radius seen (units)", self.max_radius),
+            ("the smallest radius seen (units)", min_radius),
+            ("the greatest radius seen (units)", max_radius),
             (
                 "the least fraction of the outline inside the frame",
-                self.min_share,
+                min_share,
             ),
         ] {
+            // Infinite bounds do no harm.
             if value.is_nan() {
-                return Err(SightError::NotFinite { quantity, value });
+                finite(quantity, value)?;
             }
         }
         let circle = outline.circle();

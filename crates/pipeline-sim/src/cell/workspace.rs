@@ -7,8 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::cell::ball::Ball;
 use crate::cell::geometry::Cell;
-use crate::error::QuantityError;
-use crate::error::ascending;
+use crate::error::{QuantityError, ascending, finite};
 
 /// The part of the world in which balls lie: a sector of a ring around the waist axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,18 +60,8 @@ impl Workspace {
         ascending("the azimuth (rad)", self.azimuth)?;
         ascending("the height (m)", self.height)?;
         let elbow = [self.search_elbow.0, self.search_elbow.1];
-        match self
-            .search_pans
-            .into_iter()
-            .chain(elbow)
-            .find(|a| !a.is_finite())
-        {
-            Some(value) => Err(QuantityError::NotFinite {
-                quantity: "an angle of the search poses (rad)".to_owned(),
-                value,
-            }),
-            None => Ok(()),
-        }
+        let mut angles = self.search_pans.into_iter().chain(elbow);
+        angles.try_for_each(|angle| finite("an angle of the search poses (rad)", angle))
     }
 
     /// Draws a ball in the workspace, uniform in volume. Its coordinates are NaN in a workspace

@@ -1,9 +1,14 @@
 //! Random scenes and snapshots by the parameters of a recipe.
 
+use puma_val2::{JointDelta, Joints};
 use rand::{Rng, RngExt};
 
+use crate::cell::ball::Ball;
 use crate::cell::camera::Camera;
-use crate::datasets::snapshot::{Snapshot, View};
+use crate::cell::distortion::Distortion;
+use crate::cell::geometry::Cell;
+use crate::cell::workspace::Workspace;
+use crate::datasets::snapshot::Snapshot;
 use crate::datasets::stage::Stage;
 use crate::datasets::things::{lamps, things};
 use crate::error::QuantityError;
@@ -19,7 +24,12 @@ pub(super) struct CellRecipe {
     pub(super) tall: bool,
     /// Change of the scene.
     pub(super) change: fn(&mut Scene, &mut dyn Rng),
-    pub(super) view: View,
+    /// A lens with barrel distortion.
+    pub(super) barrel: bool,
+    /// The ball out of sight.
+    pub(super) empty: bool,
+    /// The exposure, from a time drawn, of an arm that moves; `None` for one at rest.
+    pub(super) shot: Option<fn(f64) -> Shot>,
 }
 
 /// Balls on a table under the camera.
@@ -58,16 +68,78 @@ impl CellRecipe {
                 texture: 0.0,
                 gloss: rng.random_range(0.05..0.4),
             },
-            things: Vec::new(),
-            occluders: Vec::new(),
             sensor: Sensor {
                 gamma: if rng.random_bool(0.3) { 2.2 } else { 1.0 },
                 ..Sensor::default()
             },
+            ..Scene::plain()
         };
         scene.things = things(self.things, self.tall, rng);
         (self.change)(&mut scene, rng);
         scene
+    }
+
+    /// Draws a random ball and a random pose of the arm on its way from a search pose to the ball.
+    ///
+    /// The radius of the ball in the image is log-uniform over the radii on such ways.
+    pub(super) fn snapshot(
+        &self,
+        size: (u32, u32),
+        rng: &mut dyn Rng,
+    ) -> Result<Snapshot, QuantityError> {
+        let workspace = Workspace::paper();
+        let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
+        while self.barrel && cell.camera == Camera::paper() {
+            let lens = Distortion {
+                k1: rng.random_range(-0.35..-0.10),
+                k2: rng.random_range(0.0..0.08),
+                ..Distortion::default()
+            };
+            cell.camera = cell.camera.with_distortion(lens).unwrap_or(cell.camera);
+        }
+        let poses = workspace.search_poses();
+        let joints = loop {
+            let seen = workspace.sample_seen_ball(&cell, rng);
+            let (ball, pose) = seen.unwrap_or((cell.ball, poses[0]));
+            cell.place_ball(ball.centre);
+            let Ok(goal) = cell.goal_pose(Cell::REACHING_JT5_DEGREES) else {
+                continue;
+            };
+            let t: f64 = rng.random_range(0.0..1.0);
+            let aside = [0.0; 6].map(|_: f64| rng.random_range(-4.0_f64..4.0).to_radians());
+            let mut joints = Joints(std::array::from_fn(|i| {
+                let wrist = i == 3 || i == 5;
+                pose.0[i] + t * (goal.0[i] - pose.0[i]) + if wrist { 0.0 } else { aside[i] }
+            }));
+            if self.empty {
+                // Turned away from the ball.
+                joints.0[0] += if joints.0[0] > 0.0 { -0.9 } else { 0.9 };
+            }
+            let gone = || {
+                let outline = cell.outline(&joints);
+                outline.is_none_or(|o| o.share_inside(768, 576) == 0.0)
+            };
+            let seen = || cell.features(&joints).is_ok_and(|f| f.r > 6.0);
+            let wanted = if self.empty { gone() } else { seen() };
+            if wanted && cell.params.check(&joints).is_ok() {
+                break joints;
+            }
+        };
+        let (mut speed, mut shot) = (JointDelta::default(), Shot::still());
+        if let Some(exposed) = self.shot {
+            // Image speeds of up to some hundred pixels a second.
+            for speed in &mut speed.0[..3] {
+                *speed = rng.random_range(-0.30..0.30);
+            }
+            shot = exposed(rng.random_range(0.005..0.015));
+        }
+        cell.camera = cell.camera.resized(size.0, size.1)?;
+        Ok(Snapshot {
+            cell,
+            joints,
+            speed,
+            shot,
+        })
     }
 }
 
@@ -94,13 +166,16 @@ impl BenchmarkRecipe {
             };
             speed = stage.speed(rng.random_range(least..most), shot.exposure, rng);
         }
-        let snapshot = Snapshot {
-            cell: stage.cell,
-            joints: stage.joints,
-            speed,
-            shot,
-        };
-        Ok((scene, snapshot))
+        let Stage { cell, joints, .. } = stage;
+        Ok((
+            scene,
+            Snapshot {
+                cell,
+                joints,
+                speed,
+                shot,
+            },
+        ))
     }
 
     /// Draws lamps, table, the ball's surface and the sensor.
@@ -124,9 +199,8 @@ impl BenchmarkRecipe {
                 texture: 0.0,
                 gloss: rng.random_range(0.05..0.3),
             },
-            things: Vec::new(),
-            occluders: Vec::new(),
             sensor,
+            ..Scene::plain()
         }
     }
 }

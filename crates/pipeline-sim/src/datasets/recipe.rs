@@ -4,11 +4,12 @@ use nalgebra::Vector3;
 use rand::{Rng, RngExt};
 
 use crate::datasets::draw::{BenchmarkRecipe, CellRecipe};
-use crate::datasets::snapshot::{Exposure, Snapshot, View};
+use crate::datasets::snapshot::Snapshot;
 use crate::datasets::stage::other_than;
 use crate::datasets::things::cables;
 use crate::error::QuantityError;
 use crate::render::renderer::Renderer;
+use crate::render::shot::Shot;
 
 /// A recipe for labelled frames of one kind of difficulty.
 ///
@@ -47,11 +48,9 @@ const CELL: CellRecipe = CellRecipe {
     things: 70,
     tall: false,
     change: |_, _| {},
-    view: View {
-        barrel: false,
-        empty: false,
-        exposure: Exposure::Still,
-    },
+    barrel: false,
+    empty: false,
+    shot: None,
 };
 
 const BENCHMARK: BenchmarkRecipe = BenchmarkRecipe {
@@ -163,10 +162,11 @@ static CELL_RECIPES: [Recipe; 12] = [
         "motion",
         "things; the arm moves while the shutter is open",
         CellRecipe {
-            view: View {
-                exposure: Exposure::Motion,
-                ..CELL.view
-            },
+            shot: Some(|exposure| Shot {
+                exposure: 1.5 * exposure,
+                moments: 6,
+                interlace: None,
+            }),
             ..CELL
         },
     ),
@@ -174,10 +174,7 @@ static CELL_RECIPES: [Recipe; 12] = [
         "interlaced",
         "motion in two fields 20 ms apart",
         CellRecipe {
-            view: View {
-                exposure: Exposure::Interlaced,
-                ..CELL.view
-            },
+            shot: Some(|exposure| Shot::pal(exposure, 3)),
             ..CELL
         },
     ),
@@ -185,10 +182,7 @@ static CELL_RECIPES: [Recipe; 12] = [
         "distorted",
         "things; a lens with barrel distortion",
         CellRecipe {
-            view: View {
-                barrel: true,
-                ..CELL.view
-            },
+            barrel: true,
             ..CELL
         },
     ),
@@ -196,10 +190,7 @@ static CELL_RECIPES: [Recipe; 12] = [
         "empty",
         "clutter without the ball",
         CellRecipe {
-            view: View {
-                empty: true,
-                ..CELL.view
-            },
+            empty: true,
             ..CROWDED
         },
     ),
@@ -361,9 +352,8 @@ impl Recipe {
     ) -> Result<(Renderer, Snapshot), QuantityError> {
         match &self.kind {
             Kind::Cell(recipe) => {
-                let scene = recipe.scene(rng);
-                let renderer = Renderer::new(&scene, rng.random());
-                Ok((renderer, recipe.view.snapshot(size, rng)?))
+                let renderer = Renderer::new(&recipe.scene(rng), rng.random());
+                Ok((renderer, recipe.snapshot(size, rng)?))
             }
             Kind::Benchmark(recipe) => {
                 let (scene, snapshot) = recipe.draw(size, rng)?;
@@ -383,7 +373,7 @@ impl Recipe {
         rng: &mut dyn Rng,
     ) -> Result<Option<Snapshot>, QuantityError> {
         match &self.kind {
-            Kind::Cell(recipe) => recipe.view.snapshot(size, rng).map(Some),
+            Kind::Cell(recipe) => recipe.snapshot(size, rng).map(Some),
             Kind::Benchmark(_) => Ok(None),
         }
     }

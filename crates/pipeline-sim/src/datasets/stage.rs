@@ -9,6 +9,7 @@ use crate::cell::ball::Ball;
 use crate::cell::camera::Camera;
 use crate::cell::geometry::Cell;
 use crate::cell::workspace::Workspace;
+use crate::datasets::things::placed;
 use crate::render::scene::{Appearance, Occluder, Shape, Thing};
 
 /// Draws a reflectance that differs from `albedo` by at least a quarter of it.
@@ -50,11 +51,8 @@ impl Stage {
             };
             let aside = [0.0; 6].map(|_: f64| rng.random_range(-4.0_f64..4.0).to_radians());
             let turn = rng.random_range(-1.0..1.0);
-            if let Ok(mut pose) = over.goal_pose(Cell::REACHING_JT5_DEGREES) {
-                pose.0
-                    .iter_mut()
-                    .zip(aside)
-                    .for_each(|(angle, by)| *angle += by);
+            if let Ok(pose) = over.goal_pose(Cell::REACHING_JT5_DEGREES) {
+                let mut pose = pose + JointDelta(aside);
                 pose.0[5] = turn;
                 break pose;
             }
@@ -112,30 +110,24 @@ impl Stage {
         let pose = self.cell.camera_pose(&self.joints);
         let (eye, direction) = (pose.translation.vector, pose.rotation * unit.coords);
         let radius = (eye.z - self.cell.table) / (1.0 - direction.z);
-        (radius > 0.0).then(|| Ball {
-            centre: Point3::from(eye + direction * radius),
-            radius,
-        })
+        let centre = Point3::from(eye + direction * radius);
+        (radius > 0.0).then_some(Ball { centre, radius })
     }
 
     /// Returns all balls but the first as things.
     pub(super) fn other_balls(&self, table_albedo: f64, rng: &mut dyn Rng) -> Vec<Thing> {
-        let others = self.balls.iter().skip(1);
-        others
-            .map(|(_, ball)| Thing {
-                shape: Shape::Ball {
-                    radius: ball.radius,
-                },
-                x: ball.centre.x,
-                y: ball.centre.y,
-                turn: 0.0,
-                appearance: Appearance {
-                    albedo: other_than(table_albedo, rng),
-                    texture: 0.0,
-                    gloss: rng.random_range(0.05..0.3),
-                },
-            })
-            .collect()
+        let thing = |(_, Ball { centre, radius }): &(Circle, Ball)| Thing {
+            shape: Shape::Ball { radius: *radius },
+            x: centre.x,
+            y: centre.y,
+            turn: 0.0,
+            appearance: Appearance {
+                albedo: other_than(table_albedo, rng),
+                texture: 0.0,
+                gloss: rng.random_range(0.05..0.3),
+            },
+        };
+        self.balls.iter().skip(1).map(thing).collect()
     }
 
     /// Puts `count` things with straight edges beside what is there.
@@ -180,33 +172,12 @@ impl Stage {
                 },
             };
             let place = eye + ray * depth;
-            let paper = matches!(shape, Shape::Print { .. });
-            let thing = Thing {
-                shape,
-                x: place.x,
-                y: place.y,
-                turn: rng.random_range(0.0..std::f64::consts::TAU),
-                appearance: Appearance {
-                    albedo: if paper {
-                        0.85
-                    } else {
-                        rng.random_range(0.05..0.9)
-                    },
-                    texture: if paper {
-                        0.0
-                    } else {
-                        rng.random_range(0.0..0.5)
-                    },
-                    gloss: 0.0,
-                },
-            };
+            let thing = placed(shape, (place.x, place.y), rng);
             let clear = |x: f64, y: f64, radius: f64| {
                 (thing.x - x).hypot(thing.y - y) > thing.shape.footprint() + 1.1 * radius
             };
-            if self
-                .balls
-                .iter()
-                .all(|(_, b)| clear(b.centre.x, b.centre.y, b.radius))
+            let mut balls = self.balls.iter().map(|(_, ball)| ball);
+            if balls.all(|b| clear(b.centre.x, b.centre.y, b.radius))
                 && things.iter().all(|t| clear(t.x, t.y, t.shape.footprint()))
             {
                 things.push(thing);
@@ -244,8 +215,8 @@ impl Stage {
     /// during `exposure` seconds.
     pub(super) fn speed(&self, pixels: f64, exposure: f64, rng: &mut dyn Rng) -> JointDelta {
         let mut speed = JointDelta::default();
-        for i in 0..3 {
-            speed.0[i] = rng.random_range(-0.3..0.3);
+        for speed in &mut speed.0[..3] {
+            *speed = rng.random_range(-0.3..0.3);
         }
         let place = |joints: &Joints| self.cell.outline(joints).map(|o| o.centre);
         for _ in 0..3 {

@@ -11,10 +11,8 @@ pub(super) fn lamps(steepest: f64, rng: &mut dyn Rng) -> Vec<Light> {
     let total = rng.random_range(0.65..0.95);
     (0..count)
         .map(|_| {
-            let (angle, slant) = (
-                rng.random_range(0.0..std::f64::consts::TAU),
-                rng.random_range(0.1..steepest),
-            );
+            let angle = rng.random_range(0.0..std::f64::consts::TAU);
+            let slant = rng.random_range(0.1..steepest);
             Light {
                 toward: Vector3::new(slant * f64::cos(angle), slant * f64::sin(angle), 1.0),
                 intensity: total / f64::from(count),
@@ -39,11 +37,7 @@ pub(super) fn things(count: usize, tall: bool, rng: &mut dyn Rng) -> Vec<Thing> 
             },
             5..9 => Shape::Cylinder {
                 radius: rng.random_range(0.008..0.035),
-                height: if tall {
-                    rng.random_range(0.05..0.16)
-                } else {
-                    rng.random_range(0.01..0.09)
-                },
+                height: rng.random_range(if tall { 0.05..0.16 } else { 0.01..0.09 }),
             },
             9..13 => {
                 let radius = rng.random_range(0.010..0.045);
@@ -69,30 +63,10 @@ pub(super) fn things(count: usize, tall: bool, rng: &mut dyn Rng) -> Vec<Thing> 
                 width: rng.random_range(0.01..0.03),
             },
         };
-        let (rho, azimuth) = (
-            rng.random_range(0.25_f64.powi(2)..1.15_f64.powi(2)).sqrt(),
-            rng.random_range(-1.5..1.5),
-        );
-        let paper = matches!(shape, Shape::Print { .. });
-        let thing = Thing {
-            shape,
-            x: rho * f64::cos(azimuth),
-            y: rho * f64::sin(azimuth),
-            turn: rng.random_range(0.0..std::f64::consts::TAU),
-            appearance: Appearance {
-                albedo: if paper {
-                    0.85
-                } else {
-                    rng.random_range(0.05..0.9)
-                },
-                texture: if paper {
-                    0.0
-                } else {
-                    rng.random_range(0.0..0.5)
-                },
-                gloss: rng.random_range(0.0..0.3),
-            },
-        };
+        let rho = rng.random_range(0.25_f64.powi(2)..1.15_f64.powi(2)).sqrt();
+        let azimuth: f64 = rng.random_range(-1.5..1.5);
+        let mut thing = placed(shape, (rho * azimuth.cos(), rho * azimuth.sin()), rng);
+        thing.appearance.gloss = rng.random_range(0.0..0.3);
         let apart = |other: &Thing| {
             (thing.x - other.x).hypot(thing.y - other.y)
                 > shape.footprint() + other.shape.footprint() + 0.002
@@ -102,6 +76,28 @@ pub(super) fn things(count: usize, tall: bool, rng: &mut dyn Rng) -> Vec<Thing> 
         }
     }
     things
+}
+
+/// Draws turn and surface of a thing; paper is white and even.
+pub(super) fn placed(shape: Shape, (x, y): (f64, f64), rng: &mut dyn Rng) -> Thing {
+    let turn = rng.random_range(0.0..std::f64::consts::TAU);
+    let (albedo, texture) = if matches!(shape, Shape::Print { .. }) {
+        (0.85, 0.0)
+    } else {
+        (rng.random_range(0.05..0.9), rng.random_range(0.0..0.5))
+    };
+    let appearance = Appearance {
+        albedo,
+        texture,
+        gloss: 0.0,
+    };
+    Thing {
+        shape,
+        x,
+        y,
+        turn,
+        appearance,
+    }
 }
 
 /// Draws one to three cables across the frame.

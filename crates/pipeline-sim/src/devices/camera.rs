@@ -99,9 +99,8 @@ impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
             match &mut self.exposure {
                 None => drop(self.renderer.render(&cell, &joints)),
                 Some((shot, moved)) => {
-                    let middle = 0.5 * (shot.exposure + shot.interlace.unwrap_or(0.0));
                     self.renderer.take(shot, |t| {
-                        let (cell, joints) = moved(&cell, &joints, t - middle);
+                        let (cell, joints) = moved(&cell, &joints, t - shot.middle());
                         wrong = wrong.or(joints.non_finite());
                         (cell, joints)
                     });
@@ -144,8 +143,7 @@ impl<P: FnMut() -> Joints> FeatureCamera<P> {
     /// of standard deviation `noise` units, drawn from `seed`.
     ///
     /// # Errors
-    /// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is not a finite
-    /// number of zero or above.
+    /// [`QuantityError::Value`] for noise that is not a finite number of zero or above.
     pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Result<Self, QuantityError> {
         amount(NOISE, noise)?;
         Ok(Self {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::FitError;
+use crate::error::QuantityError;
 
 /// Coefficients of several targets over the same terms.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,11 +23,8 @@ impl Fit {
 
     /// Returns the value of target `i` for these terms.
     pub(super) fn value(&self, i: usize, terms: &[f64]) -> f64 {
-        self.coefficients[i]
-            .iter()
-            .zip(terms)
-            .map(|(c, t)| c * t)
-            .sum()
+        let pairs = self.coefficients[i].iter().zip(terms);
+        pairs.map(|(c, t)| c * t).sum()
     }
 
     /// Returns `true` for `targets` targets over `terms` terms with all numbers in their ranges.
@@ -49,15 +46,6 @@ pub(super) struct Rows {
     count: usize,
 }
 
-/// Position of a number in a row.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Entry {
-    /// Position among the terms.
-    Term(usize),
-    /// Position among the targets.
-    Target(usize),
-}
-
 /// Greatest magnitude of a number in a row: its squares can be summed. Columns shorter than its
 /// reciprocal count as zero.
 const GREATEST: f64 = 1e120;
@@ -67,20 +55,18 @@ impl Rows {
     /// weight).
     ///
     /// # Errors
-    /// The first number that is not finite or too large to be squared; the row is not added.
+    /// Position, terms first, and value of the first number that is not finite or too large to be
+    /// squared; the row is not added.
     pub(super) fn push(
         &mut self,
         terms: &[f64],
         targets: &[f64],
         weight: f64,
-    ) -> Result<(), (Entry, f64)> {
-        let of_terms = terms.iter().enumerate().map(|(i, t)| (Entry::Term(i), t));
-        let of_targets = targets.iter().enumerate();
-        for (entry, value) in of_terms.chain(of_targets.map(|(i, t)| (Entry::Target(i), t))) {
-            let usable = |v: f64| v.abs() <= GREATEST;
-            if !usable(*value) || !usable(value * weight) {
-                return Err((entry, *value));
-            }
+    ) -> Result<(), (usize, f64)> {
+        let usable = |v: f64| v.abs() <= GREATEST && (v * weight).abs() <= GREATEST;
+        let mut entries = terms.iter().chain(targets).enumerate();
+        if let Some((entry, value)) = entries.find(|(_, value)| !usable(**value)) {
+            return Err((entry, *value));
         }
         self.targets.resize_with(targets.len(), Vec::new);
         self.terms.extend(terms.iter().map(|t| t * weight));
@@ -93,26 +79,27 @@ impl Rows {
 
     /// Adds the rows of a ridge that pulls the coefficients toward those of `prior`: `ridge` counts
     /// against the mean over `count` samples, each coefficient in units of the reciprocal of its
-    /// scale (1 where `scales` has none).
+    /// scale.
     ///
     /// # Errors
-    /// [`FitError::Prior`] if `ridge` is too large for the arithmetic.
+    /// [`QuantityError::Value`] if `ridge` is too large for the arithmetic.
     pub(super) fn pull(
         &mut self,
         prior: &Fit,
-        scales: &[f64],
+        scale: impl Fn(usize) -> f64,
         ridge: f64,
         count: usize,
-    ) -> Result<(), FitError> {
+    ) -> Result<(), QuantityError> {
         let strength = (ridge * count as f64).sqrt();
         let mut unit = vec![0.0; prior.terms()];
         for k in 0..unit.len() {
-            let scale = scales.get(k).copied().unwrap_or(1.0);
-            unit[k] = scale;
-            let targets: Vec<f64> = prior.coefficients.iter().map(|c| c[k] * scale).collect();
+            unit[k] = scale(k);
+            let targets: Vec<f64> = prior.coefficients.iter().map(|c| c[k] * unit[k]).collect();
             self.push(&unit, &targets, strength)
-                .map_err(|(_, value)| FitError::Prior {
-                    what: format!("the ridge {ridge} is too large for a coefficient of {value}"),
+                .map_err(|(_, value)| QuantityError::Value {
+                    quantity: "the ridge of a refit".to_owned(),
+                    value: ridge,
+                    allowed: format!("smaller for a coefficient of {value}"),
                 })?;
             unit[k] = 0.0;
         }
@@ -121,14 +108,10 @@ impl Rows {
 
     /// Solves by QR of the column-scaled design matrix and a singular value decomposition of its
     /// triangle. `place` and `observations` (the rows that are no ridge) are for errors.
-    pub(super) fn solve(&self, place: &str, observations: usize) -> Result<Fit, FitError> {
+    pub(super) fn solve(&self, place: &str, observations: usize) -> Result<Fit, QuantityError> {
         let n = self.terms.len().checked_div(self.count).unwrap_or(0);
         if self.count < n || self.count == 0 {
-            return Err(FitError::TooFewSamples {
-                place: place.to_owned(),
-                got: observations,
-                needed: n.max(1),
-            });
+            return Err(too_few(place, observations, n.max(1)));
         }
         let mut design = DMatrix::from_row_slice(self.count, n, &self.terms);
         let scales: Vec<f64> = design.column_iter().map(|c| c.norm()).collect();
@@ -144,7 +127,7 @@ impl Rows {
         let greatest = svd.singular_values.max();
         let floor = greatest * 1e-9;
         let rank = svd.singular_values.iter().filter(|s| **s > floor).count();
-        let deficient = |rank| FitError::RankDeficient {
+        let deficient = |rank| QuantityError::Undetermined {
             place: place.to_owned(),
             rank,
             terms: n,
@@ -166,5 +149,14 @@ impl Rows {
             coefficients: coefficients.collect(),
             condition: greatest / svd.singular_values.min(),
         })
+    }
+}
+
+/// Returns the error of fewer samples than coefficients.
+pub(super) fn too_few(place: &str, got: usize, needed: usize) -> QuantityError {
+    QuantityError::Value {
+        quantity: format!("the number of samples for {place}"),
+        value: got as f64,
+        allowed: format!("at least {needed}"),
     }
 }

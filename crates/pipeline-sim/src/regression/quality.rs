@@ -1,12 +1,10 @@
 //! The accuracy of a model on samples.
 
-use crate::error::QuantityError;
-
 /// The accuracy with which a model reproduces one output.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Quality {
-    /// Name of the output: `dx`, `dy` or `dr`, feature units.
+    /// Name of the output: `dx`, `dy` or `dr`.
     pub output: String,
     /// Coefficient of determination, at most 1; 0 where the output does not vary.
     pub r2: f64,
@@ -20,17 +18,6 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Refuses to judge a model on no samples.
-    pub(super) fn some(samples: usize) -> Result<(), QuantityError> {
-        if samples == 0 {
-            return Err(QuantityError::NotPositive {
-                quantity: "the number of samples to judge a model on".to_owned(),
-                value: 0.0,
-            });
-        }
-        Ok(())
-    }
-
     /// Returns `true` if these belong to `outputs`, in that order, with all numbers in their
     /// ranges. Stored ones may hold anything.
     pub(super) fn are_sound(all: &[Self], outputs: &[&str]) -> bool {
@@ -47,10 +34,8 @@ impl Quality {
         let n = pairs.len() as f64;
         let mean = pairs.iter().map(|p| p.0).sum::<f64>() / n;
         let spread: f64 = pairs.iter().map(|p| (p.0 - mean).powi(2)).sum();
-        let error: f64 = pairs
-            .iter()
-            .map(|p| (p.0 - p.1.unwrap_or(0.0)).powi(2))
-            .sum();
+        let missed = pairs.iter().map(|p| p.0 - p.1.unwrap_or(0.0));
+        let error: f64 = missed.map(|miss| miss.powi(2)).sum();
         Self {
             output: output.to_owned(),
             r2: if spread > 0.0 {
@@ -62,23 +47,5 @@ impl Quality {
             samples: pairs.len(),
             unpredicted: pairs.iter().filter(|p| p.1.is_none()).count(),
         }
-    }
-}
-
-/// Version of the stored form of models.
-pub(super) const VERSION: u32 = 2;
-
-/// Refuses a stored model of another version.
-pub(super) fn check_version(found: u32) -> Result<(), String> {
-    match found {
-        VERSION => Ok(()),
-        0..VERSION => Err(format!(
-            "the model was made by an earlier version of pipeline-sim (format {found}, this one \
-             reads {VERSION}); fit it again"
-        )),
-        _ => Err(format!(
-            "the model was made by a later version of pipeline-sim (format {found}, this one \
-             reads {VERSION}); read it with that version"
-        )),
     }
 }

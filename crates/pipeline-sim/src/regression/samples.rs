@@ -8,7 +8,7 @@ use rand::{Rng, RngExt};
 use crate::cell::ball::Ball;
 use crate::cell::geometry::Cell;
 use crate::cell::noise::{NOISE, with_noise};
-use crate::error::{FitError, QuantityError, amount, at_most};
+use crate::error::{QuantityError, amount, at_most, finite, positive};
 
 /// Greatest number of samples of each kind that [`Cell::sample_moves`] draws.
 const MOST_SAMPLES: usize = 10_000_000;
@@ -23,57 +23,45 @@ const JT2: [f64; 9] = [-20.0, -6.0, -2.0, -0.6, 0.0, 0.6, 2.0, 6.0, 20.0];
 /// Moves of `JT3`, degrees.
 const JT3: [f64; 9] = [-16.0, -5.0, -1.6, -0.5, 0.0, 0.5, 1.6, 5.0, 16.0];
 
-/// One move of `JT1`, and the ball before and after it.
+/// One move, and the ball before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CentreSample {
-    /// Features before the move.
-    pub before: Features,
-    /// Turn of `JT1`, degrees.
-    pub d1: f64,
-    /// Features after the move.
-    pub after: Features,
-}
-
-/// One move of `JT2` and `JT3`, and the ball before and after it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ReachSample {
+pub struct MoveSample {
     /// Features before the move.
     pub before: Features,
     /// `JT3` before the move, degrees.
     pub jt3_degrees: f64,
-    /// Turn of `JT2`, degrees.
-    pub d2: f64,
-    /// Turn of `JT3`, degrees.
-    pub d3: f64,
+    /// Turns of `JT1`, `JT2` and `JT3`, degrees.
+    pub turns: [f64; 3],
     /// Features after the move.
     pub after: Features,
 }
 
-/// Refuses a sample that no model can be fitted to or judged on.
-pub(super) fn check(index: usize, sample: &ReachSample) -> Result<(), FitError> {
-    let numbers = [
-        ("x before", sample.before.x),
-        ("y before", sample.before.y),
-        ("r before", sample.before.r),
-        ("JT3", sample.jt3_degrees),
-        ("d2", sample.d2),
-        ("d3", sample.d3),
-        ("y after", sample.after.y),
-        ("r after", sample.after.r),
-    ];
-    for (quantity, value) in numbers {
-        let usable = value.is_finite() && (!quantity.starts_with('r') || value > 0.0);
-        if !usable {
-            return Err(FitError::NotFinite {
-                index,
-                quantity,
-                value,
-            });
+impl MoveSample {
+    /// Refuses a sample that no model can be fitted to or judged on.
+    pub(super) fn check(&self, index: usize) -> Result<(), QuantityError> {
+        let [d1, d2, d3] = self.turns;
+        for (quantity, value) in [
+            ("x before", self.before.x),
+            ("y before", self.before.y),
+            ("JT3", self.jt3_degrees),
+            ("d1", d1),
+            ("d2", d2),
+            ("d3", d3),
+            ("x after", self.after.x),
+            ("y after", self.after.y),
+        ] {
+            if !value.is_finite() {
+                finite(format!("sample {index}: {quantity}"), value)?;
+            }
         }
+        for (quantity, r) in [("r before", self.before.r), ("r after", self.after.r)] {
+            if !(r.is_finite() && r > 0.0) {
+                positive(format!("sample {index}: {quantity}"), r)?;
+            }
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 impl Cell {
@@ -107,49 +95,35 @@ impl Cell {
         })
     }
 
-    /// Draws `count` samples of each kind, each from a [`Cell::exploring_start`] of its own and
-    /// with a random move of the paper's lists; kept if the arm stays within its working limits and
-    /// the ball in sight.
+    /// Draws `count` samples of moves of `JT1`, and as many of moves of `JT2` and `JT3`, each from a
+    /// [`Cell::exploring_start`] of its own and with a random move of the paper's lists; kept if
+    /// the arm stays within its working limits and the ball in sight.
     ///
     /// Features carry normal noise of standard deviation `noise` units. In a cell in which nothing
     /// can be seen or reached the lists are short. 100 000 samples of each kind take about a second
     /// and 13 MB.
     ///
     /// # Errors
-    /// [`QuantityError::NotFinite`], [`QuantityError::Negative`] for noise that is not a finite
-    /// number of zero or above; [`QuantityError::TooLarge`] for more than ten million samples.
+    /// [`QuantityError::Value`] for noise that is not a finite number of zero or above, and for
+    /// more than ten million samples.
     pub fn sample_moves<R: Rng + ?Sized>(
         &self,
         count: usize,
         noise: f64,
         rng: &mut R,
-    ) -> Result<(Vec<CentreSample>, Vec<ReachSample>), QuantityError> {
+    ) -> Result<(Vec<MoveSample>, Vec<MoveSample>), QuantityError> {
         amount(NOISE, noise)?;
         let name = "the number of samples of each kind";
         at_most(name, count as f64, MOST_SAMPLES as f64)?;
         let (mut centering, mut reaching) = (Vec::new(), Vec::new());
         for _ in 0..count {
             centering.extend(
-                self.sample_move(noise, rng, |rng| {
-                    let d1 = JT1[rng.random_range(0..9)];
-                    (JointDelta::from_degrees([d1, 0.0, 0.0, 0.0, 0.0, 0.0]), d1)
-                })
-                .map(|(before, _, d1, after)| CentreSample { before, d1, after }),
+                self.sample_move(noise, rng, |rng| [JT1[rng.random_range(0..9)], 0.0, 0.0]),
             );
-            reaching.extend(
-                self.sample_move(noise, rng, |rng| {
-                    let (d2, d3) = (JT2[rng.random_range(0..9)], JT3[rng.random_range(0..9)]);
-                    let delta = JointDelta::from_degrees([0.0, d2, d3, 0.0, 0.0, 0.0]);
-                    (delta, (d2, d3))
-                })
-                .map(|(before, joints, (d2, d3), after)| ReachSample {
-                    before,
-                    jt3_degrees: joints.degrees()[2],
-                    d2,
-                    d3,
-                    after,
-                }),
-            );
+            reaching.extend(self.sample_move(noise, rng, |rng| {
+                let d2 = JT2[rng.random_range(0..9)];
+                [0.0, d2, JT3[rng.random_range(0..9)]]
+            }));
             if centering.is_empty() && reaching.is_empty() {
                 break;
             }
@@ -158,22 +132,30 @@ impl Cell {
     }
 
     /// Tries starts and moves until one keeps the ball in sight and the arm within its limits.
-    fn sample_move<R: Rng + ?Sized, M>(
+    fn sample_move<R: Rng + ?Sized>(
         &self,
         noise: f64,
         rng: &mut R,
-        mut draw: impl FnMut(&mut R) -> (JointDelta, M),
-    ) -> Option<(Features, Joints, M, Features)> {
+        mut draw: impl FnMut(&mut R) -> [f64; 3],
+    ) -> Option<MoveSample> {
         for _ in 0..10_000 {
             let (start, joints) = self.exploring_start(rng)?;
-            let (delta, drawn) = draw(rng);
-            let after = joints + delta;
+            let turns = draw(rng);
+            let [d1, d2, d3] = turns;
+            let after = joints + JointDelta::from_degrees([d1, d2, d3, 0.0, 0.0, 0.0]);
             if !start.within_limits(&joints) || !start.within_limits(&after) {
                 continue;
             }
             if let (Ok(before), Ok(after)) = (start.features(&joints), start.features(&after)) {
+                let jt3_degrees = joints.degrees()[2];
                 let before = with_noise(before, noise, rng);
-                return Some((before, joints, drawn, with_noise(after, noise, rng)));
+                let after = with_noise(after, noise, rng);
+                return Some(MoveSample {
+                    before,
+                    jt3_degrees,
+                    turns,
+                    after,
+                });
             }
         }
         None

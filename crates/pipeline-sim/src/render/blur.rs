@@ -4,64 +4,6 @@ use hough_heuristic::{Vectorized, widest};
 
 use crate::render::canvas::Canvas;
 
-/// Blurs `values`, rows of `width` pixels, with the sensor's three taps along each axis
-/// ([`Sensor::blur`](crate::render::scene::Sensor::blur)). The fields of an interlaced frame are
-/// blurred before they are woven.
-pub(super) fn soften(values: &mut [f32], width: usize, sigma: f64, spare: &mut Vec<f32>) {
-    let taps = three_taps(sigma);
-    if values.is_empty() || taps.0 <= 0.0 {
-        return;
-    }
-    // Two rows as they were, and a row with a pixel more at either end.
-    spare.resize(spare.len().max(3 * width + 2), 0.0);
-    widest(Softening {
-        values,
-        width,
-        taps,
-        spare,
-    });
-}
-
-/// Arguments of [`soften`].
-struct Softening<'a> {
-    values: &'a mut [f32],
-    width: usize,
-    taps: (f32, f32),
-    spare: &'a mut [f32],
-}
-
-impl Vectorized for Softening<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { values, width, .. } = self;
-        let (side, middle) = self.taps;
-        let height = values.len() / width;
-        let (mut above, rest) = self.spare.split_at_mut(width);
-        let (mut here, mixed) = rest.split_at_mut(width);
-        let mixed = &mut mixed[..width + 2];
-        here.copy_from_slice(&values[..width]);
-        above.copy_from_slice(here);
-        for y in 0..height {
-            let below = &values[(y + 1).min(height - 1) * width..][..width];
-            let rows = above.iter().zip(&*here).zip(below);
-            for (m, ((a, c), b)) in mixed[1..=width].iter_mut().zip(rows) {
-                *m = middle * c + side * (a + b);
-            }
-            std::mem::swap(&mut above, &mut here);
-            here.copy_from_slice(below);
-            mixed[0] = mixed[1];
-            mixed[width + 1] = mixed[width];
-            let sides = mixed.iter().zip(&mixed[2..]);
-            let out = &mut values[y * width..][..width];
-            for ((o, c), (l, r)) in out.iter_mut().zip(&mixed[1..]).zip(sides) {
-                *o = middle * c + side * (l + r);
-            }
-        }
-    }
-}
-
 /// Returns side and middle weight of the three-tap kernel of variance sigma², or the widest kernel
 /// of three taps.
 pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
@@ -72,53 +14,64 @@ pub(super) fn three_taps(sigma: f64) -> (f32, f32) {
 /// Pixels that are blurred at a time, so that their sums stay in registers.
 const BLOCK: usize = 32;
 
+/// Blurs rows of `width` pixels with the sensor's three taps along each axis
+/// ([`Sensor::blur`](crate::render::scene::Sensor::blur)). The fields of an interlaced frame are
+/// blurred before they are woven.
+pub(super) fn soften(values: &mut [f32], width: usize, sigma: f64, spare: &mut Vec<f32>) {
+    let (side, middle) = three_taps(sigma);
+    if side > 0.0 {
+        convolve(values, width, &[0.5 * middle, side], spare);
+    }
+}
+
 /// Blurs the whole canvas by a Gaussian of standard deviation `sigma` pixels.
 pub(super) fn defocus(canvas: &mut Canvas, sigma: f64, spare: &mut Vec<f32>) {
     let reach = (2.5 * sigma).ceil().min(40.0) as usize;
-    if sigma.is_nan() || sigma <= 0.0 || reach == 0 || canvas.light.is_empty() {
+    if sigma.is_nan() || sigma <= 0.0 || reach == 0 {
         return;
     }
-    let mut kernel: Vec<f32> = (0..=reach)
-        .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32)
-        .collect();
+    let weight = |i: usize| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32;
+    let mut kernel: Vec<f32> = (0..=reach).map(weight).collect();
     let sum = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
     kernel.iter_mut().for_each(|k| *k /= sum);
     kernel[0] *= 0.5;
-    let (w, h) = (canvas.width, canvas.height);
+    convolve(&mut canvas.light, canvas.width, &kernel, spare);
+}
+
+/// Convolves rows of `width` pixels along both axes with a symmetric kernel, given from the middle
+/// outward with half the middle weight. The border is continued.
+fn convolve(values: &mut [f32], width: usize, kernel: &[f32], spare: &mut Vec<f32>) {
+    if values.is_empty() {
+        return;
+    }
+    let (w, h, reach) = (width, values.len() / width, kernel.len() - 1);
     let needed = w * h + w + 2 * reach;
     if spare.len() < needed {
         spare.resize(needed, 0.0);
     }
     let (mixed, padded) = spare[..needed].split_at_mut(w * h);
     for y in 0..h {
-        let pairs = kernel.iter().enumerate().map(|(i, k)| {
-            let (above, below) = (y.saturating_sub(i), (y + i).min(h - 1));
-            (
-                *k,
-                &canvas.light[above * w..][..w],
-                &canvas.light[below * w..][..w],
-            )
+        let row = |y: usize| &values[y * w..][..w];
+        let pairs = kernel.iter().enumerate();
+        let pairs = pairs.map(|(i, k)| (*k, row(y.saturating_sub(i)), row((y + i).min(h - 1))));
+        widest(Weighing {
+            pairs,
+            out: &mut mixed[y * w..][..w],
         });
-        weigh(&pairs, &mut mixed[y * w..][..w]);
     }
-    for (row, out) in mixed.chunks_exact(w).zip(canvas.light.chunks_exact_mut(w)) {
+    for (row, out) in mixed.chunks_exact(w).zip(values.chunks_exact_mut(w)) {
         padded[..reach].fill(row[0]);
         padded[reach..reach + w].copy_from_slice(row);
         padded[reach + w..].fill(row[w - 1]);
         let pairs = kernel.iter().enumerate();
         let pairs = pairs.map(|(i, k)| (*k, &padded[reach - i..][..w], &padded[reach + i..][..w]));
-        weigh(&pairs, out);
+        widest(Weighing { pairs, out });
     }
 }
 
 /// Computes the sum of pairs of rows, each with its weight.
-fn weigh<'a>(pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone), out: &mut [f32]) {
-    widest(Weighing { pairs, out });
-}
-
-/// Arguments of [`weigh`].
 struct Weighing<'a, P> {
-    pairs: &'a P,
+    pairs: P,
     out: &'a mut [f32],
 }
 
@@ -127,38 +80,28 @@ impl<'a, P: Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone> Vectorized for
 
     #[inline(always)]
     fn run(self) {
-        weigh_blocks(self.pairs, self.out);
-    }
-}
-
-#[inline(always)]
-fn weigh_blocks<'a>(
-    pairs: &(impl Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone),
-    out: &mut [f32],
-) {
-    let mut at = 0;
-    let mut blocks = out.chunks_exact_mut(BLOCK);
-    for block in &mut blocks {
-        let mut sums = [0.0_f32; BLOCK];
-        for (k, a, b) in pairs.clone() {
-            let (Some(a), Some(b)) = (
-                a[at..].first_chunk::<BLOCK>(),
-                b[at..].first_chunk::<BLOCK>(),
-            ) else {
-                continue;
-            };
-            for i in 0..BLOCK {
-                sums[i] += k * (a[i] + b[i]);
+        let Self { pairs, out } = self;
+        let mut at = 0;
+        let mut blocks = out.chunks_exact_mut(BLOCK);
+        for block in &mut blocks {
+            let mut sums = [0.0_f32; BLOCK];
+            for (k, a, b) in pairs.clone() {
+                let (a, b) = (
+                    a[at..].first_chunk::<BLOCK>(),
+                    b[at..].first_chunk::<BLOCK>(),
+                );
+                let (Some(a), Some(b)) = (a, b) else { continue };
+                for i in 0..BLOCK {
+                    sums[i] += k * (a[i] + b[i]);
+                }
             }
+            block.copy_from_slice(&sums);
+            at += BLOCK;
         }
-        block.copy_from_slice(&sums);
-        at += BLOCK;
-    }
-    for (i, value) in blocks.into_remainder().iter_mut().enumerate() {
-        *value = pairs
-            .clone()
-            .map(|(k, a, b)| k * (a[at + i] + b[at + i]))
-            .sum();
+        for (i, value) in blocks.into_remainder().iter_mut().enumerate() {
+            let terms = pairs.clone().map(|(k, a, b)| k * (a[at + i] + b[at + i]));
+            *value = terms.sum();
+        }
     }
 }
 

@@ -21,26 +21,9 @@ pub(super) struct Studio<'a> {
     pub(super) bounce: f64,
 }
 
-/// Writes a row of a textured plane of reflectance 1: `plane` takes pixels to homogeneous plane
-/// coordinates in metres.
-pub(super) fn plane_row(
-    plane: &Matrix3<f64>,
-    texture: &Texture,
-    strength: f32,
-    start: (usize, usize),
-    row: &mut [f32],
-) {
-    widest(PlaneRow {
-        plane,
-        texture,
-        strength,
-        start,
-        row,
-    });
-}
-
-/// Arguments of [`plane_row`].
+/// Arguments of [`Studio::textured_row`].
 struct PlaneRow<'a> {
+    /// Map from pixels to homogeneous plane coordinates in metres.
     plane: &'a Matrix3<f64>,
     texture: &'a Texture,
     strength: f32,
@@ -56,9 +39,9 @@ impl Vectorized for PlaneRow<'_> {
         let Self {
             plane,
             texture,
-            strength,
-            start: (y, x0),
             row,
+            start: (y, x0),
+            ..
         } = self;
         let base = plane * Vector3::new(0.0, y as f64, 1.0);
         let step = plane.column(0);
@@ -69,24 +52,37 @@ impl Vectorized for PlaneRow<'_> {
         };
         let middle = x0 + row.len() / 2;
         let (a, b) = (place(middle), place(middle + 1));
-        let down = {
-            let p = plane * Vector3::new(middle as f64, y as f64 + 1.0, 1.0);
-            (p.x / p.z, p.y / p.z)
-        };
+        let below = plane * Vector3::new(middle as f64, y as f64 + 1.0, 1.0);
+        let down = (below.x / below.z, below.y / below.z);
         let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
-        texture.walk(texture.level(footprint), place, strength, x0, row);
+        texture.walk(texture.level(footprint), place, self.strength, x0, row);
     }
 }
 
 impl Studio<'_> {
+    /// Writes a row of a textured plane of reflectance 1 from a pixel, given by row and column, on.
+    pub(super) fn textured_row(
+        &self,
+        plane: &Matrix3<f64>,
+        strength: f32,
+        start: (usize, usize),
+        row: &mut [f32],
+    ) {
+        let texture = self.texture;
+        widest(PlaneRow {
+            plane,
+            texture,
+            strength,
+            start,
+            row,
+        });
+    }
+
     /// Returns the light that a surface with this normal receives, world frame.
     pub(super) fn irradiance(&self, normal: &Vector3<f64>) -> f64 {
         let up = 0.5 + 0.5 * normal.z;
-        let lamps: f64 = self
-            .lamps
-            .iter()
-            .map(|(toward, intensity)| intensity * toward.dot(normal).max(0.0))
-            .sum();
+        let lamp = |(toward, light): &(Vector3<f64>, f64)| light * toward.dot(normal).max(0.0);
+        let lamps: f64 = self.lamps.iter().map(lamp).sum();
         self.scene.ambient.max(0.0) * up + self.bounce * (1.0 - up) + lamps
     }
 
@@ -96,8 +92,7 @@ impl Studio<'_> {
         canvas: &mut Canvas,
         foot: Point2<f64>,
         radius: f64,
-        low: f64,
-        high: f64,
+        [low, high]: [f64; 2],
         appearance: &Appearance,
     ) {
         const SIDES: usize = 40;
@@ -111,19 +106,13 @@ impl Studio<'_> {
         let (top, bottom) = (ring(high), ring(low));
         // Silhouette of the side: the hull of both rings, made of the half of each that faces away
         // from the other in the image.
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        self.view.polygon(&top, &mut a);
-        self.view.polygon(&bottom, &mut b);
-        let hull = convex_hull(a.iter().chain(&b).copied().collect());
+        let mut outlines = self.view.polygon(&top);
+        outlines.extend(self.view.polygon(&bottom));
+        let hull = convex_hull(outlines);
         let axis = Point2::new(foot.x - eye.x, foot.y - eye.y);
         let rotation = self.view.pose.rotation.to_rotation_matrix();
         let shade = |x: f64, y: f64| {
-            let d = rotation
-                * Vector3::new(
-                    (x - self.view.principal.x) / self.view.focal,
-                    (y - self.view.principal.y) / self.view.focal,
-                    1.0,
-                );
+            let d = rotation * self.view.direction(x, y);
             // Intersection of the ray with the wall, seen from above.
             let dd = (d.x * d.x + d.y * d.y).max(1e-12);
             let b = d.x * axis.x + d.y * axis.y;
@@ -136,9 +125,8 @@ impl Studio<'_> {
                 let back = -d.normalize();
                 for (toward, intensity) in &self.lamps {
                     let half = (toward + back).try_normalize(1e-9).unwrap_or(n);
-                    light += intensity
-                        * appearance.gloss
-                        * (-40.0 * (1.0 - half.dot(&n)).max(0.0)).exp();
+                    let tilt = (1.0 - half.dot(&n)).max(0.0);
+                    light += intensity * appearance.gloss * (-40.0 * tilt).exp();
                 }
             }
             // Darker toward the table.
@@ -157,137 +145,93 @@ impl Studio<'_> {
             }
         });
         if eye.z > high {
-            self.face(
-                canvas,
-                &top,
-                &Vector3::x(),
-                &Vector3::y(),
-                appearance,
-                appearance.albedo,
-            );
+            self.face(canvas, &top, [Vector3::x(), Vector3::y()], appearance);
         }
     }
 
     /// Draws a flat convex face with the texture running along u and v.
-    pub(super) fn face(
+    fn face(
         &self,
         canvas: &mut Canvas,
         corners: &[Point3<f64>],
-        u: &Vector3<f64>,
-        v: &Vector3<f64>,
+        [u, v]: [Vector3<f64>; 2],
         appearance: &Appearance,
-        albedo: f64,
     ) {
-        let mut polygon = Vec::with_capacity(corners.len() + 1);
-        self.view.polygon(corners, &mut polygon);
-        let light = (albedo * self.irradiance(&u.cross(v))) as f32;
+        let polygon = self.view.polygon(corners);
+        let light = (appearance.albedo * self.irradiance(&u.cross(&v))) as f32;
         if appearance.texture <= 0.0 {
             canvas.fill(&polygon, |_, _, row| row.fill(light));
             return;
         }
-        let plane = self.view.plane(&corners[0], u, v);
+        let plane = self.view.plane(&corners[0], &u, &v);
         let strength = appearance.texture as f32;
         canvas.fill(&polygon, |y, x0, row| {
-            plane_row(&plane, self.texture, strength, (y, x0), row);
+            self.textured_row(&plane, strength, (y, x0), row);
             row.iter_mut().for_each(|value| *value *= light);
         });
     }
 
     /// Draws a thing.
     pub(super) fn thing(&self, canvas: &mut Canvas, thing: &Thing) {
-        let (sin, cos) = thing.turn.sin_cos();
-        let along = Vector3::new(cos, sin, 0.0);
-        let across = Vector3::new(-sin, cos, 0.0);
+        let [along, across] = axes(thing);
         let middle = Point3::new(thing.x, thing.y, self.table);
         let half = 0.5 * thing.shape.height();
-        if self.view.misses(
-            &(middle + Vector3::z() * half),
-            thing.shape.footprint().hypot(half),
-        ) {
+        let reach = thing.shape.footprint().hypot(half);
+        if self.view.misses(&(middle + Vector3::z() * half), reach) {
             return;
         }
-        let (appearance, albedo) = (&thing.appearance, thing.appearance.albedo);
-        let quad = |at: Point3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
-            [at - u - v, at + u - v, at + u + v, at - u + v]
-        };
+        let appearance = &thing.appearance;
         match thing.shape {
             Shape::Box {
                 length,
                 width,
                 height,
             } => {
-                let (l, w, h) = (
-                    along * (0.5 * length),
-                    across * (0.5 * width),
-                    Vector3::z() * (0.5 * height),
-                );
-                let centre = middle + h;
-                let eye = self.view.eye();
+                let (l, w) = (along * (0.5 * length), across * (0.5 * width));
+                let h = Vector3::z() * (0.5 * height);
+                let (centre, eye) = (middle + h, self.view.eye());
                 for (out, u, v) in [(l, w, h), (-l, -w, h), (w, -l, h), (-w, l, h), (h, l, w)] {
                     if (eye - (centre + out)).dot(&out) > 0.0 {
                         let corners = quad(centre + out, u, v);
-                        self.face(
-                            canvas,
-                            &corners,
-                            &u.normalize(),
-                            &v.normalize(),
-                            appearance,
-                            albedo,
-                        );
+                        self.face(canvas, &corners, [u.normalize(), v.normalize()], appearance);
                     }
                 }
             }
             Shape::Cylinder { radius, height } => {
-                self.cylinder(
-                    canvas,
-                    middle.xy(),
-                    radius,
-                    self.table,
-                    self.table + height,
-                    appearance,
-                );
+                let heights = [self.table, self.table + height];
+                self.cylinder(canvas, middle.xy(), radius, heights, appearance);
             }
             Shape::Ball { radius } => {
-                self.sphere(
-                    canvas,
-                    &(middle + Vector3::z() * radius),
-                    radius,
-                    appearance,
-                );
+                let centre = middle + Vector3::z() * radius;
+                self.sphere(canvas, &centre, radius, appearance);
             }
             Shape::Disc { radius, inner } => {
-                for (r, a) in [
-                    (radius, albedo),
-                    (
-                        inner,
-                        if albedo > 0.5 {
-                            0.4 * albedo
-                        } else {
-                            0.5 + 0.5 * albedo
-                        },
-                    ),
-                ] {
-                    if r > 0.0 {
+                let albedo = appearance.albedo;
+                let other = if albedo > 0.5 {
+                    0.4 * albedo
+                } else {
+                    0.5 + 0.5 * albedo
+                };
+                for (radius, albedo) in [(radius, albedo), (inner, other)] {
+                    if radius > 0.0 {
                         let ring: [Point3<f64>; 64] = std::array::from_fn(|i| {
                             let (s, c) = (i as f64 * std::f64::consts::TAU / 64.0).sin_cos();
-                            middle + along * (r * c) + across * (r * s)
+                            middle + along * (radius * c) + across * (radius * s)
                         });
-                        self.face(canvas, &ring, &along, &across, appearance, a);
+                        let appearance = Appearance {
+                            albedo,
+                            ..*appearance
+                        };
+                        self.face(canvas, &ring, [along, across], &appearance);
                     }
                 }
             }
-            Shape::Tape { length, width } => {
+            Shape::Tape { length, width } | Shape::Print { length, width, .. } => {
                 let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                self.face(canvas, &corners, &along, &across, appearance, albedo);
-            }
-            Shape::Print {
-                length,
-                width,
-                lines,
-            } => {
-                let corners = quad(middle, along * (0.5 * length), across * (0.5 * width));
-                self.face(canvas, &corners, &along, &across, appearance, albedo);
-                self.print(canvas, thing, (length, width), lines);
+                self.face(canvas, &corners, [along, across], appearance);
+                if let Shape::Print { lines, .. } = thing.shape {
+                    self.print(canvas, thing, (length, width), lines);
+                }
             }
         }
     }
@@ -307,9 +251,8 @@ impl Studio<'_> {
         const LAYERS: usize = 6;
         let soft = strip.softness.max(0.0) * unit;
         for k in 0..LAYERS {
-            let half = across
-                * (0.5 * strip.width * unit + soft * (0.5 - (k as f64 + 0.5) / LAYERS as f64))
-                    .max(0.0);
+            let inward = 0.5 - (k as f64 + 0.5) / LAYERS as f64;
+            let half = across * (0.5 * strip.width * unit + soft * inward).max(0.0);
             let corners = [from - half, to - half, to + half, from + half].map(Point2::from);
             let share = 1.0 / (LAYERS - k) as f32;
             canvas.blend(&corners, light as f32, share);
@@ -319,8 +262,7 @@ impl Studio<'_> {
     /// Words on a sheet: dark bars of the length of words, each with gaps and strokes like letters
     /// from afar.
     fn print(&self, canvas: &mut Canvas, thing: &Thing, (length, width): (f64, f64), lines: u32) {
-        let (sin, cos) = thing.turn.sin_cos();
-        let (along, across) = (Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0));
+        let [along, across] = axes(thing);
         let middle = Point3::new(thing.x, thing.y, self.table);
         let ink = Appearance {
             albedo: 0.1,
@@ -346,19 +288,15 @@ impl Studio<'_> {
         for line in 0..lines {
             let y = 0.43 * width - (f64::from(line) + 0.5) * pitch;
             let mut x = -0.43 * length;
-            let end = if line + 1 == lines {
-                0.1 * length
-            } else {
-                0.43 * length
-            };
+            let share = if line + 1 == lines { 0.1 } else { 0.43 };
+            let end = share * length;
             while x < end {
                 for _ in 0..2 + next(7) {
                     let kind = next(5);
                     let mut stroke = |x0: f64, y0: f64, w: f64, h: f64| {
                         let at = middle + along * (x + x0) + across * (y + y0);
-                        let (u, v) = (along * (0.5 * w), across * (0.5 * h));
-                        let corners = [at - u - v, at + u - v, at + u + v, at - u + v];
-                        self.face(canvas, &corners, &along, &across, &ink, ink.albedo);
+                        let corners = quad(at, along * (0.5 * w), across * (0.5 * h));
+                        self.face(canvas, &corners, [along, across], &ink);
                     };
                     let thick = 0.16 * size;
                     stroke(0.0, 0.0, thick, size);
@@ -366,12 +304,8 @@ impl Studio<'_> {
                         stroke(0.4 * size, 0.0, thick, 0.8 * size);
                     }
                     if kind > 1 {
-                        stroke(
-                            0.2 * size,
-                            0.3 * size * (kind as f64 - 3.0),
-                            0.5 * size,
-                            thick,
-                        );
+                        let height = 0.3 * size * (kind as f64 - 3.0);
+                        stroke(0.2 * size, height, 0.5 * size, thick);
                     }
                     x += 0.75 * size;
                     if x > end {
@@ -382,6 +316,17 @@ impl Studio<'_> {
             }
         }
     }
+}
+
+/// Returns the directions of a thing's own x and y.
+fn axes(thing: &Thing) -> [Vector3<f64>; 2] {
+    let (sin, cos) = thing.turn.sin_cos();
+    [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0)]
+}
+
+/// Returns the corners of a parallelogram with the middle `at`.
+fn quad(at: Point3<f64>, u: Vector3<f64>, v: Vector3<f64>) -> [Point3<f64>; 4] {
+    [at - u - v, at + u - v, at + u + v, at - u + v]
 }
 
 /// The convex hull of points in the plane, in order.

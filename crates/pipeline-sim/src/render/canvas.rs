@@ -67,44 +67,13 @@ impl Canvas {
         });
     }
 
-    #[inline(always)]
-    fn fill_rows(
-        &mut self,
-        polygon: &[Point2<f64>],
-        mut shade: impl FnMut(usize, usize, &mut [f32]),
-    ) {
-        let Some(rows) = self.rows_of(polygon) else {
-            return;
-        };
-        for y in rows {
-            let Some((start, end, solid)) = self.cover_row(y) else {
-                continue;
-            };
-            let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
-            if solid {
-                shade(y, start, row);
-                continue;
-            }
-            let shades = &mut self.shade[..end - start];
-            shade(y, start, shades);
-            for ((light, shade), share) in
-                row.iter_mut().zip(&*shades).zip(&self.coverage[start..end])
-            {
-                *light += (shade - *light) * share;
-            }
-        }
-    }
-
     /// Lays an even layer of light over a convex polygon that replaces `share` of what is below.
     pub(super) fn blend(&mut self, polygon: &[Point2<f64>], light: f32, share: f32) {
-        let Some(rows) = self.rows_of(polygon) else {
-            return;
-        };
-        for y in rows {
+        for y in self.rows_of(polygon) {
             let Some((start, end, solid)) = self.cover_row(y) else {
                 continue;
             };
-            let row = &mut self.light[y * self.width..(y + 1) * self.width][start..end];
+            let row = &mut self.light[y * self.width..][start..end];
             for (value, coverage) in row.iter_mut().zip(&self.coverage[start..end]) {
                 let coverage = if solid { 1.0 } else { *coverage };
                 *value += (light - *value) * coverage * share;
@@ -114,27 +83,13 @@ impl Canvas {
 
     /// Lists the edges of a polygon and returns the rows that it may touch.
     #[inline(always)]
-    fn rows_of(&mut self, polygon: &[Point2<f64>]) -> Option<std::ops::Range<usize>> {
-        if polygon.len() < 3 {
-            return None;
-        }
-        let left = polygon.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
-        let right = polygon
-            .iter()
-            .map(|p| p.x)
-            .fold(f64::NEG_INFINITY, f64::max);
-        if left > self.width as f64 || right < -1.0 {
-            return None;
-        }
-        let top = polygon.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let bottom = polygon
-            .iter()
-            .map(|p| p.y)
-            .fold(f64::NEG_INFINITY, f64::max);
+    fn rows_of(&mut self, polygon: &[Point2<f64>]) -> std::ops::Range<usize> {
+        let (left, right) = extent(polygon.iter().map(|p| p.x));
+        let (top, bottom) = extent(polygon.iter().map(|p| p.y));
         let first = (top + 0.5).floor().max(0.0);
         let last = (bottom + 0.5).floor().min(self.height as f64 - 1.0);
-        if first > last {
-            return None;
+        if polygon.len() < 3 || left > self.width as f64 || right < -1.0 || first > last {
+            return 0..0;
         }
         self.edges.clear();
         let mut p = polygon[polygon.len() - 1];
@@ -152,7 +107,7 @@ impl Canvas {
         }
         self.edges.sort_unstable_by(|a, b| b.top.total_cmp(&a.top));
         self.active.clear();
-        Some(first as usize..last as usize + 1)
+        first as usize..last as usize + 1
     }
 
     /// Computes the coverage of one row, after those above it. Returns the touched pixels
@@ -171,12 +126,9 @@ impl Canvas {
             for i in 0..SUBROWS {
                 let x = edge.x + (lines[i] - edge.top) * edge.slope;
                 let crosses = edge.top <= lines[i] && lines[i] < edge.bottom;
-                lefts[i] = if crosses && x < lefts[i] { x } else { lefts[i] };
-                rights[i] = if crosses && x > rights[i] {
-                    x
-                } else {
-                    rights[i]
-                };
+                let (left, right) = (lefts[i], rights[i]);
+                lefts[i] = if crosses && x < left { x } else { left };
+                rights[i] = if crosses && x > right { x } else { right };
             }
         }
         let mut spans = [(0.0_f64, -1.0_f64); SUBROWS];
@@ -233,9 +185,33 @@ impl<S: FnMut(usize, usize, &mut [f32])> Vectorized for Filling<'_, S> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
-        self.canvas.fill_rows(self.polygon, self.shade);
+    fn run(mut self) {
+        let canvas = self.canvas;
+        for y in canvas.rows_of(self.polygon) {
+            let Some((start, end, solid)) = canvas.cover_row(y) else {
+                continue;
+            };
+            let row = &mut canvas.light[y * canvas.width..][start..end];
+            if solid {
+                (self.shade)(y, start, row);
+                continue;
+            }
+            let shades = &mut canvas.shade[..end - start];
+            (self.shade)(y, start, shades);
+            let shares = &canvas.coverage[start..end];
+            for ((light, shade), share) in row.iter_mut().zip(&*shades).zip(shares) {
+                *light += (shade - *light) * share;
+            }
+        }
     }
+}
+
+/// Returns the least and the greatest of some numbers.
+#[inline(always)]
+fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| {
+        (least.min(v), most.max(v))
+    })
 }
 
 #[cfg(test)]

@@ -43,10 +43,8 @@ impl Warp {
         let (focal, principal) = (camera.focal_px(), camera.principal_point());
         let pixels = |(most, part): (f64, f64)| (part * focal).clamp(1.0, most);
         let step = pixels(STEP);
-        let (across, down) = (
-            Nodes::new(width as usize, step),
-            Nodes::new(height as usize, step),
-        );
+        let across = Nodes::new(width as usize, step);
+        let down = Nodes::new(height as usize, step);
         // The last answer is the start for the next.
         let mut last = (Point2::origin(), Point2::origin());
         let mut exact = |x: f64, y: f64| {
@@ -59,24 +57,20 @@ impl Warp {
             .flat_map(|j| (0..across.count).map(move |i| (i, j)))
             .map(|(i, j)| exact(across.place(i), down.place(j)))
             .collect();
-        let low = grid
-            .iter()
-            .fold(Vector2::zeros(), |a: Vector2<f64>, p| a.inf(p));
-        let high = grid
-            .iter()
-            .fold(Vector2::zeros(), |a: Vector2<f64>, p| a.sup(p));
+        let zero = Vector2::zeros();
+        let low = grid.iter().fold(zero, |a: Vector2<f64>, p| a.inf(p));
+        let high = grid.iter().fold(zero, |a: Vector2<f64>, p| a.sup(p));
         let (low, high) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 2.0));
         let (w, h) = ((high.x - low.x + 1.0) as u32, (high.y - low.y + 1.0) as u32);
         let ideal = Camera::ideal(focal, principal - low, w, h);
         let run = pixels(RUN) as usize;
         let runs = (width as usize).div_ceil(run);
-        let ends: Vec<usize> = (0..=runs)
-            .map(|k| (k * run).min(width as usize - 1))
-            .collect();
-        let shares: Vec<(usize, [f64; 4])> = ends.iter().map(|x| across.shares(*x)).collect();
-        let mut sources = vec![[0.0; 2]; ends.len() * height as usize];
+        let ends = (0..=runs).map(|k| (k * run).min(width as usize - 1));
+        let shares: Vec<(usize, [f64; 4])> = ends.map(|x| across.shares(x)).collect();
+        let columns = shares.len();
+        let mut sources = vec![[0.0; 2]; columns * height as usize];
         let mut row = vec![[0.0; 2]; across.count];
-        for (y, sources) in sources.chunks_exact_mut(ends.len()).enumerate() {
+        for (y, sources) in sources.chunks_exact_mut(columns).enumerate() {
             let (top, weights) = down.shares(y);
             let nodes = |k: usize| &grid[(top + k) * across.count..][..across.count];
             let four = nodes(0).iter().zip(nodes(1)).zip(nodes(2)).zip(nodes(3));
@@ -95,7 +89,7 @@ impl Warp {
             ideal,
             run,
             sources,
-            columns: ends.len(),
+            columns,
         })
     }
 
@@ -112,9 +106,21 @@ impl Warp {
             out,
         });
     }
+}
+
+/// Arguments of [`Warp::apply`].
+struct Applying<'a> {
+    warp: &'a Warp,
+    ideal: &'a Canvas,
+    out: &'a mut Canvas,
+}
+
+impl Vectorized for Applying<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn apply_rows(&self, ideal: &Canvas, out: &mut Canvas) {
+    fn run(self) {
+        let Self { warp, ideal, out } = self;
         let (w, width) = (ideal.width, out.width);
         // Whole pixels and their 65536ths; no frame is so large that these do not fit.
         let fixed = |v: f32| (v * 65536.0) as i32;
@@ -124,9 +130,9 @@ impl Warp {
         // Of each pixel the two above its place, and the two below.
         let (mut upper, mut lower) = (vec![[0.0_f32; 2]; width], vec![[0.0_f32; 2]; width]);
         let rows = out.light.chunks_exact_mut(width.max(1));
-        for (row, sources) in rows.zip(self.sources.chunks_exact(self.columns)) {
+        for (row, sources) in rows.zip(warp.sources.chunks_exact(warp.columns)) {
             // The last place of a row is that of its last pixel.
-            let last = (self.columns - 2) * self.run;
+            let last = (warp.columns - 2) * warp.run;
             if let Some(ends) = sources.windows(2).last() {
                 let length = (width - 1 - last).max(1) as f32;
                 let from = ends[0].map(fixed);
@@ -137,17 +143,16 @@ impl Warp {
             }
             for (c, line) in [&mut x[..last], &mut y[..last]].into_iter().enumerate() {
                 let ends = sources.windows(2).map(|ends| (ends[0][c], ends[1][c]));
-                if self.run == WHOLE_RUN {
-                    for (run, (from, to)) in
-                        line.as_chunks_mut::<WHOLE_RUN>().0.iter_mut().zip(ends)
-                    {
-                        let (at, step) =
-                            (fixed(from), fixed((to - from) * (1.0 / WHOLE_RUN as f32)));
+                if warp.run == WHOLE_RUN {
+                    let runs = line.as_chunks_mut::<WHOLE_RUN>().0;
+                    for (run, (from, to)) in runs.iter_mut().zip(ends) {
+                        let at = fixed(from);
+                        let step = fixed((to - from) * (1.0 / WHOLE_RUN as f32));
                         *run = [at, at + step, at + 2 * step, at + 3 * step];
                     }
                 } else {
-                    for (run, (from, to)) in line.chunks_mut(self.run).zip(ends) {
-                        let step = fixed((to - from) / self.run as f32);
+                    for (run, (from, to)) in line.chunks_mut(warp.run).zip(ends) {
+                        let step = fixed((to - from) / warp.run as f32);
                         for (at, i) in run.iter_mut().zip(0..) {
                             *at = fixed(from) + i * step;
                         }
@@ -169,22 +174,6 @@ impl Warp {
                 *light = upper + (lower - upper) * part(*y);
             }
         }
-    }
-}
-
-/// Arguments of [`Warp::apply`].
-struct Applying<'a> {
-    warp: &'a Warp,
-    ideal: &'a Canvas,
-    out: &'a mut Canvas,
-}
-
-impl Vectorized for Applying<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.warp.apply_rows(self.ideal, self.out);
     }
 }
 
@@ -246,14 +235,10 @@ impl Nodes {
         let first = (at.floor().max(1.0) as usize - 1).min(self.count - 4);
         let t = at - first as f64;
         let (a, b, c, d) = (t, t - 1.0, t - 2.0, t - 3.0);
+        let outer = [-b * c * d / 6.0, a * b * c / 6.0];
         (
             first,
-            [
-                -b * c * d / 6.0,
-                a * c * d / 2.0,
-                -a * b * d / 2.0,
-                a * b * c / 6.0,
-            ],
+            [outer[0], a * c * d / 2.0, -a * b * d / 2.0, outer[1]],
         )
     }
 }

@@ -81,18 +81,40 @@ impl LightGrid {
         });
     }
 
+    /// Multiplies the pixels x0.. of row y by the light on them.
+    pub(super) fn shine(&self, y: usize, x0: usize, row: &mut [f32]) {
+        widest(Shining {
+            light: self,
+            start: (y, x0),
+            row,
+        });
+    }
+}
+
+/// Arguments of [`LightGrid::lay`].
+struct Laying<'a, L> {
+    grid: &'a mut LightGrid,
+    size: (usize, usize),
+    plane: &'a Matrix3<f64>,
+    lighting: &'a L,
+}
+
+impl<L: Lighting> Vectorized for Laying<'_, L> {
+    type Output = ();
+
     #[inline(always)]
-    fn lay_rows(
-        &mut self,
-        (width, height): (usize, usize),
-        plane: &Matrix3<f64>,
-        lighting: &impl Lighting,
-    ) {
+    fn run(self) {
+        let Self {
+            grid,
+            plane,
+            lighting,
+            size: (width, height),
+        } = self;
         let nodes = |pixels: usize| pixels / (2 * STEP) * 2 + 3;
         let (columns, rows) = (nodes(width), nodes(height));
-        self.columns = columns;
-        self.values.resize(columns * rows, 0.0);
-        let row = &mut self.row;
+        grid.columns = columns;
+        grid.values.resize(columns * rows, 0.0);
+        let row = &mut grid.row;
         for list in [&mut row.x, &mut row.y, &mut row.met, &mut row.light] {
             list.resize(columns, 0.0);
         }
@@ -105,13 +127,13 @@ impl LightGrid {
             row.work_out(
                 line(j),
                 lighting,
-                &mut self.values[j * columns..][..columns],
+                &mut grid.values[j * columns..][..columns],
             );
         }
         let alike = |a: f32, b: f32| (a - b).abs() <= ALIKE * (a + b);
         for j in 0..rows {
             row.wanted.clear();
-            let (before, rest) = self.values.split_at_mut(j * columns);
+            let (before, rest) = grid.values.split_at_mut(j * columns);
             let (here, after) = rest.split_at_mut(columns);
             if j % 2 == 0 {
                 for i in (1..columns).step_by(2) {
@@ -139,20 +161,27 @@ impl LightGrid {
             }
         }
     }
+}
 
-    /// Multiplies the pixels x0.. of row y by the light on them.
-    pub(super) fn shine(&self, y: usize, x0: usize, row: &mut [f32]) {
-        widest(Shining {
-            light: self,
-            start: (y, x0),
-            row,
-        });
-    }
+/// Arguments of [`LightGrid::shine`].
+struct Shining<'a> {
+    light: &'a LightGrid,
+    start: (usize, usize),
+    row: &'a mut [f32],
+}
+
+impl Vectorized for Shining<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn shine_on(&self, (y, x0): (usize, usize), row: &mut [f32]) {
+    fn run(self) {
+        let Self {
+            light,
+            row,
+            start: (y, x0),
+        } = self;
         let (j, fy) = (y / STEP, (y % STEP) as f32 / STEP as f32);
-        let line = |j: usize| self.values.get(j * self.columns..(j + 1) * self.columns);
+        let line = |j: usize| light.values.get(j * light.columns..(j + 1) * light.columns);
         let (Some(upper), Some(lower)) = (line(j), line(j + 1)) else {
             row.fill(0.0);
             return;
@@ -170,50 +199,21 @@ impl LightGrid {
         for (part, (upper, lower)) in rest.chunks_mut(STEP).zip(nodes) {
             let to = upper + (lower - upper) * fy;
             let slope = (to - from) / STEP as f32;
-            if let Some(part) = part.first_chunk_mut::<STEP>() {
-                for (k, value) in part.iter_mut().enumerate() {
-                    *value *= from + slope * k as f32;
-                }
+            if let Some(whole) = part.first_chunk_mut::<STEP>() {
+                shade(whole, from, slope);
             } else {
-                for (k, value) in part.iter_mut().enumerate() {
-                    *value *= from + slope * k as f32;
-                }
+                shade(part, from, slope);
             }
             from = to;
         }
     }
 }
 
-/// Arguments of [`LightGrid::lay`].
-struct Laying<'a, L> {
-    grid: &'a mut LightGrid,
-    size: (usize, usize),
-    plane: &'a Matrix3<f64>,
-    lighting: &'a L,
-}
-
-impl<L: Lighting> Vectorized for Laying<'_, L> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.grid.lay_rows(self.size, self.plane, self.lighting);
-    }
-}
-
-/// Arguments of [`LightGrid::shine`].
-struct Shining<'a> {
-    light: &'a LightGrid,
-    start: (usize, usize),
-    row: &'a mut [f32],
-}
-
-impl Vectorized for Shining<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.light.shine_on(self.start, self.row);
+/// Multiplies pixels by light that begins at `from` and changes by `slope` from one to the next.
+#[inline(always)]
+fn shade(pixels: &mut [f32], from: f32, slope: f32) {
+    for (k, value) in pixels.iter_mut().enumerate() {
+        *value *= from + slope * k as f32;
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::cell::geometry::Cell;
 use crate::render::ball_shadow::BallShadow;
-use crate::render::bodies::{Studio, plane_row};
+use crate::render::bodies::Studio;
 use crate::render::canvas::Canvas;
 use crate::render::light_grid::Lighting;
 use crate::render::renderer::Renderer;
@@ -74,14 +74,10 @@ impl Renderer {
         let plane = table_plane(view, studio.table);
         let (near, far, half) = TABLE;
         let corners = [(near, -half), (far, -half), (far, half), (near, half)];
-        let mut polygon = Vec::with_capacity(8);
-        view.polygon(
-            &corners.map(|(x, y)| Point3::new(x, y, studio.table)),
-            &mut polygon,
-        );
+        let polygon = view.polygon(&corners.map(|(x, y)| Point3::new(x, y, studio.table)));
         let strength = self.scene.table.texture as f32;
         canvas.fill(&polygon, |y, x0, row| {
-            plane_row(&plane, &self.wood, strength, (y, x0), row);
+            studio.textured_row(&plane, strength, (y, x0), row);
             self.light.shine(y, x0, row);
         });
     }
@@ -94,54 +90,38 @@ impl Renderer {
     /// overlaps it as seen from above: a level plane separates the two, and the one on the far side
     /// of it comes first.
     pub(super) fn items(&self, cell: &Cell, view: &View) -> Vec<Item> {
+        /// Something that stands: its power and top, and `true` for what the ball is above.
+        type Standing = (f64, f64, bool, Item);
         let (eye, ball) = (view.eye(), cell.ball.centre);
         let overlaps =
             |x: f64, y: f64, r: f64| (x - ball.x).hypot(y - ball.y) < r + cell.ball.radius;
         let power = |x: f64, y: f64, r: f64| (x - eye.x).powi(2) + (y - eye.y).powi(2) - r * r;
         let things = || self.scene.things.iter().enumerate();
-        let mut items: Vec<Item> = things()
-            .filter(|(_, t)| t.shape.is_flat())
-            .map(|(i, _)| Item::Thing(i))
-            .collect();
-        // Power, top, `true` if the ball is above, item.
-        let mut standing: Vec<(f64, f64, bool, Item)> = things()
-            .filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t, cell))
+        let flat = things().filter(|(_, t)| t.shape.is_flat());
+        let mut items: Vec<Item> = flat.map(|(i, _)| Item::Thing(i)).collect();
+        let stands = things().filter(|(_, t)| !t.shape.is_flat() && !in_the_way(t, cell));
+        let mut standing: Vec<Standing> = stands
             .map(|(i, t)| {
                 let (foot, top) = (t.shape.footprint(), cell.table + t.shape.height());
-                (
-                    power(t.x, t.y, foot),
-                    top,
-                    overlaps(t.x, t.y, foot),
-                    Item::Thing(i),
-                )
+                let under = overlaps(t.x, t.y, foot);
+                (power(t.x, t.y, foot), top, under, Item::Thing(i))
             })
             .collect();
         standing.extend(cell.holder.map(|h| {
-            let under = ball.z > h.top && overlaps(h.foot.x, h.foot.y, h.radius);
-            (
-                power(h.foot.x, h.foot.y, h.radius),
-                h.top,
-                under,
-                Item::Holder,
-            )
+            let (x, y) = (h.foot.x, h.foot.y);
+            let under = ball.z > h.top && overlaps(x, y, h.radius);
+            (power(x, y, h.radius), h.top, under, Item::Holder)
         }));
         standing.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The ball comes by power, but after the things it is above (before them if seen from
         // below).
         let of_ball = power(ball.x, ball.y, cell.ball.radius);
-        let by_power = standing
-            .iter()
-            .filter(|(power, ..)| *power >= of_ball)
-            .count();
-        let seen_from_above = |top: f64| eye.z > top;
-        let after = standing
-            .iter()
-            .rposition(|(_, top, under, _)| *under && seen_from_above(*top))
-            .map_or(0, |i| i + 1);
-        let before = standing
-            .iter()
-            .position(|(_, top, under, _)| *under && !seen_from_above(*top))
-            .unwrap_or(standing.len());
+        let by_power = standing.iter().filter(|s| s.0 >= of_ball).count();
+        let from_above = |top: f64| eye.z > top;
+        let over = |s: &Standing| s.2 && from_above(s.1);
+        let below = |s: &Standing| s.2 && !from_above(s.1);
+        let after = standing.iter().rposition(over).map_or(0, |i| i + 1);
+        let before = standing.iter().position(below).unwrap_or(standing.len());
         let place = by_power.min(before).max(after);
         items.extend(standing[..place].iter().map(|s| s.3));
         items.push(Item::Ball);
@@ -160,16 +140,12 @@ impl Renderer {
         match item {
             Item::Thing(i) => studio.thing(canvas, &self.scene.things[*i]),
             Item::Ball => {
-                studio.sphere(
-                    canvas,
-                    &cell.ball.centre,
-                    cell.ball.radius,
-                    &studio.scene.ball,
-                );
+                let ball = &cell.ball;
+                studio.sphere(canvas, &ball.centre, ball.radius, &studio.scene.ball);
             }
             Item::Holder => {
                 if let Some(h) = cell.holder {
-                    studio.cylinder(canvas, h.foot, h.radius, cell.table, h.top, &ROD);
+                    studio.cylinder(canvas, h.foot, h.radius, [cell.table, h.top], &ROD);
                 }
             }
             Item::Occluder(i) => studio.occluder(canvas, &self.scene.occluders[*i]),
@@ -179,7 +155,6 @@ impl Renderer {
     /// Draws floor and walls.
     fn draw_backdrop(&self, canvas: &mut Canvas, studio: &Studio<'_>) {
         canvas.light.fill(0.30);
-        let mut polygon = Vec::with_capacity(8);
         let n = self.walls.len() / 2;
         let corner = |i: usize, z: f64| {
             let (sin, cos) = (i as f64 * std::f64::consts::TAU / n as f64).sin_cos();
@@ -187,25 +162,19 @@ impl Renderer {
         };
         for (i, pair) in self.walls.chunks_exact(2).enumerate() {
             for (light, low, high) in [(pair[0], FLOOR, 0.2), (pair[1], 0.2, 1.8)] {
-                let corners = [
-                    corner(i, low),
-                    corner(i + 1, low),
-                    corner(i + 1, high),
-                    corner(i, high),
-                ];
-                studio.view.polygon(&corners, &mut polygon);
+                let ends = [(i, low), (i + 1, low), (i + 1, high), (i, high)];
+                let polygon = studio.view.polygon(&ends.map(|(i, z)| corner(i, z)));
                 canvas.fill(&polygon, |_, _, row| row.fill(light));
             }
         }
         let floor: Vec<Point3<f64>> = (0..n).map(|i| corner(i, FLOOR)).collect();
-        studio.view.polygon(&floor, &mut polygon);
-        let plane = studio.view.plane(
-            &Point3::new(0.0, 0.0, FLOOR),
-            &Vector3::new(4.0, 0.0, 0.0),
-            &Vector3::new(0.0, 4.0, 0.0),
-        );
+        let polygon = studio.view.polygon(&floor);
+        let origin = Point3::new(0.0, 0.0, FLOOR);
+        let plane = studio
+            .view
+            .plane(&origin, &(Vector3::x() * 4.0), &(Vector3::y() * 4.0));
         canvas.fill(&polygon, |y, x0, row| {
-            plane_row(&plane, studio.texture, 0.4, (y, x0), row);
+            studio.textured_row(&plane, 0.4, (y, x0), row);
             row.iter_mut().for_each(|value| *value *= 0.16);
         });
     }
@@ -277,11 +246,10 @@ fn fills_frame(view: &View, cell: &Cell) -> bool {
     }
     let plane = table_plane(view, cell.table);
     let (w, h) = (view.width as f64, view.height as f64);
-    [(-1.0, -1.0), (w, -1.0), (-1.0, h), (w, h)]
-        .into_iter()
-        .all(|(x, y)| {
-            let p = plane * Vector3::new(x, y, 1.0);
-            let (u, v) = (p.x / p.z, p.y / p.z);
-            p.z > 0.0 && u > near && u < far && v.abs() < half
-        })
+    let mut corners = [(-1.0, -1.0), (w, -1.0), (-1.0, h), (w, h)].into_iter();
+    corners.all(|(x, y)| {
+        let p = plane * Vector3::new(x, y, 1.0);
+        let (u, v) = (p.x / p.z, p.y / p.z);
+        p.z > 0.0 && u > near && u < far && v.abs() < half
+    })
 }

@@ -40,15 +40,13 @@ const GAIN_ROWS: usize = 8;
 impl Exposure {
     pub(super) fn new<R: Rng + ?Sized>(sensor: Sensor, rng: &mut R) -> Self {
         let noise = (0..NOISES).map(|_| StandardNormal.sample(rng)).collect();
-        let exponent = 1.0
-            / if sensor.gamma > 0.0 {
-                sensor.gamma
-            } else {
-                1.0
-            };
-        let level =
-            |i: usize| (255.0 * (i as f64 / (LEVELS - 1) as f64).powf(exponent)).round() as u8;
-        let curve = Box::new(std::array::from_fn(level));
+        let gamma = if sensor.gamma > 0.0 {
+            sensor.gamma
+        } else {
+            1.0
+        };
+        let value = |i: usize| (i as f64 / (LEVELS - 1) as f64).powf(1.0 / gamma);
+        let curve = Box::new(std::array::from_fn(|i| (255.0 * value(i)).round() as u8));
         Self {
             sensor,
             blurred: false,
@@ -80,97 +78,6 @@ impl Exposure {
             out,
         });
     }
-
-    #[inline(always)]
-    fn expose_rows(&mut self, canvas: &Canvas, camera: &Camera, seed: u64, out: &mut [u8]) {
-        let (width, height) = (canvas.width, canvas.height);
-        if width == 0 || height == 0 {
-            return;
-        }
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let s = self.sensor;
-        let (principal, focal) = (camera.principal_point(), camera.focal_px());
-        let (side, middle) = three_taps(if self.blurred { 0.0 } else { s.blur });
-        let (read2, shot2) = (
-            ((s.read_noise / 255.0) as f32).powi(2),
-            ((s.shot_noise / 255.0) as f32).powi(2),
-        );
-        let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
-        self.mixed.resize(width + 2, 0.0);
-        self.row.resize(width, 0.0);
-        self.columns.clear();
-        self.columns
-            .extend((0..width).map(|x| (((x as f64 - principal.x) / focal) as f32).powi(2)));
-        self.gains.resize(width, 0.0);
-        self.changes.resize(width, 0.0);
-        let fall = |y: usize| 1.0 + (((y as f64 - principal.y) / focal) as f32).powi(2);
-        let gain = |fall: f32, tan2: f32| {
-            let cos2 = 1.0 / (fall + tan2);
-            exposure * (1.0 - bend * (1.0 - cos2 * cos2))
-        };
-        // Without gamma, gray levels need no table.
-        let straight = s.gamma.to_bits() == 1.0_f64.to_bits();
-        // A frame wider than the table of noise repeats it along the row.
-        let run = width.min(NOISES / 2);
-        for y in 0..height {
-            let line = |k: usize| &canvas.light[k * width..(k + 1) * width];
-            let (above, here, below) = (
-                line(y.saturating_sub(1)),
-                line(y),
-                line((y + 1).min(height - 1)),
-            );
-            for (((m, a), h), b) in self.mixed[1..=width]
-                .iter_mut()
-                .zip(above)
-                .zip(here)
-                .zip(below)
-            {
-                *m = middle * h + side * (a + b);
-            }
-            self.mixed[0] = self.mixed[1];
-            self.mixed[width + 1] = self.mixed[width];
-            if y % GAIN_ROWS == 0 {
-                let (here, later) = (fall(y), fall(y + GAIN_ROWS));
-                let gains = self.gains.iter_mut().zip(&mut self.changes);
-                for ((now, change), tan2) in gains.zip(&self.columns) {
-                    *now = gain(here, *tan2);
-                    *change = (gain(later, *tan2) - *now) * (1.0 / GAIN_ROWS as f32);
-                }
-            }
-            let start = rng.random_range(0..NOISES - run);
-            let noise = &self.noise[start..start + run];
-            for left in (0..width).step_by(run) {
-                let length = run.min(width - left);
-                let mixed = &self.mixed[left..left + length + 2];
-                let (before, here, after) = (&mixed[..length], &mixed[1..=length], &mixed[2..]);
-                let gains = self.gains[left..][..length]
-                    .iter_mut()
-                    .zip(&self.changes[left..]);
-                let lights = before.iter().zip(here).zip(after);
-                let row = self.row[left..][..length].iter_mut().zip(noise);
-                for (((value, noise), ((l, c), r)), (gain, change)) in row.zip(lights).zip(gains) {
-                    let light = (middle * c + side * (l + r)) * *gain;
-                    *gain += change;
-                    let light = light + (read2 + shot2 * light.max(0.0)).sqrt() * noise;
-                    // The sum with 2^23 rounds to a whole number and leaves it in the low bits.
-                    *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + WHOLE;
-                }
-            }
-            let grays = out[y * width..(y + 1) * width].iter_mut().zip(&self.row);
-            if straight {
-                // Rounded like the table.
-                for (gray, value) in grays {
-                    *gray =
-                        ((value - WHOLE) * (255.0 / (LEVELS - 1) as f32) + WHOLE).to_bits() as u8;
-                }
-            } else {
-                let curve = &self.curve;
-                for (gray, value) in grays {
-                    *gray = curve[value.to_bits() as usize & (LEVELS - 1)];
-                }
-            }
-        }
-    }
 }
 
 /// Arguments of [`Exposure::expose`].
@@ -187,8 +94,91 @@ impl Vectorized for Exposing<'_> {
 
     #[inline(always)]
     fn run(self) {
-        self.exposure
-            .expose_rows(self.canvas, self.camera, self.seed, self.out);
+        let Self {
+            exposure: state,
+            canvas,
+            camera,
+            seed,
+            out,
+        } = self;
+        let (width, height) = (canvas.width, canvas.height);
+        if width == 0 || height == 0 {
+            return;
+        }
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let s = state.sensor;
+        let (principal, focal) = (camera.principal_point(), camera.focal_px());
+        let (side, middle) = three_taps(if state.blurred { 0.0 } else { s.blur });
+        let variance = |deviation: f64| ((deviation / 255.0) as f32).powi(2);
+        let (read2, shot2) = (variance(s.read_noise), variance(s.shot_noise));
+        let (exposure, bend) = (s.exposure as f32, s.vignetting as f32);
+        state.mixed.resize(width + 2, 0.0);
+        state.row.resize(width, 0.0);
+        let tan2 = |at: usize, middle: f64| (((at as f64 - middle) / focal) as f32).powi(2);
+        state.columns.clear();
+        state
+            .columns
+            .extend((0..width).map(|x| tan2(x, principal.x)));
+        state.gains.resize(width, 0.0);
+        state.changes.resize(width, 0.0);
+        let fall = |y: usize| 1.0 + tan2(y, principal.y);
+        let gain = |fall: f32, tan2: f32| {
+            let cos2 = 1.0 / (fall + tan2);
+            exposure * (1.0 - bend * (1.0 - cos2 * cos2))
+        };
+        // Without gamma, gray levels need no table.
+        let straight = s.gamma.to_bits() == 1.0_f64.to_bits();
+        // A frame wider than the table of noise repeats it along the row.
+        let run = width.min(NOISES / 2);
+        for y in 0..height {
+            let line = |k: usize| &canvas.light[k * width..(k + 1) * width];
+            let (above, below) = (line(y.saturating_sub(1)), line((y + 1).min(height - 1)));
+            let around = line(y).iter().zip(above).zip(below);
+            for (m, ((here, a), b)) in state.mixed[1..=width].iter_mut().zip(around) {
+                *m = middle * here + side * (a + b);
+            }
+            state.mixed[0] = state.mixed[1];
+            state.mixed[width + 1] = state.mixed[width];
+            if y % GAIN_ROWS == 0 {
+                let (here, later) = (fall(y), fall(y + GAIN_ROWS));
+                let gains = state.gains.iter_mut().zip(&mut state.changes);
+                for ((now, change), tan2) in gains.zip(&state.columns) {
+                    *now = gain(here, *tan2);
+                    *change = (gain(later, *tan2) - *now) * (1.0 / GAIN_ROWS as f32);
+                }
+            }
+            let start = rng.random_range(0..NOISES - run);
+            let noise = &state.noise[start..start + run];
+            for left in (0..width).step_by(run) {
+                let length = run.min(width - left);
+                let mixed = &state.mixed[left..left + length + 2];
+                let (before, here, after) = (&mixed[..length], &mixed[1..=length], &mixed[2..]);
+                let gains = state.gains[left..][..length].iter_mut();
+                let gains = gains.zip(&state.changes[left..]);
+                let lights = before.iter().zip(here).zip(after);
+                let row = state.row[left..][..length].iter_mut().zip(noise);
+                for (((value, noise), ((l, c), r)), (gain, change)) in row.zip(lights).zip(gains) {
+                    let light = (middle * c + side * (l + r)) * *gain;
+                    *gain += change;
+                    let light = light + (read2 + shot2 * light.max(0.0)).sqrt() * noise;
+                    // The sum with 2^23 rounds to a whole number and leaves it in the low bits.
+                    *value = light.clamp(0.0, 1.0) * (LEVELS - 1) as f32 + WHOLE;
+                }
+            }
+            let grays = out[y * width..(y + 1) * width].iter_mut().zip(&state.row);
+            if straight {
+                // Rounded like the table.
+                const STEP: f32 = 255.0 / (LEVELS - 1) as f32;
+                for (gray, value) in grays {
+                    *gray = ((value - WHOLE) * STEP + WHOLE).to_bits() as u8;
+                }
+            } else {
+                let curve = &state.curve;
+                for (gray, value) in grays {
+                    *gray = curve[value.to_bits() as usize & (LEVELS - 1)];
+                }
+            }
+        }
     }
 }
 
@@ -230,7 +220,14 @@ mod tests {
         let mut exposure = Exposure::new(Sensor::default(), &mut rng);
         let (mut wide, mut plain) = (vec![0; 203 * 31], vec![0; 203 * 31]);
         exposure.expose(&canvas, &camera, 5, 0, &mut wide);
-        exposure.expose_rows(&canvas, &camera, 5, &mut plain);
+        let narrow = Exposing {
+            exposure: &mut exposure,
+            canvas: &canvas,
+            camera: &camera,
+            seed: 5,
+            out: &mut plain,
+        };
+        narrow.run();
         assert_eq!(wide, plain);
         assert!(wide.iter().max() > wide.iter().min());
     }

@@ -47,6 +47,11 @@ impl Shot {
             interlace: Some(0.020),
         }
     }
+
+    /// Returns the middle of the exposure, seconds after the shutter opened.
+    pub(crate) fn middle(&self) -> f64 {
+        0.5 * (self.exposure + self.interlace.unwrap_or(0.0))
+    }
 }
 
 impl Default for Shot {

@@ -1,5 +1,7 @@
 //! The truth of a frame: every round outline and its visible fraction.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Point2, Point3, Vector3};
 use puma_val2::Joints;
 
@@ -47,13 +49,9 @@ const CLOSE_UP: f64 = 96.0;
 /// Number of points of an outline.
 const OUTLINE: i32 = 96;
 
-/// A round outline: its kind, the exact ellipse in the frame, and its points as directions (x, y,
-/// 1) of the camera frame.
-struct Outline {
-    what: Round,
-    ellipse: ProjectedEllipse,
-    points: Vec<Point2<f64>>,
-}
+/// A round outline's kind, its exact ellipse in the frame, and its points as directions (x, y, 1)
+/// of the camera frame.
+type Outline = (Round, ProjectedEllipse, Vec<Point2<f64>>);
 
 impl Renderer {
     /// Returns every round outline that the frame of `cell` with the arm at `joints` shows, the
@@ -74,12 +72,12 @@ impl Renderer {
         let items = self.items(cell, &view);
         let mut found = Vec::new();
         for (rank, item) in items.iter().enumerate() {
-            for outline in self.rounds(cell, &view, item) {
-                let visible = self.visible(cell, &view, &dark, &outline.points, &items[rank + 1..]);
+            for (what, ellipse, points) in self.rounds(cell, &view, item) {
+                let visible = self.visible(cell, &view, &dark, &points, &items[rank + 1..]);
                 if visible > 0.0 {
                     found.push(RoundOutline {
-                        what: outline.what,
-                        ellipse: outline.ellipse,
+                        what,
+                        ellipse,
                         visible,
                     });
                 }
@@ -100,29 +98,23 @@ impl Renderer {
         nearer: &[Item],
     ) -> f64 {
         let spots: Vec<Point2<f64>> = outline.iter().map(|p| view.spot(p)).collect();
-        let least = spots.iter().fold(spots[0], |a, b| a.inf(b));
-        let most = spots.iter().fold(spots[0], |a, b| a.sup(b));
+        let mut least = spots.iter().fold(spots[0], |a, b| a.inf(b));
+        let mut most = spots.iter().fold(spots[0], |a, b| a.sup(b));
+        let border = Point2::new(view.width as f64 - 0.5, view.height as f64 - 0.5);
         // Without distortion, the close-up is limited to the frame.
         let straight = cell.camera.distortion().is_none();
-        let (frame_width, frame_height) = (view.width as f64, view.height as f64);
-        let (least, most) = if straight {
-            (
-                least.sup(&Point2::new(-0.5, -0.5)),
-                most.inf(&Point2::new(frame_width - 0.5, frame_height - 0.5)),
-            )
-        } else {
-            (least, most)
-        };
+        if straight {
+            least = least.sup(&Point2::new(-0.5, -0.5));
+            most = most.inf(&border);
+        }
         let extent = most - least;
         let longest = extent.x.max(extent.y);
         if !(extent.x > 0.0 && extent.y > 0.0 && longest.is_finite()) {
             return 0.0;
         }
         let scale = CLOSE_UP / longest;
-        let size = (
-            ((extent.x * scale).ceil() as usize).max(1),
-            ((extent.y * scale).ceil() as usize).max(1),
-        );
+        let pixels = |extent: f64| ((extent * scale).ceil() as usize).max(1);
+        let size = (pixels(extent.x), pixels(extent.y));
         let close = view.part(least.coords, scale, size);
         let studio = Studio {
             view: &close,
@@ -145,17 +137,11 @@ impl Renderer {
             if straight {
                 (extent.x * scale - x).min(1.0) * (extent.y * scale - y).min(1.0)
             } else {
-                let direction = Vector3::new(
-                    (x - close.principal.x) / close.focal,
-                    (y - close.principal.y) / close.focal,
-                    1.0,
-                );
-                let shown = cell.camera.project(&Point3::from(direction));
-                let inside = shown.is_some_and(|p| {
-                    (-0.5..=frame_width - 0.5).contains(&p.x)
-                        && (-0.5..=frame_height - 0.5).contains(&p.y)
-                });
-                f64::from(u8::from(inside))
+                let shown = cell.camera.project(&Point3::from(close.direction(x, y)));
+                let inside = |p: Point2<f64>| {
+                    p.x >= -0.5 && p.x <= border.x && p.y >= -0.5 && p.y <= border.y
+                };
+                f64::from(u8::from(shown.is_some_and(inside)))
             }
         };
         let light = canvas.light.iter().enumerate();
@@ -165,37 +151,31 @@ impl Renderer {
 
     /// Returns the round outlines of one item.
     fn rounds(&self, cell: &Cell, view: &View, item: &Item) -> Vec<Outline> {
-        let around = |points: &dyn Fn(f64) -> Point2<f64>| -> Vec<Point2<f64>> {
-            (0..OUTLINE)
-                .map(|i| points(f64::from(i) * std::f64::consts::TAU / f64::from(OUTLINE)))
-                .collect()
-        };
+        let angles = || (0..OUTLINE).map(|i| f64::from(i) * TAU / f64::from(OUTLINE));
         let sphere = |what, centre: &Point3<f64>, radius: f64| {
             let seen = view.seen(centre);
             let directions = unit_outline(&seen, radius).ok()?;
-            Some(Outline {
+            let ellipse = cell.camera.project_sphere(&seen, radius).ok()?;
+            Some((
                 what,
-                ellipse: cell.camera.project_sphere(&seen, radius).ok()?,
-                points: around(&|t| directions.point(t)),
-            })
+                ellipse,
+                angles().map(|t| directions.point(t)).collect(),
+            ))
         };
         let ring = |what, centre: Point3<f64>, radius: f64| {
             let at = |t: f64| view.seen(&(centre + Vector3::new(t.cos(), t.sin(), 0.0) * radius));
-            let ahead = (0..96).all(|i| at(f64::from(i) * std::f64::consts::TAU / 96.0).z > 0.01);
-            if !(ahead && radius > 0.0) {
+            if !(radius > 0.0 && angles().all(|t| at(t).z > 0.01)) {
                 return None;
             }
-            Some(Outline {
-                what,
-                ellipse: ProjectedEllipse::of_outline(|t| cell.camera.project(&at(t)))?,
-                points: around(&|t| Point2::from(at(t).xy() / at(t).z)),
-            })
+            let ellipse = ProjectedEllipse::of_outline(|t| cell.camera.project(&at(t)))?;
+            let points = angles().map(|t| Point2::from(at(t).xy() / at(t).z));
+            Some((what, ellipse, points.collect()))
         };
         let Item::Thing(i) = item else {
-            let target = matches!(item, Item::Ball).then(|| (cell.ball.centre, cell.ball.radius));
-            let outline =
-                target.and_then(|(centre, radius)| sphere(Round::Target, &centre, radius));
-            return outline.into_iter().collect();
+            let ball = &cell.ball;
+            let target = matches!(item, Item::Ball);
+            let outline = target.then(|| sphere(Round::Target, &ball.centre, ball.radius));
+            return outline.flatten().into_iter().collect();
         };
         let thing = &self.scene.things[*i];
         let at = |z: f64| Point3::new(thing.x, thing.y, cell.table + z);
@@ -216,11 +196,7 @@ impl Renderer {
 }
 
 fn area(polygon: &[Point2<f64>]) -> f64 {
-    let next = polygon.iter().cycle().skip(1);
-    polygon
-        .iter()
-        .zip(next)
-        .map(|(p, q)| 0.5 * (p.x * q.y - q.x * p.y))
-        .sum::<f64>()
-        .abs()
+    let pairs = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let parts = pairs.map(|(p, q)| 0.5 * (p.x * q.y - q.x * p.y));
+    parts.sum::<f64>().abs()
 }

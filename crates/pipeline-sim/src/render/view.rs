@@ -57,6 +57,16 @@ impl View {
         self.principal + p.coords * self.focal
     }
 
+    /// Returns the direction that a pixel shows, camera frame, with z = 1.
+    pub(super) fn direction(&self, x: f64, y: f64) -> Vector3<f64> {
+        let Point2 { coords: middle } = self.principal;
+        Vector3::new(
+            (x - middle.x) / self.focal,
+            (y - middle.y) / self.focal,
+            1.0,
+        )
+    }
+
     /// Returns a world point in the camera frame.
     pub(super) fn seen(&self, point: &Point3<f64>) -> Point3<f64> {
         self.pose.inverse_transform_point(point)
@@ -75,9 +85,9 @@ impl View {
     /// Returns `true` if no part of a sphere, given in the world, can be in the frame.
     pub(super) fn misses(&self, centre: &Point3<f64>, radius: f64) -> bool {
         let c = self.seen(centre);
-        let (left, top) = (self.principal.x + 1.0, self.principal.y + 1.0);
-        let (right, bottom) = (
-            self.width as f64 - self.principal.x,
+        let (left, right) = (self.principal.x + 1.0, self.width as f64 - self.principal.x);
+        let (top, bottom) = (
+            self.principal.y + 1.0,
             self.height as f64 - self.principal.y,
         );
         // Distance of the centre beyond the plane through the eye and one border of the frame.
@@ -92,14 +102,13 @@ impl View {
 
     /// Projects a convex polygon given in the world, cut at the near plane. Empty if nothing is
     /// left.
-    pub(super) fn polygon(&self, corners: &[Point3<f64>], out: &mut Vec<Point2<f64>>) {
-        out.clear();
-        let n = corners.len();
+    pub(super) fn polygon(&self, corners: &[Point3<f64>]) -> Vec<Point2<f64>> {
+        let mut out = Vec::with_capacity(corners.len() + 1);
         let Some(first) = corners.first().map(|p| self.seen(p)) else {
-            return;
+            return out;
         };
         let mut p = first;
-        for i in 0..n {
+        for i in 0..corners.len() {
             let q = corners.get(i + 1).map_or(first, |q| self.seen(q));
             if p.z >= NEAR {
                 out.push(self.pixel(&p));
@@ -110,6 +119,7 @@ impl View {
             }
             p = q;
         }
+        out
     }
 
     fn pixel(&self, p: &Point3<f64>) -> Point2<f64> {
@@ -128,16 +138,11 @@ impl View {
         // A plane point with coordinates (a, b) lies at a u + b v + o in the camera frame: columns
         // of the matrix to invert.
         let to_camera = Matrix3::from_columns(&[u, v, o]);
+        let (scale, middle) = (1.0 / self.focal, -self.principal.coords / self.focal);
         let ray = Matrix3::new(
-            1.0 / self.focal,
-            0.0,
-            -self.principal.x / self.focal,
-            0.0,
-            1.0 / self.focal,
-            -self.principal.y / self.focal,
-            0.0,
-            0.0,
-            1.0,
+            scale, 0.0, middle.x, //
+            0.0, scale, middle.y, //
+            0.0, 0.0, 1.0,
         );
         to_camera.try_inverse().unwrap_or_else(Matrix3::zeros) * ray
     }

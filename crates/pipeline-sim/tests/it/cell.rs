@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use nalgebra::Vector3;
-use pipeline_sim::{Ball, Cell, Grasp, ReachError, SightError, Workspace};
+use pipeline_sim::{Ball, Cell, Grasp, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -258,10 +258,7 @@ fn unseen_balls_are_refused_with_the_reason() {
     };
     assert!(matches!(at(0.0, 0.0, 0.01), SightError::Inside { .. }));
     assert!(matches!(at(0.0, 0.0, -0.3), SightError::Behind { .. }));
-    assert!(matches!(
-        at(f64::NAN, 0.0, 0.3),
-        SightError::CentreNotFinite
-    ));
+    assert!(matches!(at(f64::NAN, 0.0, 0.3), SightError::Quantity(_)));
     let mut nowhere = goal;
     nowhere.0[2] = f64::INFINITY;
     let refused = cell.features(&nowhere).expect_err("nowhere").to_string();
@@ -296,14 +293,14 @@ fn unreachable_goals_are_refused_with_the_reason() {
         |x: f64, y: f64, z: f64| refused(&|cell| cell.ball.centre = nalgebra::Point3::new(x, y, z));
     let far = at(3.0, 0.0, 0.0);
     assert!(
-        matches!(far, ReachError::OutOfReach { distance, greatest, .. } if distance > greatest)
+        matches!(far, SightError::OutOfReach { distance, greatest, .. } if distance > greatest)
     );
-    assert!(matches!(at(0.1, 0.0, 0.0), ReachError::BesideWaist { .. }));
+    assert!(matches!(at(0.1, 0.0, 0.0), SightError::BesideWaist { .. }));
     let back = at(-0.6, 0.0, -0.1);
     assert!(
         matches!(
             back,
-            ReachError::OutOfLimits {
+            SightError::OutOfLimits {
                 joint: Joint::J1,
                 ..
             }
@@ -315,10 +312,6 @@ fn unreachable_goals_are_refused_with_the_reason() {
         "{back}"
     );
     assert!(at(0.6, f64::NAN, 0.0).to_string().contains("y coordinate"));
-    assert_eq!(
-        refused(&|cell| cell.ball.radius = -1.0),
-        ReachError::BallRadius { radius: -1.0 }
-    );
     let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
     assert!(
         cell.goal_pose(f64::INFINITY)
@@ -347,8 +340,8 @@ fn measures_that_are_not_finite_are_named() {
     for radius in [f64::NAN, -0.02, 0.0] {
         let mut wrong = cell;
         wrong.ball.radius = radius;
-        let error = wrong.goal_pose(45.0).expect_err("no ball");
-        assert!(matches!(error, ReachError::BallRadius { .. }), "{error}");
+        let error = wrong.goal_pose(45.0).expect_err("no ball").to_string();
+        assert!(error.contains("radius of the ball"), "{error}");
     }
 }
 

@@ -155,15 +155,10 @@ fn balls_without_an_outline_are_named() {
         at(0.5, 0.0, 0.01, 0.02),
         Err(SightError::Behind { .. })
     ));
-    assert!(matches!(
-        at(f64::NAN, 0.0, 0.5, 0.02),
-        Err(SightError::CentreNotFinite)
-    ));
+    let quantity = |x, r| at(x, 0.0, 0.5, r).expect_err("no ball").to_string();
+    assert!(quantity(f64::NAN, 0.02).contains("distance of the ball"));
     for r in [0.0, -0.02, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            at(0.0, 0.0, 0.5, r),
-            Err(SightError::BallRadius { .. })
-        ));
+        assert!(quantity(0.0, r).contains("radius of the ball"));
     }
     for (f, w, width, height, named) in [
         (0.0, 0.0088, 768, 576, "focal length (m)"),
@@ -174,12 +169,10 @@ fn balls_without_an_outline_are_named() {
         (0.0115, 0.0088, 0, 576, "frame width (px)"),
         (0.0115, 0.0088, 768, 0, "frame height (px)"),
     ] {
-        let refused = Camera::pinhole(f, w, width, height).expect_err("no camera");
-        assert!(
-            matches!(refused, QuantityError::NotPositive { ref quantity, .. } if quantity == named),
-            "{refused}"
-        );
-        assert!(refused.to_string().contains(named), "{refused}");
+        let refused = Camera::pinhole(f, w, width, height)
+            .expect_err("no camera")
+            .to_string();
+        assert!(refused.starts_with(named), "{refused}");
     }
     assert!(camera.with_focal_factor(0.0).is_err());
     assert!(
@@ -271,10 +264,7 @@ fn resized_camera_shows_all_of_the_old_frame() {
         assert!((shown.x + 0.5 - beside - scale * (circle.x + 0.5)).abs() < 1e-9);
         assert!((shown.y + 0.5 - scale * (circle.y + 0.5)).abs() < 1e-9);
     }
-    assert!(matches!(
-        camera.resized(0, 576),
-        Err(QuantityError::NotPositive { .. })
-    ));
+    assert!(camera.resized(0, 576).is_err());
 }
 
 #[test]
@@ -377,10 +367,8 @@ fn oversized_frame_is_refused() {
             Camera::pinhole(0.01, 0.01, width, height),
         ];
         for refused in refused {
-            assert!(
-                matches!(refused, Err(QuantityError::TooLarge { .. })),
-                "{width} {height}"
-            );
+            let refused = refused.expect_err("too large").to_string();
+            assert!(refused.contains("at most 16384"), "{refused}");
         }
     }
 }
