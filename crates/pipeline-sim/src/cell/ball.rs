@@ -41,25 +41,26 @@ pub struct Holder {
 impl Holder {
     /// Returns the holder that carries `ball`: a rod of 8 mm radius that ends where the ball rests.
     pub(crate) fn under(ball: &Ball) -> Self {
-        let radius = 0.008_f64.min(0.8 * ball.radius);
-        // The ball sinks a little into the open end of the rod.
-        let top = ball.centre.z
-            - (ball.radius * ball.radius - radius * radius)
-                .max(0.0)
-                .sqrt();
-        Self {
+        let holder = Self {
             foot: ball.centre.xy(),
-            top,
-            radius,
+            top: ball.centre.z,
+            radius: 0.008_f64.min(0.8 * ball.radius),
+        };
+        Self {
+            top: ball.centre.z - holder.rise(ball),
+            ..holder
         }
+    }
+
+    /// Returns the height of the centre of `ball` above the rod's open end while it rests there.
+    pub(super) fn rise(&self, ball: &Ball) -> f64 {
+        let squared = ball.radius * ball.radius - self.radius * self.radius;
+        squared.max(0.0).sqrt()
     }
 
     /// Returns `true` if `ball` rests on this holder, to a millimetre.
     pub fn carries(&self, ball: &Ball) -> bool {
-        let sunk = (ball.radius * ball.radius - self.radius * self.radius)
-            .max(0.0)
-            .sqrt();
         (ball.centre.xy() - self.foot).norm() < 0.001
-            && (ball.centre.z - sunk - self.top).abs() < 0.001
+            && (ball.centre.z - self.rise(ball) - self.top).abs() < 0.001
     }
 }

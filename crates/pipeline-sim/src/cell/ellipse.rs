@@ -146,7 +146,7 @@ mod tests {
 
     /// Counts the fraction inside.
     fn counted(e: &ProjectedEllipse, width: u32, height: u32) -> f64 {
-        let n = 20_000;
+        let n = 5_000;
         let inside = |p: Point2<f64>| {
             (-0.5..=f64::from(width) - 0.5).contains(&p.x)
                 && (-0.5..=f64::from(height) - 0.5).contains(&p.y)
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn share_inside_is_the_counted_one() {
-        for i in 0..4000 {
+        for i in 0..600 {
             let f = |k: i32| f64::from(i * 7919 % (k * 97)) / f64::from(k * 97);
             let major = 3.0 + 140.0 * f(3);
             let e = ProjectedEllipse {
@@ -170,7 +170,7 @@ mod tests {
             };
             let (share, count) = (e.share_inside(100, 70), counted(&e, 100, 70));
             assert!(
-                (share - count).abs() < 1e-3,
+                (share - count).abs() < 2e-3,
                 "{e:?}: {share} against {count}"
             );
         }

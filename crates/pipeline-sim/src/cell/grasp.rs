@@ -6,6 +6,7 @@ use puma_val2::{Gripper, Joints, PumaParams};
 
 use crate::cell::ball::Holder;
 use crate::cell::geometry::Cell;
+use crate::cell::hand::Capsule;
 
 /// The result of closing the jaws.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,10 +73,7 @@ impl Cell {
         let ball = &mut self.ball;
         match self.holder {
             Some(h) if (ball.centre.xy() - h.foot).norm() <= h.radius => {
-                let sunk = (ball.radius * ball.radius - h.radius * h.radius)
-                    .max(0.0)
-                    .sqrt();
-                ball.centre = Point3::new(h.foot.x, h.foot.y, h.top + sunk);
+                ball.centre = Point3::new(h.foot.x, h.foot.y, h.top + h.rise(ball));
             }
             holder => {
                 ball.centre.z = self.table + ball.radius;
@@ -102,27 +100,19 @@ impl Cell {
         // Pushing it off one body may push it into another.
         for _ in 0..8 {
             let centre = self.ball.centre;
-            let deepest = bodies
+            let gaps = bodies
                 .iter()
-                .map(|body| {
-                    (
-                        body.gap_to_sphere(&centre, self.ball.radius),
-                        body.nearest_axis_point(&centre),
-                    )
-                })
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((gap, from)) = deepest.filter(|(gap, _)| *gap < -1e-9) else {
+                .map(|body| (body.gap_to_sphere(&centre, self.ball.radius), body));
+            let deepest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((gap, body)) = deepest.filter(|(gap, _)| *gap < -1e-9) else {
                 break;
             };
-            let away = centre - from;
-            let aside = Vector3::new(away.x, away.y, 0.0)
-                .try_normalize(1e-9)
-                .unwrap_or_else(Vector3::x);
+            let away = centre - body.nearest_axis_point(&centre);
+            let level = Vector3::new(away.x, away.y, 0.0);
+            let aside = level.try_normalize(1e-9).unwrap_or_else(Vector3::x);
             // Sideways along the table, far enough to clear a gap that opens obliquely.
-            let slant = aside
-                .dot(&away.try_normalize(1e-9).unwrap_or(aside))
-                .max(0.25);
-            self.slide_ball(aside * (-gap / slant));
+            let slant = aside.dot(&away.try_normalize(1e-9).unwrap_or(aside));
+            self.slide_ball(aside * (-gap / slant.max(0.25)));
         }
         (self.ball.centre - start).norm()
     }
@@ -143,35 +133,27 @@ impl Cell {
         let wrist_at = |joints: &Joints| self.params.wrist(joints).translation.vector;
         let (start, end) = (wrist_at(from), wrist_at(to));
         let bodies = self.hand_bodies(from);
-        let hand = bodies
-            .iter()
-            .map(|b| {
-                (b.from.coords - start)
-                    .norm()
-                    .max((b.to.coords - start).norm())
-                    + b.radius
-            })
-            .fold(0.0, f64::max);
+        let reach = |body: &Capsule| {
+            let ends = [body.from, body.to].map(|end| (end.coords - start).norm());
+            ends[0].max(ends[1]) + body.radius
+        };
+        let hand = bodies.iter().map(reach).fold(0.0, f64::max);
         let PumaParams { a2, a3, d2, d4, .. } = self.params;
         let arm = a2.abs() + d2.abs() + a3.hypot(d4);
-        let turned = (0..6)
-            .map(|i| (to.0[i] - from.0[i]).abs())
-            .fold(0.0, f64::max);
-        let way: f64 = (0..3).map(|i| (to.0[i] - from.0[i]).abs()).sum();
+        let turns: [f64; 6] = std::array::from_fn(|i| (to.0[i] - from.0[i]).abs());
+        let way: f64 = turns[..3].iter().sum();
         let ball = self.ball.centre.coords;
-        if (ball - start).norm().min((ball - end).norm())
-            > hand + self.ball.radius + 0.5 * arm * way
-        {
+        let nearer = (ball - start).norm().min((ball - end).norm());
+        if nearer > hand + self.ball.radius + 0.5 * arm * way {
             return 0.0;
         }
+        let turned = turns.into_iter().fold(0.0, f64::max);
         let steps = (turned / STEP).ceil().clamp(1.0, 1000.0) as usize;
         let (before, mut pushed) = (self.ball.centre, false);
         for i in 1..=steps {
             let t = i as f64 / steps as f64;
-            let pose = Joints(std::array::from_fn(|j| {
-                from.0[j] + t * (to.0[j] - from.0[j])
-            }));
-            pushed |= self.follow(&pose) > 0.0;
+            let at = |j: usize| from.0[j] + t * (to.0[j] - from.0[j]);
+            pushed |= self.follow(&Joints(std::array::from_fn(at))) > 0.0;
         }
         if pushed {
             (self.ball.centre - before).norm()
@@ -229,11 +211,8 @@ fn way_out(
     // |across + by * along| = reach, with only what is across the jaws counting.
     let turned = wrist.rotation.inverse() * aside;
     let along = Vector3::new(turned.x, 0.0, turned.z);
-    let (a, b, c) = (
-        along.norm_squared(),
-        across.dot(&along),
-        across.norm_squared() - reach * reach,
-    );
+    let (a, b) = (along.norm_squared(), across.dot(&along));
+    let c = across.norm_squared() - reach * reach;
     let by = (-b + (b * b - a * c).max(0.0).sqrt()) / a;
     by.is_finite().then_some((aside, by))
 }

@@ -198,7 +198,7 @@ mod tests {
             let mut draw = || rng.random_range(-reach..reach);
             Point3::new(draw(), draw(), draw())
         };
-        for k in 0..600 {
+        for k in 0..150 {
             // Some are nearly parallel, some are points.
             let spread = [0.05, 1e-4, 0.0][k % 3];
             let (from, along) = (point(0.1), point(0.1).coords);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::cell::ball::{Ball, Holder};
-use crate::render::scene::Scene;
+use crate::render::scene::{Light, Scene};
 use crate::render::shadow::{table_light, toward};
 
 /// The soft shadows of ball and holder on the table.
@@ -24,38 +24,34 @@ struct Lamp {
     /// Fraction of the light on the table.
     share: f64,
     /// Box on the table that holds both shadows: least and greatest x, least and greatest y.
-    bounds: [f64; 4],
+    bounds: [f32; 4],
 }
 
 impl BallShadow {
     pub(super) fn new(scene: &Scene, ball: &Ball, holder: Option<Holder>, table: f64) -> Self {
         let (_, shares) = table_light(scene);
-        let lamps: Vec<Lamp> = scene
-            .lights
-            .iter()
-            .zip(shares)
-            .map(|(light, share)| {
-                let axis = toward(light);
-                let reach = light.half_angle.clamp(0.0, 0.7).tan();
-                let drop = (ball.centre.z - table).max(0.0) / axis.z.max(0.05);
-                let margin =
-                    ball.radius / axis.z.max(0.05) + drop * reach * 1.5 / axis.z.max(0.05) + 0.03;
-                let tip = ball.centre - axis * drop;
-                let foot = holder.map_or(tip.xy(), |h| h.foot);
-                let bounds = [
-                    tip.x.min(foot.x) - margin,
-                    tip.x.max(foot.x) + margin,
-                    tip.y.min(foot.y) - margin,
-                    tip.y.max(foot.y) + margin,
-                ];
-                Lamp {
-                    axis,
-                    reach,
-                    share,
-                    bounds,
-                }
-            })
-            .collect();
+        let lamp = |(light, share): (&Light, f64)| {
+            let axis = toward(light);
+            let (steep, reach) = (axis.z.max(0.05), light.half_angle.clamp(0.0, 0.7).tan());
+            let drop = (ball.centre.z - table).max(0.0) / steep;
+            let margin = ball.radius / steep + drop * reach * 1.5 / steep + 0.03;
+            let tip = (ball.centre - axis * drop).xy();
+            let foot = holder.map_or(tip, |h| h.foot);
+            let (low, high) = (tip.inf(&foot), tip.sup(&foot));
+            let bounds = [
+                low.x - margin,
+                high.x + margin,
+                low.y - margin,
+                high.y + margin,
+            ];
+            Lamp {
+                axis,
+                reach,
+                share,
+                bounds: bounds.map(|b| b as f32),
+            }
+        };
+        let lamps = scene.lights.iter().zip(shares).map(lamp).collect();
         Self {
             lamps,
             ball: *ball,
@@ -68,21 +64,18 @@ impl BallShadow {
     #[inline(always)]
     pub(super) fn at(&self, x: &[f32], y: &[f32], factors: &mut [f32], spare: &mut [f32]) {
         factors.fill(1.0);
-        let least = |v: &[f32]| {
-            v.iter()
-                .fold(f32::INFINITY, |a, b| if *b < a { *b } else { a })
-        };
-        let most = |v: &[f32]| {
-            v.iter()
-                .fold(f32::NEG_INFINITY, |a, b| if *b > a { *b } else { a })
-        };
+        let (lesser, greater) = (
+            |a, b| if b < a { b } else { a },
+            |a, b| if b > a { b } else { a },
+        );
+        let least = |v: &[f32]| v.iter().copied().fold(f32::INFINITY, lesser);
+        let most = |v: &[f32]| v.iter().copied().fold(f32::NEG_INFINITY, greater);
         let places = [least(x), most(x), least(y), most(y)];
         let apart = |b: &[f32; 4]| {
             places[1] <= b[0] || places[0] >= b[1] || places[3] <= b[2] || places[2] >= b[3]
         };
         for lamp in &self.lamps {
-            let bounds = lamp.bounds.map(|b| b as f32);
-            if apart(&bounds) {
+            if apart(&lamp.bounds) {
                 continue;
             }
             spare.fill(0.0);
@@ -90,7 +83,7 @@ impl BallShadow {
             if let Some(holder) = &self.holder {
                 self.behind_holder(lamp, holder, x, y, spare);
             }
-            let [x0, x1, y0, y1] = bounds;
+            let [x0, x1, y0, y1] = lamp.bounds;
             let share = lamp.share as f32;
             for (((factor, hidden), x), y) in factors.iter_mut().zip(&*spare).zip(x).zip(y) {
                 let inside = (*x > x0) & (*x < x1) & (*y > y0) & (*y < y1);
@@ -105,17 +98,12 @@ impl BallShadow {
                     let (dx, dy) = (x - fx, y - fy);
                     let distance2 = dx * dx + dy * dy;
                     let gloom = 0.35 * fading((distance2.sqrt() - radius).max(0.0) * (1.0 / 0.012));
-                    *factor *= if distance2 < NEAR * NEAR {
-                        1.0 - gloom
-                    } else {
-                        1.0
-                    };
+                    let near = distance2 < NEAR * NEAR;
+                    *factor *= if near { 1.0 - gloom } else { 1.0 };
                 }
             }
         }
-        factors
-            .iter_mut()
-            .for_each(|factor| *factor = factor.max(0.02));
+        factors.iter_mut().for_each(|f| *f = f.max(0.02));
     }
 
     /// Raises `hidden` to the shares of a lamp that the ball hides.
@@ -189,7 +177,6 @@ mod tests {
     use nalgebra::{Point2, Point3};
 
     use super::*;
-    use crate::render::scene::Light;
 
     /// Factors along the x-axis, one for each millimetre.
     fn along_x(scene: &Scene, ball: &Ball, holder: Option<Holder>) -> Vec<f32> {

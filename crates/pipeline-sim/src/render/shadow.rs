@@ -12,11 +12,8 @@ const LAMP_POINTS: usize = 24;
 
 /// Returns the light on a horizontal surface, and the fraction of it from each lamp.
 pub(super) fn table_light(scene: &Scene) -> (f64, Vec<f64>) {
-    let lamps: Vec<f64> = scene
-        .lights
-        .iter()
-        .map(|l| l.intensity.max(0.0) * toward(l).z.max(0.0))
-        .collect();
+    let light = |lamp: &Light| lamp.intensity.max(0.0) * toward(lamp).z.max(0.0);
+    let lamps: Vec<f64> = scene.lights.iter().map(light).collect();
     let total = scene.ambient.max(0.0) + lamps.iter().sum::<f64>();
     let shares = lamps.iter().map(|l| l / total.max(1e-9)).collect();
     (total, shares)
@@ -58,15 +55,11 @@ impl ThingShadows {
     /// Darkens `stains` where things keep the lamps' light off the table, and a little around their
     /// feet.
     pub(super) fn new(stains: CoarseMap, scene: &Scene) -> Self {
-        let casts: Vec<Option<Cast>> = scene
-            .things
-            .iter()
-            .map(|t| cast(&stains, scene, t))
-            .collect();
+        let things = scene.things.iter();
         let mut shadows = Self {
             bare: stains.values.clone(),
+            casts: things.map(|t| cast(&stains, scene, t)).collect(),
             map: stains,
-            casts,
             left_out: Vec::new(),
         };
         for i in 0..shadows.casts.len() {
@@ -87,11 +80,10 @@ impl ThingShadows {
             return;
         }
         let before = std::mem::replace(&mut self.left_out, things);
-        let come_and_gone: Vec<usize> = (0..self.casts.len())
-            .filter(|i| before.contains(i) != self.left_out.contains(i))
-            .collect();
-        for i in come_and_gone {
-            self.darken(i);
+        for i in 0..self.casts.len() {
+            if before.contains(&i) != self.left_out.contains(&i) {
+                self.darken(i);
+            }
         }
     }
 
@@ -109,23 +101,25 @@ impl ThingShadows {
             let Some(other) = other.as_ref().filter(|_| !self.left_out.contains(&i)) else {
                 continue;
             };
-            let (left, right) = (
-                columns.start.max(other.columns.start),
-                columns.end.min(other.columns.end),
-            );
-            if left >= right {
+            let columns = shared(columns, &other.columns);
+            if columns.is_empty() {
                 continue;
             }
-            for j in rows.start.max(other.rows.start)..rows.end.min(other.rows.end) {
-                let from =
-                    (j - other.rows.start) * other.columns.len() + left - other.columns.start;
-                let values = &mut self.map.values[j * side + left..j * side + right];
+            for j in shared(rows, &other.rows) {
+                let row = (j - other.rows.start) * other.columns.len();
+                let from = row + columns.start - other.columns.start;
+                let values = &mut self.map.values[j * side..][columns.clone()];
                 for (value, factor) in values.iter_mut().zip(&other.factors[from..]) {
                     *value *= factor;
                 }
             }
         }
     }
+}
+
+/// Returns what two ranges have in common.
+fn shared(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
 }
 
 /// Returns the shadow of a thing on a map; `None` if there is none.
@@ -135,21 +129,16 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
     }
     let (_, shares) = table_light(scene);
     let (foot, height) = (thing.shape.footprint(), thing.shape.height());
-    let lamps: Vec<(f64, Vec<Vector3<f64>>)> = scene
+    let points = scene
         .lights
         .iter()
-        .zip(&shares)
-        .map(|(light, share)| (*share, lamp_points(light, thing.turn)))
-        .collect();
+        .map(|light| lamp_points(light, thing.turn));
+    let lamps: Vec<(f64, Vec<Vector3<f64>>)> = shares.into_iter().zip(points).collect();
     // Longest shadow for any point of a lamp.
-    let slope = |d: &Vector3<f64>| d.x.hypot(d.y) / d.z.max(1e-3);
-    let longest = lamps
-        .iter()
-        .flat_map(|(_, points)| points)
-        .map(slope)
-        .fold(0.0, f64::max);
-    let reach = foot + (height * longest).max(0.05);
-    let (columns, rows) = map.range(thing.x, thing.y, reach.min(map.size));
+    let slopes = lamps.iter().flat_map(|(_, points)| points);
+    let slopes = slopes.map(|d| d.x.hypot(d.y) / d.z.max(1e-3));
+    let reach = foot + (height * slopes.fold(0.0, f64::max)).max(0.05);
+    let [columns, rows] = map.range(thing.x, thing.y, reach.min(map.size));
     if columns.is_empty() || rows.is_empty() {
         return None;
     }
@@ -172,11 +161,10 @@ fn cast(map: &CoarseMap, scene: &Scene, thing: &Thing) -> Option<Cast> {
             // Things also hide part of the sky from the table near their feet.
             let mut factor = 1.0 - 0.35 * (-gap(&thing.shape, &from) / 0.012).exp();
             for (share, points) in &lamps {
-                let blocked = points
-                    .iter()
-                    .zip(&aside)
-                    .filter(|(d, aside)| d.z > 1e-3 && meets(&thing.shape, &(from + **aside), d))
-                    .count();
+                let hidden = |(d, aside): &(&Vector3<f64>, &Vector3<f64>)| {
+                    d.z > 1e-3 && meets(&thing.shape, &(from + *aside), d)
+                };
+                let blocked = points.iter().zip(&aside).filter(hidden).count();
                 factor -= share * blocked as f64 / LAMP_POINTS as f64;
             }
             factors.push(factor.max(0.02) as f32);
@@ -213,17 +201,14 @@ fn lamp_points(light: &Light, turn: f64) -> Vec<Vector3<f64>> {
     let v = axis.cross(&u);
     let reach = light.half_angle.clamp(0.0, 0.7).tan();
     let (sin, cos) = turn.sin_cos();
-    (0..LAMP_POINTS)
-        .map(|k| {
-            // Vogel's spiral.
-            let (radius, angle) = (
-                ((k as f64 + 0.5) / LAMP_POINTS as f64).sqrt() * reach,
-                k as f64 * 2.399_963,
-            );
-            let d = axis + u * (radius * angle.cos()) + v * (radius * angle.sin());
-            Vector3::new(d.x * cos + d.y * sin, d.y * cos - d.x * sin, d.z)
-        })
-        .collect()
+    // Vogel's spiral.
+    let point = |k: usize| {
+        let radius = ((k as f64 + 0.5) / LAMP_POINTS as f64).sqrt() * reach;
+        let angle = k as f64 * 2.399_963;
+        let d = axis + u * (radius * angle.cos()) + v * (radius * angle.sin());
+        Vector3::new(d.x * cos + d.y * sin, d.y * cos - d.x * sin, d.z)
+    };
+    (0..LAMP_POINTS).map(point).collect()
 }
 
 /// Returns `true` if the ray from a point of the table upward along `d` meets the shape, which
@@ -250,10 +235,11 @@ fn meets(shape: &Shape, from: &Point3<f64>, d: &Vector3<f64>) -> bool {
         }
         Shape::Cylinder { radius, height } => {
             // Nearest horizontal approach to the axis while the ray is below the top.
-            let (dx, dy, top) = (d.x / d.z, d.y / d.z, height);
+            let (dx, dy) = (d.x / d.z, d.y / d.z);
             let speed2 = dx * dx + dy * dy;
+            let nearest = -(from.x * dx + from.y * dy) / speed2;
             let z = if speed2 > 0.0 {
-                (-(from.x * dx + from.y * dy) / speed2).clamp(0.0, top)
+                nearest.clamp(0.0, height)
             } else {
                 0.0
             };

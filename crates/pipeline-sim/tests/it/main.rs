@@ -1,10 +1,5 @@
 //! Tests of the simulated cell through its public interface.
 
-#![allow(
-    clippy::print_stdout,
-    reason = "measured errors, shown with --nocapture"
-)]
-
 mod cell;
 mod detection;
 mod devices;

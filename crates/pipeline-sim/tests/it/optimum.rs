@@ -26,7 +26,7 @@ fn goal_is_four_to_five_moves_from_the_search_poses() {
     let (workspace, moves) = (Workspace::paper(), moves());
     let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (mut total, mut starts) = (0, 0);
-    while starts < 60 {
+    while starts < 20 {
         let seen = workspace.sample_seen_ball(&nominal, &mut rng);
         let (ball, mut pose) = seen.expect("most balls are seen");
         let cell = Cell::paper(ball);

@@ -41,7 +41,7 @@ fn brute_force(camera: &Camera, centre: &Point3<f64>, radius: f64) -> (f64, f64,
         centre.y / centre.z,
     );
     let inside = camera.principal_point() + Vector2::new(u, v) * camera.focal_px();
-    let n = 1024;
+    let n = 512;
     let outline: Vec<Vector2<f64>> = (0..n)
         .map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / f64::from(n)).sin_cos();
@@ -89,24 +89,6 @@ const PLACES: [(f64, f64, f64); 6] = [
 
 #[test]
 fn projected_circle_agrees_with_a_ray_cast() {
-    let camera = Camera::paper();
-    for (x, y, z) in PLACES {
-        let centre = Point3::new(x, y, z);
-        let circle = camera
-            .project_sphere(&centre, 0.020)
-            .expect("in view")
-            .circle();
-        let (cx, cy, r) = brute_force(&camera, &centre, 0.020);
-        let error = (circle.x - cx)
-            .abs()
-            .max((circle.y - cy).abs())
-            .max((circle.radius - r).abs());
-        assert!(error < 0.01, "{centre}: {circle:?} against {cx} {cy} {r}");
-    }
-}
-
-#[test]
-fn projected_circle_agrees_through_a_lens() {
     let lens = Distortion {
         k1: -0.20,
         k2: 0.05,
@@ -114,28 +96,23 @@ fn projected_circle_agrees_through_a_lens() {
         p1: 0.002,
         p2: -0.001,
     };
-    let camera = Camera::paper()
+    let bent = Camera::paper()
         .with_distortion(lens)
         .expect("does not fold");
-    for (x, y, z) in PLACES {
-        let centre = Point3::new(x, y, z);
-        let circle = camera
-            .project_sphere(&centre, 0.020)
-            .expect("in view")
-            .circle();
-        let (cx, cy, r) = brute_force(&camera, &centre, 0.020);
-        let error = (circle.x - cx).abs().max((circle.y - cy).abs());
-        assert!(error < 0.01, "{centre}: {circle:?} against {cx} {cy} {r}");
-        assert!(
-            (circle.radius - r).abs() < 0.01,
-            "{centre}: {} against {r}",
-            circle.radius
-        );
-        let back = camera
-            .ray(camera.project(&centre).expect("in front"))
-            .expect("shown")
-            * z;
-        assert!((back - centre.coords).norm() < 1e-9);
+    for camera in [Camera::paper(), bent] {
+        for (x, y, z) in PLACES {
+            let centre = Point3::new(x, y, z);
+            let outline = camera.project_sphere(&centre, 0.020).expect("in view");
+            let (circle, (cx, cy, r)) = (outline.circle(), brute_force(&camera, &centre, 0.020));
+            let off = (circle.x - cx)
+                .abs()
+                .max((circle.y - cy).abs())
+                .max((circle.radius - r).abs());
+            assert!(off < 0.01, "{centre}: {circle:?} against {cx} {cy} {r}");
+            let pixel = camera.project(&centre).expect("in front");
+            let back = camera.ray(pixel).expect("shown") * z;
+            assert!((back - centre.coords).norm() < 1e-9);
+        }
     }
 }
 
@@ -290,8 +267,8 @@ fn directions_beyond_the_fold_are_not_shown() {
             .with_distortion(lens)
             .expect("does not fold in the frame");
         let (mut shown, mut refused) = (0, 0);
-        for (i, k) in (0..400).flat_map(|i| (0..24).map(move |k| (i, k))) {
-            let (tangent, angle) = (0.015 * f64::from(i), f64::from(k) * 0.27);
+        for (i, k) in (0..100).flat_map(|i| (0..24).map(move |k| (i, k))) {
+            let (tangent, angle) = (0.06 * f64::from(i), f64::from(k) * 0.27);
             let direction = Point3::new(tangent * angle.cos(), tangent * angle.sin(), 1.0);
             let Some(pixel) = camera.project(&direction) else {
                 refused += 1;
@@ -313,7 +290,7 @@ fn directions_beyond_the_fold_are_not_shown() {
                 );
             }
         }
-        assert!(shown > 500, "{shown}");
+        assert!(shown > 120, "{shown}");
         assert_eq!(refused > 0, folds, "{lens:?}: {refused}");
     }
     // A frame shows all that its rays meet.

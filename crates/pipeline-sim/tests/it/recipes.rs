@@ -1,6 +1,5 @@
 //! Frames of each recipe show what it says.
 
-use pipeline_sim::image::GrayImage;
 use pipeline_sim::{
     Camera, QuantityError, Recipe, Renderer, Round, RoundOutline, Sensor, Snapshot,
 };
@@ -26,18 +25,29 @@ fn balls(renderer: &Renderer, snapshot: &Snapshot) -> Vec<RoundOutline> {
 
 #[test]
 fn frames_of_each_recipe_repeat_with_their_seed() {
-    let refused = Recipe::named("nothing")
-        .expect_err("no such recipe")
-        .to_string();
-    for kind in Recipe::benchmark().iter().map(Recipe::name) {
-        assert!(refused.contains(kind), "{refused}");
-        let frame = |seed| -> GrayImage {
-            let (mut renderer, snapshot) = drawn(kind, (192, 144), seed);
-            snapshot.take(&mut renderer).clone()
-        };
-        let first = frame(3);
-        assert!(first == frame(3), "{kind}");
-        assert!(kind != "many" || first != frame(4), "{kind}");
+    let unknown = Recipe::named("nothing").expect_err("no such recipe");
+    for recipe in Recipe::cell().iter().chain(Recipe::benchmark()) {
+        let kind = recipe.name();
+        assert!(unknown.to_string().contains(kind), "{unknown}");
+        let (mut renderer, snapshot) = drawn(kind, (192, 144), 3);
+        assert_eq!(renderer.scene().check(), Ok(()), "{kind}");
+        assert_eq!(snapshot.shot.check(), Ok(()), "{kind}");
+        let truth = snapshot.truth(&renderer);
+        let target = truth.first().is_some_and(|s| s.what == Round::Target);
+        assert_eq!(target, !kind.contains("empty"), "{kind}");
+        let frame = snapshot.take(&mut renderer).clone();
+        let darkest = frame.iter().min().copied().unwrap_or(0);
+        let brightest = frame.iter().max().copied().unwrap_or(0);
+        assert!(brightest - darkest > 40, "{kind}: {darkest}..{brightest}");
+        // The scenes of both lists are made alike.
+        if matches!(kind, "occluded" | "interlaced" | "textured" | "many") {
+            let (mut again, same) = drawn(kind, (192, 144), 3);
+            assert!(
+                *same.take(&mut again) == frame && same.truth(&again) == truth,
+                "{kind}"
+            );
+            assert!(drawn(kind, (192, 144), 4).1 != same, "{kind}");
+        }
     }
 }
 
@@ -94,7 +104,7 @@ fn balls_have_the_number_size_and_visibility_of_the_recipe() {
 
 #[test]
 fn radii_are_spread_over_the_whole_range() {
-    let mut radii: Vec<f64> = (0..40)
+    let mut radii: Vec<f64> = (0..24)
         .map(|seed| {
             let Snapshot { cell, joints, .. } = drawn("clean", (192, 144), seed).1;
             4.0 * cell.outline(&joints).expect("in view").circle().radius
@@ -103,8 +113,8 @@ fn radii_are_spread_over_the_whole_range() {
     radii.sort_by(f64::total_cmp);
     // The median of an even spread on a logarithmic scale is the geometric mean of the ends.
     let middle = (12.0_f64 * 145.0).sqrt();
-    assert!(radii[0] < 18.0 && radii[39] > 105.0, "{radii:?}");
-    assert!((0.7..1.4).contains(&(radii[20] / middle)), "{}", radii[20]);
+    assert!(radii[0] < 20.0 && radii[23] > 95.0, "{radii:?}");
+    assert!((0.6..1.6).contains(&(radii[12] / middle)), "{}", radii[12]);
 }
 
 #[test]
@@ -112,9 +122,7 @@ fn noise_has_the_strength_of_the_recipe() {
     for (kind, expected) in [
         ("clean", Sensor::default().read_noise),
         ("noise-10", 10.0),
-        ("noise-25", 25.0),
         ("noise-40", 40.0),
-        ("distractors-noise-10", 10.0),
         ("distractors-noise-25", 25.0),
     ] {
         let (mut renderer, snapshot) = drawn(kind, (768, 576), 5);
@@ -144,7 +152,7 @@ fn noise_has_the_strength_of_the_recipe() {
 
 #[test]
 fn motion_blur_is_four_to_twelve_pixels() {
-    for seed in 0..8 {
+    for seed in 0..4 {
         let (_, snapshot) = drawn("motion-blur", (768, 576), seed);
         let place = |seconds| {
             let (cell, joints) = snapshot.moment(seconds);

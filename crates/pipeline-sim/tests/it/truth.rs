@@ -282,7 +282,7 @@ fn truth_of_distorted_frames_agrees_with_their_rays() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     let recipe = Recipe::named("distorted").expect("a recipe");
     let mut rows = 0;
-    for _ in 0..4 {
+    for _ in 0..2 {
         let drawn = recipe.draw((768, 576), &mut rng);
         let (renderer, _) = drawn.expect("a frame of pixels");
         let scene = renderer.scene();
@@ -320,5 +320,5 @@ fn truth_of_distorted_frames_agrees_with_their_rays() {
             }
         }
     }
-    assert!(rows > 80, "{rows}");
+    assert!(rows > 40, "{rows}");
 }
