@@ -9,18 +9,17 @@
 
 mod overview;
 
-use std::error::Error;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Parser;
-use example_support::files::{animated, writable_folder, write_whole};
-use example_support::program::ended;
+use example_support::files::{animated, writable_folder, write_png, write_whole};
+use example_support::learning::paper_cell;
+use example_support::program::{ExitCode, Outcome, ended};
 use example_support::say;
 use hough_heuristic::Y4mWriter;
+use image::GrayImage;
 use image::imageops::{FilterType, resize};
-use image::{GrayImage, ImageFormat};
-use pipeline_sim::{Cell, Renderer, Scene, Sensor, Workspace};
+use pipeline_sim::{Cell, Renderer, Scene, Workspace};
 use puma_val2::{Joint, Joints};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -43,57 +42,44 @@ fn main() -> ExitCode {
     ended(draw(&Options::parse()))
 }
 
-fn draw(options: &Options) -> Result<(), Box<dyn Error>> {
+fn draw(options: &Options) -> Outcome {
     writable_folder(&options.out)?;
-    let save = |name: &str, bytes: &[u8]| {
-        let path = options.out.join(name);
-        write_whole(&path, bytes)?;
-        say!("{}", path.display());
-        Ok::<(), Box<dyn Error>>(())
-    };
+    let out = |name: &str| options.out.join(name);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let workspace = Workspace::paper();
-    let nominal = Cell::paper(pipeline_sim::Ball::at(0.6, 0.0, -0.1));
     let (ball, start) = workspace
-        .sample_seen_ball(&nominal, &mut rng)
+        .sample_seen_ball(&paper_cell(), &mut rng)
         .ok_or("no search pose sees the workspace")?;
     let cell = Cell::paper(ball);
     let goal = cell.goal_pose(Cell::REACHING_JT5_DEGREES)?;
     let path = reach(&cell, &start, &goal, options.frames.max(4));
 
     let overview = overview::overview(&cell, &workspace, &path[..=path.len() * 3 / 4])?;
-    save("overview.svg", overview.as_bytes())?;
+    write_whole(&out("overview.svg"), overview.as_bytes())?;
     let mut renderer = Renderer::new(&Scene::laboratory(), options.seed);
-    for (name, pose) in [("search.png", &start), ("goal.png", &goal)] {
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        renderer
-            .render(&cell, pose)
-            .write_to(&mut bytes, ImageFormat::Png)?;
-        save(name, bytes.get_ref())?;
-    }
+    write_png(&out("search.png"), renderer.render(&cell, &start))?;
+    write_png(&out("goal.png"), renderer.render(&cell, &goal))?;
     let mut video = Y4mWriter::new(Vec::new(), 12, 1)?;
     for pose in &path {
         video.write(renderer.render(&cell, pose))?;
     }
-    save("run.y4m", &video.finish()?)?;
+    write_whole(&out("run.y4m"), &video.finish()?)?;
     // Without noise the animated picture compresses well.
-    let quiet = Sensor {
-        read_noise: 0.0,
-        shot_noise: 0.0,
-        ..Sensor::default()
-    };
-    let mut renderer = Renderer::new(
-        &Scene {
-            sensor: quiet,
-            ..Scene::laboratory()
-        },
-        options.seed,
-    );
-    let frames: Vec<GrayImage> = path
-        .iter()
-        .map(|pose| resize(renderer.render(&cell, pose), 384, 288, FilterType::Triangle))
-        .collect();
-    save("run.png", &animated(&frames, (1, 12), (3, 2))?)?;
+    let mut quiet = Scene::laboratory();
+    (quiet.sensor.read_noise, quiet.sensor.shot_noise) = (0.0, 0.0);
+    let mut renderer = Renderer::new(&quiet, options.seed);
+    let small = |pose| resize(renderer.render(&cell, pose), 384, 288, FilterType::Triangle);
+    let frames: Vec<GrayImage> = path.iter().map(small).collect();
+    write_whole(&out("run.png"), &animated(&frames, (1, 12), (3, 2))?)?;
+    for name in [
+        "overview.svg",
+        "search.png",
+        "goal.png",
+        "run.y4m",
+        "run.png",
+    ] {
+        say!("{}", out(name).display());
+    }
     Ok(())
 }
 

@@ -1,7 +1,6 @@
 //! The cell as a drawing: arm, camera, workspace and ball from the side and from above.
 
-use std::error::Error;
-
+use example_support::program::Outcome;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use pipeline_sim::{Cell, Workspace};
 use plotters::coord::Shift;
@@ -25,11 +24,7 @@ const TABLE: RGBColor = RGBColor(138, 111, 77);
 type Line = (&'static str, Vec<Point3<f64>>, ShapeStyle);
 
 /// Draws the cell as SVG with the arm in the last pose of `path`, and the way of its tool point.
-pub(crate) fn overview(
-    cell: &Cell,
-    workspace: &Workspace,
-    path: &[Joints],
-) -> Result<String, Box<dyn Error>> {
+pub(crate) fn overview(cell: &Cell, workspace: &Workspace, path: &[Joints]) -> Outcome<String> {
     let joints = path.last().ok_or("a path without poses")?;
     let pan = joints.0[0];
     let mut svg = String::new();
@@ -43,45 +38,39 @@ pub(crate) fn overview(
         let above = |p: &Point3<f64>| (-p.y, p.x);
         let [eye, upper, lower, corners @ ..] = sight_lines(cell, joints);
         let at = |along: f64| Point3::new(along * pan.cos(), along * pan.sin(), cell.table);
+        let (space, sight) = (SPACE.stroke_width(2), SIGHT.stroke_width(1));
         let from_side = [
-            (
-                "workspace",
-                section(cell, workspace, pan),
-                SPACE.stroke_width(2),
-            ),
+            ("workspace", section(cell, workspace, pan), space),
             ("table", vec![at(-0.6), at(1.2)], TABLE.stroke_width(3)),
             ("", vec![at(0.0), Point3::origin()], ARM.stroke_width(8)),
-            (
-                "field of view",
-                vec![eye, upper, lower, eye],
-                SIGHT.stroke_width(1),
-            ),
+            ("field of view", vec![eye, upper, lower, eye], sight),
         ];
         let [a, b, c, d] = corners;
         let from_above = [
-            ("workspace", ring(workspace), SPACE.stroke_width(2)),
+            ("workspace", ring(workspace), space),
             (
                 "field of view",
                 vec![a, b, c, d, a, eye, b, c, eye, d],
-                SIGHT.stroke_width(1),
+                sight,
             ),
         ];
         let both = arm_and_ball(cell, joints, path, eye);
-        let title = "from the side, in the plane of the arm";
+        let (title, lines) = ("from the side, in the plane of the arm", from_side.iter());
         view(
             &views[0],
             title,
             (-0.6, -0.75),
             side,
-            from_side.iter().chain(&both),
+            lines.chain(&both),
             cell,
         )?;
+        let (title, lines) = ("from above", from_above.iter());
         view(
             &views[1],
-            "from above",
+            title,
             (-0.9, -0.4),
             above,
-            from_above.iter().chain(&both),
+            lines.chain(&both),
             cell,
         )?;
         root.present()?;
@@ -97,7 +86,7 @@ fn view<'a>(
     flat: impl Fn(&Point3<f64>) -> (f64, f64),
     lines: impl Iterator<Item = &'a Line>,
     cell: &Cell,
-) -> Result<(), Box<dyn Error>> {
+) -> Outcome {
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 15))
         .margin(8)
@@ -119,19 +108,12 @@ fn view<'a>(
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], style));
         }
     }
-    let round: Vec<(f64, f64)> = (0..=40)
-        .map(|i| f64::from(i) / 40.0 * std::f64::consts::TAU)
-        .map(|angle| {
-            (
-                cell.ball.radius * angle.cos(),
-                cell.ball.radius * angle.sin(),
-            )
-        })
-        .map(|(right, up)| {
-            let (x, y) = flat(&cell.ball.centre);
-            (x + right, y + up)
-        })
-        .collect();
+    let ((x, y), radius) = (flat(&cell.ball.centre), cell.ball.radius);
+    let around = |i| {
+        let (sin, cos) = (f64::from(i) / 40.0 * std::f64::consts::TAU).sin_cos();
+        (x + radius * cos, y + radius * sin)
+    };
+    let round: Vec<(f64, f64)> = (0..=40).map(around).collect();
     chart
         .draw_series([Polygon::new(round, BALL.filled())])?
         .label("ball")
@@ -153,27 +135,18 @@ fn arm_and_ball(cell: &Cell, joints: &Joints, path: &[Joints], eye: Point3<f64>)
     let elbow = waist * Point3::new(params.a2 * j2.cos(), params.d2, -params.a2 * j2.sin());
     let wrist = Point3::from(params.wrist(joints).translation.vector);
     let way = path.iter().map(|joints| cell.tool_point(joints)).collect();
+    let arm = vec![Point3::origin(), shoulder, elbow, wrist];
+    let hand = vec![wrist, cell.tool_point(joints)];
     let mut lines = vec![
-        (
-            "arm",
-            vec![Point3::origin(), shoulder, elbow, wrist],
-            ARM.stroke_width(8),
-        ),
-        (
-            "hand",
-            vec![wrist, cell.tool_point(joints)],
-            HAND.stroke_width(5),
-        ),
+        ("arm", arm, ARM.stroke_width(8)),
+        ("hand", hand, HAND.stroke_width(5)),
         ("camera", vec![wrist, eye], CAMERA.stroke_width(2)),
         ("way of the tool point", way, BALL.stroke_width(1)),
     ];
     if let Some(holder) = cell.holder {
         let foot = |z: f64| Point3::new(holder.foot.x, holder.foot.y, z);
-        lines.push((
-            "holder",
-            vec![foot(cell.table), foot(holder.top)],
-            BLACK.stroke_width(3),
-        ));
+        let post = vec![foot(cell.table), foot(holder.top)];
+        lines.push(("holder", post, BLACK.stroke_width(3)));
     }
     lines
 }
@@ -230,13 +203,8 @@ fn sight_lines(cell: &Cell, joints: &Joints) -> [Point3<f64>; 7] {
         eye + ray * down.clamp(0.0, FAR)
     };
     let x = 0.5 * w;
-    [
-        eye,
-        end(x, -0.5),
-        end(x, h),
-        end(-0.5, -0.5),
-        end(w, -0.5),
-        end(w, h),
-        end(-0.5, h),
-    ]
+    let [above, below] = [end(x, -0.5), end(x, h)];
+    let corners = [end(-0.5, -0.5), end(w, -0.5), end(w, h), end(-0.5, h)];
+    let [a, b, c, d] = corners;
+    [eye, above, below, a, b, c, d]
 }

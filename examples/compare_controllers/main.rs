@@ -9,27 +9,31 @@
 
 use std::error::Error;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
-    Agent, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, Percept, SavedRun, Servo,
-    ServoLaw as Law, ServoSettings, TaughtGoal,
+    Agent, AgentConfig, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, RunEvent,
+    SavedRun, Servo, ServoLaw as Law, ServoSettings, TaughtGoal,
 };
-use pipeline_sim::{Ball, Cell, ErrorLevel, MoveForm};
-use puma_grasp::{BallDetector, Simulator};
+use hough_heuristic::CircleDetector;
+use pipeline_sim::{ErrorLevel, MoveForm, Workspace};
+use puma_grasp::{BallDetector, Rig, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::comparison::{self, Row, Tally};
-use example_support::files::{writable_folder, write_whole};
-use example_support::learning::{ACTIONS, ACTIONS_FINE, TRIALS};
+use example_support::comparison::{self, Row};
+use example_support::files::{Table, writable_folder, write_whole};
+use example_support::learning::{
+    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
+};
 use example_support::plane::{ExactPlane, search_percepts};
-use example_support::program::{at_least_one, ended};
+use example_support::program::{
+    ExitCode, Outcome, at_least_one, ended, on_all_cores, progress_bar,
+};
 use example_support::say;
-use world::World;
-
-mod world;
+use example_support::stages::Stages;
+use example_support::tally::{Counted, Tally};
+use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
 
 /// Compares controllers on randomly drawn errors of arm and camera and randomly drawn balls, the
 /// same for all.
@@ -53,12 +57,12 @@ struct Options {
     seed: u64,
 
     /// Cells per level of errors
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = at_least_one::<u64>)]
-    draws: u64,
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = at_least_one)]
+    draws: usize,
 
     /// Balls per cell
-    #[arg(long, value_name = "N", default_value_t = 30, value_parser = at_least_one::<u64>)]
-    starts: u64,
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = at_least_one)]
+    starts: usize,
 
     /// Moves by which the hybrid learns each cell
     #[arg(long, value_name = "N", default_value_t = 1000)]
@@ -98,107 +102,51 @@ fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     writable_folder(&options.out)?;
     let mut rivals = rivals(options)?;
     rivals.retain(|(name, _)| name.contains(&options.only));
     if rivals.is_empty() {
         return Err(format!("no controller has {:?} in its name", options.only).into());
     }
-    let failures = Failures {
-        folder: options.logs.then(|| options.out.join("failures")),
-    };
+    let mut file = Table::create(options.out.join("comparison.csv"), Row::CSV_HEADER)?;
     let mut rows = Vec::new();
     say!("{}", Row::HEADER);
+    let bar = progress_bar(
+        (options.levels.len() * options.draws) as u64,
+        "cells",
+        false,
+    );
     for level in &options.levels {
-        let (mut tallies, mut unshown) = (vec![Tally::default(); rivals.len()], 0);
-        for draw in 0..options.draws {
-            let errors = seed_of(options.seed, &[1, draw]);
-            let new_world = || World::draw(options, *level, errors);
-            let mut world = new_world()?;
-            let goal = if options.taught_goal {
-                world.teach_goal(seed_of(options.seed, &[5, draw]))?
-            } else {
-                None
-            };
-            // A cell in which the goal cannot be shown keeps the paper's.
-            unshown += usize::from(options.taught_goal && goal.is_none());
-            let untaught = world.agent_config(options);
-            let config = goal.map_or_else(
-                || untaught.clone(),
-                |goal| untaught.clone().with_taught_goal(&goal),
-            );
-            for ((name, rival), tally) in rivals.iter().zip(&mut tallies) {
-                let run_of = |run: String| format!("{level} {name} cell {draw} {run}");
-                let controller = match rival {
-                    Rival::Hybrid => {
-                        let agent =
-                            Agent::with_controller(config.clone(), new_hybrid(goal.as_ref()))?;
-                        let seed = seed_of(options.seed, &[2, draw]);
-                        let (hybrid, fault) = taught_hybrid(&mut world, agent, seed, options.moves);
-                        // The hybrid works with what it had learned by then.
-                        if let Some(Fault { run, saved, error }) = fault {
-                            let run = run_of(format!("teaching {run}"));
-                            failures.broken_off(&run, &saved, &*error)?;
-                            world = new_world()?;
-                        }
-                        Box::new(hybrid)
-                    }
-                    _ => rival.controller(goal.as_ref()),
-                };
-                tally.begin_draw();
-                let mut agent = Agent::with_controller(config.clone(), controller)?;
-                for start in 0..options.starts {
-                    let seed = seed_of(options.seed, &[3, draw, start]);
-                    let run_of_ball = run_of(format!("ball {start}"));
-                    let mut saved = SavedRun::before(&agent);
-                    let run = world.run(&mut agent, seed, &mut |event| saved.note(event));
-                    let (mut trial, collisions) = match run {
-                        Ok(Some(run)) => run,
-                        Ok(None) => continue,
-                        // A run that a fault of arm or camera ends has failed.
-                        Err(error) => {
-                            failures.broken_off(&run_of_ball, &saved, &*error)?;
-                            tally.add_broken_off();
-                            world = new_world()?;
-                            continue;
-                        }
-                    };
-                    let success = if options.grip {
-                        trial.held
-                    } else {
-                        trial.at_goal.is_some()
-                    };
-                    if let (Some(cycles), false) = (trial.at_goal, options.grip) {
-                        // Moves after reaching the goal are not counted.
-                        trial.outcome.cycles = cycles;
-                    }
-                    tally.add(success, &trial.outcome);
-                    if let Some(collisions) = collisions {
-                        *tally.collisions.get_or_insert(0) += collisions;
-                    }
-                    if !success {
-                        failures.keep(&run_of_ball, &saved)?;
-                    }
-                }
-            }
-        }
-        for ((name, _), tally) in rivals.iter().zip(&tallies) {
-            let row = Row::new(*level, name, tally);
-            say!("{row}");
+        let cells = on_all_cores(options.draws, |draw| {
+            let cell = DrawnCell::new(options, *level, draw as u64)?;
+            let mut world = cell.world()?;
+            let runs = rivals
+                .iter()
+                .map(|(name, rival)| cell.runs(name, rival, &mut world));
+            let runs = runs.collect::<Outcome<Vec<_>>>()?;
+            bar.inc(1);
+            Ok((runs, options.taught_goal && cell.goal.is_none()))
+        })?;
+        for (rival, (name, _)) in rivals.iter().enumerate() {
+            let cells = cells.iter().map(|(runs, _)| runs[rival].clone()).collect();
+            let row = Row::new(*level, name, &Tally { cells });
+            bar.suspend(|| say!("{row}"));
+            file.row(row.csv())?;
             rows.push(row);
         }
+        let unshown = cells.iter().filter(|(_, unshown)| *unshown).count();
         if unshown > 0 {
-            say!(
-                "{level}: in {unshown} of {} cells the ball between the jaws is out of the \
-                 camera's \
-                 view; the goal there is the untaught one",
-                options.draws
-            );
+            bar.suspend(|| {
+                say!(
+                    "{level}: in {unshown} of {} cells the ball between the jaws is out of the \
+                     camera's view; the goal there is the untaught one",
+                    options.draws
+                );
+            });
         }
     }
-    let csv = comparison::csv(&rows);
-    write_whole(&options.out.join("comparison.csv"), csv.as_bytes())?;
+    bar.finish_and_clear();
     let success = if options.grip {
         "grasped"
     } else {
@@ -210,32 +158,183 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Folder of the failed runs, if they are kept.
-struct Failures {
-    folder: Option<PathBuf>,
+/// A cell with drawn errors, in which all controllers are tried.
+struct DrawnCell<'a> {
+    options: &'a Options,
+    level: ErrorLevel,
+    draw: u64,
+    /// The goal shown in the cell. A cell in which it cannot be shown keeps the paper's.
+    goal: Option<TaughtGoal>,
+    config: AgentConfig,
 }
 
-impl Failures {
-    fn keep(&self, run: &str, saved: &SavedRun) -> Result<(), Box<dyn Error>> {
-        let Some(folder) = &self.folder else {
-            return Ok(());
+impl<'a> DrawnCell<'a> {
+    fn new(options: &'a Options, level: ErrorLevel, draw: u64) -> Outcome<Self> {
+        let paper = AgentConfig::paper(Workspace::paper().search_poses());
+        let mut cell = Self {
+            options,
+            level,
+            draw,
+            goal: None,
+            config: AgentConfig {
+                lift: paper.lift.filter(|_| options.grip),
+                ..paper
+            },
         };
-        writable_folder(folder)?;
-        write_whole(
-            &folder.join(format!("{run}.json")),
-            saved.to_json().as_bytes(),
+        if options.taught_goal
+            && let World::Shortcut(world) = cell.world()?
+        {
+            cell.goal = world.teach_goal(seed_of(options.seed, &[5, draw]))?;
+        }
+        if let Some(goal) = &cell.goal {
+            cell.config = cell.config.with_taught_goal(goal);
+        }
+        Ok(cell)
+    }
+
+    /// Returns the cell as it was drawn.
+    fn world(&self) -> Outcome<World> {
+        World::draw(
+            self.options,
+            self.level,
+            seed_of(self.options.seed, &[1, self.draw]),
         )
     }
 
-    /// Reports and keeps a run that was broken off.
-    fn broken_off(
-        &self,
-        run: &str,
-        saved: &SavedRun,
-        error: &dyn Error,
-    ) -> Result<(), Box<dyn Error>> {
-        eprintln!("{run}: broken off: {error}");
-        self.keep(run, saved)
+    /// Lets a controller go for all balls. A run that a fault of arm or camera ends has failed.
+    fn runs(&self, name: &str, rival: &Rival, world: &mut World) -> Outcome<Vec<Counted>> {
+        let (options, draw) = (self.options, self.draw);
+        let controller = match rival {
+            Rival::Hybrid => Box::new(self.taught_hybrid(name, world)?),
+            _ => rival.controller(self.goal.as_ref()),
+        };
+        let mut agent = Agent::with_controller(self.config.clone(), controller)?;
+        let mut runs = Vec::new();
+        for start in 0..options.starts as u64 {
+            let mut saved = SavedRun::before(&agent);
+            let seed = seed_of(options.seed, &[3, draw, start]);
+            let run = world.run(&mut agent, seed, &mut |event| saved.note(event));
+            let counted = match run {
+                Ok(None) => continue,
+                Ok(Some(trial)) => Counted {
+                    success: if options.grip {
+                        trial.held
+                    } else {
+                        trial.at_goal.is_some()
+                    },
+                    // Moves after reaching the goal are not counted.
+                    moves: match trial.at_goal {
+                        Some(moves) if !options.grip => moves,
+                        _ => trial.outcome.cycles,
+                    },
+                    losses: trial.outcome.losses,
+                    collisions: trial.collisions,
+                    ..Counted::default()
+                },
+                Err(error) => {
+                    self.report(name, &format!("ball {start}"), &*error);
+                    *world = self.world()?;
+                    Counted::default()
+                }
+            };
+            if !counted.success {
+                self.keep(name, &format!("ball {start}"), &saved)?;
+            }
+            runs.push(counted);
+        }
+        Ok(runs)
+    }
+
+    /// Returns the hybrid after at most `--moves` moves in `world`, frozen. If a fault ends its
+    /// teaching, it works with what it has learned by then.
+    fn taught_hybrid(&self, name: &str, world: &mut World) -> Outcome<Hybrid> {
+        let mut agent =
+            Agent::with_controller(self.config.clone(), new_hybrid(self.goal.as_ref()))?;
+        let (longest, moves) = (self.config.max_cycles, self.options.moves);
+        let seed = seed_of(self.options.seed, &[2, self.draw]);
+        let (mut made, mut run) = (0, 0);
+        // One more run could take the longest; a ball that is not found takes no move.
+        while made + longest <= moves && run <= moves as u64 {
+            let mut saved = SavedRun::before(&agent);
+            let seed = seed_of(seed, &[run]);
+            match world.run(&mut agent, seed, &mut |event| saved.note(event)) {
+                Ok(trial) => made += trial.map_or(0, |trial| trial.outcome.cycles),
+                Err(error) => {
+                    let run = format!("teaching {run}");
+                    self.report(name, &run, &*error);
+                    self.keep(name, &run, &saved)?;
+                    *world = self.world()?;
+                    break;
+                }
+            }
+            run += 1;
+        }
+        Ok(agent.into_controller().frozen())
+    }
+
+    fn report(&self, name: &str, run: &str, error: &dyn Error) {
+        eprintln!("{}: broken off: {error}", self.run_name(name, run));
+    }
+
+    /// Writes a failed run if asked for.
+    fn keep(&self, name: &str, run: &str, saved: &SavedRun) -> Outcome {
+        if !self.options.logs {
+            return Ok(());
+        }
+        let folder = self.options.out.join("failures");
+        writable_folder(&folder)?;
+        let file = folder.join(format!("{}.json", self.run_name(name, run)));
+        write_whole(&file, saved.to_json().as_bytes())
+    }
+
+    fn run_name(&self, name: &str, run: &str) -> String {
+        format!("{} {name} cell {} {run}", self.level, self.draw)
+    }
+}
+
+/// The devices in a cell with drawn errors.
+enum World {
+    /// Features straight from the geometry, an arm that moves at once.
+    Shortcut(Box<TrialCell>),
+    /// Rendered frames, circle detection, VAL II on a line.
+    Chain(Box<Rig>, Box<dyn CircleDetector + Send>),
+}
+
+impl World {
+    fn draw(options: &Options, level: ErrorLevel, seed: u64) -> Outcome<Self> {
+        if options.full_chain {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let rig = rig_with_errors(level, &bright_ball_scene(), seed, &mut rng)?;
+            return Ok(Self::Chain(Box::new(rig), options.detector.build(seed)?));
+        }
+        let cell = TrialCell::draw(level, seed)?;
+        let cell = if options.grip {
+            cell
+        } else {
+            cell.without_bodies()
+        };
+        Ok(Self::Shortcut(Box::new(cell)))
+    }
+
+    /// Lets `agent` go for the ball that `seed` places; `None` if no ball can be seen.
+    fn run<C: Controller>(
+        &mut self,
+        agent: &mut Agent<C>,
+        seed: u64,
+        observe: &mut dyn FnMut(&RunEvent<'_>),
+    ) -> Outcome<Option<Trial>> {
+        let (rig, detector) = match self {
+            Self::Shortcut(cell) => return Ok(cell.run(agent, seed, &mut |_, _| (), observe)?),
+            Self::Chain(rig, detector) => (rig, detector),
+        };
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let Ok(ball) = ball_in_view(rig.cell(), &mut rng) else {
+            return Ok(None);
+        };
+        rig.clear_for(Workspace::paper().search_poses()[3])?;
+        rig.place(&ball)?;
+        let trial = run_on_rig(rig, &mut **detector, agent, &Stages::default(), observe)?;
+        Ok(Some(trial))
     }
 }
 
@@ -265,7 +364,7 @@ impl Rival {
 }
 
 /// Returns all controllers with their names.
-fn rivals(options: &Options) -> Result<Vec<(&'static str, Rival)>, Box<dyn Error>> {
+fn rivals(options: &Options) -> Outcome<Vec<(&'static str, Rival)>> {
     let servos = [
         ("position-based, gain 1", Law::PositionBased, 1.0),
         ("image-based goal J, gain 1", Law::ImageBasedAtGoal, 1.0),
@@ -299,7 +398,7 @@ fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
 
 /// Learns the paper's controller without errors, in the regression simulator and in the exact
 /// plane. Learns nothing if none of them is compared.
-fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Error>> {
+fn learned(options: &Options) -> Outcome<Vec<(&'static str, Learned)>> {
     const NAMES: [&str; 5] = [
         "Q 90, linear regression",
         "Q 90, rigid regression",
@@ -310,64 +409,26 @@ fn learned(options: &Options) -> Result<Vec<(&'static str, Learned)>, Box<dyn Er
     if !NAMES.iter().any(|name| name.contains(&options.only)) {
         return Ok(Vec::new());
     }
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));
-    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
-    let rigid = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
-    let linear = Simulator::fit(&centering, &reaching, MoveForm::Linear)?;
-    let plane = ExactPlane::new(20_000, &mut rng);
-    let anywhere: Vec<Percept> = (0..TRIALS).map(|_| rigid.start(&mut rng)).collect();
-    let trials = search_percepts(TRIALS, seed_of(options.seed, &[4]));
-    let (spec, quiet) = (BehaviourSpec::centering(), &mut |_: &qtable::Record| ());
+    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));
+    let forms = [MoveForm::Rigid22, MoveForm::Linear];
+    let [rigid, linear] = simulators(&paper_cell(), forms, rng)?;
+    let plane = ExactPlane::new(20_000, rng);
+    let starts = anywhere(&rigid, TRIALS, rng);
+    let found = search_percepts(TRIALS, seed_of(options.seed, &[4]));
+    let centering = BehaviourSpec::centering();
     let centering = rigid
-        .learn(spec, &anywhere, ACTIONS.0, &mut rng, quiet)?
+        .learn(centering, &starts, ACTIONS.0, rng, &mut quiet)?
         .behaviour;
     let (paper, fine) = (BehaviourSpec::approaching, BehaviourSpec::approaching_fine);
     let approaching = [
-        linear.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
-        rigid.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
-        rigid.learn(fine(), &trials, ACTIONS_FINE, &mut rng, quiet)?,
-        plane.learn(paper(), &trials, ACTIONS.1, &mut rng, quiet)?,
-        plane.learn(fine(), &trials, ACTIONS_FINE, &mut rng, quiet)?,
+        linear.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
+        rigid.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
+        rigid.learn(fine(), &found, ACTIONS_FINE, rng, &mut quiet)?,
+        plane.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
+        plane.learn(fine(), &found, ACTIONS_FINE, rng, &mut quiet)?,
     ];
     let both = approaching.map(|lesson| Learned::new(centering.clone(), lesson.behaviour));
     Ok(NAMES.into_iter().zip(both).collect())
-}
-
-/// A run of teaching that was broken off.
-struct Fault {
-    run: u64,
-    saved: SavedRun,
-    error: Box<dyn Error>,
-}
-
-/// Returns the hybrid after at most `moves` moves in `world`, frozen, and the fault that ended
-/// teaching early, if any.
-fn taught_hybrid(
-    world: &mut World,
-    mut agent: Agent<Hybrid>,
-    seed: u64,
-    moves: usize,
-) -> (Hybrid, Option<Fault>) {
-    let longest = agent.config().max_cycles;
-    let (mut made, mut fault) = (0, None);
-    for run in 0.. {
-        // One more run could take this many moves; a ball that is not found takes none.
-        if made + longest > moves || run > moves as u64 {
-            break;
-        }
-        let mut saved = SavedRun::before(&agent);
-        match world.run(&mut agent, seed_of(seed, &[run]), &mut |event| {
-            saved.note(event);
-        }) {
-            Ok(trial) => made += trial.map_or(0, |(trial, _)| trial.outcome.cycles),
-            Err(error) => {
-                fault = Some(Fault { run, saved, error });
-                break;
-            }
-        }
-    }
-    (agent.into_controller().frozen(), fault)
 }
 
 /// Derives a seed for each use.

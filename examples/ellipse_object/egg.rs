@@ -3,10 +3,10 @@
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{FrameError, FrameSource};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use pipeline_sim::{Scene, SharedCell};
+use pipeline_sim::{Light, Scene, SharedCell};
 use puma_val2::Joints;
+use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
-use rand::{RngExt, SeedableRng};
 
 /// A spheroid on its side: as thick as the ball, and longer.
 #[derive(Clone, Copy, Debug)]
@@ -41,25 +41,7 @@ const GRAIN: f64 = 4.0;
 /// Exponent from light to gray level.
 const GAMMA: f64 = 0.6;
 
-impl<'a> EggCamera<'a> {
-    pub(crate) fn new(
-        frames: &'a mut dyn FrameSource,
-        cell: SharedCell,
-        pose: impl Fn() -> Joints + 'static,
-        egg: Egg,
-        scene: Scene,
-        seed: u64,
-    ) -> Self {
-        Self {
-            frames,
-            cell,
-            pose: Box::new(pose),
-            egg,
-            scene,
-            noise: Xoshiro256PlusPlus::seed_from_u64(seed),
-        }
-    }
-
+impl EggCamera<'_> {
     /// Draws the egg: the ray of every pixel meets the spheroid, and the point met is lit.
     fn paint(&mut self, frame: &mut GrayImage) {
         let cell = self.cell.get();
@@ -77,17 +59,11 @@ impl<'a> EggCamera<'a> {
         let (focal, middle) = (cell.camera.focal_px(), cell.camera.principal_point());
         let (pulled, beyond) = (form * centre, centre.dot(&(form * centre)) - 1.0);
         let up = camera.rotation.inverse() * Vector3::z();
-        let lamps: Vec<(Vector3<f64>, f64)> = self
-            .scene
-            .lights
-            .iter()
-            .map(|lamp| {
-                (
-                    camera.rotation.inverse() * lamp.toward.normalize(),
-                    lamp.intensity,
-                )
-            })
-            .collect();
+        let lamp = |lamp: &Light| {
+            let toward = camera.rotation.inverse() * lamp.toward.normalize();
+            (toward, lamp.intensity)
+        };
+        let lamps: Vec<(Vector3<f64>, f64)> = self.scene.lights.iter().map(lamp).collect();
         let reach = focal * long / (centre.z - long) + 3.0;
         let at = (
             middle.x + focal * centre.x / centre.z,

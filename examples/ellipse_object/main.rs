@@ -10,9 +10,7 @@
 //! ```
 
 use std::cell::Cell;
-use std::error::Error;
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Parser;
@@ -23,7 +21,7 @@ use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse, FrameError};
 use nalgebra::Vector3;
 use pipeline_sim::{MoveForm, Workspace};
-use puma_grasp::{Rig, RigParts, Simulator, bright_ball_scene};
+use puma_grasp::{Rig, RigParts, bright_ball_scene};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -31,10 +29,11 @@ use rand::{RngExt, SeedableRng};
 use detour::Detour;
 use egg::{Egg, EggCamera};
 use example_support::files::{keep_run, writable_folder, write_png};
-use example_support::learning::learn_both;
+use example_support::learning::{learn_both, simulators};
 use example_support::overlay::Overlay;
-use example_support::program::{at_least_one, ended};
+use example_support::program::{ExitCode, Outcome, at_least_one, ended, progress_bar};
 use example_support::say;
+use example_support::trial::ball_in_view;
 
 mod detour;
 mod egg;
@@ -59,8 +58,8 @@ struct Options {
     seed: u64,
 
     /// Number of eggs
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one::<u16>)]
-    runs: u16,
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
+    runs: usize,
 
     /// Length of the egg, millimetres; its thickness is 40
     #[arg(long, value_name = "MM", default_value_t = 56.0, value_parser = length)]
@@ -81,7 +80,7 @@ fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     writable_folder(&options.out)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let scene = bright_ball_scene();
@@ -90,24 +89,21 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         features: egg_features(options.seed)?,
         outline: Rc::default(),
     };
-    let workspace = Workspace::paper();
     let config = AgentConfig {
         grip_across: true,
-        ..AgentConfig::paper(workspace.search_poses())
+        ..AgentConfig::paper(Workspace::paper().search_poses())
     };
-    let (centering, reaching) = rig.cell().get().sample_moves(2_500, 0.5, &mut rng)?;
-    let simulator = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
+    let [simulator] = simulators(&rig.cell().get(), [MoveForm::Rigid22], &mut rng)?;
     let pair = BehaviourPair::paper_mended();
     let learned = learn_both(&simulator, pair, options.seed, &mut rng)?;
-    let agent = Agent::with_controller(config.clone(), learned)?;
+    let agent = Agent::with_controller(config, learned)?;
 
     let run_file = |run: usize| options.out.join(format!("egg{run:03}.json"));
     let (mut gripped, mut moves) = (0, 0);
     say!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
-    for run in 1..=usize::from(options.runs) {
-        let (place, _) = workspace
-            .sample_seen_ball(&rig.cell().get(), &mut rng)
-            .ok_or("no place of the workspace is in view from a search pose")?;
+    let bar = progress_bar(options.runs as u64, "eggs", false);
+    for run in 1..=options.runs {
+        let place = ball_in_view(rig.cell(), &mut rng)?;
         let egg = Egg {
             half_length: 0.5e-3 * options.length,
             heading: rng.random_range(0.0..std::f64::consts::PI),
@@ -119,8 +115,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             arm,
             mut sensor,
         } = rig.parts();
-        let mut camera =
-            EggCamera::new(camera, cell.clone(), pose, egg, scene.clone(), rng.random());
+        let mut camera = EggCamera {
+            frames: camera,
+            cell: cell.clone(),
+            pose: Box::new(pose),
+            egg,
+            scene: scene.clone(),
+            noise: Xoshiro256PlusPlus::seed_from_u64(rng.random()),
+        };
         // The last view of the egg; and, when the jaws closed, their distance from the ball's
         // centre, metres, and their angle from straight across, degrees.
         let (mut last, mut closed) = (None, None);
@@ -128,25 +130,21 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let mut eye = CameraEye::looking_for(&mut camera, &mut features);
         let params = cell.get().params;
         let mut saved = SavedRun::before(&agent);
-        let end = agent.run(
-            &mut eye,
-            &mut Detour { arm, params },
-            &mut *sensor,
-            &mut |event| {
-                saved.note(event);
-                match (&event.kind, event.frame, outline.get()) {
-                    (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
-                        last = Some((frame.clone(), ellipse));
-                    }
-                    (EventKind::Gripping(_), ..) => {
-                        let miss = cell.with(|cell| cell.grip_miss(&event.joints));
-                        closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
-                    }
-                    (EventKind::Missed, ..) => closed = None,
-                    _ => {}
+        let mut arm = Detour { arm, params };
+        let end = agent.run(&mut eye, &mut arm, &mut *sensor, &mut |event| {
+            saved.note(event);
+            match (&event.kind, event.frame, outline.get()) {
+                (EventKind::Seen(_), Some(frame), Some(ellipse)) if closed.is_none() => {
+                    last = Some((frame.clone(), ellipse));
                 }
-            },
-        );
+                (EventKind::Gripping(_), ..) => {
+                    let miss = cell.with(|cell| cell.grip_miss(&event.joints));
+                    closed = Some((miss, off_across(&cell.get(), &event.joints, &egg)));
+                }
+                (EventKind::Missed, ..) => closed = None,
+                _ => {}
+            }
+        });
         // The camera borrows the rig until here.
         drop(eye);
         drop(camera);
@@ -174,13 +172,14 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         let [miss, off] = closed.map_or(["-".into(), "-".into()], |(miss, off)| {
             [1e3 * miss, off].map(|value| format!("{value:.1}"))
         });
-        say!(
-            "{run:4}  {:5}  {:4}  {seen:<32} {miss:>9}  {off:>16}  {result}",
-            outcome.cycles,
-            outcome.losses
-        );
+        let (cycles, losses) = (outcome.cycles, outcome.losses);
+        bar.suspend(|| {
+            say!("{run:4}  {cycles:5}  {losses:4}  {seen:<32} {miss:>9}  {off:>16}  {result}");
+        });
+        bar.inc(1);
         if !held {
-            say!("      {}", keep_run(&run_file(run), &saved)?);
+            let kept = keep_run(&run_file(run), &saved)?;
+            bar.suspend(|| say!("      {kept}"));
         }
         if let Some((frame, ellipse)) = last {
             let mut overlay = Overlay::new(&frame);
@@ -193,10 +192,11 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             write_png(&picture, &overlay.into_image())?;
         }
     }
+    bar.finish_and_clear();
     say!(
         "\n{gripped} of {} gripped ({:.1} %), {:.1} moves on average; pictures: {}",
         options.runs,
-        100.0 * gripped as f64 / f64::from(options.runs),
+        100.0 * gripped as f64 / options.runs as f64,
         moves as f64 / gripped.max(1) as f64,
         options.out.display()
     );
@@ -204,7 +204,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 }
 
 /// Builds a detector of ellipses among the edges of the frame.
-fn egg_features(seed: u64) -> Result<EggTarget, Box<dyn Error>> {
+fn egg_features(seed: u64) -> Outcome<EggTarget> {
     let edges = Canny::new(CannyConfig {
         low: 20.0,
         high: 50.0,
@@ -238,10 +238,6 @@ impl Target for Watched {
 /// Returns the angle of the jaws from straight across the egg, degrees.
 fn off_across(cell: &pipeline_sim::Cell, joints: &Joints, egg: &Egg) -> f64 {
     let along_the_jaws = cell.params.wrist(joints).rotation * Vector3::y();
-    along_the_jaws
-        .dot(&egg.axis())
-        .abs()
-        .min(1.0)
-        .asin()
-        .to_degrees()
+    let off = along_the_jaws.dot(&egg.axis()).abs().min(1.0).asin();
+    off.to_degrees()
 }

@@ -26,7 +26,7 @@ pub(crate) struct Options {
     pub(crate) seed: u64,
 
     /// Number of balls
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one::<usize>)]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
     pub(crate) runs: usize,
 
     /// Serial device of a VAL II controller or emulator, 9600 8N1; none is started then

@@ -1,70 +1,64 @@
 //! The learning curves (Fig. 6 of the paper) and the features per step (Fig. 7), as SVG.
 
-use std::error::Error;
+use std::path::Path;
 
-use example_support::plot::{Line, Panel, drawn};
+use example_support::plot::{CURVES, Line, Panel, write_svg};
+use example_support::program::Outcome;
+use example_support::trial::FEATURES;
+use grasp_agent::Lesson;
 use hough_heuristic::Features;
-use qtable::Record;
 
 use crate::record::RunRecord;
 
-type Drawn = Result<String, Box<dyn Error>>;
-
-/// Draws the share of episodes that reached the goal and the mean error of Q over the actions.
-pub(crate) fn learning_curves(curves: &[(&str, &[Record])]) -> Drawn {
-    let panels = curves.iter().flat_map(|(name, curve)| {
-        let panel = |title: &str, pick: fn(&Record) -> Option<f64>| {
-            let known = |record: &Record| Some((record.actions as f64, pick(record)?));
-            let line = curve.iter().filter_map(known).collect();
-            Panel::new(
-                &format!("{name}: {title}"),
-                "actions",
-                vec![(String::new(), line)],
-            )
-        };
-        let success = panel("goal reached, % of episodes", |record| {
-            Some(100.0 * record.success_share?)
-        });
-        let error = panel("mean error of Q", |record| record.mean_td_error);
-        [success.up_to(100.0), error]
+/// Draws the share of episodes that reached the goal and the mean error of Q over the actions. A
+/// line marks the table that was kept.
+pub(crate) fn learning_curves(path: &Path, lessons: &[Lesson]) -> Outcome {
+    let panels = lessons.iter().flat_map(|lesson| {
+        CURVES.map(|curve| {
+            let name = &lesson.behaviour.spec().name;
+            let mut panel = Panel::of_learning(name, curve, std::slice::from_ref(&lesson.curve));
+            let kept = lesson.learned_by as f64;
+            let end = panel.lines[0].1.iter().map(|at| at.1).fold(1.0, f64::max);
+            panel
+                .lines
+                .push(("table kept".into(), vec![(kept, 0.0), (kept, end)]));
+            panel
+        })
     });
-    drawn(&panels.collect::<Vec<_>>(), 2, (500, 360))
+    write_svg(path, &panels.collect::<Vec<_>>(), 2, (500, 360))
 }
 
 /// Draws x, y and r at every step of every run, with the goal interval shaded; three runs, from
 /// far, middle and near, stand out.
-pub(crate) fn features_per_step(runs: &[RunRecord]) -> Drawn {
-    let mut tracks: Vec<Vec<(usize, Features)>> = runs
-        .iter()
-        .map(RunRecord::track)
-        .filter(|track| !track.is_empty())
-        .collect();
+pub(crate) fn features_per_step(path: &Path, runs: &[RunRecord]) -> Outcome {
+    let tracks = runs.iter().map(|run| &run.track);
+    let mut tracks: Vec<&Vec<(usize, Features)>> = tracks.filter(|t| !t.is_empty()).collect();
     tracks.sort_by(|a, b| a[0].1.r.total_cmp(&b[0].1.r));
-    let last = tracks.len().saturating_sub(1);
     let distinct = [
         (0, "the farthest start"),
         (tracks.len() / 2, "a start in between"),
-        (last, "the nearest start"),
+        (tracks.len().saturating_sub(1), "the nearest start"),
     ];
-    type Pick = fn(&Features) -> f64;
-    let panels: [(&str, f64, (f64, f64), Pick); 3] = [
-        ("x", 192.0, (99.0, 108.0), |f| f.x),
-        ("y", 144.0, (74.0, 82.0), |f| f.y),
-        ("r", 68.0, (32.0, 34.0), |f| f.r),
-    ];
-    let panels = panels.map(|(name, top, goal, pick)| {
+    let panels = FEATURES.map(|feature| {
         let line = |track: &Vec<(usize, Features)>| {
-            let points = track.iter().map(|(step, f)| (*step as f64, pick(f)));
+            let points = track
+                .iter()
+                .map(|(step, f)| (*step as f64, (feature.of)(f)));
             points.collect()
         };
         let named = distinct
             .iter()
             .filter_map(|(index, words)| Some(((*words).into(), line(tracks.get(*index)?))));
-        let title = format!("{name} (feature units)");
-        Panel::new(&title, "step", named.collect::<Vec<Line>>())
-            .in_front_of(tracks.iter().map(line).collect())
-            .with_goal(goal.0, goal.1)
-            .up_to(top)
+        Panel {
+            title: format!("{} until the grip", feature.name),
+            across: "moves since the first sighting".into(),
+            up: format!("{}, feature units", feature.name),
+            lines: named.collect::<Vec<Line>>(),
+            behind: tracks.iter().map(|track| line(track)).collect(),
+            goal: Some(feature.goal),
+            top: Some(feature.most),
+            ..Panel::default()
+        }
     });
-    drawn(&panels, 1, (900, 310))
+    write_svg(path, &panels, 1, (900, 310))
 }

@@ -1,43 +1,48 @@
 //! Records of the runs: a row per event, a picture per frame.
 
-use grasp_agent::{EventKind, RunEvent, RunOutcome, SavedRun};
+use grasp_agent::{EventKind, RunEvent, SavedRun};
 use hough_heuristic::Features;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
-use puma_val2::{JointDelta, Joints};
+use pipeline_sim::Cell;
+use serde::Serialize;
 
 use example_support::overlay::Overlay;
 use example_support::trial::Trial;
 
 /// Record of one run.
 pub(crate) struct RunRecord {
-    /// The ball's centre, millimetres in the arm's world frame.
-    pub(crate) ball_mm: [f64; 3],
-    pub(crate) rows: Vec<Row>,
+    /// Number of the run, from 1.
+    pub(crate) run: usize,
+    /// The run in `summary.json`.
+    pub(crate) summary: RunSummary,
     /// The run for the example `replay`.
     pub(crate) saved: SavedRun,
+    /// Features at every step from the first sighting on, as in Fig. 7 of the paper.
+    pub(crate) track: Vec<(usize, Features)>,
     /// Number of frames.
     frames: usize,
     /// Set while the jaws are closed, when sightings do not count.
     gripped: bool,
-    pub(crate) outcome: Option<RunOutcome>,
-    /// Fault that ended the run.
-    pub(crate) fault: Option<String>,
-    /// Set if the jaws hold the ball and the agent reports it.
-    pub(crate) grasped: bool,
-    /// Number of collisions of the hand.
-    pub(crate) collisions: usize,
-    /// Distance of the gripper from the ball's centre when the jaws closed, millimetres.
-    pub(crate) miss_mm: Option<f64>,
 }
 
-/// One event.
-pub(crate) struct Row {
-    pub(crate) step: usize,
-    pub(crate) event: &'static str,
-    pub(crate) features: Option<Features>,
-    pub(crate) joints: Joints,
-    pub(crate) action: Option<JointDelta>,
+/// A run in `summary.json`.
+#[derive(Default, Serialize)]
+pub(crate) struct RunSummary {
+    /// The ball's centre in the arm's world frame.
+    pub(crate) ball_mm: [f64; 3],
+    /// Set if the jaws hold the ball and the agent reports it.
+    pub(crate) grasped: bool,
+    pub(crate) cycles: usize,
+    pub(crate) losses: usize,
+    /// Number of collisions with ball, holder or table.
+    pub(crate) collisions: usize,
+    #[serde(rename = "final")]
+    pub(crate) last_seen: Option<Features>,
+    /// Distance of the gripper from the ball's centre when the jaws closed.
+    pub(crate) miss_mm: Option<f64>,
+    /// Reason why the agent gave up, or the fault that ended the run.
+    pub(crate) reason: Option<String>,
 }
 
 /// A frame at half size with the detected circle drawn in.
@@ -46,109 +51,112 @@ pub(crate) struct Picture {
     /// Number of the frame, from 1 in each run.
     pub(crate) number: usize,
     pub(crate) step: usize,
-    /// Set if the ball was found.
-    pub(crate) seen: bool,
+    /// Set if the ball was found, or the jaws are closed.
+    pub(crate) shown: bool,
     pub(crate) image: RgbImage,
-    words: String,
+    pub(crate) words: String,
 }
 
-impl Picture {
-    /// Returns the picture below a caption.
-    pub(crate) fn captioned(&self) -> RgbImage {
-        Overlay::from(self.image.clone())
-            .captioned(&self.words)
-            .into_image()
-    }
+fn rounded(value: f64) -> f64 {
+    (value * 100.0).round() / 100.0
 }
 
 impl RunRecord {
-    pub(crate) fn new(ball_mm: [f64; 3], saved: SavedRun) -> Self {
+    pub(crate) fn new(run: usize, ball_mm: [f64; 3], saved: SavedRun) -> Self {
+        let summary = RunSummary {
+            ball_mm: ball_mm.map(rounded),
+            ..RunSummary::default()
+        };
         Self {
-            ball_mm,
-            rows: Vec::new(),
+            run,
+            summary,
             saved,
+            track: Vec::new(),
             frames: 0,
             gripped: false,
-            outcome: None,
-            fault: None,
-            grasped: false,
-            collisions: 0,
-            miss_mm: None,
         }
     }
 
-    /// Records an event. Returns the picture of its frame if there is one.
-    pub(crate) fn note(&mut self, run: usize, event: &RunEvent<'_>) -> Option<Picture> {
+    /// Records an event in `cell`. Returns its row of `features.csv`, and the picture of its frame
+    /// if there is one.
+    pub(crate) fn note(&mut self, event: &RunEvent<'_>, cell: &Cell) -> (String, Option<Picture>) {
         self.saved.note(event);
+        let (mut features, mut action) = (None, ",,".to_owned());
         match event.kind {
+            EventKind::Gripping(_) => {
+                self.summary.miss_mm = Some(rounded(1000.0 * cell.grip_miss(&event.joints)));
+            }
             EventKind::Gripped => self.gripped = true,
             EventKind::Missed => self.gripped = false,
+            EventKind::Seen(sighting) if !self.gripped => features = Some(sighting.features),
+            EventKind::Moved(delta) => {
+                let [d1, d2, d3, ..] = delta.degrees();
+                action = format!("{d1:.3},{d2:.3},{d3:.3}");
+            }
             _ => {}
         }
-        let (sighting, action) = match event.kind {
-            EventKind::Seen(sighting) if !self.gripped => (Some(sighting), None),
-            EventKind::Moved(delta) => (None, Some(delta)),
-            _ => (None, None),
-        };
-        let features = sighting.map(|sighting| sighting.features);
-        self.rows.push(Row {
-            step: event.cycle,
-            event: event.kind.word(),
-            features,
-            joints: event.joints,
-            action,
-        });
-
-        let mut overlay = Overlay::new(event.frame?);
-        self.frames += 1;
-        if let Some(sighting) = sighting {
-            overlay.circle(&sighting.features.to_circle(event.frame?.width()));
+        if let Some(features) = features {
+            // The last of several sightings without a move between counts.
+            self.track.pop_if(|(step, _)| *step == event.cycle);
+            self.track.push((event.cycle, features));
         }
-        let full = overlay.into_image();
-        let half = resize(
-            &full,
-            full.width() / 2,
-            full.height() / 2,
-            FilterType::Triangle,
-        );
-        let found = features.map_or("no ball".into(), |f| {
-            format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r)
-        });
-        let (step, seen) = (event.cycle, features.is_some());
+        let xyr = features.map_or(",,".into(), |f| format!("{:.3},{:.3},{:.3}", f.x, f.y, f.r));
+        let joints = event
+            .joints
+            .degrees()
+            .map(|degrees| format!("{degrees:.3}"));
+        let (run, step, joints) = (self.run, event.cycle, joints.join(","));
+        let row = format!("{run},{step},{xyr},{joints},{action},{}", event.kind.word());
+        (row, self.picture(event, features))
+    }
+
+    fn picture(&mut self, event: &RunEvent<'_>, features: Option<Features>) -> Option<Picture> {
+        let frame = event.frame?;
+        self.frames += 1;
+        let mut overlay = Overlay::new(frame);
+        let mut found = "no ball".into();
+        if let Some(f) = features {
+            overlay.circle(&f.to_circle(frame.width()));
+            found = format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r);
+        }
+        let (width, height) = (frame.width() / 2, frame.height() / 2);
         Some(Picture {
-            run,
+            run: self.run,
             number: self.frames,
-            step,
-            seen,
-            image: half,
-            words: format!("run {run} step {step}  {found}"),
+            step: event.cycle,
+            shown: features.is_some() || self.gripped,
+            image: resize(&overlay.into_image(), width, height, FilterType::Triangle),
+            words: format!("run {} step {}  {found}", self.run, event.cycle),
         })
     }
 
-    /// Records that the jaws close `miss` metres from the ball's centre.
-    pub(crate) fn gripped_at(&mut self, miss: f64) {
-        self.miss_mm = Some(miss * 1000.0);
-    }
-
     /// Records the end of the run.
-    pub(crate) fn ended(&mut self, trial: &Trial, collisions: usize) {
-        self.grasped = trial.outcome.gave_up.is_none() && trial.held;
-        self.collisions = collisions;
-        self.outcome = Some(trial.outcome);
+    pub(crate) fn ended(&mut self, trial: &Trial) {
+        let outcome = &trial.outcome;
+        self.summary = RunSummary {
+            ball_mm: self.summary.ball_mm,
+            grasped: outcome.gave_up.is_none() && trial.held,
+            cycles: outcome.cycles,
+            losses: outcome.losses,
+            collisions: trial.collisions.unwrap_or(0),
+            last_seen: outcome.last_seen.map(|sighting| {
+                let Features { x, y, r } = sighting.features;
+                let [x, y, r] = [x, y, r].map(rounded);
+                Features { x, y, r }
+            }),
+            miss_mm: self.summary.miss_mm,
+            reason: outcome.gave_up.map(|reason| reason.to_string()),
+        };
     }
+}
 
-    /// Returns the features at every step from the first sighting on, as in Fig. 7 of the paper.
-    pub(crate) fn track(&self) -> Vec<(usize, Features)> {
-        let mut track: Vec<(usize, Features)> = Vec::new();
-        for row in &self.rows {
-            if let Some(features) = row.features {
-                // The last of several sightings without a move between counts.
-                if track.last().is_some_and(|(step, _)| *step == row.step) {
-                    track.pop();
-                }
-                track.push((row.step, features));
-            }
+impl RunSummary {
+    /// Returns the result in words.
+    pub(crate) fn result(&self) -> String {
+        match &self.reason {
+            _ if self.grasped => "grasped".into(),
+            Some(reason) => format!("not grasped: {reason}"),
+            None => "not grasped: the jaws hold no ball, and none is seen".into(),
         }
-        track
     }
 }

@@ -5,10 +5,8 @@
 //! cargo run --release --example paper_figure_3
 //! ```
 
-use std::error::Error;
 use std::ops::Range;
-use std::path::PathBuf;
-use std::process::ExitCode;
+use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use hough_heuristic::image::{GenericImage, GrayImage, Luma, Rgb, RgbImage};
@@ -22,7 +20,7 @@ use rand::{RngExt, SeedableRng};
 
 use example_support::files::{writable_folder, write_png};
 use example_support::overlay::Overlay;
-use example_support::program::ended;
+use example_support::program::{ExitCode, Outcome, ended};
 use example_support::say;
 
 /// Draws original, edges, structure D and the detected circle of a rendered scene.
@@ -44,7 +42,7 @@ fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     let frame = render(options.seed)?;
     let mut detector = Heuristic::with_canny(HeuristicConfig {
         seed: options.seed,
@@ -71,20 +69,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         )
     });
     let panels = [
-        Overlay::new(&frame).captioned("Original").into_image(),
-        Overlay::new(edges.image())
-            .captioned(&edge_words)
-            .into_image(),
+        Overlay::new(&frame).captioned("Original"),
+        Overlay::new(edges.image()).captioned(&edge_words),
         structure(&frame, edges, options.seed),
-        result.captioned(&result_words).into_image(),
+        result.captioned(&result_words),
     ];
-
-    if let Some(folder) = options
-        .picture
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-    {
-        writable_folder(folder)?;
+    if let Some(folder) = options.picture.parent() {
+        writable_folder(&Path::new(".").join(folder))?;
     }
     write_png(&options.picture, &sheet(&panels)?)?;
     say!("{}", options.picture.display());
@@ -92,7 +83,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
 }
 
 /// Renders the first search pose that has the ball in full view.
-fn render(seed: u64) -> Result<GrayImage, Box<dyn Error>> {
+fn render(seed: u64) -> Outcome<GrayImage> {
     let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
     let inside = |circle: &Circle| {
         let margin = circle.radius + 5.0;
@@ -119,26 +110,19 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         picture.put_pixel(pixel.x, pixel.y, Rgb([255, 255, 255]));
     }
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let draws = std::iter::repeat_with(|| {
-        let pixels: [EdgePixel; 3] =
-            std::array::from_fn(|_| edges.pixels()[rng.random_range(0..edges.pixels().len())]);
-        Circle::through(&pixels)
-            .filter(|circle| RADII.contains(&circle.radius))
-            .map(|circle| (pixels, circle))
+    let all = edges.pixels();
+    let mut draws = (0..10_000).filter(|_| !all.is_empty()).filter_map(|_| {
+        let pixels: [EdgePixel; 3] = std::array::from_fn(|_| all[rng.random_range(0..all.len())]);
+        let circle = Circle::through(&pixels)?;
+        RADII.contains(&circle.radius).then_some((pixels, circle))
     });
-    let drawn = if edges.pixels().is_empty() {
-        None
-    } else {
-        draws.take(10_000).flatten().next()
-    };
-    let Some((pixels, circle)) = drawn else {
+    let Some((pixels, circle)) = draws.next() else {
         let words = "D: no three of its pixels make a circle of such a radius";
-        return Overlay::from(picture).captioned(words).into_image();
+        return Overlay::from(picture).captioned(words);
     };
     let mut plot = |x: i32, y: i32, colour| {
-        if let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y))
-            && let Some(pixel) = picture.get_pixel_mut_checked(x, y)
-        {
+        // Below zero no pixel is found.
+        if let Some(pixel) = picture.get_pixel_mut_checked(x as u32, y as u32) {
             *pixel = Rgb(colour);
         }
     };
@@ -153,48 +137,35 @@ fn structure(frame: &GrayImage, edges: &EdgeMap, seed: u64) -> RgbImage {
         }
     }
     let beta = matched(edges, &circle);
-    Overlay::from(picture)
-        .captioned(&format!(
-            "D, three of its pixels, their circle: beta {beta:.2}"
-        ))
-        .into_image()
+    let words = format!("D, three of its pixels, their circle: beta {beta:.2}");
+    Overlay::from(picture).captioned(&words)
 }
 
 /// Returns the belonging of a circle at the default tolerance of one pixel, counted pixel by pixel.
 fn matched(edges: &EdgeMap, circle: &Circle) -> f64 {
     let lit = |x: i32, y: i32| {
-        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else {
-            return false;
-        };
-        edges
-            .image()
-            .get_pixel_checked(x, y)
-            .is_some_and(|pixel| pixel.0[0] != 0)
+        // Below zero no pixel is found.
+        let pixel = edges.image().get_pixel_checked(x as u32, y as u32);
+        pixel.is_some_and(|pixel| pixel.0[0] != 0)
     };
     let (mut pixels, mut matched) = (0u32, 0u32);
     circle.outline(edges.width(), edges.height(), |x, y| {
+        let cross = [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)];
         pixels += 1;
-        matched += u32::from(
-            [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]
-                .iter()
-                .any(|(dx, dy)| lit(x + dx, y + dy)),
-        );
+        matched += u32::from(cross.iter().any(|(dx, dy)| lit(x + dx, y + dy)));
         true
     });
     f64::from(matched) / f64::from(pixels)
 }
 
 /// Lays out four panels of one size, two by two.
-fn sheet(panels: &[RgbImage; 4]) -> Result<RgbImage, Box<dyn Error>> {
+fn sheet(panels: &[RgbImage; 4]) -> Outcome<RgbImage> {
     const GAP: u32 = 6;
     let (width, height) = panels[0].dimensions();
     let mut sheet = RgbImage::from_pixel(2 * width + GAP, 2 * height + GAP, Rgb([255, 255, 255]));
     for (place, panel) in (0..).zip(panels) {
-        sheet.copy_from(
-            panel,
-            (place % 2) * (width + GAP),
-            (place / 2) * (height + GAP),
-        )?;
+        let (x, y) = ((place % 2) * (width + GAP), (place / 2) * (height + GAP));
+        sheet.copy_from(panel, x, y)?;
     }
     Ok(sheet)
 }

@@ -5,10 +5,7 @@
 //! cargo run --release --example paper_figures -- --help
 //! ```
 
-use std::error::Error;
-use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{
@@ -16,20 +13,22 @@ use grasp_agent::{
     Percept,
 };
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, ErrorLevel, MoveForm};
+use pipeline_sim::{Cell, ErrorLevel, MoveForm};
 use puma_grasp::Simulator;
-use qtable::Record;
+use puma_val2::Joints;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::cpu::cpu_time;
-use example_support::files::{writable_folder, write_png, write_whole};
-use example_support::learning::{ACTIONS, TRIALS};
+use example_support::files::{Table, writable_folder, write_png};
+use example_support::learning::{
+    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
+};
 use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
-use example_support::plot::{Panel, drawn};
-use example_support::program::{at_least_one, ended};
+use example_support::plot::{CURVES, Panel, write_svg};
+use example_support::program::{ExitCode, Outcome, at_least_one, ended};
 use example_support::say;
-use example_support::trial::TrialCell;
+use example_support::stages::cpu_time;
+use example_support::trial::{FEATURES, TrialCell, at_goal};
 
 mod on_the_arm;
 mod snapshots;
@@ -44,163 +43,149 @@ struct Options {
     out: PathBuf,
 
     /// Number of seeds to learn with
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one::<u64>)]
-    seeds: u64,
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one)]
+    seeds: usize,
 
     /// First seed
     #[arg(long, value_name = "N", default_value_t = 0)]
     first_seed: u64,
 
     /// Balls, placed where the search finds them, to test the learned tables with
-    #[arg(long, value_name = "N", default_value_t = 400, value_parser = at_least_one::<u16>)]
-    starts: u16,
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = at_least_one)]
+    starts: usize,
 
     /// Make figure 6 and its table only
     #[arg(long)]
     learning_only: bool,
 
     /// Training actions of the fine preset of 540 states
-    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
+    #[arg(long, value_name = "N", default_value_t = ACTIONS_FINE)]
     fine: u64,
 
     /// Number of arms, each with errors of its own
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one::<u64>)]
-    arms: u64,
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one)]
+    arms: usize,
 }
 
 fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     writable_folder(&options.out)?;
     let taught = figure_6(options)?;
-    if options.learning_only {
-        say!("figures: {}", options.out.display());
-        return Ok(());
+    if !options.learning_only {
+        figures_7_and_8(options, &taught)?;
+        write_png(
+            &options.out.join("figure9.png"),
+            &snapshots::snapshots(&taught, 2000)?,
+        )?;
+        on_the_arm::from_simulation_to_the_arm(options.arms, &options.out)?;
     }
-    figures_7_and_8(options, &taught)?;
-    write_png(
-        &options.out.join("figure9.png"),
-        &snapshots::snapshots(&taught, 2000)?,
-    )?;
-    let report = on_the_arm::from_simulation_to_the_arm(options.arms)?;
-    write_whole(&options.out.join("on_the_arm.svg"), report.svg.as_bytes())?;
-    write_whole(&options.out.join("on_the_arm.csv"), report.csv.as_bytes())?;
     say!("figures: {}", options.out.display());
     Ok(())
 }
 
 /// Learns with many seeds: curves of both behaviours, and the results of the learned tables from
 /// the search poses.
-fn figure_6(options: &Options) -> Result<Learned, Box<dyn Error>> {
-    let starts = search_starts(
-        usize::from(options.starts),
-        options.first_seed.wrapping_add(1),
-    );
-    let optimum =
-        starts.iter().map(|start| start.optimum).sum::<usize>() as f64 / starts.len() as f64;
+fn figure_6(options: &Options) -> Outcome<Learned> {
+    let starts = search_starts(options.starts, options.first_seed.wrapping_add(1));
+    let optimum = starts.iter().map(|start| start.optimum).sum::<usize>();
     say!(
         "Figure 6: approaching, learned with each simulator and reward, then tried in the exact \
-         plane from {} starts of the search (breadth-first optimum {optimum:.2} steps, loop \
-         breaker {}); without search and recovery, so that a ball once lost stays lost",
+         plane from {} starts of the search (breadth-first optimum {:.2} steps, loop breaker {}); \
+         without search and recovery, so that a ball once lost stays lost",
         starts.len(),
+        optimum as f64 / starts.len() as f64,
         Learned::APPROACHING_KAPPA
     );
     say!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
-    let mut curves: Vec<(&str, Vec<Vec<Record>>)> =
-        vec![("centering", Vec::new()), ("approaching", Vec::new())];
+    let columns = "behaviour,seed,actions,success_share,mean_td_error";
+    let mut csv = Table::create(options.out.join("figure6.csv"), columns)?;
+    let mut curves = [("centering", Vec::new()), ("approaching", Vec::new())];
     let mut taught = None;
-    for seed in options.first_seed..options.first_seed.saturating_add(options.seeds) {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let plane = ExactPlane::new(20_000, &mut rng);
-        let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-        let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng)?;
-        let rigid = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
-        let linear = Simulator::fit(&centering, &reaching, MoveForm::Linear)?;
-        let literal = BehaviourPair::paper_literal().approaching;
-        let (mended, fine) = (
-            BehaviourPair::paper_mended(),
-            BehaviourPair::fine().approaching,
-        );
-        let wide = mended
-            .clone()
-            .with_y_goal(GoalInterval::Y_SECTION_4)?
-            .approaching;
-        let mut floored = literal.clone();
-        floored.reward.floor = 1.0;
-        let quiet = &mut |_: &Record| ();
-        let anywhere: Vec<Percept> = (0..TRIALS).map(|_| rigid.start(&mut rng)).collect();
-        let centering = rigid.learn(mended.centering, &anywhere, ACTIONS.0, &mut rng, quiet)?;
-        let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
-        // A table of more states has more corners in which a ball can be lost.
-        let more_found = search_percepts(10_000, seed.wrapping_add(1_000_000));
-        let rng = &mut rng;
-        let mended = mended.approaching;
-        let (found, none) = (&found[..], &[][..]);
-        type Cases<'a> = [(
-            &'a str,
-            Option<&'a Simulator>,
-            &'a BehaviourSpec,
-            &'a [Percept],
-        ); 8];
-        let cases: Cases<'_> = [
-            ("exact plane, mended", None, &mended, found),
-            ("exact plane, mended, last table", None, &mended, none),
-            ("exact plane, y goal 74..92", None, &wide, found),
-            ("exact plane, literal", None, &literal, none),
-            ("exact plane, floored only", None, &floored, none),
-            ("exact plane, fine", None, &fine, &more_found),
-            ("rigid regression, mended", Some(&rigid), &mended, found),
-            ("linear regression, mended", Some(&linear), &mended, found),
-        ];
-        let lessons = cases.map(|(name, simulator, spec, trials)| {
-            let actions = if *spec == fine {
-                options.fine
-            } else {
-                ACTIONS.1
-            };
-            let (spec, begin) = (spec.clone(), cpu_time());
-            let lesson = match simulator {
-                None => plane.learn(spec, trials, actions, rng, quiet),
-                Some(simulator) => simulator.learn(spec, trials, actions, rng, quiet),
-            };
-            (name, (lesson, cpu_time().saturating_sub(begin)))
-        });
-        for (name, (lesson, spent)) in &lessons {
-            say!(
-                "{seed:4}  {name:32} {}  {:8.2}",
-                scored(lesson, &starts),
-                spent.as_secs_f64()
-            );
-        }
-        let [(_, (approaching, _)), ..] = lessons;
-        let approaching = approaching?;
+    for seed in (options.first_seed..).take(options.seeds) {
+        let (centering, approaching) = learned_with(options, seed, &starts)?;
         curves[0].1.push(centering.curve);
         curves[1].1.push(approaching.curve);
         taught.get_or_insert(Learned::new(centering.behaviour, approaching.behaviour));
     }
-    let mut csv = String::from("behaviour,seed,actions,success_share,mean_td_error\n");
     for (name, seeds) in &curves {
         for (seed, curve) in (options.first_seed..).zip(seeds) {
             for record in curve {
                 let cell = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.5}"));
                 let (share, error) = (cell(record.success_share), cell(record.mean_td_error));
-                let _ = writeln!(csv, "{name},{seed},{},{share},{error}", record.actions);
+                csv.row(format_args!(
+                    "{name},{seed},{},{share},{error}",
+                    record.actions
+                ))?;
             }
         }
     }
-    write_whole(&options.out.join("figure6.csv"), csv.as_bytes())?;
-    let mut panels = Vec::new();
-    for (name, seeds) in &curves {
-        let title = format!("{name}: goal reached, % of episodes");
-        let success = Panel::of_seeds(&title, seeds, |r| r.success_share.map(|s| 100.0 * s));
-        let title = format!("{name}: mean error of Q");
-        let error = Panel::of_seeds(&title, seeds, |r| r.mean_td_error);
-        panels.extend([success.up_to(105.0), error]);
-    }
-    write_svg(options, "figure6", &panels, 2)?;
+    let panels = curves
+        .iter()
+        .flat_map(|(name, seeds)| CURVES.map(|curve| Panel::of_learning(name, curve, seeds)));
+    let panels: Vec<Panel> = panels.collect();
+    write_svg(&options.out.join("figure6.svg"), &panels, 2, SIZE)?;
     taught.ok_or_else(|| "at least one seed is needed".into())
+}
+
+/// Size of each panel, pixels.
+const SIZE: (u32, u32) = (400, 290);
+
+/// Learns with one seed in all simulators and with all rewards, and prints the results. Returns
+/// centering, and approaching with the mended reward in the exact plane.
+fn learned_with(options: &Options, seed: u64, starts: &[PlaneStart]) -> Outcome<(Lesson, Lesson)> {
+    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
+    let plane = ExactPlane::new(20_000, rng);
+    let forms = [MoveForm::Rigid22, MoveForm::Linear];
+    let [rigid, linear] = simulators(&paper_cell(), forms, rng)?;
+    let BehaviourPair {
+        centering,
+        approaching: mended,
+    } = BehaviourPair::paper_mended();
+    let literal = BehaviourPair::paper_literal().approaching;
+    let fine = BehaviourPair::fine().approaching;
+    let wide = BehaviourPair::paper_mended().with_y_goal(GoalInterval::Y_SECTION_4)?;
+    let mut floored = literal.clone();
+    floored.reward.floor = 1.0;
+    let trials = anywhere(&rigid, TRIALS, rng);
+    let centering = rigid.learn(centering, &trials, ACTIONS.0, rng, &mut quiet)?;
+    let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
+    // A table of more states has more corners in which a ball can be lost.
+    let more_found = search_percepts(10_000, seed.wrapping_add(1_000_000));
+    let mut learn = |name, simulator: Option<&Simulator>, spec: &BehaviourSpec, trials: &[_]| {
+        let actions = if *spec == fine {
+            options.fine
+        } else {
+            ACTIONS.1
+        };
+        let (spec, begin) = (spec.clone(), cpu_time());
+        let lesson = match simulator {
+            None => plane.learn(spec, trials, actions, rng, &mut quiet),
+            Some(simulator) => simulator.learn(spec, trials, actions, rng, &mut quiet),
+        };
+        let seconds = cpu_time().saturating_sub(begin).as_secs_f64();
+        say!(
+            "{seed:4}  {name:32} {}  {seconds:8.2}",
+            scored(&lesson, starts)
+        );
+        lesson
+    };
+    let (found, none): (&[Percept], &[Percept]) = (&found, &[]);
+    let approaching = learn("exact plane, mended", None, &mended, found)?;
+    for (name, simulator, spec, trials) in [
+        ("exact plane, mended, last table", None, &mended, none),
+        ("exact plane, y goal 74..92", None, &wide.approaching, found),
+        ("exact plane, literal", None, &literal, none),
+        ("exact plane, floored only", None, &floored, none),
+        ("exact plane, fine", None, &fine, &more_found),
+        ("rigid regression, mended", Some(&rigid), &mended, found),
+        ("linear regression, mended", Some(&linear), &mended, found),
+    ] {
+        let _ = learn(name, simulator, spec, trials);
+    }
+    Ok((centering, approaching))
 }
 
 fn scored(lesson: &Result<Lesson, BehaviourError>, starts: &[PlaneStart]) -> String {
@@ -214,124 +199,108 @@ fn scored(lesson: &Result<Lesson, BehaviourError>, starts: &[PlaneStart]) -> Str
     }
 }
 
+/// Features and theta 3 at every step of a run.
+type Path = Vec<(Features, f64)>;
+
 /// Draws features per step while reaching, by distance and elbow, and while the ball is pushed away
 /// repeatedly.
-fn figures_7_and_8(options: &Options, taught: &Learned) -> Result<(), Box<dyn Error>> {
+fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
     let cell = TrialCell::draw(ErrorLevel::None, 0)?;
-    let mut config = cell.agent_config();
-    config.max_cycles = 120;
-    let mut csv = String::from("figure,run,step,x,y,r,theta3\n");
-    let (mut reach, mut track) = (Vec::new(), Vec::new());
-    for (figure, pushes, runs) in [(7, 0, 60), (8, 3, 3)] {
+    let path = options.out.join("figures7and8.csv");
+    let mut csv = Table::create(path, "figure,run,step,x,y,r,theta3")?;
+    let mut paths = |figure: u32, runs: u64, pushes: usize| -> Outcome<Vec<Path>> {
+        let mut paths = Vec::new();
         for run in 0..runs {
-            let mut agent = Agent::with_controller(config.clone(), taught.clone())?;
-            // The last sighting before each move.
-            let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
-            let mut world = |cell: &mut Cell, joints: &puma_val2::Joints| {
-                let at_goal = |f: &Features| {
-                    let inside = |(_, (low, high), of): &Feature| (*low..=*high).contains(&of(f));
-                    FEATURES.iter().all(inside)
-                };
-                let there = cell.features(joints).is_ok_and(|f| at_goal(&f));
-                if there && done < pushes {
-                    done += usize::from(cell.push_to_radius(joints, 60.0));
-                }
-            };
-            cell.run(&mut agent, 500 + run, &mut world, &mut |event| {
-                gripped |= event.kind == EventKind::Gripped;
-                if let EventKind::Seen(sighting) = event.kind
-                    && !gripped
-                {
-                    if looked_at.replace(event.cycle) == Some(event.cycle) {
-                        path.pop();
-                    }
-                    let f = sighting.features;
-                    path.push((f, Percept::new(f, &event.joints).theta3));
-                }
-            })?;
-            for (step, (f, theta3)) in path.iter().enumerate() {
-                let _ = writeln!(
-                    csv,
-                    "{figure},{run},{step},{:.2},{:.2},{:.2},{theta3:.2}",
-                    f.x, f.y, f.r
-                );
+            let path = path_of(&cell, taught, 500 + run, pushes)?;
+            for (step, (Features { x, y, r }, theta3)) in path.iter().enumerate() {
+                csv.row(format_args!(
+                    "{figure},{run},{step},{x:.2},{y:.2},{r:.2},{theta3:.2}"
+                ))?;
             }
-            if figure == 7 {
-                reach.push(path);
-            } else {
-                track.push(path);
-            }
+            paths.push(path);
         }
-    }
-    write_whole(&options.out.join("figures7and8.csv"), csv.as_bytes())?;
+        Ok(paths)
+    };
+    let (reach, track) = (paths(7, 60, 0)?, paths(8, 3, 3)?);
     // One figure for each interval of theta 3 that the goal is reached in, three distances in each,
     // as in the paper.
     let mut panels = Vec::new();
     for (low, high) in [(-50.0, 6.0), (6.0, 27.0), (27.0, 60.0)] {
-        let ends_here = |path: &&Vec<(Features, f64)>| {
-            path.len() > 3
-                && path
-                    .last()
-                    .is_some_and(|(_, theta3)| (low..high).contains(theta3))
+        let ends_here = |path: &&Path| {
+            let end = path.last().map(|(_, theta3)| *theta3);
+            path.len() > 3 && end.is_some_and(|end| (low..high).contains(&end))
         };
-        let mut paths: Vec<_> = reach.iter().filter(ends_here).collect();
+        let mut paths: Vec<&Path> = reach.iter().filter(ends_here).collect();
         paths.sort_by(|a, b| a[0].0.r.total_cmp(&b[0].0.r));
         // "The starting position is chosen in such a way as to have the maximum off centering", at
         // each of three distances.
-        let third = paths.len().div_ceil(3).max(1);
-        let mut thirds = paths.chunks(third);
+        let mut thirds = paths.chunks(paths.len().div_ceil(3).max(1));
         let three = ["far", "middle", "near"].map(|start| {
-            let most = thirds.next().into_iter().flatten();
-            (
-                start,
-                most.max_by(|a, b| off_centre(&a[0].0).total_cmp(&off_centre(&b[0].0))),
-            )
+            let third = thirds.next().into_iter().flatten();
+            let off = |path: &&&Path| off_centre(&path[0].0);
+            (start, third.max_by(|a, b| off(a).total_cmp(&off(b))))
         });
-        for (name, (low_end, high_end), feature) in FEATURES {
+        for feature in FEATURES {
             let lines = three.iter().filter_map(|(start, path)| {
                 let along = path.as_ref()?.iter().enumerate();
-                let line = along.map(|(i, (f, _))| (i as f64, feature(f))).collect();
-                Some((start.to_string(), line))
+                let line = along.map(|(i, (f, _))| (i as f64, (feature.of)(f)));
+                Some((format!("{start} start"), line.collect()))
             });
-            let title = format!("{name}, theta 3 ends in {low}..{high}");
-            panels.push(Panel::new(&title, "step", lines.collect()).with_goal(low_end, high_end));
+            panels.push(Panel {
+                title: format!("{}, theta 3 ends in {low}..{high}", feature.name),
+                across: "moves".into(),
+                up: "feature units".into(),
+                lines: lines.collect(),
+                goal: Some(feature.goal),
+                ..Panel::default()
+            });
         }
     }
-    write_svg(options, "figure7", &panels, 3)?;
-    let panels: Vec<Panel> = track
-        .iter()
-        .zip(1..)
-        .map(|(path, number)| {
-            let line = path.iter().enumerate().map(|(i, (f, _))| (i as f64, f.r));
-            let title = format!("r, ball {number}, pushed to r = 60 three times");
-            let (low, high) = FEATURES[2].1;
-            Panel::new(&title, "step", vec![(String::new(), line.collect())])
-                .with_goal(low, high)
-                .up_to(70.0)
-        })
-        .collect();
-    write_svg(options, "figure8", &panels, 3)
+    write_svg(&options.out.join("figure7.svg"), &panels, 3, SIZE)?;
+    let panels = track.iter().zip(1..).map(|(path, number)| {
+        let line = path.iter().enumerate().map(|(i, (f, _))| (i as f64, f.r));
+        Panel {
+            title: format!("r, ball {number}, pushed to r = 60 three times"),
+            across: "moves".into(),
+            up: "feature units".into(),
+            lines: vec![(String::new(), line.collect())],
+            goal: Some(FEATURES[2].goal),
+            top: Some(70.0),
+            ..Panel::default()
+        }
+    });
+    let panels: Vec<Panel> = panels.collect();
+    write_svg(&options.out.join("figure8.svg"), &panels, 3, SIZE)
 }
 
-fn write_svg(
-    options: &Options,
-    figure: &str,
-    panels: &[Panel],
-    columns: usize,
-) -> Result<(), Box<dyn Error>> {
-    let svg = drawn(panels, columns, (400, 290))?;
-    write_whole(&options.out.join(format!("{figure}.svg")), svg.as_bytes())
+/// Returns the last sighting before each move of a run towards the ball that `seed` places. When it
+/// is reached, it is pushed away, `pushes` times.
+fn path_of(cell: &TrialCell, taught: &Learned, seed: u64, pushes: usize) -> Outcome<Path> {
+    let mut config = cell.agent_config();
+    config.max_cycles = 120;
+    let mut agent = Agent::with_controller(config, taught.clone())?;
+    let (mut done, mut path, mut looked_at, mut gripped) = (0, Vec::new(), None, false);
+    let mut world = |cell: &mut Cell, joints: &Joints| {
+        if done < pushes && cell.features(joints).is_ok_and(|f| at_goal(&f)) {
+            done += usize::from(cell.push_to_radius(joints, 60.0));
+        }
+    };
+    cell.run(&mut agent, seed, &mut world, &mut |event| {
+        gripped |= event.kind == EventKind::Gripped;
+        if let EventKind::Seen(sighting) = event.kind
+            && !gripped
+        {
+            if looked_at.replace(event.cycle) == Some(event.cycle) {
+                path.pop();
+            }
+            let f = sighting.features;
+            path.push((f, Percept::new(f, &event.joints).theta3));
+        }
+    })?;
+    Ok(path)
 }
 
 /// Returns the distance of a ball from the goal in the image, in halves of its sides.
 fn off_centre(f: &Features) -> f64 {
     ((f.x - 103.5) / 96.0).hypot((f.y - 78.0) / 72.0)
 }
-
-/// A feature: its name, its goal, and its reader.
-type Feature = (&'static str, (f64, f64), fn(&Features) -> f64);
-const FEATURES: [Feature; 3] = [
-    ("x", (99.0, 108.0), |f| f.x),
-    ("y", (74.0, 82.0), |f| f.y),
-    ("r", (32.0, 34.0), |f| f.r),
-];

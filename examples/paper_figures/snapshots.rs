@@ -1,7 +1,5 @@
 //! Figure 9: the pose of the arm and the camera's view at four moments of a reach.
 
-use std::error::Error;
-
 use grasp_agent::{Agent, AgentConfig, CameraModel, EventKind, Learned, Sighting};
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, EdgeDetector};
@@ -15,6 +13,8 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::overlay::{CAPTION, Overlay, Rgb888};
+use example_support::program::Outcome;
+use example_support::trial::ball_in_view;
 
 /// Size of each picture, below its caption.
 const TILE: (u32, u32) = (384, 288);
@@ -32,18 +32,13 @@ struct Moment {
 
 /// Draws four columns, from the first sighting to the goal, of three rows: the pose from the side,
 /// the frame with the circle, its edges.
-pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Result<RgbImage, Box<dyn Error>> {
+pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Outcome<RgbImage> {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
     let mut detector = BallDetector::default().build(seed)?;
-    let workspace = Workspace::paper();
-    let mut agent = Agent::with_controller(
-        AgentConfig::paper(workspace.search_poses()),
-        learned.clone(),
-    )?;
+    let config = AgentConfig::paper(Workspace::paper().search_poses());
+    let mut agent = Agent::with_controller(config, learned.clone())?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (ball, _) = workspace
-        .sample_seen_ball(&rig.cell().get(), &mut rng)
-        .ok_or("no place of the workspace is in view from a search pose")?;
+    let ball = ball_in_view(rig.cell(), &mut rng)?;
     rig.place(&ball)?;
     let table = rig.cell().get().table;
     let (mut moments, mut gripped) = (Vec::new(), false);
@@ -88,18 +83,11 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
     let camera = wrist * model.mount;
     let (sin, cos) = joints[Joint::J2].sin_cos();
     let elbow = into_plane.inverse() * Point3::new(model.arm.a2 * cos, 0.0, -model.arm.a2 * sin);
-    let mut drawing = Overlay::from(RgbImage::from_pixel(
-        TILE.0,
-        TILE.1,
-        image::Rgb([250, 250, 252]),
-    ));
+    let ground = RgbImage::from_pixel(TILE.0, TILE.1, image::Rgb([250, 250, 252]));
+    let mut drawing = Overlay::from(ground);
     let surface = SHOULDER.1 - SCALE * table;
-    drawing.line(
-        (0.0, surface),
-        (f64::from(TILE.0), surface),
-        Rgb888::new(170, 140, 100),
-        3,
-    );
+    let right = (f64::from(TILE.0), surface);
+    drawing.line((0.0, surface), right, Rgb888::new(170, 140, 100), 3);
     drawing.line(SHOULDER, (SHOULDER.0, surface), dark, 12);
     // The upper and the lower border of the camera's view.
     let slope = 0.5 * 144.0 / model.focal;
@@ -108,36 +96,32 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
         let eye = camera * Point3::origin();
         drawing.line(at(eye), at(far), Rgb888::new(190, 205, 230), 1);
     }
+    let [wrist, camera] = [wrist, camera].map(|pose| at(pose * Point3::origin()));
     drawing.line(SHOULDER, at(elbow), blue, 9);
-    drawing.line(at(elbow), at(wrist * Point3::origin()), blue, 7);
-    drawing.line(
-        at(wrist * Point3::origin()),
-        at(model.tool_point(joints)),
-        dark,
-        4,
-    );
-    drawing.disc(at(camera * Point3::origin()), 5.0, Rgb888::new(20, 130, 60));
+    drawing.line(at(elbow), wrist, blue, 7);
+    drawing.line(wrist, at(model.tool_point(joints)), dark, 4);
+    drawing.disc(camera, 5.0, Rgb888::new(20, 130, 60));
     drawing.disc(
         at(ball.centre),
         SCALE * ball.radius,
         Rgb888::new(220, 110, 20),
     );
-    let degrees = joints.degrees();
-    let words = format!(
-        "move {}: {:.0} {:.0} {:.0} deg",
-        moment.moves, degrees[0], degrees[1], degrees[2]
-    );
-    drawing.captioned(&words).into_image()
+    let [j1, j2, j3, ..] = joints.degrees();
+    drawing.captioned(&format!(
+        "move {}: {j1:.0} {j2:.0} {j3:.0} deg",
+        moment.moves
+    ))
 }
 
 fn seen(moment: &Moment) -> RgbImage {
     let mut overlay = Overlay::new(&moment.frame);
-    overlay.circle(&moment.sighting.features.to_circle(moment.frame.width()));
     let f = moment.sighting.features;
-    small(overlay, &format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r))
+    overlay.circle(&f.to_circle(moment.frame.width()));
+    let small = resize(&overlay.into_image(), TILE.0, TILE.1, FilterType::Triangle);
+    Overlay::from(small).captioned(&format!("x {:.1} y {:.1} r {:.1}", f.x, f.y, f.r))
 }
 
-fn edges(moment: &Moment) -> Result<RgbImage, Box<dyn Error>> {
+fn edges(moment: &Moment) -> Outcome<RgbImage> {
     let mut canny = Canny::new(CannyConfig {
         low: 20.0,
         high: 50.0,
@@ -152,10 +136,5 @@ fn edges(moment: &Moment) -> Result<RgbImage, Box<dyn Error>> {
         );
         image.put_pixel(x, y, image::Rgb([255; 3]));
     }
-    Ok(Overlay::from(image).captioned("edges").into_image())
-}
-
-fn small(overlay: Overlay, words: &str) -> RgbImage {
-    let small = resize(&overlay.into_image(), TILE.0, TILE.1, FilterType::Triangle);
-    Overlay::from(small).captioned(words).into_image()
+    Ok(Overlay::from(image).captioned("edges"))
 }

@@ -19,18 +19,14 @@
 
 mod kinds;
 
-use std::error::Error;
-use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
-use example_support::cpu::cpu_time;
-use example_support::files::{writable_folder, write_png, write_whole};
-use example_support::program::ended;
+use example_support::files::{Table, writable_folder, write_png};
+use example_support::program::{ExitCode, Outcome, ended, progress_bar};
 use example_support::say;
-use indicatif::{ProgressBar, ProgressStyle};
+use example_support::stages::cpu_time;
 use kinds::{Kind, Kinds, repeated, share, size};
 use pipeline_sim::{Camera, Renderer, Round, RoundOutline};
 
@@ -65,7 +61,7 @@ fn main() -> ExitCode {
     ended(render(&Options::parse()))
 }
 
-fn render(options: &Options) -> Result<(), Box<dyn Error>> {
+fn render(options: &Options) -> Outcome {
     let kinds: Vec<Kind> = options.kinds.iter().flat_map(|k| k.0.clone()).collect();
     if let Some(name) = repeated(&kinds) {
         let message = format!(
@@ -76,10 +72,9 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             .exit();
     }
     writable_folder(&options.out)?;
-    let mut truth = String::from("file,cx,cy,r,what,visible\n");
-    let mut frames = String::from("file,scene\n");
-    let bar = ProgressBar::new(kinds.len() as u64 * options.frames)
-        .with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}")?);
+    let mut truth = Table::create(options.out.join("truth.csv"), "file,cx,cy,r,what,visible")?;
+    let mut frames = Table::create(options.out.join("frames.csv"), "file,scene")?;
+    let bar = progress_bar(kinds.len() as u64 * options.frames, "frames", false);
     for kind in kinds {
         let name = kind.recipe.name();
         let mut rng = kind.generator(options.seed);
@@ -101,34 +96,30 @@ fn render(options: &Options) -> Result<(), Box<dyn Error>> {
             let frame = snapshot.take(&mut renderer);
             milliseconds.push(1e3 * cpu_time().saturating_sub(before).as_secs_f64());
             write_png(&options.out.join(&file), frame)?;
-            writeln!(frames, "{file},{name}")?;
+            frames.row(format_args!("{file},{name}"))?;
             let sightings = snapshot.truth(&renderer);
             let scale = snapshot.cell.camera.focal_px() / Camera::paper().focal_px();
             let least = kind.least_radius * scale;
             let counted = |sighting: &&RoundOutline| counts(sighting, options.visible, least);
             for sighting in sightings.iter().filter(counted) {
                 let circle = sighting.ellipse.circle();
-                writeln!(
-                    truth,
+                truth.row(format_args!(
                     "{file},{:.3},{:.3},{:.3},{:?},{:.2}",
                     circle.x, circle.y, circle.radius, sighting.what, sighting.visible
-                )?;
+                ))?;
             }
             shared = Some(renderer);
             bar.inc(1);
         }
         milliseconds.sort_by(f64::total_cmp);
-        if let (Some(least), Some(median)) = (
-            milliseconds.first(),
-            milliseconds.get(milliseconds.len() / 2),
-        ) {
+        let middle = milliseconds.len() / 2;
+        if let (Some(least), Some(median)) = (milliseconds.first(), milliseconds.get(middle)) {
             let row = format!("{name:20} CPU, ms a frame: {least:.1} least, {median:.1} median");
             bar.suspend(|| say!("{row}"));
         }
     }
-    write_whole(&options.out.join("truth.csv"), truth.as_bytes())?;
-    write_whole(&options.out.join("frames.csv"), frames.as_bytes())?;
-    bar.finish_with_message(format!("in {}", options.out.display()));
+    bar.finish_and_clear();
+    say!("results: {}", options.out.display());
     Ok(())
 }
 

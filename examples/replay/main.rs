@@ -6,14 +6,12 @@
 
 #![allow(clippy::print_stderr, reason = "a program for a terminal")]
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::Parser;
 use grasp_agent::{AgentError, RunEvent, SavedRun};
 
-use example_support::program::ended;
+use example_support::program::{ExitCode, Outcome, ended};
 use example_support::say;
 
 /// Replays runs that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers`
@@ -36,7 +34,7 @@ fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     let (mut others, mut unread) = (0, 0);
     for file in &options.files {
         // The other files can still be replayed.
@@ -78,22 +76,16 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         };
         say!("{name}: the same {} events; {end}", events.len());
     }
-    let files = options.files.len();
-    match (others, unread) {
-        (0, 0) => Ok(()),
-        (_, 0) => Err(format!("{others} of {files} runs took another course").into()),
-        (0, _) => Err(format!("{unread} of {files} runs cannot be made again").into()),
-        _ => Err(format!(
-            "{others} of {files} runs took another course, {unread} cannot be made again"
-        )
-        .into()),
+    if others + unread == 0 {
+        return Ok(());
     }
+    let files = options.files.len();
+    Err(format!("{others} of {files} runs took another course, {unread} cannot be replayed").into())
 }
 
 /// Reads a run.
-fn read(file: &Path) -> Result<SavedRun, Box<dyn Error>> {
-    let text = std::fs::read_to_string(file)?;
-    Ok(SavedRun::from_json(&text)?)
+fn read(file: &Path) -> Outcome<SavedRun> {
+    Ok(SavedRun::from_json(&std::fs::read_to_string(file)?)?)
 }
 
 /// Formats an event: its cycle, its kind, and the pose of the arm.

@@ -5,24 +5,22 @@
 //! cargo run --release --example track -- --help
 //! ```
 
-use std::error::Error;
-use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Parser;
-use example_support::ball_tally::{Counted, Tally};
-use example_support::files::{animated, keep_run, writable_folder, write_whole};
-use example_support::program::{at_least_one, ended};
+use example_support::files::{Table, animated, keep_run, writable_folder, write_whole};
+use example_support::program::{ExitCode, Outcome, at_least_one, ended, progress_bar};
 use example_support::say;
 use example_support::stages::{Stages, Timed};
-use example_support::trial::{Trial, TrialCell, run_on_rig};
+use example_support::tally::{Counted, Tally};
+use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, Belief, EventKind, Hybrid, HybridSettings, RunEvent, SavedRun,
 };
 use hough_heuristic::CircleDetector;
 use image::GrayImage;
 use image::imageops::{FilterType, resize};
+use indicatif::ProgressBar;
 use pipeline_sim::{Cell, ErrorLevel, Workspace};
 use puma_grasp::{BallDetector, Rig, bright_ball_scene};
 use puma_val2::Joints;
@@ -59,7 +57,7 @@ struct Options {
     teach: usize,
 
     /// Number of cells that the runs are spread over, each with errors drawn anew
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one::<usize>)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     cells: usize,
 
     /// Movement of the ball
@@ -104,33 +102,38 @@ fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn run(options: &Options) -> Outcome {
     let belief = options.belief.as_deref().map(Belief::load).transpose()?;
     writable_folder(&options.out)?;
+    let path = options.out.join("track.csv");
+    let csv = (!options.shortcut).then(|| Table::create(path, "run,move,x,y,r,event"));
+    let balls = options.runs + options.cells * options.teach;
     let mut runs = Runs {
         options,
         belief,
         detector: options.detector.build(options.seed)?,
         stages: Stages::default(),
-        csv: String::from("run,move,x,y,r,event\n"),
+        csv: csv.transpose()?,
         film: Vec::new(),
         tally: Tally::default(),
+        bar: progress_bar(balls as u64, "balls", false),
     };
     // The results until a fault are kept.
-    let cells = 0..options.cells;
-    let done = cells.into_iter().try_for_each(|cell| runs.in_cell(cell));
+    let done = (0..options.cells).try_for_each(|cell| runs.in_cell(cell));
+    runs.bar.finish_and_clear();
     if options.shortcut {
         say!("{}", runs.tally);
         return done;
     }
-    write_whole(&options.out.join("track.csv"), runs.csv.as_bytes())?;
-    if !runs.film.is_empty() {
+    let film = if runs.film.is_empty() {
+        Ok(())
+    } else {
         let film = animated(&runs.film, (1, 3), (1, 3))?;
-        write_whole(&options.out.join("track.png"), &film)?;
-    }
+        write_whole(&options.out.join("track.png"), &film)
+    };
     say!("{}\n{}", runs.stages, runs.tally);
     say!("results: {}", options.out.display());
-    done
+    done.and(film)
 }
 
 /// A cell with drawn errors.
@@ -142,7 +145,7 @@ enum Place {
 }
 
 impl Place {
-    fn draw(options: &Options, seed: u64) -> Result<Self, Box<dyn Error>> {
+    fn draw(options: &Options, seed: u64) -> Outcome<Self> {
         if options.shortcut {
             let cell = TrialCell::draw(options.level, seed)?;
             return Ok(Self::Shortcut(Box::new(cell)));
@@ -150,9 +153,7 @@ impl Place {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut scene = bright_ball_scene();
         scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
-        let rig = Rig::emulated(false, &scene, seed)?;
-        let wrong = options.level.draw(&mut rng).apply(&rig.cell().get())?;
-        rig.cell().with(|cell| *cell = wrong);
+        let rig = rig_with_errors(options.level, &scene, seed, &mut rng)?;
         Ok(Self::Chain(Box::new(rig), rng))
     }
 }
@@ -164,16 +165,17 @@ struct Runs<'a> {
     belief: Option<Belief>,
     detector: Box<dyn CircleDetector + Send>,
     stages: Stages,
-    csv: String,
+    csv: Option<Table>,
     film: Vec<GrayImage>,
     tally: Tally,
+    bar: ProgressBar,
 }
 
 impl Runs<'_> {
     /// Makes the runs in one cell: first on balls at rest to learn from, then those that count.
-    fn in_cell(&mut self, number: usize) -> Result<(), Box<dyn Error>> {
+    fn in_cell(&mut self, number: usize) -> Outcome {
         let options = self.options;
-        self.tally.begin_cell();
+        self.tally.cells.push(Vec::new());
         let seed = options.seed.wrapping_add(number as u64);
         let mut place = Place::draw(options, seed)?;
         let mut config = AgentConfig::paper(Workspace::paper().search_poses());
@@ -192,7 +194,7 @@ impl Runs<'_> {
                 agent = Agent::with_controller(agent.config().clone(), stages.around(learned))?;
             }
             let fate = if teaching { Fate::Rest } else { options.ball };
-            let counted = (!teaching).then(|| self.tally.runs() + 1);
+            let run = self.tally.runs().count() + 1;
             let mut saved = SavedRun::before(&agent);
             let (end, happened, collisions) = match &mut place {
                 Place::Shortcut(cell) => {
@@ -202,38 +204,42 @@ impl Runs<'_> {
                     (end.transpose(), world.has_happened(), None)
                 }
                 Place::Chain(rig, rng) => {
-                    let (ball, _) = Workspace::paper()
-                        .sample_seen_ball(&rig.cell().get(), rng)
-                        .ok_or("no place of the workspace is in view from a search pose")?;
-                    rig.place(&ball)?;
+                    rig.place(&ball_in_view(rig.cell(), rng)?)?;
                     let mut world = World::new(fate, rng.random());
+                    let counted = (!teaching).then_some(run);
                     let end = self.on_chain(rig, &mut agent, &mut world, counted, &mut saved);
                     // Keeps what was learned, however the run ended.
                     let learned = agent.controller().inner.belief();
                     learned.save(&options.out.join("camera.belief"))?;
-                    let collisions = rig.contacts().collisions;
-                    (Some(end), world.has_happened(), Some(collisions))
+                    (
+                        Some(end?),
+                        world.has_happened(),
+                        Some(rig.contacts().collisions),
+                    )
                 }
             };
+            self.bar.inc(1);
             let Some(end) = end else {
                 continue;
             };
-            let Some(run) = counted else {
+            if teaching {
                 if let Err(error) = end {
                     let kept = keep_run(&options.out.join("teaching.json"), &saved)?;
                     return Err(format!("teaching was broken off: {error}; {kept}").into());
                 }
                 continue;
-            };
-            let held = |trial: &Trial| trial.held && trial.outcome.gave_up.is_none();
-            let success = end.as_ref().is_ok_and(held);
-            self.tally.add(Counted {
-                happened,
+            }
+            let trial = end.as_ref().ok();
+            let success = trial.is_some_and(|trial| trial.held && trial.outcome.gave_up.is_none());
+            let counted = Counted {
+                too_early: !happened,
                 success,
-                moves: end.as_ref().map_or(0, |trial| trial.outcome.cycles),
-                near: end.as_ref().map_or(0, |trial| trial.near),
+                moves: trial.map_or(0, |trial| trial.outcome.cycles),
+                near: trial.map_or(0, |trial| trial.near),
                 collisions,
-            });
+                ..Counted::default()
+            };
+            self.tally.cells[number].push(counted);
             let collisions = collisions.unwrap_or(0);
             if !success || collisions > 0 {
                 let kept = keep_run(&options.out.join(format!("run-{run:03}.json")), &saved)?;
@@ -245,14 +251,15 @@ impl Runs<'_> {
                         |reason| format!("not grasped: {reason}"),
                     ),
                 };
-                say!("run {run}: {reason}, {collisions} collisions; {kept}");
+                let words = format!("run {run}: {reason}, {collisions} collisions; {kept}");
+                self.bar.suspend(|| say!("{words}"));
             }
         }
         Ok(())
     }
 
     /// Lets `agent` go for the ball that is placed in the rig; `counted` is the number of a run
-    /// that counts.
+    /// that counts. Fails if a row cannot be written.
     fn on_chain(
         &mut self,
         rig: &mut Rig,
@@ -260,23 +267,21 @@ impl Runs<'_> {
         world: &mut World,
         counted: Option<usize>,
         saved: &mut SavedRun,
-    ) -> Result<Trial, AgentError> {
+    ) -> Outcome<Result<Trial, AgentError>> {
         let (shared, mut gripped) = (rig.cell().clone(), false);
-        let (csv, film) = (&mut self.csv, &mut self.film);
+        let (csv, film, mut written) = (&mut self.csv, &mut self.film, Ok(()));
         let mut observe = |event: &RunEvent<'_>| {
             saved.note(event);
             match &event.kind {
                 EventKind::Moved(_) => shared.with(|cell| world.go_on(cell, &event.joints)),
                 EventKind::Gripped => gripped = true,
                 EventKind::Missed => gripped = false,
-                EventKind::Seen(sighting) if !gripped => {
-                    if let Some(row) = counted {
-                        let f = sighting.features;
-                        let _ = writeln!(
-                            csv,
-                            "{row},{},{:.2},{:.2},{:.2},{}",
-                            event.cycle, f.x, f.y, f.r, world.events
-                        );
+                EventKind::Seen(sighting) if !gripped && written.is_ok() => {
+                    if let (Some(run), Some(csv)) = (counted, &mut *csv) {
+                        let (f, step, events) = (sighting.features, event.cycle, world.events);
+                        let (x, y, r) = (f.x, f.y, f.r);
+                        written =
+                            csv.row(format_args!("{run},{step},{x:.2},{y:.2},{r:.2},{events}"));
                     }
                 }
                 _ => {}
@@ -286,7 +291,8 @@ impl Runs<'_> {
                 film.push(resize(frame, width, height, FilterType::Triangle));
             }
         };
-        run_on_rig(rig, &mut *self.detector, agent, &self.stages, &mut observe)
+        let end = run_on_rig(rig, &mut *self.detector, agent, &self.stages, &mut observe);
+        written.map(|()| end)
     }
 }
 

@@ -1,7 +1,7 @@
 //! A ball that does not stay where it is.
 
 use clap::ValueEnum;
-use hough_heuristic::Features;
+use example_support::trial::at_goal;
 use pipeline_sim::{Cell, Workspace};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -61,18 +61,14 @@ impl World {
             Fate::Jump if reached && self.events < 1 => {
                 // To a place in view of the search.
                 for _ in 0..100 {
-                    let Some(place) =
-                        workspace.sample_jump(&cell.ball.centre, 0.150, &mut self.rng)
-                    else {
+                    let from = &cell.ball.centre;
+                    let Some(place) = workspace.sample_jump(from, 0.150, &mut self.rng) else {
                         return;
                     };
                     let mut there = *cell;
                     there.place_ball(place);
-                    if workspace
-                        .search_poses()
-                        .iter()
-                        .any(|pose| there.features(pose).is_ok())
-                    {
+                    let seen = |pose: &Joints| there.features(pose).is_ok();
+                    if workspace.search_poses().iter().any(seen) {
                         *cell = there;
                         self.events = 1;
                         return;
@@ -103,8 +99,4 @@ impl World {
             _ => {}
         }
     }
-}
-
-fn at_goal(f: &Features) -> bool {
-    (99.0..=108.0).contains(&f.x) && (74.0..=82.0).contains(&f.y) && (32.0..=34.0).contains(&f.r)
 }

@@ -289,7 +289,7 @@ fn replays(file: &Path, text: &str) {
     let (code, said, errors) = or_skip!(replayed(&[&other, file]));
     assert_eq!(code, Some(1), "{errors}");
     assert!(said.contains(whole) && said.contains("the same"), "{said}");
-    assert!(errors.contains("error: 1 of 2 runs"), "{errors}");
+    assert!(errors.contains("error: 0 of 2 runs"), "{errors}");
     assert!(
         errors.contains("other.json") && errors.contains("no saved run"),
         "{errors}"

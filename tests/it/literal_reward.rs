@@ -7,7 +7,6 @@
 use example_support::plane::ExactPlane;
 use grasp_agent::{BehaviourPair, BehaviourSpec, Percept, Reward};
 use hough_heuristic::Features;
-use puma_val2::JointDelta;
 use qtable::{Action, Model, ModelEnvironment, ModelEstimate, Outcome, State, Status, Step};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -169,18 +168,4 @@ fn equation_6_divides_by_zero_and_mended_it_approaches() {
     assert!(infinite > 100 && none == 0, "{infinite} {none}");
     assert!(cycling < 0.5 && worth > 150.0, "{cycling} {worth}");
     assert!(arriving > 0.9, "{arriving}");
-}
-
-#[test]
-fn without_drawn_starts_there_is_one_to_learn_from() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    let plane = ExactPlane::new(0, &mut rng);
-    let start = plane.start(&mut rng);
-    assert!(plane.after(&start, &JointDelta::default()).is_some());
-    let spec = BehaviourSpec::approaching();
-    let lesson = plane
-        .learn(spec, &[], 2_000, &mut rng, &mut |_| ())
-        .expect("learns");
-    let last = lesson.curve.last();
-    assert!(last.is_some_and(|record| record.episodes > 0));
 }

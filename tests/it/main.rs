@@ -4,10 +4,9 @@
 
 use std::sync::OnceLock;
 
-use example_support::learning::learn_both;
+use example_support::learning::{learn_both, paper_cell, simulators};
 use grasp_agent::{Behaviour, BehaviourPair, Learned};
-use pipeline_sim::{Ball, Cell, MoveForm};
-use puma_grasp::Simulator;
+use pipeline_sim::MoveForm;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -27,10 +26,8 @@ fn learned() -> &'static Learned {
     static LEARNED: OnceLock<Learned> = OnceLock::new();
     LEARNED.get_or_init(|| {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-        let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-        let (centering, reaching) = cell.sample_moves(2_500, 0.5, &mut rng).expect("samples");
-        let simulator =
-            Simulator::fit(&centering, &reaching, MoveForm::Rigid22).expect("enough samples");
+        let [simulator] =
+            simulators(&paper_cell(), [MoveForm::Rigid22], &mut rng).expect("enough samples");
         let quality = simulator.quality();
         assert!(quality.iter().all(|output| output.r2 > 0.9), "{quality:?}");
         let pair = BehaviourPair::paper_mended();

@@ -1,21 +1,19 @@
 //! Tables of the programs: shares with intervals.
 
-use example_support::ball_tally::{self, Counted};
-use example_support::comparison::{Row, Tally, csv, plot};
+use example_support::comparison::{Row, plot};
+use example_support::tally::{Counted, Tally};
 use pipeline_sim::ErrorLevel;
 
 fn told(runs: &[(bool, bool)], collisions: Option<usize>) -> String {
-    let mut tally = ball_tally::Tally::default();
-    for (happened, success) in runs {
-        tally.add(Counted {
-            happened: *happened,
-            success: *success,
-            moves: 2,
-            near: 0,
-            collisions,
-        });
-    }
-    tally.to_string()
+    let run = |(happened, success): &(bool, bool)| Counted {
+        too_early: !happened,
+        success: *success,
+        moves: 2,
+        collisions,
+        ..Counted::default()
+    };
+    let cells = vec![runs.iter().map(run).collect()];
+    Tally { cells }.to_string()
 }
 
 #[test]
@@ -36,9 +34,16 @@ fn a_tally_leaves_out_what_was_not_counted() {
 
 /// The row of a controller with these successes and runs of each cell.
 fn row(draws: &[(usize, usize)]) -> Row {
-    let mut tally = Tally::default();
-    tally.draws = draws.into();
-    Row::new(ErrorLevel::Heavy, "hybrid", &tally)
+    let cell = |(successes, runs): &(usize, usize)| {
+        let run = |run| Counted {
+            success: run < *successes,
+            moves: 9,
+            ..Counted::default()
+        };
+        (0..*runs).map(run).collect()
+    };
+    let cells = draws.iter().map(cell).collect();
+    Row::new(ErrorLevel::Heavy, "hybrid", &Tally { cells })
 }
 
 #[test]
@@ -50,13 +55,9 @@ fn the_interval_of_a_comparison_always_leaves_some_chance() {
     // More runs in as many cells do not narrow the interval; a cell without runs does not count.
     assert!(row(&[(300, 300); 16]).to_string().contains("80.6..100.0"));
     assert!(row(&[(3, 6), (0, 0), (6, 6)]).to_string().contains(" 75.0"));
-    let none = csv(&[row(&[])]);
-    assert!(
-        none.ends_with("heavy,\"hybrid\",,,,0,0,,NaN,,0\n"),
-        "{none}"
-    );
-    let file = csv(std::slice::from_ref(&all));
+    assert_eq!(row(&[]).csv(), "heavy,\"hybrid\",,,,0,0,,NaN,,0");
+    let file = all.csv();
     assert!(file.contains("100.000,80.639,100.000,16,16"), "{file}");
     let plot = plot(&[all], "grasped").expect("draws");
-    assert!(plot.contains("% grasped / moves"));
+    assert!(plot.contains("9.0 moves, 100.0 %"), "{plot}");
 }

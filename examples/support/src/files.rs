@@ -1,17 +1,20 @@
 //! Result files: written whole or not at all.
 
-use std::error::Error;
-use std::fs;
-use std::path::Path;
+use std::fmt::Display;
+use std::fs::{self, File};
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
 
 use grasp_agent::SavedRun;
-use image::{GrayImage, ImageBuffer, Pixel, PixelWithColorType};
+use image::{GrayImage, ImageBuffer, ImageFormat, Pixel, PixelWithColorType};
+
+use crate::program::Outcome;
 
 /// Creates the folder if need be, and checks that files can be written into it.
 ///
 /// # Errors
 /// A folder that cannot be written to.
-pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
+pub fn writable_folder(folder: &Path) -> Outcome {
     let probe = folder.join(".writable.part");
     fs::create_dir_all(folder)
         .and_then(|()| fs::write(&probe, b""))
@@ -24,7 +27,7 @@ pub fn writable_folder(folder: &Path) -> Result<(), Box<dyn Error>> {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Outcome {
     let failed = |error| format!("{}: cannot be written: {error}", path.display());
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if fs::metadata(&target).is_ok_and(|there| !there.is_file()) {
@@ -43,9 +46,40 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
 ///
 /// # Errors
 /// Those of [`write_whole`].
-pub fn keep_run(path: &Path, saved: &SavedRun) -> Result<String, Box<dyn Error>> {
+pub fn keep_run(path: &Path, saved: &SavedRun) -> Outcome<String> {
     write_whole(path, saved.to_json().as_bytes())?;
     Ok(format!("for `replay`: {}", path.display()))
+}
+
+/// A table in a file, to which rows are written as they come.
+#[derive(Debug)]
+pub struct Table {
+    file: File,
+    path: PathBuf,
+}
+
+impl Table {
+    /// Creates or replaces the file, and writes the names of its columns.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create(path: PathBuf, columns: &str) -> Outcome<Self> {
+        write_whole(&path, b"")?;
+        let file = File::options().append(true).open(&path)?;
+        let mut table = Self { file, path };
+        table.row(columns)?;
+        Ok(table)
+    }
+
+    /// Writes a row.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn row(&mut self, row: impl Display) -> Outcome {
+        let written = self.file.write_all(format!("{row}\n").as_bytes());
+        Ok(written
+            .map_err(|error| format!("{}: cannot be written: {error}", self.path.display()))?)
+    }
 }
 
 /// Encodes frames of one size as an animated PNG, each shown for `delay` seconds (a fraction), the
@@ -53,11 +87,7 @@ pub fn keep_run(path: &Path, saved: &SavedRun) -> Result<String, Box<dyn Error>>
 ///
 /// # Errors
 /// No frames, or frames of several sizes.
-pub fn animated(
-    frames: &[GrayImage],
-    delay: (u16, u16),
-    last: (u16, u16),
-) -> Result<Vec<u8>, Box<dyn Error>> {
+pub fn animated(frames: &[GrayImage], delay: (u16, u16), last: (u16, u16)) -> Outcome<Vec<u8>> {
     let first = frames.first().ok_or("no frames")?;
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, first.width(), first.height());
@@ -81,11 +111,11 @@ pub fn animated(
 ///
 /// # Errors
 /// Those of [`write_whole`].
-pub fn write_png<P>(path: &Path, picture: &ImageBuffer<P, Vec<u8>>) -> Result<(), Box<dyn Error>>
+pub fn write_png<P>(path: &Path, picture: &ImageBuffer<P, Vec<u8>>) -> Outcome
 where
     P: Pixel<Subpixel = u8> + PixelWithColorType,
 {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png)?;
     write_whole(path, bytes.get_ref())
 }

@@ -1,17 +1,54 @@
-//! Both behaviours of the paper, learned in one simulator.
+//! The paper's simulator, and both behaviours learned in it.
 
 use grasp_agent::{BehaviourError, BehaviourPair, Learned, Percept};
+use pipeline_sim::{Ball, Cell, MoveForm};
 use puma_grasp::Simulator;
+use qtable::Record;
 use rand::Rng;
 
 use crate::plane::search_percepts;
+use crate::program::Outcome;
 
+/// Moves sampled in the cell for the regression.
+pub const SAMPLES: usize = 2_500;
 /// Actions to learn from, centering and approaching.
 pub const ACTIONS: (u64, u64) = (60_000, 500_000);
 /// Actions to learn approaching on 540 states from.
 pub const ACTIONS_FINE: u64 = 4_000_000;
 /// Trials in the simulator by which the best table is chosen.
 pub const TRIALS: usize = 500;
+
+/// Returns the paper's cell, with the ball in front of the arm.
+pub fn paper_cell() -> Cell {
+    Cell::paper(Ball::at(0.6, 0.0, -0.1))
+}
+
+/// Samples moves in `cell` and fits a simulator of each form to them.
+///
+/// # Errors
+/// Those of sampling and of [`Simulator::fit`].
+pub fn simulators<const N: usize>(
+    cell: &Cell,
+    forms: [MoveForm; N],
+    rng: &mut dyn Rng,
+) -> Outcome<[Simulator; N]> {
+    /// Standard deviation of the features in the samples, feature units.
+    const FEATURE_NOISE: f64 = 0.5;
+    let (centering, reaching) = cell.sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
+    let fit = |form: &MoveForm| Simulator::fit(&centering, &reaching, *form);
+    let fitted: Vec<Simulator> = forms.iter().map(fit).collect::<Result<_, _>>()?;
+    fitted
+        .try_into()
+        .map_err(|_| "one simulator for each form".into())
+}
+
+/// Draws percepts to begin trials of a simulator from.
+pub fn anywhere(simulator: &Simulator, count: usize, rng: &mut dyn Rng) -> Vec<Percept> {
+    (0..count).map(|_| simulator.start(rng)).collect()
+}
+
+/// Shows no progress of learning.
+pub fn quiet(_: &Record) {}
 
 /// Learns both behaviours with [`ACTIONS`] and [`TRIALS`]. `seed` is that of the balls from which
 /// approaching is tried.
@@ -24,10 +61,11 @@ pub fn learn_both(
     seed: u64,
     rng: &mut dyn Rng,
 ) -> Result<Learned, BehaviourError> {
-    let anywhere: Vec<Percept> = (0..TRIALS).map(|_| simulator.start(rng)).collect();
-    let found = search_percepts(TRIALS, seed);
-    let quiet = &mut |_: &qtable::Record| ();
-    let centering = simulator.learn(pair.centering, &anywhere, ACTIONS.0, rng, quiet)?;
-    let approaching = simulator.learn(pair.approaching, &found, ACTIONS.1, rng, quiet)?;
+    let (starts, found) = (
+        anywhere(simulator, TRIALS, rng),
+        search_percepts(TRIALS, seed),
+    );
+    let centering = simulator.learn(pair.centering, &starts, ACTIONS.0, rng, &mut quiet)?;
+    let approaching = simulator.learn(pair.approaching, &found, ACTIONS.1, rng, &mut quiet)?;
     Ok(Learned::new(centering.behaviour, approaching.behaviour))
 }

@@ -1,9 +1,7 @@
-//! Shared parts of the example programs: trials, learning, result files, pictures and diagrams, CPU
-//! time by stage, Wilson's interval.
+//! Shared parts of the example programs: start and end, trials, learning, result files, pictures,
+//! diagrams and tables.
 
-pub mod ball_tally;
 pub mod comparison;
-pub mod cpu;
 pub mod files;
 pub mod learning;
 pub mod overlay;
@@ -11,5 +9,5 @@ pub mod plane;
 pub mod plot;
 pub mod program;
 pub mod stages;
+pub mod tally;
 pub mod trial;
-pub mod wilson;

@@ -1,17 +1,19 @@
 //! Circles and words drawn over a frame.
 
-use embedded_graphics::mono_font::MonoTextStyle;
-use embedded_graphics::mono_font::iso_8859_1::FONT_10X20;
+use embedded_graphics::mono_font::iso_8859_1::{FONT_6X10, FONT_10X20};
+use embedded_graphics::mono_font::{MonoTextStyle, MonoTextStyleBuilder};
 pub use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::pixelcolor::RgbColor;
 use embedded_graphics::prelude::*;
-use embedded_graphics::primitives::{Circle as Ring, Line, PrimitiveStyle, Rectangle};
+use embedded_graphics::primitives::{Circle as Ring, Line, PrimitiveStyle, StyledDrawable};
 use embedded_graphics::text::{Baseline, Text};
 use hough_heuristic::Circle;
 use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 
 /// Height of a caption, pixels.
 pub const CAPTION: u32 = 24;
+/// Colour of what was found.
+const FOUND: Rgb888 = Rgb888::new(60, 255, 60);
 
 /// A frame to draw on.
 #[derive(Clone, Debug)]
@@ -29,76 +31,79 @@ impl Overlay {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
     }
 
+    fn stroke<S>(&mut self, shape: S, style: PrimitiveStyle<Rgb888>)
+    where
+        S: StyledDrawable<PrimitiveStyle<Rgb888>, Color = Rgb888, Output = ()>,
+    {
+        let Ok(()) = shape.draw_styled(&style, self);
+    }
+
     /// Draws a found circle: its outline and its centre, clipped to the frame.
     pub fn circle(&mut self, circle: &Circle) {
-        let green = Rgb888::new(60, 255, 60);
-        let centre = Point::new(circle.x.round() as i32, circle.y.round() as i32);
         let diameter = (2.0 * circle.radius).round().max(1.0) as u32;
-        let outline =
-            Ring::with_center(centre, diameter).into_styled(PrimitiveStyle::with_stroke(green, 3));
-        let Ok(()) = outline.draw(self);
+        let ring = Ring::with_center(point((circle.x, circle.y)), diameter);
+        self.stroke(ring, PrimitiveStyle::with_stroke(FOUND, 3));
         let arm = ((circle.radius * 0.15) as i32).clamp(3, 12);
         for along in [Point::new(arm, 0), Point::new(0, arm)] {
-            let Ok(()) = Line::new(centre - along, centre + along)
-                .into_styled(PrimitiveStyle::with_stroke(green, 1))
-                .draw(self);
+            let centre = point((circle.x, circle.y));
+            let cross = Line::new(centre - along, centre + along);
+            self.stroke(cross, PrimitiveStyle::with_stroke(FOUND, 1));
         }
     }
 
     /// Draws a straight line.
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
-        let at = |(x, y): (f64, f64)| Point::new(x.round() as i32, y.round() as i32);
-        let style = PrimitiveStyle::with_stroke(colour, width);
-        let Ok(()) = Line::new(at(from), at(to)).into_styled(style).draw(self);
+        let line = Line::new(point(from), point(to));
+        self.stroke(line, PrimitiveStyle::with_stroke(colour, width));
     }
 
     /// Draws a filled disc.
     pub fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
-        let at = Point::new(centre.0.round() as i32, centre.1.round() as i32);
         let diameter = (2.0 * radius).round().max(1.0) as u32;
-        let Ok(()) = Ring::with_center(at, diameter)
-            .into_styled(PrimitiveStyle::with_fill(colour))
-            .draw(self);
+        let disc = Ring::with_center(point(centre), diameter);
+        self.stroke(disc, PrimitiveStyle::with_fill(colour));
     }
 
     /// Draws a closed curve, given as a function of an angle.
-    pub fn closed(&mut self, point: impl Fn(f64) -> (f64, f64)) {
+    pub fn closed(&mut self, curve: impl Fn(f64) -> (f64, f64)) {
         const CORNERS: u32 = 120;
-        let at = |corner: u32| {
-            let (x, y) = point(std::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS));
-            Point::new(x.round() as i32, y.round() as i32)
-        };
-        let style = PrimitiveStyle::with_stroke(Rgb888::new(60, 255, 60), 3);
+        let at = |corner| curve(std::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS));
         for corner in 0..CORNERS {
-            let Ok(()) = Line::new(at(corner), at(corner + 1))
-                .into_styled(style)
-                .draw(self);
+            self.line(at(corner), at(corner + 1), FOUND, 3);
         }
     }
 
-    /// Draws a caption on a dark bar over the top of the picture.
-    fn caption(&mut self, words: &str) {
-        let bar = Rectangle::new(Point::zero(), Size::new(self.0.width(), CAPTION));
-        let Ok(()) = bar
-            .into_styled(PrimitiveStyle::with_fill(Rgb888::new(20, 20, 40)))
-            .draw(self);
-        let style = MonoTextStyle::new(&FONT_10X20, Rgb888::YELLOW);
-        let Ok(_) = Text::with_baseline(words, Point::new(6, 2), style, Baseline::Top).draw(self);
+    /// Writes small words into the top left corner.
+    pub fn label(&mut self, words: &str) {
+        let style = MonoTextStyleBuilder::new()
+            .font(&FONT_6X10)
+            .text_color(Rgb888::YELLOW)
+            .background_color(Rgb888::new(20, 20, 40))
+            .build();
+        let text = Text::with_baseline(words, Point::zero(), style, Baseline::Top);
+        let Ok(_) = text.draw(self);
     }
 
     /// Adds a caption in a dark strip above the picture.
-    pub fn captioned(self, words: &str) -> Self {
-        let mut higher = RgbImage::new(self.0.width(), self.0.height() + CAPTION);
+    pub fn captioned(self, words: &str) -> RgbImage {
+        let dark = Rgb([20, 20, 40]);
+        let mut higher = RgbImage::from_pixel(self.0.width(), self.0.height() + CAPTION, dark);
         image::imageops::replace(&mut higher, &self.0, 0, i64::from(CAPTION));
         let mut captioned = Self(higher);
-        captioned.caption(words);
-        captioned
+        let style = MonoTextStyle::new(&FONT_10X20, Rgb888::YELLOW);
+        let text = Text::with_baseline(words, Point::new(6, 2), style, Baseline::Top);
+        let Ok(_) = text.draw(&mut captioned);
+        captioned.0
     }
 
     /// Returns the picture.
     pub fn into_image(self) -> RgbImage {
         self.0
     }
+}
+
+fn point((x, y): (f64, f64)) -> Point {
+    Point::new(x.round() as i32, y.round() as i32)
 }
 
 impl OriginDimensions for Overlay {

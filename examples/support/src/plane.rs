@@ -9,11 +9,13 @@ use grasp_agent::{
     Percept,
 };
 use hough_heuristic::Features;
-use pipeline_sim::{Ball, Cell, SightRule, Workspace};
+use pipeline_sim::{Cell, SightRule, Workspace};
 use puma_val2::{JointDelta, Joints};
 use qtable::{Action, Record};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
+
+use crate::learning::paper_cell;
 
 /// A simulator of approaching with the exact geometry, and the starts to learn from.
 #[derive(Clone, Debug)]
@@ -52,10 +54,9 @@ const MOST_STEPS: usize = 60;
 const CAMERA_BESIDE: f64 = 0.225;
 
 impl ExactPlane {
-    /// Draws `starts` exploring starts. With none, every episode begins with the ball as a search
-    /// pose shows it.
+    /// Draws at most `starts` exploring starts.
     pub fn new(starts: usize, rng: &mut dyn Rng) -> Self {
-        let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
+        let cell = paper_cell();
         let drawn = (0..starts).filter_map(|_| {
             let (cell, joints) = cell.exploring_start(rng)?;
             let mut features = cell.features(&joints).ok()?;
@@ -63,22 +64,10 @@ impl ExactPlane {
             features.x = 0.5 * Features::WIDTH + CAMERA_BESIDE * features.r;
             Some(Percept::new(features, &joints))
         });
-        let mut starts: Vec<Percept> = drawn.collect();
-        if starts.is_empty() {
-            let features = Features {
-                x: 98.0,
-                y: 72.0,
-                r: 9.5,
-            };
-            starts.push(Percept {
-                features,
-                theta3: 40.0,
-            });
-        }
         Self {
             model: CameraModel::paper(),
             sight: SightRule::default(),
-            starts,
+            starts: drawn.collect(),
         }
     }
 
@@ -121,8 +110,14 @@ impl ExactPlane {
 /// from each.
 pub fn search_starts(count: usize, seed: u64) -> Vec<PlaneStart> {
     let spec = BehaviourSpec::approaching();
+    let moves: Vec<JointDelta> = (0..spec.actions())
+        .map(|action| spec.delta(Action(action)))
+        .collect();
+    let reached =
+        |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
     let starts = found_by_search(seed).filter_map(|(cell, joints)| {
-        let optimum = optimum(&cell, &joints, &spec)?;
+        let fewest = cell.fewest_moves(&joints, &moves, reached, MOST_STEPS as u32);
+        let optimum = fewest.ok()?? as usize;
         Some(PlaneStart {
             cell,
             joints,
@@ -188,16 +183,4 @@ fn steps_to_goal(behaviour: &Behaviour, penalty: f64, start: &PlaneStart) -> Opt
         perceive()
     });
     steps.ok()
-}
-
-/// Returns the fewest steps from `joints` to the goal with the actions of `spec`, the ball in view
-/// after each; `None` if there is no way.
-fn optimum(cell: &Cell, joints: &Joints, spec: &BehaviourSpec) -> Option<usize> {
-    let moves: Vec<JointDelta> = (0..spec.actions())
-        .map(|action| spec.delta(Action(action)))
-        .collect();
-    let reached =
-        |features: &Features, joints: &Joints| spec.at_goal(&Percept::new(*features, joints));
-    let fewest = cell.fewest_moves(joints, &moves, reached, MOST_STEPS as u32);
-    Some(fewest.ok()?? as usize)
 }

@@ -1,24 +1,36 @@
 //! Diagrams of lines as SVG, with a legend where there are several.
 
-use std::error::Error;
+use std::path::Path;
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use qtable::Record;
+
+use crate::files::write_whole;
+use crate::program::Outcome;
 
 /// Named points, joined by a line.
 pub type Line = (String, Vec<(f64, f64)>);
 
 /// A diagram: some lines, a band around the first, and the interval of the goal.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Panel {
-    title: String,
-    across: String,
-    lines: Vec<Line>,
+    /// Words above the diagram.
+    pub title: String,
+    /// Quantity of the horizontal axis.
+    pub across: String,
+    /// Quantity of the vertical axis.
+    pub up: String,
+    /// Lines, each in a colour of its own.
+    pub lines: Vec<Line>,
     /// Lines in gray behind the others.
-    behind: Vec<Vec<(f64, f64)>>,
-    band: Vec<(f64, f64, f64)>,
-    goal: Option<(f64, f64)>,
-    top: Option<f64>,
+    pub behind: Vec<Vec<(f64, f64)>>,
+    /// Place, lower and upper end of the band.
+    pub band: Vec<(f64, f64, f64)>,
+    /// Interval that is shaded.
+    pub goal: Option<(f64, f64)>,
+    /// Upper end of the vertical axis, by default a little above the highest point.
+    pub top: Option<f64>,
 }
 
 const COLOURS: [RGBColor; 6] = [
@@ -30,51 +42,24 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(90, 90, 90),
 ];
 const GOAL: RGBColor = RGBColor(120, 190, 120);
+const GRAY: RGBColor = RGBColor(200, 200, 205);
+
+/// What is drawn of learning curves: its name, its value in a record, and the end of its axis.
+pub type Curve = (&'static str, fn(&Record) -> Option<f64>, Option<f64>);
+
+/// Success and error of learning, over the actions.
+pub const CURVES: [Curve; 2] = [
+    (
+        "episodes that reach the goal, %",
+        |record| Some(100.0 * record.success_share?),
+        Some(105.0),
+    ),
+    ("mean error of Q", |record| record.mean_td_error, None),
+];
 
 impl Panel {
-    /// Makes a diagram of `lines` over a quantity named `across`.
-    pub fn new(title: &str, across: &str, lines: Vec<Line>) -> Self {
-        Self {
-            title: title.into(),
-            across: across.into(),
-            lines,
-            behind: Vec::new(),
-            band: Vec::new(),
-            goal: None,
-            top: None,
-        }
-    }
-
-    /// Adds lines in gray behind the others.
-    #[must_use]
-    pub fn in_front_of(self, behind: Vec<Vec<(f64, f64)>>) -> Self {
-        Self { behind, ..self }
-    }
-
-    /// Shades the interval of the goal.
-    #[must_use]
-    pub fn with_goal(self, low: f64, high: f64) -> Self {
-        Self {
-            goal: Some((low, high)),
-            ..self
-        }
-    }
-
-    /// Sets the upper end of the axis.
-    #[must_use]
-    pub fn up_to(self, top: f64) -> Self {
-        Self {
-            top: Some(top),
-            ..self
-        }
-    }
-
-    /// Makes a diagram of the mean over the seeds, with the 95 % interval as band.
-    pub fn of_seeds(
-        title: &str,
-        seeds: &[Vec<Record>],
-        value: impl Fn(&Record) -> Option<f64>,
-    ) -> Self {
+    /// Makes a diagram of the mean over several learning curves, with its 95 % interval as band.
+    pub fn of_learning(title: &str, (up, value, top): Curve, seeds: &[Vec<Record>]) -> Self {
         let (mut mean_line, mut band) = (Vec::new(), Vec::new());
         for i in 0..seeds.iter().map(Vec::len).min().unwrap_or(0) {
             let values: Vec<f64> = seeds.iter().filter_map(|curve| value(&curve[i])).collect();
@@ -86,17 +71,18 @@ impl Panel {
             mean_line.push((x, mean));
             band.push((x, mean - half, mean + half));
         }
-        let line = (String::new(), mean_line);
         Self {
-            band,
-            ..Self::new(title, "actions", vec![line])
+            title: title.into(),
+            across: "actions".into(),
+            up: up.into(),
+            lines: vec![(String::new(), mean_line)],
+            band: if seeds.len() > 1 { band } else { Vec::new() },
+            top,
+            ..Self::default()
         }
     }
 
-    fn draw(
-        &self,
-        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
-    ) -> Result<(), Box<dyn Error>> {
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Outcome {
         let lines = self.lines.iter().map(|(_, line)| line);
         let points = || lines.clone().chain(&self.behind).flatten();
         let right = points().map(|p| p.0).fold(1.0, f64::max);
@@ -105,13 +91,14 @@ impl Panel {
             .chain(self.band.iter().map(|b| b.2))
             .chain(self.goal.map(|(_, high)| high))
             .fold(1.0, f64::max);
+        let top = self.top.unwrap_or(1.05 * highest);
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, ("sans-serif", 15))
             .margin(8)
             .margin_right(18)
             .x_label_area_size(34)
             .y_label_area_size(46)
-            .build_cartesian_2d(0.0..right, 0.0..self.top.unwrap_or(1.05 * highest))?;
+            .build_cartesian_2d(0.0..right, 0.0..top)?;
         let short = |value: &f64| {
             if *value >= 10_000.0 {
                 format!("{:.0}k", value / 1000.0)
@@ -122,6 +109,7 @@ impl Panel {
         chart
             .configure_mesh()
             .x_desc(&self.across)
+            .y_desc(&self.up)
             .x_labels(7)
             .y_labels(6)
             .x_label_formatter(&short)
@@ -131,42 +119,44 @@ impl Panel {
             .draw()?;
         if let Some((low, high)) = self.goal {
             let band = Rectangle::new([(0.0, low), (right, high)], GOAL.mix(0.45).filled());
-            chart.draw_series([band])?;
+            chart.draw_series([band])?.label("goal").legend(|(x, y)| {
+                Rectangle::new([(x, y - 5), (x + 16, y + 5)], GOAL.mix(0.45).filled())
+            });
         }
         if !self.band.is_empty() {
-            let top = self.top.unwrap_or(f64::INFINITY);
-            let edge = self
-                .band
-                .iter()
-                .map(|b| (b.0, b.1.max(0.0)))
-                .chain(self.band.iter().rev().map(|b| (b.0, b.2.min(top))));
-            chart.draw_series([Polygon::new(edge.collect::<Vec<_>>(), COLOURS[0].mix(0.2))])?;
+            let lower = self.band.iter().map(|b| (b.0, b.1.max(0.0)));
+            let upper = self.band.iter().rev().map(|b| (b.0, b.2.min(top)));
+            let edge: Vec<_> = lower.chain(upper).collect();
+            let colour = COLOURS[0].mix(0.2);
+            chart
+                .draw_series([Polygon::new(edge, colour)])?
+                .label("95 % interval of the mean")
+                .legend(move |(x, y)| {
+                    Rectangle::new([(x, y - 5), (x + 16, y + 5)], colour.filled())
+                });
         }
-        const GRAY: RGBColor = RGBColor(200, 200, 205);
         for line in &self.behind {
-            let points = line.iter().copied();
-            chart.draw_series(LineSeries::new(points, GRAY.stroke_width(2)))?;
+            chart.draw_series(LineSeries::new(line.iter().copied(), GRAY.stroke_width(2)))?;
         }
         for ((name, line), colour) in self.lines.iter().zip(COLOURS.iter().cycle()) {
-            let drawn = chart.draw_series(LineSeries::new(
-                line.iter().copied(),
-                colour.stroke_width(2),
-            ))?;
+            let style = colour.stroke_width(2);
+            let drawn = chart.draw_series(LineSeries::new(line.iter().copied(), style))?;
             if !name.is_empty() {
-                drawn.label(name).legend(|(x, y)| {
-                    PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2))
-                });
+                drawn
+                    .label(name)
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], style));
             }
             if line.len() < 80 {
                 chart.draw_series(line.iter().map(|at| Circle::new(*at, 2, colour.filled())))?;
             }
         }
-        if self.lines.iter().any(|(name, _)| !name.is_empty()) {
+        let named = self.lines.iter().any(|(name, _)| !name.is_empty());
+        if named || self.goal.is_some() || !self.band.is_empty() {
             chart
                 .configure_series_labels()
                 .position(SeriesLabelPosition::LowerRight)
                 .background_style(WHITE.mix(0.85))
-                .border_style(RGBColor(200, 200, 205))
+                .border_style(GRAY)
                 .label_font(("sans-serif", 12))
                 .draw()?;
         }
@@ -189,20 +179,15 @@ fn mean_and_interval(values: &[f64]) -> (f64, f64) {
     (mean, factor * (variance / n).sqrt())
 }
 
-/// Draws panels of `size` pixels each in rows of `columns`, as SVG.
+/// Writes panels of `size` pixels each, in rows of `columns`, as SVG.
 ///
 /// # Errors
-/// Those of plotters.
-pub fn drawn(
-    panels: &[Panel],
-    columns: usize,
-    (width, height): (u32, u32),
-) -> Result<String, Box<dyn Error>> {
-    let columns = columns.max(1);
+/// Those of plotters, and a file that cannot be written.
+pub fn write_svg(path: &Path, panels: &[Panel], columns: usize, size: (u32, u32)) -> Outcome {
     let rows = panels.len().div_ceil(columns).max(1);
     let mut svg = String::new();
     {
-        let size = (width * columns as u32, height * rows as u32);
+        let size = (size.0 * columns as u32, size.1 * rows as u32);
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         for (area, panel) in root.split_evenly((rows, columns)).iter().zip(panels) {
@@ -210,5 +195,5 @@ pub fn drawn(
         }
         root.present()?;
     }
-    Ok(svg)
+    write_whole(path, svg.as_bytes())
 }

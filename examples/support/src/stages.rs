@@ -10,7 +10,19 @@ use hough_heuristic::image::GrayImage;
 use hough_heuristic::{CircleDetector, Detection, FrameError, FrameRefused, FrameSource};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
 
-use crate::cpu::cpu_time;
+/// Returns the CPU time of this thread; wall time where the system does not tell.
+pub fn cpu_time() -> Duration {
+    #[cfg(unix)]
+    {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
+    }
+    #[cfg(not(unix))]
+    {
+        static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+        BEGIN.get_or_init(std::time::Instant::now).elapsed()
+    }
+}
 
 /// CPU time of this thread and wall time of all cycles so far, by stage.
 #[derive(Clone, Debug, Default)]
@@ -59,8 +71,7 @@ impl fmt::Display for Stages {
             f,
             "per move, ms of CPU: edges and circle {:.2}, decision {:.3}, serial line {:.2}; \
              waiting for the arm {:.2} ms; rendering {:.2} ms of CPU, which a camera would not \
-             need \
-             ({} moves)",
+             need ({} moves)",
             each(spent.detect),
             each(spent.decide),
             each(spent.serial),

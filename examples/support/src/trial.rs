@@ -6,7 +6,7 @@ use grasp_agent::{
 };
 use hough_heuristic::{CircleDetector, Features, FrameError};
 use pipeline_sim::{
-    Ball, Cell, ErrorLevel, Errors, FeatureCamera, HandShape, QuantityError, SharedCell,
+    Ball, Cell, ErrorLevel, Errors, FeatureCamera, HandShape, QuantityError, Scene, SharedCell,
     SimulatedArm, Workspace,
 };
 use puma_grasp::{Rig, RigParts};
@@ -14,24 +14,60 @@ use puma_val2::{ArmError, Joint, JointDelta, Joints, Manipulator, ProximitySenso
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
+use crate::learning::paper_cell;
+use crate::program::Outcome;
 use crate::stages::Stages;
 
-/// [`FeatureCamera`] as an [`Eye`].
-#[derive(Debug)]
-pub struct FeatureEye<P>(pub FeatureCamera<P>);
+/// A feature of the ball in the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Feature {
+    /// Its letter.
+    pub name: &'static str,
+    /// Goal interval.
+    pub goal: (f64, f64),
+    /// Largest value of interest.
+    pub most: f64,
+    /// Reader of its value.
+    pub of: fn(&Features) -> f64,
+}
 
-impl<P: FnMut() -> Joints> Eye for FeatureEye<P> {
-    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
-        Ok(self.0.look().map(Sighting::new))
+/// All features, in feature units.
+pub const FEATURES: [Feature; 3] = [
+    feature("x", (99.0, 108.0), 192.0, |f| f.x),
+    feature("y", (74.0, 82.0), 144.0, |f| f.y),
+    feature("r", (32.0, 34.0), 68.0, |f| f.r),
+];
+
+const fn feature(
+    name: &'static str,
+    goal: (f64, f64),
+    most: f64,
+    of: fn(&Features) -> f64,
+) -> Feature {
+    Feature {
+        name,
+        goal,
+        most,
+        of,
     }
 }
 
-/// The devices that an agent works with, and the cell around them.
-struct Devices<'a> {
-    eye: &'a mut dyn Eye,
-    arm: &'a mut dyn Manipulator,
-    sensor: &'a mut dyn ProximitySensor,
-    cell: &'a SharedCell,
+/// Returns whether the ball stands at the paper's goal.
+pub fn at_goal(features: &Features) -> bool {
+    FEATURES.iter().all(|feature| {
+        let (low, high) = feature.goal;
+        (low..=high).contains(&(feature.of)(features))
+    })
+}
+
+/// A closure that returns the features of the ball in view, as an [`Eye`].
+#[derive(Debug)]
+pub struct FeatureEye<F>(pub F);
+
+impl<F: FnMut() -> Option<Features>> Eye for FeatureEye<F> {
+    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
+        Ok((self.0)().map(Sighting::new))
+    }
 }
 
 /// The result of one run toward a ball.
@@ -45,6 +81,8 @@ pub struct Trial {
     pub held: bool,
     /// Stops by the proximity sensors.
     pub near: usize,
+    /// Collisions of the hand; counted through the full chain only.
+    pub collisions: Option<usize>,
 }
 
 /// Lets `agent` go for the ball in the rig's cell, and adds the time of each stage to `stages`.
@@ -65,39 +103,68 @@ pub fn run_on_rig<C: Controller>(
         mut sensor,
     } = rig.parts();
     let (mut camera, mut detector) = (stages.around(camera), stages.around(detector));
-    let devices = Devices {
-        eye: &mut CameraEye::new(&mut camera, &mut detector),
-        arm: &mut stages.around(arm),
-        sensor: &mut *sensor,
-        cell: &cell,
-    };
-    devices.run(agent, observe)
+    let mut eye = CameraEye::new(&mut camera, &mut detector);
+    let mut arm = stages.around(arm);
+    let trial = reach(agent, &mut eye, &mut arm, &mut *sensor, &cell, observe)?;
+    Ok(Trial {
+        collisions: Some(cell.contacts().collisions),
+        ..trial
+    })
 }
 
-impl Devices<'_> {
-    fn run<C: Controller>(
-        self,
-        agent: &mut Agent<C>,
-        observe: &mut dyn FnMut(&RunEvent<'_>),
-    ) -> Result<Trial, AgentError> {
-        let (mut at_goal, mut near) = (None, 0);
-        let outcome = agent.run_and_learn(self.eye, self.arm, self.sensor, &mut |event| {
-            match event.kind {
-                EventKind::AtGoal => {
-                    at_goal.get_or_insert(event.cycle);
-                }
-                EventKind::TooNear => near += 1,
-                _ => {}
+fn reach<C: Controller>(
+    agent: &mut Agent<C>,
+    eye: &mut dyn Eye,
+    arm: &mut dyn Manipulator,
+    sensor: &mut dyn ProximitySensor,
+    cell: &SharedCell,
+    observe: &mut dyn FnMut(&RunEvent<'_>),
+) -> Result<Trial, AgentError> {
+    let (mut at_goal, mut near) = (None, 0);
+    let outcome = agent.run_and_learn(eye, arm, sensor, &mut |event| {
+        match event.kind {
+            EventKind::AtGoal => {
+                at_goal.get_or_insert(event.cycle);
             }
-            observe(event);
-        })?;
-        Ok(Trial {
-            outcome,
-            at_goal,
-            held: self.cell.get().held.is_some(),
-            near,
-        })
-    }
+            EventKind::TooNear => near += 1,
+            _ => {}
+        }
+        observe(event);
+    })?;
+    Ok(Trial {
+        outcome,
+        at_goal,
+        held: cell.get().held.is_some(),
+        near,
+        collisions: None,
+    })
+}
+
+/// Starts an emulated controller, around whose arm the cell has errors of `level`. Of these only
+/// those of camera and ball apply: the emulated arm has no play.
+///
+/// # Errors
+/// Those of [`Rig::emulated`].
+pub fn rig_with_errors(
+    level: ErrorLevel,
+    scene: &Scene,
+    seed: u64,
+    rng: &mut Xoshiro256PlusPlus,
+) -> Outcome<Rig> {
+    let rig = Rig::emulated(false, scene, seed)?;
+    let wrong = level.draw(rng).apply(&rig.cell().get())?;
+    rig.cell().with(|cell| *cell = wrong);
+    Ok(rig)
+}
+
+/// Draws a ball in view of one of the search poses.
+///
+/// # Errors
+/// A camera that sees none.
+pub fn ball_in_view(cell: &SharedCell, rng: &mut Xoshiro256PlusPlus) -> Outcome<Ball> {
+    let seen = Workspace::paper().sample_seen_ball(&cell.get(), rng);
+    let (ball, _) = seen.ok_or("no place of the workspace is in view from a search pose")?;
+    Ok(ball)
 }
 
 /// A cell with drawn errors on the feature shortcut: no frames, and an arm that moves at once.
@@ -116,9 +183,8 @@ impl TrialCell {
     /// A camera that cannot be; none of the levels makes one.
     pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, QuantityError> {
         let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
-        let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
         Ok(Self {
-            cell: errors.apply(&nominal)?,
+            cell: errors.apply(&paper_cell())?,
             errors,
             workspace: Workspace::paper(),
             bodies: true,
@@ -229,16 +295,13 @@ impl TrialCell {
         shared.with(|cell| cell.place_ball(cell.tool_point(&gripping)));
         arm.move_to(from)?;
         let mut camera = self.camera(shared, arm.pose(), seed)?;
-        let seen: Option<Vec<Features>> = (0..LOOKS).map(|_| camera.look()).collect();
-        let mean = |seen: Vec<Features>| {
-            let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / LOOKS as f64;
-            Features {
-                x: mean(|f| f.x),
-                y: mean(|f| f.y),
-                r: mean(|f| f.r),
-            }
+        let looks = (0..LOOKS).map(|_| camera.look());
+        let Some(seen) = looks.collect::<Option<Vec<Features>>>() else {
+            return Ok(None);
         };
-        Ok(seen.map(mean).filter(well_inside))
+        let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / LOOKS as f64;
+        let [x, y, r] = [mean(|f| f.x), mean(|f| f.y), mean(|f| f.r)];
+        Ok(Some(Features { x, y, r }).filter(well_inside))
     }
 
     /// Returns a camera with the noise of the drawn errors.
@@ -277,35 +340,15 @@ impl TrialCell {
         cell.place_ball(ball.centre);
         let shared = SharedCell::new(cell);
         let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
-        let camera = self.camera(shared.clone(), arm.pose(), rng.random())?;
-        let devices = Devices {
-            eye: &mut ChangingWorld {
-                eye: FeatureEye(camera),
-                cell: shared.clone(),
-                pose: arm.pose(),
-                world,
-            },
-            sensor: &mut Sensor(self.bodies.then(|| arm.clone())),
-            arm: &mut arm,
-            cell: &shared,
-        };
-        devices.run(agent, observe).map(Some)
-    }
-}
-
-/// An eye in a world that changes before every look.
-struct ChangingWorld<'a, E, P> {
-    eye: E,
-    cell: SharedCell,
-    pose: P,
-    world: &'a mut dyn FnMut(&mut Cell, &Joints),
-}
-
-impl<E: Eye, P: FnMut() -> Joints> Eye for ChangingWorld<'_, E, P> {
-    fn look(&mut self) -> Result<Option<Sighting>, FrameError> {
-        let joints = (self.pose)();
-        self.cell.with(|cell| (self.world)(cell, &joints));
-        self.eye.look()
+        let mut camera = self.camera(shared.clone(), arm.pose(), rng.random())?;
+        let mut pose = arm.pose();
+        let mut eye = FeatureEye(|| {
+            let joints = pose();
+            shared.with(|cell| world(cell, &joints));
+            camera.look()
+        });
+        let mut sensor = Sensor(self.bodies.then(|| arm.clone()));
+        reach(agent, &mut eye, &mut arm, &mut sensor, &shared, observe).map(Some)
     }
 }
 
