@@ -13,11 +13,10 @@
 //!   specifications of centering and approaching.
 //! * A [`Controller`] decides on joint moves: [`Learned`] (the paper's two behaviours), [`Servo`]
 //!   (the alternatives that the paper names), [`Hybrid`] (a servo that calibrates its own
-//!   [`CameraModel`]), [`Retargeted`] (any of them with a goal that was shown on the arm), or one
-//!   of your own.
+//!   [`CameraModel`]), or one of your own. A [`TaughtGoal`] is a goal that was shown on the arm.
 //! * An [`Agent`] runs a controller and the modules around it on an [`Eye`] (a camera and a
 //!   [`Target`]) and a [`Manipulator`](puma_val2::Manipulator). It reports every [`RunEvent`]; an
-//!   [`EventLog`] keeps them, and a `SavedRun` can be replayed from its text alone.
+//!   [`EventLog`] keeps them, and a [`SavedRun`] can be replayed from its text alone.
 //!
 //! # The state machine
 //!

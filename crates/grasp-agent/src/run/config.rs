@@ -124,28 +124,20 @@ impl AgentConfig {
     /// Checks what can be known before anything moves.
     pub(crate) fn check(&self) -> Result<(), String> {
         self.limits.check()?;
-        for (count, what) in [
+        for (name, count, remedy) in [
             (
+                "search_poses",
                 self.search_poses.len(),
-                "search_poses is empty; give at least one pose",
+                "give at least one pose",
             ),
-            (self.goal.len(), "goal is empty; give at least one interval"),
-            (
-                self.max_cycles,
-                "max_cycles is 0; no move could be made, give at least 1",
-            ),
-            (
-                self.max_views,
-                "max_views is 0; the search could look from nowhere, give at least 1",
-            ),
-            (self.looks, "looks is 0; the agent must look at least once"),
-            (
-                self.same_frames,
-                "same_frames is 0; every camera would count as frozen, give at least 1",
-            ),
+            ("goal", self.goal.len(), "give at least one interval"),
+            ("max_cycles", self.max_cycles, "allow at least one move"),
+            ("max_views", self.max_views, "allow at least one viewpoint"),
+            ("looks", self.looks, "look at least once"),
+            ("same_frames", self.same_frames, "give at least 1"),
         ] {
             if count == 0 {
-                return Err(what.into());
+                return Err(format!("{name} is 0 or empty; {remedy}"));
             }
         }
         let mut poses = self.search_poses.iter();
@@ -172,13 +164,9 @@ impl AgentConfig {
                 ));
             }
         }
-        if self
-            .lift
-            .is_some_and(|lift| lift == JointDelta::default() || !is_finite(&lift))
-        {
-            return Err(
-                "lift moves nothing, or is not finite; give a move, or None for no lift".into(),
-            );
+        let lifts = |lift: &JointDelta| *lift != JointDelta::default() && is_finite(lift);
+        if !self.lift.iter().all(lifts) {
+            return Err("lift moves nothing, or is not finite; None is no lift".into());
         }
         if !(self.left_behind.is_finite() && self.left_behind >= 0.0) {
             return Err(format!(

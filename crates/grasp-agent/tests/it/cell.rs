@@ -91,11 +91,6 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// From now on the gripper does not answer.
-    pub(crate) fn cut_gripper(&mut self) {
-        self.fault = Fault::GripperDead(0);
-    }
-
     /// Returns the pose that the arm reports.
     fn reported(&self, mut joints: Joints) -> Joints {
         if matches!(self.fault, Fault::Nowhere(after) if self.moves >= after) {

@@ -277,17 +277,6 @@ fn a_hybrid_grips_from_where_every_move_is_halted() {
 }
 
 #[test]
-fn every_search_begins_with_an_event() {
-    let (_, log, _) = end_of(Fault::None);
-    assert_eq!(log.events[1].kind, EventKind::Searching);
-    // A ball that is lost for good is recovered nowhere and searched anew.
-    let (end, log, _) = end_of(Fault::PhantomOnce);
-    assert_eq!(end.unwrap().gave_up, Some(GaveUp::NotFound));
-    let last = words_from(&log, "recover");
-    assert!(last.contains(&"searching"), "{last:?}");
-}
-
-#[test]
 fn false_circles_do_not_mislead_the_hybrid_for_long() {
     let mut agent = agent_of(hybrid());
     let mut reached = 0;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use grasp_agent::{CameraModel, EventKind, EventLog};
 
-use crate::cell::{Fault, Shared, agent_of, hybrid, servo};
+use crate::cell::{Fault, Shared, agent_of, hybrid};
 use crate::faults::{end_of, words_from};
 
 /// Phases of the state machine.
@@ -180,32 +180,4 @@ fn an_order_that_is_not_answered_is_in_the_log() {
         of(Fault::StoppedShort(3)),
         EventKind::AtSearchPose(_) | EventKind::Moved(_)
     ));
-}
-
-#[test]
-fn a_gripper_that_does_not_open_again_is_in_the_log() {
-    let servo = servo();
-    let mut agent = agent_of(servo);
-    let cell = Shared::paper(Fault::Slippery);
-    let mut log = EventLog::default();
-    // Once the jaws have closed on nothing the line is cut.
-    let end = agent.run_and_learn(
-        &mut cell.clone(),
-        &mut cell.clone(),
-        &mut cell.clone(),
-        &mut |event| {
-            if event.kind == EventKind::Gripped {
-                cell.0.borrow_mut().cut_gripper();
-            }
-            log.note(event);
-        },
-    );
-    assert!(end.is_err());
-    let [.., unanswered, _] = &log.events[..] else {
-        panic!("{log:?}")
-    };
-    assert_eq!(
-        unanswered.kind,
-        EventKind::Unanswered("open the jaws".into())
-    );
 }

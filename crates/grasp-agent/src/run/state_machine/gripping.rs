@@ -8,7 +8,7 @@ use crate::limits::JointLimits;
 use crate::percept::Sighting;
 use crate::run::event::EventKind;
 use crate::run::state_machine::acting::Went;
-use crate::run::state_machine::{Gone, OFTEN, Run, State, is_same_place, lost};
+use crate::run::state_machine::{OFTEN, Run, State, is_same_place, lost};
 
 /// Least share of the ball's radius, seen from the same pose, of something that can be the ball.
 const BALL_SIZED: f64 = 0.6;
@@ -81,7 +81,7 @@ impl Run<'_> {
                 State::Recover {
                     ball,
                     from,
-                    why: Gone::Missed,
+                    missed: true,
                 }
             }
         })

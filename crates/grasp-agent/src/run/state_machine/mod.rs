@@ -45,11 +45,11 @@ enum State {
     Search,
     /// The ball is in view.
     Reach(Sighting),
-    /// The ball was in view from the pose `from`, and is not any more.
+    /// The ball was in view from the pose `from`, and is not any more, or was missed by a grip.
     Recover {
         ball: Sighting,
         from: Joints,
-        why: Gone,
+        missed: bool,
     },
     /// The ball is at the goal, or as near to it as can be.
     Grip {
@@ -60,25 +60,14 @@ enum State {
     End(Option<GaveUp>),
 }
 
-/// Reason why a ball has to be recovered.
-#[derive(Clone, Copy, Debug)]
-enum Gone {
-    Lost,
-    Missed,
-}
-
 impl State {
     /// Returns the event of entering this state from another one.
     fn entry(&self) -> EventKind {
         match *self {
             Self::Search => EventKind::Searching,
             Self::Reach(_) => EventKind::Reaching,
-            Self::Recover {
-                why: Gone::Lost, ..
-            } => EventKind::Lost,
-            Self::Recover {
-                why: Gone::Missed, ..
-            } => EventKind::Missed,
+            Self::Recover { missed: false, .. } => EventKind::Lost,
+            Self::Recover { missed: true, .. } => EventKind::Missed,
             Self::Grip { at_goal: true, .. } => EventKind::AtGoal,
             Self::Grip { at_goal: false, .. } => EventKind::Cornered,
             Self::End(None) => EventKind::Grasped,
@@ -180,11 +169,9 @@ impl<'a> Run<'a> {
             if discriminant(&next) != discriminant(&state) {
                 self.tell(next.entry());
             }
-            if let State::Recover { why, .. } = next {
-                match why {
-                    Gone::Lost => self.losses += 1,
-                    Gone::Missed => self.cycles += 1,
-                }
+            if let State::Recover { missed, .. } = next {
+                self.losses += usize::from(!missed);
+                self.cycles += usize::from(missed);
             }
             state = next;
         }
@@ -378,7 +365,7 @@ fn lost(ball: Sighting, from: Joints) -> State {
     State::Recover {
         ball,
         from,
-        why: Gone::Lost,
+        missed: false,
     }
 }
 
