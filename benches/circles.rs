@@ -18,46 +18,28 @@ use hough_heuristic::{AContrario, AContrarioConfig, Canny, CircleDetector};
 /// The standard transform takes seconds on frames that are wider.
 const WIDEST_SHT: u32 = 768;
 
-fn scenes() -> Vec<(&'static str, Scene)> {
+fn scenes() -> [(&'static str, Scene); 6] {
     let scene = Scene {
         radius: (20.0, 140.0),
         ..Scene::default()
     };
-    let small = Scene {
-        width: 192,
-        height: 144,
-        radius: (10.0, 35.0),
+    let sized = |width, height, radius| Scene {
+        width,
+        height,
+        radius,
         ..scene
     };
-    let large = Scene {
-        width: 1920,
-        height: 1080,
-        ..scene
-    };
-    let crowded = Scene {
-        balls: 20,
-        radius: (20.0, 60.0),
-        ..scene
-    };
-    vec![
-        ("192x144, 1 ball", small),
+    let (mut crowded, mut cluttered, mut noisy) = (scene, scene, scene);
+    (crowded.balls, crowded.radius) = (20, (20.0, 60.0));
+    cluttered.distractors = 20;
+    noisy.noise = 15.0;
+    [
+        ("192x144, 1 ball", sized(192, 144, (10.0, 35.0))),
         ("768x576, 1 ball", scene),
-        (
-            "768x576, 20 distractors",
-            Scene {
-                distractors: 20,
-                ..scene
-            },
-        ),
-        (
-            "768x576, noise 15",
-            Scene {
-                noise: 15.0,
-                ..scene
-            },
-        ),
+        ("768x576, 20 distractors", cluttered),
+        ("768x576, noise 15", noisy),
         ("768x576, 20 balls", crowded),
-        ("1920x1080, 1 ball", large),
+        ("1920x1080, 1 ball", sized(1920, 1080, scene.radius)),
     ]
 }
 

@@ -8,22 +8,13 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use hough_heuristic::{Canny, EdgeDetector};
 
 fn edges(criterion: &mut Criterion) {
+    let (mut cluttered, mut noisy) = (Scene::default(), Scene::default());
+    cluttered.distractors = 20;
+    noisy.noise = 30.0;
     let scenes = [
         ("1 ball", Scene::default()),
-        (
-            "20 distractors",
-            Scene {
-                distractors: 20,
-                ..Scene::default()
-            },
-        ),
-        (
-            "noise 30",
-            Scene {
-                noise: 30.0,
-                ..Scene::default()
-            },
-        ),
+        ("20 distractors", cluttered),
+        ("noise 30", noisy),
     ];
     let mut group = criterion.benchmark_group("edges");
     for (name, scene) in scenes {

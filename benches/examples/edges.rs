@@ -58,21 +58,6 @@ enum Operator {
     Imageproc,
 }
 
-/// The operator at work.
-enum Edges {
-    Canny(Box<Canny>),
-    Imageproc(ImageprocCanny),
-}
-
-impl Edges {
-    fn operator(&mut self) -> &mut dyn EdgeDetector {
-        match self {
-            Self::Canny(canny) => &mut **canny,
-            Self::Imageproc(canny) => canny,
-        }
-    }
-}
-
 fn main() -> ExitCode {
     match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -90,15 +75,13 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         noise_factor,
         ..
     } = options;
-    let mut detector = match options.operator {
-        Operator::Canny => Edges::Canny(Box::new(Canny::new(CannyConfig {
-            low,
-            high,
-            noise_factor,
-            ..CannyConfig::default()
-        })?)),
-        Operator::Imageproc => Edges::Imageproc(ImageprocCanny::new(low, high)?),
+    let config = CannyConfig {
+        low,
+        high,
+        noise_factor,
+        ..CannyConfig::default()
     };
+    let (mut own, mut other) = (Canny::new(config)?, ImageprocCanny::new(low, high)?);
     let mut files = ImageFiles::open(&options.frames)?;
     let (mut table, mut all) = (String::from("file,cpu_us,low,high\n"), Vec::new());
     let mut frame = GrayImage::default();
@@ -111,40 +94,34 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
                 continue;
             }
         }
-        let name = PathBuf::from(
-            files
-                .last_path()
-                .and_then(|path| path.file_name())
-                .unwrap_or_default(),
-        );
-        let micros = 1e6
-            * least_cpu_time(options.reps, || {
-                detector.operator().detect_edges(&frame);
-            })
-            .as_secs_f64();
+        let name = files.last_path().and_then(|path| path.file_name());
+        let name = PathBuf::from(name.unwrap_or_default());
+        let detector: &mut dyn EdgeDetector = match options.operator {
+            Operator::Canny => &mut own,
+            Operator::Imageproc => &mut other,
+        };
+        let time = least_cpu_time(options.reps, || {
+            detector.detect_edges(&frame);
+        });
+        let micros = 1e6 * time.as_secs_f64();
         all.push(micros);
-        let (low, high) = match &detector {
-            Edges::Canny(canny) => canny.thresholds(),
-            Edges::Imageproc(_) => (low, high),
+        if let Some(folder) = &options.edges {
+            let path = folder.join(name.with_extension("png"));
+            detector.edges().image().save(path)?;
+        }
+        let (low, high) = match options.operator {
+            Operator::Canny => own.thresholds(),
+            Operator::Imageproc => (low, high),
         };
         writeln!(table, "{},{micros:.1},{low:.2},{high:.2}", name.display())?;
-        if let Some(folder) = &options.edges {
-            detector
-                .operator()
-                .edges()
-                .image()
-                .save(folder.join(name.with_extension("png")))?;
-        }
     }
     if let Some(path) = &options.times {
         std::fs::write(path, table)?;
     }
     all.sort_by(f64::total_cmp);
     let at = |share: f64| {
-        all.get((all.len() as f64 * share) as usize)
-            .or(all.last())
-            .copied()
-            .unwrap_or_default()
+        let place = all.get((all.len() as f64 * share) as usize);
+        place.or(all.last()).copied().unwrap_or_default()
     };
     println!(
         "{} frames, CPU us: median {:.0}, 95 % {:.0}, most {:.0}",

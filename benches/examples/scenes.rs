@@ -14,15 +14,14 @@
 
 use std::error::Error;
 use std::fmt::Write as _;
-use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use circle_scenes::patterns;
 use circle_scenes::simple::{KINDS, Kind};
 use clap::Parser;
 use hough_heuristic::Circle;
-use hough_heuristic::image::{GrayImage, ImageFormat};
+use hough_heuristic::image::GrayImage;
 
 /// Renders scenes with one difficulty each.
 #[derive(Parser)]
@@ -67,11 +66,21 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     } else {
         &options.kinds
     };
+    let failed = |file: &str, error: &dyn Error| {
+        format!(
+            "{}: cannot be written: {error}",
+            options.out.join(file).display()
+        )
+    };
+    let save = |file: &str, frame: &GrayImage| {
+        let saved = frame.save(options.out.join(file));
+        saved.map_err(|error| failed(file, &error))
+    };
     for kind in kinds.iter().filter(|_| !options.patterns) {
         for number in 0..options.frames {
             let (frame, balls) = kind.render(options.size, options.seed, number);
             let file = format!("{}_{number:03}.png", kind.name);
-            save_png(&options.out.join(&file), &frame)?;
+            save(&file, &frame)?;
             writeln!(frames, "{file},{}", kind.name)?;
             for Circle { x, y, radius } in balls {
                 writeln!(truth, "{file},{x:.4},{y:.4},{radius:.4}")?;
@@ -81,20 +90,15 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     if options.patterns {
         let (width, height) = options.size;
         for (name, frame) in patterns::patterns(width, height) {
-            let file = format!("{name}.png");
-            save_png(&options.out.join(&file), &frame)?;
-            writeln!(frames, "{file},patterns")?;
+            save(&format!("{name}.png"), &frame)?;
+            writeln!(frames, "{name}.png,patterns")?;
         }
     }
-    save(&options.out.join("truth.csv"), truth.as_bytes())?;
-    save(&options.out.join("frames.csv"), frames.as_bytes())?;
+    for (file, table) in [("truth.csv", truth), ("frames.csv", frames)] {
+        let written = std::fs::write(options.out.join(file), table);
+        written.map_err(|error| failed(file, &error))?;
+    }
     Ok(())
-}
-
-fn save_png(path: &Path, frame: &GrayImage) -> Result<(), Box<dyn Error>> {
-    let mut png = Cursor::new(Vec::new());
-    frame.write_to(&mut png, ImageFormat::Png)?;
-    save(path, png.get_ref())
 }
 
 /// Width and height, as in `768x576`.
@@ -113,17 +117,4 @@ fn kind(name: &str) -> Result<Kind, String> {
             let names = KINDS.map(|kind| kind.name).join(", ");
             format!("no such kind; there are {names}")
         })
-}
-
-/// Writes a file as a whole or not at all; what is there and is no regular file is written to as it
-/// is.
-fn save(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
-    let failed = |error| format!("{}: cannot be written: {error}", path.display());
-    if std::fs::metadata(path).is_ok_and(|there| !there.is_file()) {
-        return Ok(std::fs::write(path, bytes).map_err(failed)?);
-    }
-    let unfinished = path.with_extension("part");
-    let written =
-        std::fs::write(&unfinished, bytes).and_then(|()| std::fs::rename(&unfinished, path));
-    Ok(written.map_err(failed)?)
 }
