@@ -6,7 +6,7 @@ mod stream;
 mod y4m;
 
 #[cfg(feature = "files")]
-pub use files::ImageFiles;
+pub use files::{Channel, ImageFiles};
 pub use stream::FrameStream;
 pub use y4m::Y4mWriter;
 

@@ -2,14 +2,43 @@
 
 use std::path::{Path, PathBuf};
 
-use image::{GrayImage, ImageReader};
+use image::metadata::Orientation;
+use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Luma};
 
 use crate::frame::{FrameError, FrameSource};
 
 /// The endings that a folder is searched for, in lower case.
-const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "pgm"];
+const ENDINGS: &[&str] = if cfg!(feature = "cli") {
+    &["png", "jpg", "jpeg", "pgm", "bmp", "tif", "tiff"]
+} else {
+    &["png", "jpg", "jpeg", "pgm", "bmp"]
+};
 
-/// A [`FrameSource`] over image files: PNG, JPEG and PGM, colour turned to luma.
+/// The part of a coloured picture that becomes the gray frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
+pub enum Channel {
+    /// Brightness as the eye sees it.
+    #[default]
+    Luma,
+    /// The red component.
+    Red,
+    /// The green component.
+    Green,
+    /// The blue component.
+    Blue,
+    /// The one of the three components that changes most over 4 pixels, in the mean square.
+    Strongest,
+}
+
+/// A [`FrameSource`] over image files: PNG, JPEG, PGM and BMP, with the feature `cli` also TIFF.
+///
+/// A picture is turned as its EXIF orientation says, so that coordinates are those that a viewer
+/// shows. Coloured pictures give their [`Channel`]; transparency is ignored. Values of 16 bits are
+/// scaled to 8 by the bits that the largest value of the picture needs, at least 8: with `b` bits,
+/// 2^b - 1 becomes 255. Data of 10 or 12 bits thus use the whole range, and
+/// [`last_depth`](Self::last_depth) tells that they did.
 ///
 /// A file that cannot be read gives an error that names it, and the next
 /// [`grab`](FrameSource::grab) goes on with the next file.
@@ -32,18 +61,22 @@ const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "pgm"];
 pub struct ImageFiles {
     paths: Vec<PathBuf>,
     next: usize,
+    channel: Channel,
+    depth: Option<u32>,
 }
 
 impl ImageFiles {
-    /// These files, in this order. They are opened when their turn comes.
+    /// Takes these files, in this order. They are opened when their turn comes.
     pub fn new(paths: impl IntoIterator<Item = PathBuf>) -> Self {
         Self {
             paths: paths.into_iter().collect(),
             next: 0,
+            channel: Channel::Luma,
+            depth: None,
         }
     }
 
-    /// One file, or the image files of a folder in the order of their names.
+    /// Takes one file, or the image files of a folder in the order of their names.
     ///
     /// A folder is not searched for folders inside it; a file is taken whatever its name.
     ///
@@ -77,31 +110,119 @@ impl ImageFiles {
         Ok(Self::new(paths))
     }
 
-    /// The file that the last call of [`grab`](FrameSource::grab) read, or failed to read; none
-    /// before the first call.
+    /// Sets the channel of coloured pictures (default [`Channel::Luma`]).
+    #[must_use]
+    pub fn with_channel(mut self, channel: Channel) -> Self {
+        self.channel = channel;
+        self
+    }
+
+    /// Returns the file that the last call of [`grab`](FrameSource::grab) read, or failed to read;
+    /// none before the first call.
     pub fn last_path(&self) -> Option<&Path> {
         let last = self.next.checked_sub(1)?;
         self.paths.get(last).map(PathBuf::as_path)
+    }
+
+    /// Returns the bits that the values of the last file used, if it has values of 16 bits and used
+    /// fewer of them: its gray levels were scaled up.
+    pub fn last_depth(&self) -> Option<u32> {
+        self.depth
+    }
+
+    /// The next picture, upright, of 8 bits or scaled to all of 16.
+    pub(crate) fn next_picture(&mut self) -> Result<DynamicImage, FrameError> {
+        let path = self.paths.get(self.next).ok_or(FrameError::End)?;
+        self.next += 1;
+        self.depth = None;
+        let mut picture = read(path).map_err(|error| FrameError::Failed {
+            origin: path.display().to_string(),
+            reason: error.to_string(),
+        })?;
+        self.depth = stretch(&mut picture);
+        Ok(picture)
+    }
+
+    /// The frame that becomes of a picture.
+    pub(crate) fn gray(&self, picture: DynamicImage) -> GrayImage {
+        let component = match self.channel {
+            Channel::Red => 0,
+            Channel::Green => 1,
+            Channel::Blue => 2,
+            _ => 3,
+        };
+        if !picture.color().has_color() || self.channel == Channel::Luma {
+            return picture.into_luma8();
+        }
+        let picture = picture.into_rgb8();
+        let of = |component: usize| {
+            let (width, height) = picture.dimensions();
+            GrayImage::from_fn(width, height, |x, y| {
+                Luma([picture.get_pixel(x, y).0[component]])
+            })
+        };
+        if component < 3 {
+            return of(component);
+        }
+        let mut strongest = of(0);
+        for other in [of(1), of(2)] {
+            if change(&other) > change(&strongest) {
+                strongest = other;
+            }
+        }
+        strongest
     }
 }
 
 impl FrameSource for ImageFiles {
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
-        let path = self.paths.get(self.next).ok_or(FrameError::End)?;
-        self.next += 1;
-        *frame = read(path).map_err(|error| FrameError::Failed {
-            origin: path.display().to_string(),
-            reason: error.to_string(),
-        })?;
+        let picture = self.next_picture()?;
+        *frame = self.gray(picture);
         Ok(())
     }
 }
 
-fn read(path: &Path) -> image::ImageResult<GrayImage> {
-    Ok(ImageReader::open(path)?
-        .with_guessed_format()?
-        .decode()?
-        .to_luma8())
+/// Reads a picture, turned as its orientation says, without transparency where it has 16 bits.
+fn read(path: &Path) -> image::ImageResult<DynamicImage> {
+    let reader = ImageReader::open(path)?.with_guessed_format()?;
+    let mut decoder = reader.into_decoder()?;
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut picture = DynamicImage::from_decoder(decoder)?;
+    picture.apply_orientation(orientation);
+    Ok(match picture {
+        DynamicImage::ImageLumaA16(_) => picture.into_luma16().into(),
+        DynamicImage::ImageRgba16(_) => picture.into_rgb16().into(),
+        _ => picture,
+    })
+}
+
+/// Scales values of 16 bits by the bits that the largest needs; returns these if they are fewer
+/// than 16.
+fn stretch(picture: &mut DynamicImage) -> Option<u32> {
+    let values: &mut [u16] = match picture {
+        DynamicImage::ImageLuma16(gray) => gray,
+        DynamicImage::ImageRgb16(rgb) => rgb,
+        _ => return None,
+    };
+    let largest = values.iter().copied().max()?;
+    let bits = (u16::BITS - largest.leading_zeros()).max(8);
+    let white = (1u32 << bits) - 1;
+    for value in values {
+        *value = ((u32::from(*value) * 0xffff + white / 2) / white) as u16;
+    }
+    (bits < u16::BITS).then_some(bits)
+}
+
+/// The sum of the squared differences between pixels 4 px apart.
+fn change(gray: &GrayImage) -> u64 {
+    let square = |a: u8, b: u8| u64::from(a.abs_diff(b)).pow(2);
+    let pairs = |apart: usize, line: &[u8]| -> u64 {
+        let ends = line.iter().skip(apart);
+        line.iter().zip(ends).map(|(&a, &b)| square(a, b)).sum()
+    };
+    let width = gray.width() as usize;
+    let rows = gray.as_raw().chunks_exact(width.max(1));
+    rows.map(|row| pairs(4, row)).sum::<u64>() + pairs(4 * width, gray.as_raw())
 }
 
 fn is_image(path: &Path) -> bool {
@@ -114,12 +235,13 @@ fn is_image(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::ImageBuffer;
 
     #[test]
     fn a_folder_is_read_in_order_and_past_a_broken_file() {
         let folder = tempfile::tempdir().unwrap();
-        for (name, gray) in [("b.png", 20), ("a.PGM", 10), ("d.jpg", 40)] {
-            let frame = GrayImage::from_pixel(4, 3, image::Luma([gray]));
+        for (name, gray) in [("b.png", 20), ("a.PGM", 10), ("d.jpg", 40), ("e.bmp", 50)] {
+            let frame = GrayImage::from_pixel(4, 3, Luma([gray]));
             frame.save(folder.path().join(name)).unwrap();
         }
         std::fs::write(folder.path().join("c.png"), b"not an image").unwrap();
@@ -139,7 +261,7 @@ mod tests {
                 }
             }
         }
-        assert_eq!(grays, [10, 20, 0, 40]);
+        assert_eq!(grays, [10, 20, 0, 40, 50]);
         assert!(matches!(files.grab(&mut frame), Err(FrameError::End)));
     }
 
@@ -154,5 +276,77 @@ mod tests {
                 .to_string()
                 .contains("png")
         );
+    }
+
+    /// The gray levels of a picture that is written to a file and read again.
+    fn levels(picture: &DynamicImage, channel: Channel) -> (Vec<u8>, Option<u32>) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        picture.save(&path).unwrap();
+        let mut files = ImageFiles::open(path).unwrap().with_channel(channel);
+        let mut frame = GrayImage::default();
+        files.grab(&mut frame).unwrap();
+        (frame.into_raw(), files.last_depth())
+    }
+
+    #[test]
+    fn values_of_sixteen_bits_fill_the_range() {
+        for (largest, depth) in [
+            (1023u16, Some(10)),
+            (4095, Some(12)),
+            (65535, None),
+            (200, Some(8)),
+        ] {
+            let gray =
+                ImageBuffer::from_fn(3, 1, |x, _| Luma([[0, largest / 2, largest][x as usize]]));
+            let (levels, told) = levels(&gray.into(), Channel::Luma);
+            let white = if largest == 200 { 200 } else { 255 };
+            assert_eq!(levels, [0, white / 2, white], "{largest}");
+            assert_eq!(told, depth, "{largest}");
+        }
+    }
+
+    #[test]
+    fn a_channel_is_chosen_by_name_or_by_its_changes() {
+        // Red before green of the same luma, in a little blue noise.
+        let picture = image::RgbImage::from_fn(40, 30, |x, y| {
+            let noise = (x * 7 + y * 13) % 5;
+            image::Rgb([
+                if x > 15 { 200 } else { 20 },
+                if x > 15 { 30 } else { 84 },
+                noise as u8,
+            ])
+        });
+        let picture = DynamicImage::ImageRgb8(picture);
+        let first = |channel| levels(&picture, channel).0[0];
+        assert_eq!(
+            [
+                first(Channel::Red),
+                first(Channel::Green),
+                first(Channel::Blue)
+            ],
+            [20, 84, 0]
+        );
+        let red = levels(&picture, Channel::Red);
+        assert_eq!(levels(&picture, Channel::Strongest), red);
+    }
+
+    #[test]
+    fn pictures_are_turned_as_viewers_do() {
+        // An EXIF block that says "turn by a quarter to the right".
+        let exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+        let mut jpeg = std::io::Cursor::new(Vec::new());
+        let frame = GrayImage::from_fn(32, 16, |x, _| Luma([if x < 16 { 250 } else { 5 }]));
+        frame.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+        let jpeg = jpeg.into_inner();
+        let length = (exif.len() as u16 + 2).to_be_bytes();
+        let turned = [&jpeg[..2], b"\xff\xe1", &length, exif, &jpeg[2..]].concat();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("turned.jpg");
+        std::fs::write(&path, turned).unwrap();
+        let mut read = GrayImage::default();
+        ImageFiles::open(path).unwrap().grab(&mut read).unwrap();
+        assert_eq!(read.dimensions(), (16, 32));
+        assert!(read.get_pixel(8, 4).0[0] > 200 && read.get_pixel(8, 28).0[0] < 50);
     }
 }
