@@ -69,7 +69,7 @@ impl BallDetector {
             Self::AContrario => {
                 let config = AContrarioConfig {
                     min_radius: RADII.0,
-                    max_radius: RADII.1,
+                    max_radius: Some(RADII.1),
                     max_circles: 1,
                     min_score: MIN_SCORE,
                     seed,

@@ -18,11 +18,10 @@ use hough_heuristic::{
 fn main() -> Result<(), Box<dyn Error>> {
     let mut config = AContrarioConfig::default();
     let mut words = std::env::args().skip(1);
-    for radius in [&mut config.min_radius, &mut config.max_radius] {
-        if let Some(word) = words.next() {
-            *radius = word.parse()?;
-        }
+    if let Some(word) = words.next() {
+        config.min_radius = word.parse()?;
     }
+    config.max_radius = words.next().map(|word| word.parse()).transpose()?;
     let mut detector = AContrario::new(config)?;
     let mut frames = FrameStream::y4m(BufReader::new(stdin().lock()))?;
     let mut frame = GrayImage::default();

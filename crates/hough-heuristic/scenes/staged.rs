@@ -1,7 +1,7 @@
-//! The three transforms by name and behind one trait, stages included.
+//! The detectors behind one trait, stages included, and the three transforms by name.
 
 use hough_heuristic::{
-    Acceptance, CircleDetector, ConfigError, EdgeDetector, Heuristic, HeuristicConfig,
+    AContrario, Acceptance, CircleDetector, ConfigError, EdgeDetector, Heuristic, HeuristicConfig,
     RandomizedHough, RandomizedHoughConfig, Stages, StandardHough, StandardHoughConfig,
 };
 
@@ -34,6 +34,16 @@ macro_rules! staged {
 }
 
 staged!(Heuristic RandomizedHough StandardHough);
+
+impl Staged for AContrario {
+    fn stages(&self) -> Stages<'_> {
+        self.stages()
+    }
+
+    fn keep_candidates(&mut self, keep: bool) {
+        self.keep_candidates(keep);
+    }
+}
 
 /// One of [`TRANSFORMS`].
 pub fn transform(

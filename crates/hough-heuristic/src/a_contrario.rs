@@ -11,13 +11,16 @@ mod halve;
 mod level;
 mod measure;
 mod measurement;
+mod part;
 mod partners;
 mod polar;
 mod proof;
 mod prover;
 mod refute;
 mod report;
+mod rings;
 mod search;
+mod stages;
 mod strongest;
 mod thin;
 mod track;
@@ -28,6 +31,7 @@ use image::GrayImage;
 
 pub use config::AContrarioConfig;
 pub use measurement::{Effort, Measurement};
+pub use rings::Rings;
 
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
@@ -121,8 +125,9 @@ pub struct AContrario {
     /// The outlines that were measured.
     reported: Vec<Ring>,
     budget: Budget,
-    /// The part of the frame that [`AContrario::track`] searches.
+    /// The part of the frame that is searched, if it is not all of it.
     window: GrayImage,
+    shown: stages::Shown,
 }
 
 impl AContrario {
@@ -147,6 +152,7 @@ impl AContrario {
             reported: Vec::new(),
             budget: Budget::default(),
             window: GrayImage::default(),
+            shown: stages::Shown::default(),
             config,
         })
     }
@@ -165,6 +171,16 @@ impl AContrario {
             ended_by_budget: self.budget.spent,
             ended_by_count: self.budget.left_out,
         }
+    }
+
+    /// Lists the measurements as detections.
+    fn list(&mut self) {
+        self.found.clear();
+        let detections = self.measurements.iter().map(|measurement| Detection {
+            circle: measurement.circle,
+            score: measurement.score,
+        });
+        self.found.extend(detections);
     }
 
     /// Finds the circles of a frame with radii in this range, or about the one radius, into
@@ -315,16 +331,9 @@ impl CircleDetector for AContrario {
     fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
         self.measurements.clear();
         self.budget = Budget::default();
-        if let Some(region) = &self.config.region {
-            region.check_frame(frame.width(), frame.height())?;
-        }
-        self.find(frame, (self.config.min_radius, self.config.max_radius));
-        self.found.clear();
-        let detections = self.measurements.iter().map(|measurement| Detection {
-            circle: measurement.circle,
-            score: measurement.score,
-        });
-        self.found.extend(detections);
+        self.find_in_region(frame)?;
+        self.choose();
+        self.list();
         Ok(&self.found)
     }
 }
@@ -332,8 +341,7 @@ impl CircleDetector for AContrario {
 /// Returns the circles of a single frame with radii of `min_radius..=max_radius` pixels, best
 /// first.
 ///
-/// Runs [`AContrario`] with its default settings, which report up to 32 circles. For a stream of
-/// frames build a detector once.
+/// Runs [`AContrario`] with its default settings. For a stream of frames build a detector once.
 ///
 /// # Errors
 /// [`ConfigError::RadiusRange`] if the range is empty, [`ConfigError::OutOfRange`] if its lower end
@@ -345,7 +353,7 @@ pub fn detect_circles(
 ) -> Result<Vec<Detection>, ConfigError> {
     let config = AContrarioConfig {
         min_radius,
-        max_radius,
+        max_radius: Some(max_radius),
         ..AContrarioConfig::default()
     };
     let mut detector = AContrario::new(config)?;

@@ -81,13 +81,13 @@ mod frame;
 #[cfg(feature = "files")]
 mod output;
 #[cfg(feature = "cli")]
-pub mod program;
+mod program;
 mod region;
 mod sampling;
 mod stages;
 mod transforms;
 
-pub use a_contrario::{AContrario, AContrarioConfig, Effort, Measurement, detect_circles};
+pub use a_contrario::{AContrario, AContrarioConfig, Effort, Measurement, Rings, detect_circles};
 pub use acceptance::Acceptance;
 pub use circle::{Circle, Features};
 pub use curve::{Curve, Ellipse, Line};
@@ -98,9 +98,11 @@ pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeMap, EdgePixel};
 pub use edges::{Vectorized, widest};
 pub use error::ConfigError;
 #[cfg(feature = "files")]
-pub use frame::ImageFiles;
+pub use frame::{Channel, ImageFiles};
 pub use frame::{FrameError, FrameSource, FrameStream, Y4mWriter};
 pub use image;
+#[cfg(feature = "cli")]
+pub use program::run_detect_circles;
 pub use region::Region;
 pub use stages::Stages;
 pub use transforms::{

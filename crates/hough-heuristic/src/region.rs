@@ -1,5 +1,7 @@
 //! The rectangle in which a centre must lie.
 
+use image::GrayImage;
+
 use crate::circle::Circle;
 use crate::detect::FrameRefused;
 use crate::error::ConfigError;
@@ -64,6 +66,40 @@ impl Region {
             (0.0..=f64::from(length)).contains(&from_edge)
         };
         within(circle.x, self.left, self.width) && within(circle.y, self.top, self.height)
+    }
+}
+
+impl Region {
+    /// Returns the part of a frame that lies within `reach` pixels of the region.
+    pub(crate) fn grown(&self, reach: f64, frame_width: u32, frame_height: u32) -> Self {
+        let reach = reach.ceil() as u32;
+        let span = |start: u32, length: u32, end: u32| {
+            let first = start.saturating_sub(reach);
+            (
+                first,
+                (start + length).saturating_add(reach).min(end) - first,
+            )
+        };
+        let (left, width) = span(self.left, self.width, frame_width);
+        let (top, height) = span(self.top, self.height, frame_height);
+        Self {
+            left,
+            top,
+            width,
+            height,
+        }
+    }
+
+    /// Copies the pixels of the region, which must lie in the frame, reusing the memory of `into`.
+    pub(crate) fn cut(&self, frame: &GrayImage, into: GrayImage) -> GrayImage {
+        let mut pixels = into.into_raw();
+        pixels.clear();
+        let (first, end) = (self.left as usize, (self.left + self.width) as usize);
+        let rows = frame.as_raw().chunks_exact(frame.width().max(1) as usize);
+        for row in rows.skip(self.top as usize).take(self.height as usize) {
+            pixels.extend_from_slice(&row[first..end]);
+        }
+        GrayImage::from_raw(self.width, self.height, pixels).unwrap_or_default()
     }
 }
 

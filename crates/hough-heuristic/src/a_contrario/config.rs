@@ -1,8 +1,13 @@
 //! The settings of the a contrario detector.
 
-use crate::error::ConfigError;
-use crate::error::{require, require_radii};
+use super::rings::Rings;
+use crate::error::{ConfigError, require, require_radii, require_some};
 use crate::region::Region;
+
+/// Default of the largest radius, in shorter sides of the frame.
+const LARGEST: f64 = 0.52;
+/// Least default of the largest radius beside a small region, pixels.
+const LARGEST_IN_REGION: f64 = 280.0;
 
 /// Settings of [`AContrario`](crate::AContrario).
 ///
@@ -14,12 +19,18 @@ pub struct AContrarioConfig {
     /// Smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is
     /// searched too, which takes several times as long.
     pub min_radius: f64,
-    /// Largest radius, pixels (default 280; min_radius..=100000). If it equals `min_radius`, the
-    /// radius is known: circles whose measured radius is within 1 px plus 5 % of it are reported
-    /// with that radius.
-    pub max_radius: f64,
-    /// Largest number of circles reported, best first (default 32; at least 1).
+    /// Largest radius, pixels (min_radius..=100000). The default, None, is 0.52 of the frame's
+    /// shorter side; with a `region` it is at most 0.52 of the region's shorter side or 280 px,
+    /// whichever is more. If it equals `min_radius`, the radius is known: circles whose measured
+    /// radius is within 1 px plus 5 % of it are reported with that radius.
+    pub max_radius: Option<f64>,
+    /// Largest number of circles reported, best first (default: all; at least 1).
     pub max_circles: usize,
+    /// Circles reported of those about one centre (default [`Rings::All`]).
+    pub rings: Rings,
+    /// Smallest distance between the centres of two circles, pixels (default 0: any; at least 0).
+    /// Of two nearer ones the better is reported.
+    pub min_distance: f64,
     /// Smallest score reported (default 0.5, which bounds circles of pure chance by one in ten
     /// frames; 0..=1). Larger values drop things that are hardly round. Smaller values add mostly
     /// circles of chance.
@@ -36,7 +47,8 @@ pub struct AContrarioConfig {
     /// time limit the result depends on the speed of the machine. It has no effect on targets
     /// without a clock.
     pub milliseconds_per_megapixel: Option<f64>,
-    /// Region in which the centre must lie (default None: anywhere).
+    /// Region in which the centre must lie (default None: anywhere). Only the region and what lies
+    /// within the largest radius of it are searched.
     pub region: Option<Region>,
     /// Seed of the draws (default 1).
     pub seed: u64,
@@ -46,8 +58,10 @@ impl Default for AContrarioConfig {
     fn default() -> Self {
         Self {
             min_radius: 8.0,
-            max_radius: 280.0,
-            max_circles: 32,
+            max_radius: None,
+            max_circles: usize::MAX,
+            rings: Rings::All,
+            min_distance: 0.0,
             min_score: 0.5,
             contrast: 8.0,
             draws_per_megapixel: 50_000,
@@ -60,44 +74,39 @@ impl Default for AContrarioConfig {
 
 impl AContrarioConfig {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        require_radii(self.min_radius, self.max_radius)?;
-        require(
-            "min_radius",
-            self.min_radius,
-            "at least 4",
-            self.min_radius >= 4.0,
-        )?;
-        require(
-            "max_circles",
-            self.max_circles as f64,
-            "at least 1",
-            self.max_circles > 0,
-        )?;
-        require(
-            "min_score",
-            self.min_score,
-            "0..=1",
-            (0.0..=1.0).contains(&self.min_score),
-        )?;
-        require(
-            "contrast",
-            self.contrast,
-            "above 0..=128",
-            self.contrast > 0.0 && self.contrast <= 128.0,
-        )?;
-        require(
-            "draws_per_megapixel",
-            self.draws_per_megapixel.into(),
-            "at least 1",
-            self.draws_per_megapixel > 0,
-        )?;
+        let (min, score, contrast) = (self.min_radius, self.min_score, self.contrast);
+        require_radii(min, self.max_radius.unwrap_or(min))?;
+        require("min_radius", min, "at least 4", min >= 4.0)?;
+        require_some("max_circles", self.max_circles)?;
+        let distance = self.min_distance;
+        let usable = distance.is_finite() && distance >= 0.0;
+        require("min_distance", distance, "finite and at least 0 px", usable)?;
+        require("min_score", score, "0..=1", (0.0..=1.0).contains(&score))?;
+        let usable = contrast > 0.0 && contrast <= 128.0;
+        require("contrast", contrast, "above 0..=128", usable)?;
+        require_some("draws_per_megapixel", self.draws_per_megapixel as usize)?;
         let time = self.milliseconds_per_megapixel.unwrap_or(1.0);
-        require(
-            "milliseconds_per_megapixel",
-            time,
-            "above 0..=1e6",
-            time > 0.0 && time <= 1e6,
-        )?;
+        let usable = time > 0.0 && time <= 1e6;
+        require("milliseconds_per_megapixel", time, "above 0..=1e6", usable)?;
         self.region.map_or(Ok(()), |region| region.check())
+    }
+
+    /// The radius, if only one is allowed.
+    pub(super) fn known_radius(&self) -> Option<f64> {
+        self.max_radius.filter(|max| self.min_radius >= *max)
+    }
+
+    /// The range of radii for a frame of this size.
+    pub(super) fn radii(&self, width: u32, height: u32) -> (f64, f64) {
+        let part = |width: u32, height: u32| LARGEST * f64::from(width.min(height));
+        let by_frame = part(width, height);
+        let by_region = |region: Region| part(region.width, region.height).max(LARGEST_IN_REGION);
+        let default = self
+            .region
+            .map_or(by_frame, |region| by_region(region).min(by_frame));
+        let max = self
+            .max_radius
+            .unwrap_or(default.max(self.min_radius + 1.0));
+        (self.min_radius, max)
     }
 }

@@ -120,6 +120,12 @@ impl Level {
         rows.end(candidates.len());
     }
 
+    /// The positions of all points.
+    pub(super) fn points(&self) -> impl Iterator<Item = (f32, f32)> {
+        let positions = self.rows.x.iter().zip(&self.rows.y);
+        positions.map(|(&x, &y)| (x, y)).take(self.free.len())
+    }
+
     /// The mark of the pixel, or None outside.
     #[inline]
     pub(super) fn mark(&self, x: f32, y: f32) -> Option<(u8, usize)> {

@@ -68,12 +68,10 @@ impl AContrario {
                 radius: r.into(),
             };
             let fits = (radii.0..=radii.1).contains(&circle.radius);
-            if self.config.min_radius >= self.config.max_radius {
-                circle.radius = self.config.max_radius;
-            }
+            circle.radius = self.config.known_radius().unwrap_or(circle.radius);
             let region = self.config.region.as_ref();
             if fits && region.is_none_or(|region| region.holds(&circle)) {
-                if self.measurements.len() == self.config.max_circles {
+                if self.measurements.len() == self.most_reported() {
                     self.budget.left_out = true;
                     break;
                 }

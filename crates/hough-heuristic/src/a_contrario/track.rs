@@ -2,9 +2,11 @@
 
 use image::GrayImage;
 
+use super::part::MARGIN;
 use super::{AContrario, LEAST_SIDE, Measurement};
 use crate::circle::Circle;
 use crate::detect::{CircleDetector, FrameRefused};
+use crate::region::Region;
 
 impl AContrario {
     /// Searches for the circle `last`, whose centre and radius may have changed by `reach` pixels,
@@ -35,9 +37,10 @@ impl AContrario {
 
     /// The best circle near the last one.
     fn follow(&mut self, frame: &GrayImage, last: &Circle, reach: f64) -> Option<Measurement> {
+        let (min, max) = self.config.radii(frame.width(), frame.height());
         let radii = (
-            (last.radius - reach).max(self.config.min_radius),
-            (last.radius + reach).min(self.config.max_radius),
+            (last.radius - reach).max(min),
+            (last.radius + reach).min(max),
         );
         let usable = [last.x, last.y, last.radius, reach]
             .iter()
@@ -47,30 +50,23 @@ impl AContrario {
         }
         // The window holds the outline wherever it may be, and the rays beyond it.
         let extent = last.radius + 2.0 * reach + MARGIN;
-        let clip = |value: f64, end: u32| value.clamp(0.0, f64::from(end)) as u32;
-        let (left, right) = (
-            clip(last.x - extent, frame.width()),
-            clip(last.x + extent + 1.0, frame.width()),
-        );
-        let (top, bottom) = (
-            clip(last.y - extent, frame.height()),
-            clip(last.y + extent + 1.0, frame.height()),
-        );
-        let (width, height) = (right - left, bottom - top);
+        let span = |middle: f64, end: u32| {
+            let clip = |value: f64| value.clamp(0.0, f64::from(end)) as u32;
+            let first = clip(middle - extent);
+            (first, clip(middle + extent + 1.0) - first)
+        };
+        let (left, width) = span(last.x, frame.width());
+        let (top, height) = span(last.y, frame.height());
         if width < LEAST_SIDE || height < LEAST_SIDE {
             return None;
         }
-        let mut pixels = std::mem::take(&mut self.window).into_raw();
-        pixels.clear();
-        for row in frame
-            .as_raw()
-            .chunks_exact(frame.width() as usize)
-            .take(bottom as usize)
-            .skip(top as usize)
-        {
-            pixels.extend_from_slice(&row[left as usize..right as usize]);
-        }
-        let window = GrayImage::from_raw(width, height, pixels).unwrap_or_default();
+        let part = Region {
+            left,
+            top,
+            width,
+            height,
+        };
+        let window = part.cut(frame, std::mem::take(&mut self.window));
         let region = self.config.region.take();
         self.find(&window, radii);
         self.config.region = region;
@@ -98,6 +94,3 @@ impl AContrario {
         })
     }
 }
-
-/// Pixels beyond the outline, at its farthest, that are looked at.
-const MARGIN: f64 = 16.0;

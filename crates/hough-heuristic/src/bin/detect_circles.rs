@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    hough_heuristic::program::run(std::env::args_os())
+    hough_heuristic::run_detect_circles(std::env::args_os())
 }

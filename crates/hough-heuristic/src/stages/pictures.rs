@@ -53,7 +53,7 @@ impl Stages<'_> {
             ("1_edges.png", edges),
             ("2_structure.png", structure),
             ("3_candidates.png", candidates),
-            ("4_accepted.png", with_circles(frame, found)),
+            ("4_accepted.png", with_circles(darkened(frame, 1), found)),
         ];
         let paths = pictures.each_ref().map(|(name, _)| folder.join(name));
         for (path, (_, picture)) in paths.iter().zip(&pictures) {
@@ -63,9 +63,8 @@ impl Stages<'_> {
     }
 }
 
-/// Returns the frame with the circles found and their centers drawn in.
-pub(crate) fn with_circles(frame: &GrayImage, found: &[Detection]) -> RgbImage {
-    let mut picture = darkened(frame, 1);
+/// Draws the circles found and their centers into a picture.
+pub(crate) fn with_circles(mut picture: RgbImage, found: &[Detection]) -> RgbImage {
     for &Detection { circle, .. } in found {
         for radius in [circle.radius - 0.5, circle.radius + 0.5] {
             draw(&mut picture, &Circle { radius, ..circle }, FOUND);

@@ -20,7 +20,7 @@ use crate::detectors::SCENE;
 
 pub(crate) fn with(change: impl FnOnce(&mut AContrarioConfig)) -> AContrario {
     let mut config = AContrarioConfig {
-        max_radius: 60.0,
+        max_radius: Some(60.0),
         ..AContrarioConfig::default()
     };
     change(&mut config);
@@ -207,7 +207,7 @@ fn any_number_of_threads_finds_the_same() {
             ..SCENE
         };
         let (frame, balls) = scene.render();
-        let detector = || with(|config| config.max_radius = 130.0);
+        let detector = || with(|config| config.max_radius = Some(130.0));
         let mut one = detector();
         pool(1).install(|| one.detect(&frame).unwrap());
         assert!(2 * one.measurements().len() > balls.len());
@@ -258,7 +258,7 @@ fn no_pattern_takes_more_than_the_budget() {
     for (name, frame) in patterns(400, 300) {
         for draws_per_megapixel in [1_000, 20_000, 200_000] {
             let mut detector = with(|config| {
-                config.max_radius = 140.0;
+                config.max_radius = Some(140.0);
                 config.draws_per_megapixel = draws_per_megapixel;
             });
             detector.detect(&frame).unwrap();
@@ -292,6 +292,8 @@ fn an_empty_budget_is_refused_and_a_spent_one_is_reported() {
         refused(|config| config.max_circles = 0),
         refused(|config| config.min_score = 1.1),
         refused(|config| config.contrast = 0.0),
+        refused(|config| config.max_radius = Some(0.0)),
+        refused(|config| config.min_distance = f64::NAN),
     ] {
         assert!(matches!(
             error,

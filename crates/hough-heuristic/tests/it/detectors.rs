@@ -17,7 +17,7 @@ pub(crate) fn all(accept: Acceptance) -> Vec<(&'static str, Box<dyn CircleDetect
         .collect();
     let a_contrario = AContrarioConfig {
         min_radius: accept.min_radius,
-        max_radius: accept.max_radius,
+        max_radius: Some(accept.max_radius),
         max_circles: accept.max_circles,
         region: accept.region,
         ..AContrarioConfig::default()

@@ -8,6 +8,7 @@
 mod a_contrario;
 mod a_contrario_score;
 mod any_frame;
+mod choice;
 mod curves;
 mod detectors;
 mod heuristic;

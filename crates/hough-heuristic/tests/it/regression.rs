@@ -79,7 +79,7 @@ fn views(frame: &GrayImage) -> Vec<(GrayImage, impl Fn(&Circle) -> Circle)> {
 fn detector(min_radius: f64, max_radius: f64) -> AContrario {
     AContrario::new(AContrarioConfig {
         min_radius,
-        max_radius,
+        max_radius: Some(max_radius),
         max_circles: 3000,
         ..AContrarioConfig::default()
     })
