@@ -44,72 +44,44 @@ impl ArmDynamics {
     /// Returns the values of Armstrong, Khatib and Burdick (1986) as edited by Corke and
     /// Armstrong-Hélouvry (1994) for the Robotics Toolbox.
     pub fn corke() -> Self {
-        let link = |mass, centre, inertia, motor_inertia, viscous, coulomb, gear| LinkDynamics {
-            mass,
-            centre,
-            inertia,
-            motor_inertia,
-            viscous,
-            coulomb,
-            gear,
-        };
+        let mass = [0.0, 17.4, 4.8, 0.82, 0.34, 0.09];
+        let centre = [
+            [0.0; 3],
+            [-0.3638, 0.006, 0.2275],
+            [-0.0203, -0.0141, 0.070],
+            [0.0, 0.019, 0.0],
+            [0.0; 3],
+            [0.0, 0.0, 0.032],
+        ];
+        let inertia = [
+            [0.0, 0.35, 0.0],
+            [0.13, 0.524, 0.539],
+            [0.066, 0.086, 0.0125],
+            [1.8e-3, 1.3e-3, 1.8e-3],
+            [0.3e-3, 0.4e-3, 0.3e-3],
+            [0.15e-3, 0.15e-3, 0.04e-3],
+        ];
+        let motor_inertia = [200e-6, 200e-6, 200e-6, 33e-6, 33e-6, 33e-6];
+        let viscous = [1.48e-3, 0.817e-3, 1.38e-3, 71.2e-6, 82.6e-6, 36.7e-6];
+        let coulomb = [
+            [0.395, -0.435],
+            [0.126, -0.071],
+            [0.132, -0.105],
+            [11.2e-3, -16.9e-3],
+            [9.26e-3, -14.5e-3],
+            [3.96e-3, -10.5e-3],
+        ];
+        let gear = [62.6111, 107.815, 53.7063, 76.0364, 71.923, 76.686];
         Self {
-            links: [
-                link(
-                    0.0,
-                    [0.0; 3],
-                    [0.0, 0.35, 0.0],
-                    200e-6,
-                    1.48e-3,
-                    [0.395, -0.435],
-                    62.6111,
-                ),
-                link(
-                    17.4,
-                    [-0.3638, 0.006, 0.2275],
-                    [0.13, 0.524, 0.539],
-                    200e-6,
-                    0.817e-3,
-                    [0.126, -0.071],
-                    107.815,
-                ),
-                link(
-                    4.8,
-                    [-0.0203, -0.0141, 0.070],
-                    [0.066, 0.086, 0.0125],
-                    200e-6,
-                    1.38e-3,
-                    [0.132, -0.105],
-                    53.7063,
-                ),
-                link(
-                    0.82,
-                    [0.0, 0.019, 0.0],
-                    [1.8e-3, 1.3e-3, 1.8e-3],
-                    33e-6,
-                    71.2e-6,
-                    [11.2e-3, -16.9e-3],
-                    76.0364,
-                ),
-                link(
-                    0.34,
-                    [0.0; 3],
-                    [0.3e-3, 0.4e-3, 0.3e-3],
-                    33e-6,
-                    82.6e-6,
-                    [9.26e-3, -14.5e-3],
-                    71.923,
-                ),
-                link(
-                    0.09,
-                    [0.0, 0.0, 0.032],
-                    [0.15e-3, 0.15e-3, 0.04e-3],
-                    33e-6,
-                    36.7e-6,
-                    [3.96e-3, -10.5e-3],
-                    76.686,
-                ),
-            ],
+            links: std::array::from_fn(|i| LinkDynamics {
+                mass: mass[i],
+                centre: centre[i],
+                inertia: inertia[i],
+                motor_inertia: motor_inertia[i],
+                viscous: viscous[i],
+                coulomb: coulomb[i],
+                gear: gear[i],
+            }),
             gravity: 9.81,
         }
     }

@@ -75,29 +75,29 @@ fn moves_out_of_range_are_refused_before_anything_is_sent() {
     client.joints().unwrap();
     let before = client.line().traffic();
     let out = JointDelta::from_degrees([0.0, 0.0, 136.0, 0.0, 0.0, 0.0]);
-    assert!(matches!(
+    assert_matches!(
         client.move_by(out),
         Err(ArmError::JointLimit { joint: Joint::J3, wanted_degrees, max_degrees, .. })
             if (wanted_degrees - 226.0).abs() < 1e-9 && (max_degrees - 225.0).abs() < 1e-9
-    ));
-    assert!(matches!(
+    );
+    assert_matches!(
         client.drive(Joint::J2, f64::NAN, 100.0),
         Err(ArmError::NotFinite { joint: Joint::J2 })
-    ));
-    assert!(matches!(
+    );
+    assert_matches!(
         client.drive(Joint::J2, 0.1, 0.0),
         Err(ArmError::Setting { .. })
-    ));
-    assert!(matches!(
+    );
+    assert_matches!(
         client.set_speed(f64::INFINITY),
         Err(ArmError::Setting { .. })
-    ));
+    );
     let mut nowhere = Joints::default();
     nowhere.0[5] = f64::INFINITY;
-    assert!(matches!(
+    assert_matches!(
         client.move_to(nowhere),
         Err(ArmError::NotFinite { joint: Joint::J6 })
-    ));
+    );
     assert_eq!(client.line().traffic(), before);
 }
 
@@ -109,10 +109,10 @@ fn arm_power_off_is_reported_and_waited_for_if_so_configured() {
         MemoryLine::new(emulator)
     };
     let mut client = Val2Client::connect(line(), ClientConfig::default()).unwrap();
-    assert!(matches!(
-    client.calibrate(),
-    Err(ArmError::Refused { message, .. }) if message == "Arm power off"
-    ));
+    assert_matches!(
+        client.calibrate(),
+        Err(ArmError::Refused { message, .. }) if message == "Arm power off"
+    );
     let patient = ClientConfig {
         power_retries: 2,
         power_retry_delay: Duration::from_secs(5),
@@ -172,21 +172,15 @@ fn silence_and_garbage_are_told_apart_in_time() {
         }
     }
     let silent = Val2Client::connect(Dead(Duration::ZERO, b""), ClientConfig::default()).map(drop);
-    assert!(
-        matches!(
-            &silent,
-            Err(ArmError::Silence { port, waited, .. })
-                if port == "/dev/nothing" && waited.as_secs() == 10
-        ),
-        "{silent:?}"
+    assert_matches!(
+        &silent,
+        Err(ArmError::Silence { port, waited, .. })
+            if port == "/dev/nothing" && waited.as_secs() == 10
     );
     for noise in [&b"\xff\x00\x81"[..], b"login: ", b"42 "] {
         let garbled =
             Val2Client::connect(Dead(Duration::ZERO, noise), ClientConfig::default()).map(drop);
-        assert!(
-            matches!(garbled, Err(ArmError::Garbled { .. })),
-            "{noise:?}: {garbled:?}"
-        );
+        assert_matches!(garbled, Err(ArmError::Garbled { .. }), "{noise:?}");
     }
 }
 
@@ -207,15 +201,12 @@ fn the_hand_moves_to_its_pose_interpolated_or_straight() {
     }
     let mut far = start.hand;
     far.x = 3.0;
-    assert!(matches!(
-    client.move_hand(&far, false),
-    Err(ArmError::Refused { message, .. }) if message == "Location out of range"
-    ));
-    far.x = f64::NAN;
-    assert!(matches!(
+    assert_matches!(
         client.move_hand(&far, false),
-        Err(ArmError::Setting { .. })
-    ));
+        Err(ArmError::Refused { message, .. }) if message == "Location out of range"
+    );
+    far.x = f64::NAN;
+    assert_matches!(client.move_hand(&far, false), Err(ArmError::Setting { .. }));
 }
 
 #[test]
@@ -245,17 +236,11 @@ fn programs_are_stored_run_and_aborted() {
         said.contains(" 1") && said.contains(" 2") && said.contains("completed"),
         "{said}"
     );
-    assert!(matches!(
-        client.execute("NOTHING"),
-        Err(ArmError::Refused { .. })
-    ));
+    assert_matches!(client.execute("NOTHING"), Err(ArmError::Refused { .. }));
     client
         .store_program("COUNT", &["WAIT SIG(1001)".to_owned()])
         .unwrap();
-    assert!(matches!(
-        client.execute("COUNT"),
-        Err(ArmError::Silence { .. })
-    ));
+    assert_matches!(client.execute("COUNT"), Err(ArmError::Silence { .. }));
     client.joints().unwrap();
 }
 
@@ -275,10 +260,10 @@ fn a_running_program_is_aborted_at_connection_or_reported() {
         abort_running_program: false,
         ..ClientConfig::default()
     };
-    assert!(matches!(
+    assert_matches!(
         Val2Client::connect(running(), gentle).map(drop),
         Err(ArmError::Garbled { .. })
-    ));
+    );
 }
 
 #[test]
@@ -323,12 +308,9 @@ fn a_program_that_asks_for_values_is_aborted_and_not_answered() {
         let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
         client.calibrate().unwrap();
         let outcome = client.execute("ASK");
-        assert!(
-            matches!(
-                outcome,
-                Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
-            ),
-            "{outcome:?}"
+        assert_matches!(
+            outcome,
+            Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
         );
         assert!(client.last_known().is_none());
         client
@@ -347,12 +329,10 @@ fn a_program_without_end_is_aborted_in_time() {
     client.store_program("QUIET", &quiet).unwrap();
     for name in ["CHAT", "QUIET"] {
         let outcome = client.execute(name);
-        assert!(
-            matches!(
-                outcome,
-                Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
-            ),
-            "{name}: {outcome:?}"
+        assert_matches!(
+            outcome,
+            Err(ArmError::Garbled { .. } | ArmError::Silence { .. }),
+            "{name}"
         );
         client.joints().unwrap();
         client.set_gripper(Gripper::Closed).unwrap();
@@ -381,10 +361,7 @@ fn a_step_that_is_refused_leaves_the_editor() {
     for bad in ["FROBNICATE 3", "IF 1 GOTO"] {
         let steps = ["TYPE 1".to_owned(), bad.to_owned()];
         let outcome = client.store_program("BAD", &steps);
-        assert!(
-            matches!(&outcome, Err(ArmError::Refused { sent, .. }) if sent == bad),
-            "{outcome:?}"
-        );
+        assert_matches!(&outcome, Err(ArmError::Refused { sent, .. }) if sent == bad);
         client.joints().unwrap();
         client.set_gripper(Gripper::Open).unwrap();
     }
@@ -402,10 +379,7 @@ fn names_and_steps_of_several_lines_are_refused_unsent() {
             client.store_program("GOOD", &["TYPE 1".to_owned(), bad.to_owned()]),
         ];
         for outcome in outcomes {
-            assert!(
-                matches!(outcome, Err(ArmError::Setting { .. })),
-                "{bad:?}: {outcome:?}"
-            );
+            assert_matches!(outcome, Err(ArmError::Setting { .. }), "{bad:?}");
         }
     }
     assert_eq!(client.line().traffic(), before);

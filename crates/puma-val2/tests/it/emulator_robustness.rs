@@ -6,81 +6,16 @@ use proptest::prelude::*;
 use puma_val2::{Emulator, Location, Profile, PumaParams};
 
 /// Pieces of VAL II in which chance finds more than in bytes.
+const WORDS: &str = r#"
+    WHERE DO CAL Y N SPEED HERE POINT EDIT EXECUTE ABORT A #P P 10 -3.5 , ( ) = [ ] : + *
+    MOVE MOVES DRIVE TRANS #PPOINT IF THEN GOTO FOR TO END WHILE CASE OF VALUE UNTIL TYPE
+    PROMPT "x" /X9 REACTI 1001 SIG WAIT CALL DELAY E I D S STORE LOAD TOOL BASE SHIFT BY
+    FRAME READY ; DECOMPOSE SET DELETE LISTP RETRY PROCEED NEXT DRAW
+"#;
+
+/// A line of such pieces.
 fn line() -> impl Strategy<Value = String> {
-    let word = prop_oneof![
-        Just("WHERE"),
-        Just("DO"),
-        Just("CAL"),
-        Just("Y"),
-        Just("N"),
-        Just("SPEED"),
-        Just("HERE"),
-        Just("POINT"),
-        Just("EDIT"),
-        Just("EXECUTE"),
-        Just("ABORT"),
-        Just("A"),
-        Just("#P"),
-        Just("P"),
-        Just("10"),
-        Just("-3.5"),
-        Just(","),
-        Just("("),
-        Just(")"),
-        Just("="),
-        Just("["),
-        Just("]"),
-        Just(":"),
-        Just("+"),
-        Just("*"),
-        Just("MOVE"),
-        Just("MOVES"),
-        Just("DRIVE"),
-        Just("TRANS"),
-        Just("#PPOINT"),
-        Just("IF"),
-        Just("THEN"),
-        Just("GOTO"),
-        Just("FOR"),
-        Just("TO"),
-        Just("END"),
-        Just("WHILE"),
-        Just("CASE"),
-        Just("OF"),
-        Just("VALUE"),
-        Just("UNTIL"),
-        Just("TYPE"),
-        Just("PROMPT"),
-        Just("\"x\""),
-        Just("/X9"),
-        Just("REACTI"),
-        Just("1001"),
-        Just("SIG"),
-        Just("WAIT"),
-        Just("CALL"),
-        Just("DELAY"),
-        Just("E"),
-        Just("I"),
-        Just("D"),
-        Just("S"),
-        Just("STORE"),
-        Just("LOAD"),
-        Just("TOOL"),
-        Just("BASE"),
-        Just("SHIFT"),
-        Just("BY"),
-        Just("FRAME"),
-        Just("READY"),
-        Just(";"),
-        Just("DECOMPOSE"),
-        Just("SET"),
-        Just("DELETE"),
-        Just("LISTP"),
-        Just("RETRY"),
-        Just("PROCEED"),
-        Just("NEXT"),
-        Just("DRAW"),
-    ];
+    let word = prop::sample::select(WORDS.split_whitespace().collect::<Vec<_>>());
     prop::collection::vec(word, 0..10).prop_map(|words| words.join(" "))
 }
 

@@ -7,6 +7,19 @@
     reason = "functions that serve tests may fail and print"
 )]
 
+/// Fails, and shows the value, unless it has this pattern.
+macro_rules! assert_matches {
+    ($value:expr, $pattern:pat $(if $guard:expr)?) => {
+        assert_matches!($value, $pattern $(if $guard)?, "")
+    };
+    ($value:expr, $pattern:pat $(if $guard:expr)?, $($context:tt)+) => {
+        match &$value {
+            $pattern $(if $guard)? => {}
+            other => panic!("{} {other:?}", format!($($context)+)),
+        }
+    };
+}
+
 mod budget;
 mod client;
 mod client_robustness;

@@ -6,24 +6,40 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
-use puma_val2::{ArmDynamics, Joints, PumaParams, Xyzoat};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix4, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector6,
+};
+use puma_val2::{ArmDynamics, Joints, PumaParams, Solution, Xyzoat};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// The rows of a table as numbers; words become NaN.
-fn table(name: &str) -> Option<Vec<Vec<f64>>> {
+/// Compares every row of a table, whose words become NaN, and prints the greatest differences.
+fn compare<const N: usize>(
+    name: &str,
+    least_rows: usize,
+    bound: f64,
+    differences: impl Fn(&[f64]) -> [f64; N],
+) {
     let folder = std::env::var_os("PUMA_GRASP_SHARED");
     let path = folder.map(|f| std::path::Path::new(&f).join("oracles").join(name));
     let Some(text) = path.and_then(|p| std::fs::read_to_string(p).ok()) else {
         println!("skipped: {name} is not there (PUMA_GRASP_SHARED)");
-        return None;
+        return;
     };
-    let row = |line: &str| {
-        line.split(',')
-            .map(|v| v.parse().unwrap_or(f64::NAN))
-            .collect()
-    };
-    Some(text.lines().skip(1).map(row).collect())
+    let (mut worst, mut rows) = ([0.0; N], 0);
+    for line in text.lines().skip(1) {
+        let number = |word: &str| word.parse().unwrap_or(f64::NAN);
+        let row: Vec<f64> = line.split(',').map(number).collect();
+        for (worst, difference) in worst.iter_mut().zip(differences(&row)) {
+            *worst = greater(*worst, difference);
+        }
+        rows += 1;
+    }
+    let shown = worst.map(|w| format!("{w:.1e}")).join(", ");
+    println!("{name}: {rows} rows, greatest differences {shown}");
+    assert!(
+        rows > least_rows && worst.iter().all(|w| *w < bound),
+        "{name}: {worst:?}"
+    );
 }
 
 fn six(row: &[f64]) -> [f64; 6] {
@@ -64,6 +80,12 @@ fn apart(a: &Joints, b: &Joints) -> f64 {
     (0..6).fold(0.0, |most, i| greater(most, angle_between(a.0[i], b.0[i])))
 }
 
+/// The distance of the solution that lies nearest.
+fn nearest(found: &[Solution; 8], wanted: &Joints) -> f64 {
+    let distances = found.iter().map(|s| apart(&s.joints, wanted));
+    distances.fold(f64::MAX, f64::min)
+}
+
 /// The greater of two differences. What is no number is as far off as can be: `f64::max` would
 /// overlook it.
 fn greater(a: f64, b: f64) -> f64 {
@@ -96,144 +118,74 @@ fn what_is_no_number_is_a_difference() {
 
 #[test]
 fn forward_kinematics_agree_with_the_toolbox() {
-    let Some(rows) = table("fk_oracle.dev.csv") else {
-        return;
-    };
     let arm = PumaParams::corke();
-    let worst = rows
-        .iter()
-        .map(|row| {
-            amax(&(toolbox_pose(&arm.forward(&val(row))) - Matrix4::from_row_slice(&row[6..22])))
-        })
-        .fold(0.0, greater);
-    println!(
-        "forward kinematics: {} rows, greatest difference {worst:.1e}",
-        rows.len()
-    );
-    assert!(rows.len() > 100 && worst < 1e-9);
+    compare("fk_oracle.dev.csv", 100, 1e-9, |row| {
+        let pose = toolbox_pose(&arm.forward(&val(row)));
+        [amax(&(pose - Matrix4::from_row_slice(&row[6..22])))]
+    });
 }
 
 #[test]
 fn all_solutions_of_the_inverse_agree_with_the_toolbox() {
-    let Some(rows) = table("ik_oracle.dev.csv") else {
-        return;
-    };
     let arm = PumaParams::corke();
-    let mut worst = 0.0_f64;
-    for row in &rows {
-        let pose = from_toolbox(&row[7..23]);
-        let wanted = val(&row[24..30]);
-        let found = arm.inverse(&pose).unwrap();
-        assert_eq!(found.len(), 8);
-        let best = found
-            .iter()
-            .map(|s| apart(&s.joints, &wanted))
-            .fold(f64::MAX, f64::min);
-        worst = greater(worst, best);
-    }
-    println!(
-        "inverse kinematics: {} solutions, greatest difference {worst:.1e} rad",
-        rows.len()
-    );
-    assert!(rows.len() > 100 && worst < 1e-9);
+    compare("ik_oracle.dev.csv", 100, 1e-9, |row| {
+        let found = arm.inverse(&from_toolbox(&row[7..23])).unwrap();
+        [nearest(&found, &val(&row[24..30]))]
+    });
 }
 
 #[test]
 fn jacobians_agree_with_the_toolbox() {
-    let Some(rows) = table("jacobian_oracle.dev.csv") else {
-        return;
-    };
     let arm = PumaParams::corke();
-    let turned = nalgebra::Matrix6::from_diagonal(&[-1.0, -1.0, 1.0, -1.0, -1.0, 1.0].into());
-    let mut worst = 0.0_f64;
-    for row in &rows {
+    let turned = Matrix6::from_diagonal(&[-1.0, -1.0, 1.0, -1.0, -1.0, 1.0].into());
+    compare("jacobian_oracle.dev.csv", 40, 1e-9, |row| {
         let joints = val(row);
-        let (world, tool) = (arm.jacobian(&joints), arm.jacobian_tool(&joints));
-        for (ours, theirs) in [(world, &row[6..42]), (tool, &row[42..78])] {
-            let difference = turned * ours - nalgebra::Matrix6::from_row_slice(theirs);
-            worst = greater(worst, amax(&difference));
-        }
-    }
-    println!(
-        "Jacobians: {} rows, greatest difference {worst:.1e}",
-        rows.len()
-    );
-    assert!(rows.len() > 40 && worst < 1e-9);
+        let off = |ours, theirs: &[f64]| amax(&(turned * ours - Matrix6::from_row_slice(theirs)));
+        [
+            off(arm.jacobian(&joints), &row[6..42]),
+            off(arm.jacobian_tool(&joints), &row[42..78]),
+        ]
+    });
 }
 
 #[test]
 fn torques_agree_with_the_toolbox() {
-    let Some(rows) = table("dynamics_oracle.dev.csv") else {
-        return;
-    };
     let (arm, dynamics) = (PumaParams::corke(), ArmDynamics::corke());
-    let mut worst = [0.0_f64; 4];
-    for row in &rows {
+    compare("dynamics_oracle.dev.csv", 40, 1e-6, |row| {
         let (joints, qd, qdd) = (val(row), six(&row[6..]), six(&row[12..]));
-        let free = dynamics.inverse(&arm, &joints, qd, qdd);
-        let friction = dynamics.friction(qd);
-        let gravity = dynamics.gravity_torques(&arm, &joints);
+        let free = Vector6::from(dynamics.inverse(&arm, &joints, qd, qdd));
+        let friction = Vector6::from(dynamics.friction(qd));
+        let gravity = Vector6::from(dynamics.gravity_torques(&arm, &joints));
         let mass = dynamics.mass_matrix(&arm, &joints);
-        for i in 0..6 {
-            worst[0] = greater(worst[0], (gravity[i] - row[18 + i]).abs());
-            worst[1] = greater(worst[1], (free[i] - row[24 + i]).abs());
-            worst[2] = greater(worst[2], (free[i] + friction[i] - row[30 + i]).abs());
-        }
-        worst[3] = greater(
-            worst[3],
-            amax(&(mass - nalgebra::Matrix6::from_row_slice(&row[36..72]))),
-        );
-    }
-    println!(
-        "dynamics: {} rows, greatest difference gravity {:.1e}, free {:.1e}, with friction {:.1e} \
-         N m, mass matrix {:.1e}",
-        rows.len(),
-        worst[0],
-        worst[1],
-        worst[2],
-        worst[3]
-    );
-    assert!(
-        rows.len() > 40 && worst.iter().all(|w| *w < 1e-6),
-        "{worst:?}"
-    );
+        [
+            amax(&(gravity - Vector6::from(six(&row[18..])))),
+            amax(&(free - Vector6::from(six(&row[24..])))),
+            amax(&(free + friction - Vector6::from(six(&row[30..])))),
+            amax(&(mass - Matrix6::from_row_slice(&row[36..72]))),
+        ]
+    });
 }
 
 #[test]
 fn oat_angles_agree_with_the_table() {
-    let Some(rows) = table("val_oat_oracle.dev.csv") else {
-        return;
-    };
     let arm = PumaParams::unimation();
-    let (mut worst, mut table_error) = (0.0_f64, 0.0_f64);
-    for row in &rows {
-        let joints = Joints::from_degrees(six(row));
-        let pose = arm.forward(&joints);
-        let rotation = Matrix3::from_row_slice(&row[12..21]);
+    compare("val_oat_oracle.dev.csv", 100, 1e-9, |row| {
+        let pose = arm.forward(&Joints::from_degrees(six(row)));
         // The joint angles of the table are rounded to thousandths; its rotation is exact, and so
         // are the angles made of it.
-        let rotation =
-            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        let matrix = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&row[12..21]));
+        let rotation = UnitQuaternion::from_rotation_matrix(&matrix);
         let exact = Isometry3::from_parts(pose.translation, rotation);
         let shown = Xyzoat::from_pose(&exact).val();
-        for (i, angle) in shown.iter().enumerate().skip(3) {
-            worst = greater(
-                worst,
-                angle_between(angle.to_radians(), row[6 + i].to_radians()),
-            );
-        }
-        for (i, length) in shown.iter().enumerate().take(3) {
-            table_error = greater(table_error, (length - row[6 + i]).abs());
-        }
         let again = Xyzoat::from_val(six(&row[6..])).pose();
-        worst = greater(worst, again.rotation.angle_to(&rotation));
-    }
-    println!(
-        "O A T: {} rows, greatest difference {worst:.1e} rad; positions within {table_error:.1e} \
-         mm",
-        rows.len()
-    );
-    assert!(rows.len() > 100 && worst < 1e-9);
+        let apart = |i: usize| angle_between(shown[i].to_radians(), row[6 + i].to_radians());
+        [
+            apart(3),
+            apart(4),
+            apart(5),
+            again.rotation.angle_to(&rotation),
+        ]
+    });
 }
 
 #[test]
@@ -272,19 +224,10 @@ fn an_independent_inverse_finds_the_same_solutions() {
         let theirs = opw.inverse(&opw.forward(&toolbox));
         compared += 1;
         for solution in &theirs {
-            let wanted = val(solution);
-            let best = ours
-                .iter()
-                .map(|s| apart(&s.joints, &wanted))
-                .fold(f64::MAX, f64::min);
-            worst = greater(worst, best);
+            worst = greater(worst, nearest(&ours, &val(solution)));
         }
         lost += usize::from(theirs.len() != ours.len());
-        let own = ours
-            .iter()
-            .map(|s| apart(&s.joints, &joints))
-            .fold(f64::MAX, f64::min);
-        worst = greater(worst, own);
+        worst = greater(worst, nearest(&ours, &joints));
     }
     println!(
         "rs-opw-kinematics: {compared} poses, greatest difference {worst:.1e} rad, {lost} with \

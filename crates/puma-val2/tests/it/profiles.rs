@@ -123,9 +123,10 @@ fn a_session_with_three_hundred_controllers() {
             .attach_sensor(1001, |joints| joints.degrees()[0] > 20.0)
             .unwrap();
         let stopped = client.move_by(JointDelta::from_degrees([40.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
-        assert!(
-            matches!(stopped, Err(puma_val2::ArmError::ProximityStop { .. })),
-            "{context}: {stopped:?}"
+        assert_matches!(
+            stopped,
+            Err(puma_val2::ArmError::ProximityStop { .. }),
+            "{context}"
         );
     }
 }

@@ -43,7 +43,7 @@ fn a_pseudo_terminal_can_be_closed_and_opened_again() {
     client.set_gripper(Gripper::Closed).unwrap();
     assert_eq!(server.with_emulator(|e| e.gripper()), Gripper::Closed);
     drop(server);
-    assert!(matches!(client.joints(), Err(ArmError::Line { .. })));
+    assert_matches!(client.joints(), Err(ArmError::Line { .. }));
 }
 
 #[test]

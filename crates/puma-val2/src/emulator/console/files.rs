@@ -74,23 +74,15 @@ impl Emulator {
     ) -> Result<(), Fault> {
         let file = cursor.name()?;
         self.profile.check_name(&file)?;
-        let mut names = Vec::new();
-        if cursor.sign("=") {
-            names.push(self.stored_name(cursor)?);
-            while cursor.sign(",") {
-                names.push(self.stored_name(cursor)?);
-            }
-        }
+        let name = |c: &mut Cursor<'_>| PlaceName::parse(c)?.key(&self.scope());
+        let names = cursor.after_sign("=", |c| c.list(name))?;
+        let names = names.unwrap_or_default();
         cursor.expect_end()?;
-        let of_kind = |k: Kind| kind.is_none_or(|kind| kind == k);
-        let there = |name: &String| {
-            of_kind(Kind::Program) && self.memory.programs.contains_key(name)
-                || of_kind(Kind::Place) && self.memory.places.contains_key(name)
-                || of_kind(Kind::Real) && self.memory.reals.contains_key(name)
-        };
+        let there = |name: &String| self.memory.kind_of(name, kind).is_some();
         if !names.iter().all(there) {
             return Err(Message::UndefinedValue.into());
         }
+        let of_kind = |k: Kind| kind.is_none_or(|kind| kind == k);
         let wanted = |k: Kind, name: &str| {
             of_kind(k) && (names.is_empty() || names.iter().any(|n| n == name))
         };
@@ -101,10 +93,6 @@ impl Emulator {
         self.floppy.insert(file.clone(), text);
         self.note(Event::FileStored(file));
         Ok(())
-    }
-
-    fn stored_name(&self, cursor: &mut Cursor<'_>) -> Result<String, Fault> {
-        PlaceName::parse(cursor)?.key(&self.scope())
     }
 
     /// Carries out `LOAD file`: everything in it, or one kind.
@@ -124,43 +112,41 @@ impl Emulator {
 
 fn text_of(memory: &Memory, wanted: impl Fn(Kind, &str) -> bool) -> String {
     let mut text = String::new();
-    for (name, program) in memory
-        .programs
-        .iter()
-        .filter(|(n, _)| wanted(Kind::Program, n))
-    {
-        text.push_str(&format!(".PROGRAM {name}\n"));
-        for step in &program.steps {
-            text.push_str(&format!(" {}\n", step.text));
+    for (name, program) in &memory.programs {
+        if wanted(Kind::Program, name) {
+            let steps = program.steps.iter().map(|step| format!(" {}", step.text));
+            section(&mut text, &format!(".PROGRAM {name}"), steps);
         }
-        text.push_str(".END\n");
     }
-    let places: Vec<_> = memory
-        .places
-        .iter()
-        .filter(|(n, _)| wanted(Kind::Place, n))
-        .collect();
-    if !places.is_empty() {
-        text.push_str(".LOCATIONS\n");
-        for (name, place) in places {
-            let values = place.val().map(|v| format!("{v:.6}")).join(",");
-            text.push_str(&format!("{name} {values}\n"));
-        }
-        text.push_str(".END\n");
+    let places = memory.places.iter();
+    let places = places.filter(|(name, _)| wanted(Kind::Place, name));
+    let mut places = places.map(|(name, place)| {
+        let values = place.val().map(|v| format!("{v:.6}")).join(",");
+        format!("{name} {values}")
+    });
+    if let Some(first) = places.next() {
+        section(
+            &mut text,
+            ".LOCATIONS",
+            std::iter::once(first).chain(places),
+        );
     }
-    let reals: Vec<_> = memory
-        .reals
-        .iter()
-        .filter(|(n, _)| wanted(Kind::Real, n))
-        .collect();
-    if !reals.is_empty() {
-        text.push_str(".REALS\n");
-        for (name, value) in reals {
-            text.push_str(&format!("{name} {value}\n"));
-        }
-        text.push_str(".END\n");
+    let reals = memory.reals.iter();
+    let reals = reals.filter(|(name, _)| wanted(Kind::Real, name));
+    let mut reals = reals.map(|(name, value)| format!("{name} {value}"));
+    if let Some(first) = reals.next() {
+        section(&mut text, ".REALS", std::iter::once(first).chain(reals));
     }
     text
+}
+
+/// Adds a heading, lines and `.END`.
+fn section(text: &mut String, heading: &str, lines: impl Iterator<Item = String>) {
+    let all = std::iter::once(heading.to_owned()).chain(lines);
+    for line in all.chain([".END".to_owned()]) {
+        text.push_str(&line);
+        text.push('\n');
+    }
 }
 
 enum Section {

@@ -9,15 +9,19 @@ use crate::emulator::language::place_expr::PlaceExpr;
 use crate::emulator::language::scope::Scope;
 use crate::emulator::message::{Fault, Message};
 
+type OfTwo = fn(f64, f64) -> f64;
+type OfNumbers = fn(&[f64]) -> f64;
+type OfPositions = fn(&[Vector3<f64>]) -> f64;
+
 #[derive(Clone, Debug)]
 pub(crate) enum Expr {
     Number(f64),
     Variable(Variable),
     Negate(Box<Expr>),
     Not(Box<Expr>),
-    Binary(fn(f64, f64) -> f64, Box<Expr>, Box<Expr>),
-    Call(fn(&[f64]) -> f64, Vec<Expr>),
-    OfPlaces(fn(&[Vector3<f64>]) -> f64, Vec<PlaceExpr>),
+    Binary(OfTwo, Box<Expr>, Box<Expr>),
+    Call(OfNumbers, Vec<Expr>),
+    OfPlaces(OfPositions, Vec<PlaceExpr>),
     /// `SIG`: all of these signals are as their signs say.
     Signals(Vec<Expr>),
 }
@@ -30,7 +34,7 @@ pub(crate) struct Variable {
 }
 
 /// Functions of numbers, with the least and the greatest number of arguments.
-const FUNCTIONS: [(&str, [usize; 2], fn(&[f64]) -> f64); 11] = [
+const FUNCTIONS: [(&str, [usize; 2], OfNumbers); 11] = [
     ("ABS", [1, 1], |v| v[0].abs()),
     ("ATAN2", [2, 2], |v| v[0].atan2(v[1]).to_degrees()),
     ("COS", [1, 1], |v| v[0].to_radians().cos()),
@@ -45,7 +49,7 @@ const FUNCTIONS: [(&str, [usize; 2], fn(&[f64]) -> f64); 11] = [
 ];
 
 /// Functions of the positions of locations, with the number of locations.
-const PLACE_FUNCTIONS: [(&str, usize, fn(&[Vector3<f64>]) -> f64); 4] = [
+const PLACE_FUNCTIONS: [(&str, usize, OfPositions); 4] = [
     ("DISTANCE", 2, |p| (p[1] - p[0]).norm()),
     ("DX", 1, |p| p[0].x),
     ("DY", 1, |p| p[0].y),
@@ -54,7 +58,7 @@ const PLACE_FUNCTIONS: [(&str, usize, fn(&[Vector3<f64>]) -> f64); 4] = [
 
 /// Binary operators in all their spellings, and their binding strengths, loosest first.
 #[allow(clippy::float_cmp)] // VAL's `==` compares as the controller does.
-const OPERATORS: [(&[&str], u8, fn(f64, f64) -> f64); 15] = [
+const OPERATORS: [(&[&str], u8, OfTwo); 15] = [
     (&["OR"], 1, |a, b| truth(is_true(a) || is_true(b))),
     (&["XOR"], 1, |a, b| truth(is_true(a) != is_true(b))),
     (&["AND"], 2, |a, b| truth(is_true(a) && is_true(b))),

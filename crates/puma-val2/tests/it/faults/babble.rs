@@ -143,12 +143,10 @@ fn connecting_to_a_line_that_babbles_ends_in_time() {
         let mut line = Babbling::new(words, Duration::from_millis(5));
         line.from = Some(Duration::ZERO);
         let outcome = Val2Client::connect(line, ClientConfig::default()).map(drop);
-        assert!(
-            matches!(
-                outcome,
-                Err(ArmError::Garbled { .. } | ArmError::Silence { .. })
-            ),
-            "{words:?}: {outcome:?}"
+        assert_matches!(
+            outcome,
+            Err(ArmError::Garbled { .. } | ArmError::Silence { .. }),
+            "{words:?}"
         );
     }
 }

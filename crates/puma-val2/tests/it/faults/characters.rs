@@ -91,10 +91,7 @@ fn a_half_typed_line_is_not_added_to_the_next() {
     client
         .line_mut()
         .strike(Way::FromController, 3, Damage::Flipped(0));
-    assert!(matches!(
-        client.set_speed(30.0),
-        Err(ArmError::Garbled { .. })
-    ));
+    assert_matches!(client.set_speed(30.0), Err(ArmError::Garbled { .. }));
     assert!(client.line().struck);
     client.joints().unwrap();
 }

@@ -29,12 +29,9 @@ const WAYS: [MoveWay; 3] = [MoveWay::Drive, MoveWay::Ppoint, MoveWay::Point];
 fn arm_power_lost_in_mid_move() {
     for way in WAYS {
         let (client, outcome) = disturbed(way, |emulator| emulator.set_arm_power(false));
-        assert!(
-            matches!(
+        assert_matches!(
             &outcome,
             Err(ArmError::Refused { message, .. }) if message == "Arm power off"
-            ),
-            "{outcome:?}"
         );
         assert_knows_where(&client);
     }
@@ -44,12 +41,9 @@ fn arm_power_lost_in_mid_move() {
 fn envelope_error_in_mid_move() {
     for way in WAYS {
         let (client, outcome) = disturbed(way, |emulator| emulator.envelope_error(Joint::J2));
-        assert!(
-            matches!(
+        assert_matches!(
             &outcome,
             Err(ArmError::Refused { message, .. }) if message == "Envelope error Jt 2"
-            ),
-            "{outcome:?}"
         );
         assert_knows_where(&client);
     }
@@ -59,11 +53,8 @@ fn envelope_error_in_mid_move() {
 fn the_controller_restarts_in_mid_move() {
     for way in WAYS {
         let (mut client, outcome) = disturbed(way, Emulator::restart);
-        assert!(
-            matches!(outcome, Err(ArmError::Restarted { .. })),
-            "{outcome:?}"
-        );
-        assert!(matches!(client.joints(), Err(ArmError::Restarted { .. })));
+        assert_matches!(outcome, Err(ArmError::Restarted { .. }));
+        assert_matches!(client.joints(), Err(ArmError::Restarted { .. }));
         client.reconnect().unwrap();
         client.calibrate().unwrap();
         client
@@ -76,16 +67,10 @@ fn the_controller_restarts_in_mid_move() {
 fn the_controller_restarts_between_commands() {
     let mut client = client(Profile::val2(), MoveWay::Automatic);
     client.line_mut().inner.emulator_mut().restart();
-    assert!(matches!(
-        client.move_by(STEP),
-        Err(ArmError::Restarted { .. })
-    ));
+    assert_matches!(client.move_by(STEP), Err(ArmError::Restarted { .. }));
     client.reconnect().unwrap();
     // It knows its position again only after calibration, and says so.
-    assert!(matches!(
-        client.move_by(STEP),
-        Err(ArmError::Refused { .. })
-    ));
+    assert_matches!(client.move_by(STEP), Err(ArmError::Refused { .. }));
     client.calibrate().unwrap();
     client.move_by(STEP).unwrap();
 }
@@ -130,12 +115,9 @@ fn limits_of_the_controller_that_are_narrower_than_ours() {
         client.calibrate().unwrap();
         let start = client.joints().unwrap();
         let outcome = client.move_by(STEP);
-        assert!(
-            matches!(
+        assert_matches!(
             &outcome,
             Err(ArmError::Refused { message, .. }) if message == "Location out of range Jt 2"
-            ),
-            "{outcome:?}"
         );
         judge(&mut client, start, &outcome, "narrow");
         assert_knows_where(&client);
@@ -150,11 +132,11 @@ fn a_controller_that_stops_short_is_found_out() {
     };
     let mut client = client(profile, MoveWay::Drive);
     let outcome = client.drive(Joint::J1, 0.2, 100.0);
-    assert!(matches!(
+    assert_matches!(
         outcome,
         Err(ArmError::NotReached { joint: Joint::J1, wanted_degrees, reported_degrees, .. })
             if (wanted_degrees - reported_degrees - 0.5).abs() < 1e-3
-    ));
+    );
 }
 
 #[test]
@@ -163,10 +145,7 @@ fn a_motion_that_never_ends_is_stopped() {
     client.set_speed(0.05).unwrap();
     let start = truth(&client);
     let outcome = client.move_by(STEP);
-    assert!(
-        matches!(outcome, Err(ArmError::Silence { .. })),
-        "{outcome:?}"
-    );
+    assert_matches!(outcome, Err(ArmError::Silence { .. }));
     judge(&mut client, start, &outcome, "slow");
     assert_knows_where(&client);
 }

@@ -75,9 +75,10 @@ fn a_signal_that_has_gone_again_is_not_lost() {
             client.arm_proximity(1001).unwrap();
             let start = truth(&client);
             let outcome = client.move_by(STEP);
-            assert!(
-                matches!(outcome, Err(ArmError::ProximityStop { signal: 1001, .. })),
-                "{} {from}: {outcome:?}",
+            assert_matches!(
+                outcome,
+                Err(ArmError::ProximityStop { signal: 1001, .. }),
+                "{} {from}",
                 profile.name
             );
             judge(&mut client, start, &outcome, "pulse");
@@ -88,10 +89,7 @@ fn a_signal_that_has_gone_again_is_not_lost() {
         put_object(&mut client, -1.0, 1.0);
         client.arm_proximity(1001).unwrap();
         let start = truth(&client);
-        assert!(matches!(
-            client.move_by(STEP),
-            Err(ArmError::ProximityStop { .. })
-        ));
+        assert_matches!(client.move_by(STEP), Err(ArmError::ProximityStop { .. }));
         assert!(off(truth(&client), start) < 1e-6);
     }
 }
@@ -135,10 +133,7 @@ fn every_motion_is_guarded() {
             put_object(&mut client, 5.0, 8.5);
             client.arm_proximity(1001).unwrap();
             let outcome = motion(&mut client);
-            assert!(
-                matches!(outcome, Err(ArmError::ProximityStop { .. })),
-                "{context}: {outcome:?}"
-            );
+            assert_matches!(outcome, Err(ArmError::ProximityStop { .. }), "{context}");
             let stands = truth(&client).degrees()[0];
             assert!((1.0..9.0).contains(&stands), "{context}: {stands}");
             assert_knows_where(&client);
@@ -187,15 +182,9 @@ fn what_cannot_be_guarded_is_refused_and_nothing_is_sent() {
         .unwrap();
     client.arm_proximity(1001).unwrap();
     let before = client.line().inner.traffic();
-    assert!(matches!(
-        client.execute("MINE"),
-        Err(ArmError::Setting { .. })
-    ));
-    assert!(matches!(client.calibrate(), Err(ArmError::Setting { .. })));
-    assert!(matches!(
-        client.resident().map(drop),
-        Err(ArmError::Setting { .. })
-    ));
+    assert_matches!(client.execute("MINE"), Err(ArmError::Setting { .. }));
+    assert_matches!(client.calibrate(), Err(ArmError::Setting { .. }));
+    assert_matches!(client.resident().map(drop), Err(ArmError::Setting { .. }));
     assert_eq!(client.line().inner.traffic(), before);
     client.disarm_proximity().unwrap();
     client.execute("MINE").unwrap();
@@ -205,10 +194,10 @@ fn what_cannot_be_guarded_is_refused_and_nothing_is_sent() {
 #[test]
 fn a_signal_that_there_is_not_is_refused_at_once() {
     let mut client = client(Profile::val2(), MoveWay::Automatic);
-    assert!(matches!(
-    client.arm_proximity(5000),
-    Err(ArmError::Refused { message, .. }) if message == "Illegal signal number"
-    ));
+    assert_matches!(
+        client.arm_proximity(5000),
+        Err(ArmError::Refused { message, .. }) if message == "Illegal signal number"
+    );
     client.move_by(STEP).unwrap();
 }
 
@@ -270,7 +259,7 @@ fn damage_anywhere_in_a_move_that_is_stopped() {
                 let stands = truth(&client).degrees()[0];
                 assert!(stands < 9.0, "{context}: {stands} after {outcome:?}");
                 if !client.line().struck {
-                    assert!(matches!(outcome, Err(ArmError::ProximityStop { .. })));
+                    assert_matches!(outcome, Err(ArmError::ProximityStop { .. }));
                     break;
                 }
                 sum.count(matches!(outcome, Err(ArmError::ProximityStop { .. })));

@@ -79,16 +79,13 @@ fn a_refused_move_leaves_no_stale_position_behind() {
         let mut resident = client.resident().unwrap();
         resident.line_mut().disturb = Some(Box::new(disturb));
         let outcome = resident.move_by(STEP);
-        assert!(
-            matches!(outcome, Err(ArmError::Refused { .. })),
-            "{outcome:?}"
-        );
+        assert_matches!(outcome, Err(ArmError::Refused { .. }));
         // It has ended with that, and says so.
-        assert!(matches!(resident.joints(), Err(ArmError::Setting { .. })));
-        assert!(matches!(
+        assert_matches!(resident.joints(), Err(ArmError::Setting { .. }));
+        assert_matches!(
             resident.set_gripper(Gripper::Open),
             Err(ArmError::Setting { .. })
-        ));
+        );
         drop(resident);
         judge(&mut client, start, &outcome, "resident refused");
         assert!(off(truth(&client), start) > 0.1, "stopped in mid-move");
@@ -110,12 +107,9 @@ fn limits_of_the_controller_that_are_narrower_than_ours() {
     client.calibrate().unwrap();
     let mut resident = client.resident().unwrap();
     let outcome = resident.move_by(STEP);
-    assert!(
-        matches!(
+    assert_matches!(
         &outcome,
         Err(ArmError::Refused { message, .. }) if message == "Location out of range Jt 2"
-        ),
-        "{outcome:?}"
     );
     drop(resident);
     assert_knows_where(&client);
@@ -128,14 +122,8 @@ fn the_controller_restarts_under_the_program() {
     let mut resident = client.resident().unwrap();
     resident.line_mut().disturb = Some(Box::new(Emulator::restart));
     let outcome = resident.move_by(STEP);
-    assert!(
-        matches!(outcome, Err(ArmError::Restarted { .. })),
-        "{outcome:?}"
-    );
-    assert!(matches!(
-        resident.move_by(STEP),
-        Err(ArmError::Setting { .. })
-    ));
+    assert_matches!(outcome, Err(ArmError::Restarted { .. }));
+    assert_matches!(resident.move_by(STEP), Err(ArmError::Setting { .. }));
     drop(resident);
     judge(&mut client, start, &outcome, "restart");
     assert!(client.last_known().is_none());

@@ -102,7 +102,7 @@ fn without_an_echo_motions_by_one_line_are_refused_unsent() {
         client.calibrate().unwrap();
         let refused = client.move_by(STEP).unwrap_err();
         assert!(refused.to_string().contains("POINT"), "{refused}");
-        assert!(matches!(refused, ArmError::Setting { .. }));
+        assert_matches!(refused, ArmError::Setting { .. });
         assert_eq!(client.line().inner.emulator().joints(), Joints::READY);
     }
     let config = ClientConfig {
@@ -113,8 +113,8 @@ fn without_an_echo_motions_by_one_line_are_refused_unsent() {
     let mut client = Val2Client::connect(line, config).unwrap();
     client.calibrate().unwrap();
     client.move_by(STEP).unwrap();
-    assert!(matches!(
+    assert_matches!(
         client.drive(Joint::J1, 0.1, 100.0),
         Err(ArmError::Setting { .. })
-    ));
+    );
 }
