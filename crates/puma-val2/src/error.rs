@@ -33,8 +33,8 @@ pub enum ArmError {
     },
     /// No complete answer came in time.
     #[error(
-        "{port}: no complete answer to `{sent}` within {waited:?}: expected {expected}, heard \
-         {heard:?}"
+        "{port}: no complete answer to `{sent}` within {waited:?} (the setting `{setting}`): \
+         expected {expected}, heard {heard:?}"
     )]
     Silence {
         /// The line.
@@ -47,6 +47,30 @@ pub enum ArmError {
         heard: String,
         /// Time waited.
         waited: Duration,
+        /// Setting that limits this time.
+        setting: &'static str,
+    },
+    /// The controller shows no prompt: it hears nothing, or waits for the end of a motion.
+    #[error(
+        "{port}: the controller shows no prompt for {waited:?}: the arm may be moving; wait for \
+         the end of its motion, or press the emergency stop on the panel"
+    )]
+    Busy {
+        /// The line.
+        port: String,
+        /// Time waited.
+        waited: Duration,
+    },
+    /// A program on the controller asks for values. It may move the arm by what it is answered.
+    #[error(
+        "{port}: a program asks {question:?}: answer it at the controller's terminal, or connect \
+         with `abort_running_program`"
+    )]
+    Asked {
+        /// The line.
+        port: String,
+        /// Question, shortened.
+        question: String,
     },
     /// An answer cannot be understood.
     #[error("{port}: the answer to `{sent}` makes no sense: expected {expected}, heard {heard:?}")]
@@ -136,6 +160,24 @@ pub enum ArmError {
         signal: u16,
         /// Joint angles at which the arm stands.
         joints: Joints,
+    },
+    /// A backup does not say what it should. Nothing was changed.
+    #[error("line {line} of the backup {problem}: {text}")]
+    Text {
+        /// Number of the line, from 1.
+        line: usize,
+        /// Text of the line, shortened.
+        text: String,
+        /// Fault of the line.
+        problem: &'static str,
+    },
+    /// A controller holds other contents under names of a backup. Nothing was changed.
+    #[error("{port}: the controller holds other contents of {names}: nothing was restored")]
+    Conflict {
+        /// The line.
+        port: String,
+        /// Kinds and names.
+        names: String,
     },
     /// A setting is out of its range. Nothing was sent.
     #[error("{what} cannot be {value}: {allowed}")]

@@ -16,13 +16,14 @@ pub struct ClientConfig {
     /// value that is too small slows the exchange but does no harm.
     pub reply_timeout: Duration,
     /// Longest time of a motion, a calibration or anything else that moves the arm (default: 60 s).
-    /// The arm is stopped after it.
+    /// The arm is stopped after it. A motion that takes longer at the speed set, or at SPEED 1
+    /// where none has been set, gets twice the time it takes.
     pub motion_timeout: Duration,
     /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect)
     /// (default: 10 s); loading from a floppy takes longer.
     pub connect_timeout: Duration,
-    /// Monitor speed set by `connect`, percent (default: 50), above 0 to 327; `None` leaves it as
-    /// it is.
+    /// Monitor speed set by `connect`, percent, above 0 to 327 (default: none, `connect` leaves it
+    /// as it is).
     pub speed_percent: Option<f64>,
     /// Greatest distance of a joint from its goal that counts as reached, radians (default: 0.05
     /// degrees). A PUMA 560 stands at encoder counts up to 0.009 degrees apart; less than 0.01
@@ -41,9 +42,12 @@ pub struct ClientConfig {
     /// Answer to a start-up question that speaks of initializing, which erases programs and
     /// locations (default: no).
     pub initialize: bool,
-    /// Makes `connect` abort a program that runs (default: yes); otherwise a running program is an
-    /// error.
+    /// Makes `connect` abort a program that runs, or asks for values (default: no). A running
+    /// program leaves the position to be read; moves are refused.
     pub abort_running_program: bool,
+    /// The controller understands Ctrl-C, Ctrl-Q and Ctrl-U (default: yes). Otherwise they are not
+    /// sent.
+    pub control_characters: bool,
     /// Number of further tries of `calibrate` while arm power is off (default: 0).
     pub power_retries: usize,
     /// Pause between these tries (default: 2 s).
@@ -71,14 +75,15 @@ impl Default for ClientConfig {
             reply_timeout: Duration::from_secs(1),
             motion_timeout: Duration::from_secs(60),
             connect_timeout: Duration::from_secs(10),
-            speed_percent: Some(50.0),
+            speed_percent: None,
             tolerance: 0.05_f64.to_radians(),
             retries: 3,
             check_echo: true,
             way: MoveWay::Automatic,
             load_from_floppy: true,
             initialize: false,
-            abort_running_program: true,
+            abort_running_program: false,
+            control_characters: true,
             power_retries: 0,
             power_retry_delay: Duration::from_secs(2),
             point_name: "PGOAL".into(),
@@ -97,6 +102,20 @@ impl ClientConfig {
         Self {
             quiet: Duration::from_millis(2),
             ..Self::default()
+        }
+    }
+
+    /// Returns settings for a line of this speed, 110 to 9600 baud and more: the times of
+    /// [`ClientConfig::default`], or as many characters as these times are worth at 9600 baud
+    /// where that is longer.
+    pub fn for_baud(baud: u32) -> Self {
+        let characters = |count| Duration::from_secs(10) * count / baud.max(1);
+        let usual = Self::default();
+        Self {
+            quiet: usual.quiet.max(characters(4)),
+            reply_timeout: usual.reply_timeout.max(characters(100)),
+            connect_timeout: usual.connect_timeout.max(characters(1000)),
+            ..usual
         }
     }
 

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::client::config::ClientConfig;
-use crate::client::dialogue::{NUDGE, SPOIL, is_boot_question, last_question, way_out};
+use crate::client::dialogue::{
+    CANCEL, NUDGE, SPOIL, STOP, is_boot_question, is_own_echo, last_line, last_question, shortened,
+    way_out,
+};
 use crate::client::number::check_percent;
 use crate::client::reader;
 use crate::client::reader::Ending;
@@ -15,12 +18,14 @@ use crate::error::ArmError;
 use crate::transport::Transport;
 
 impl<T: Transport> Val2Client<T> {
-    /// Connects to the monitor and sets the speed of `config`. A start-up dialogue is answered, any
-    /// other dialogue is left, and a half-typed line is deleted.
+    /// Connects to the monitor. A start-up dialogue is answered, any other dialogue is left, and a
+    /// half-typed line is deleted. Nothing is sent that stops the arm or a program, or sets the
+    /// speed, unless `config` says so.
     ///
     /// # Errors
-    /// [`ArmError::Silence`] or [`ArmError::Garbled`] within `config.connect_timeout` if there is
-    /// no VAL monitor at the other end.
+    /// [`ArmError::Busy`] after `config.connect_timeout` if the controller sends back what is typed
+    /// and no prompt; [`ArmError::Silence`] or [`ArmError::Garbled`] if there is no VAL monitor at
+    /// the other end; [`ArmError::Asked`] if a program asks for values.
     pub fn connect(transport: T, config: ClientConfig) -> Result<Self, ArmError> {
         check(&config)?;
         let mut client = Self {
@@ -29,6 +34,7 @@ impl<T: Transport> Val2Client<T> {
             points: BTreeMap::new(),
             goal_program: None,
             lacks_ppoint: false,
+            speed: None,
             guard: None,
         };
         client.reconnect()?;
@@ -46,6 +52,7 @@ impl<T: Transport> Val2Client<T> {
         self.points.clear();
         self.goal_program = None;
         self.lacks_ppoint = false;
+        self.speed = None;
         self.wire.nudge = SPOIL;
         let outcome = self.find_prompt();
         self.wire.nudge = NUDGE;
@@ -54,6 +61,37 @@ impl<T: Transport> Val2Client<T> {
         match self.wire.config.speed_percent {
             Some(percent) => self.set_speed(percent),
             None => Ok(()),
+        }
+    }
+
+    /// Stops the arm and a running program over any line, without waiting for a prompt first: for a
+    /// program that has just been started, while the arm moves for another one.
+    ///
+    /// `Ok` says that the controller has answered. `PANIC` is sent twice and Ctrl-C, if the
+    /// controller understands it, then `ABORT`.
+    ///
+    /// # Errors
+    /// [`ArmError::Busy`] if the controller has not shown a prompt within 1.5 seconds: the arm may
+    /// be moving; [`ArmError::Line`] if the line did not take it.
+    pub fn stop_on(transport: T, config: ClientConfig) -> Result<(), ArmError> {
+        let waited = config
+            .quiet
+            .saturating_mul(4)
+            .max(Duration::from_millis(1500));
+        let mut wire = Wire::new(transport, config);
+        wire.nudge = b"PANIC\r";
+        wire.send(STOP, "PANIC")?;
+        match wire.read_reply("PANIC", waited) {
+            Ok(reply) if reply.ending != Ending::Running => Ok(()),
+            Ok(_) => {
+                wire.send(b"ABORT\r", "ABORT")?;
+                wire.read_reply("ABORT", waited).map(drop)
+            }
+            Err(error @ ArmError::Line { .. }) => Err(error),
+            Err(_) => {
+                let port = wire.port();
+                Err(ArmError::Busy { port, waited })
+            }
         }
     }
 
@@ -69,9 +107,21 @@ impl<T: Transport> Val2Client<T> {
             let left = self.wire.left(until);
             let reply = match self.wire.read_reply("CR", left) {
                 Ok(reply) => reply,
-                Err(ArmError::Silence { heard, waited, .. }) if heard.is_empty() => {
-                    let waited = waited.max(timeout);
-                    return Err(self.wire.silence("CR", expected, "", waited));
+                Err(ArmError::Silence { heard, .. }) if heard.is_empty() => {
+                    return Err(ArmError::Silence {
+                        port: self.wire.port(),
+                        sent: "CR".to_owned(),
+                        expected: expected.to_owned(),
+                        heard,
+                        waited: timeout,
+                        setting: "connect_timeout",
+                    });
+                }
+                Err(ArmError::Silence { heard, .. }) if is_own_echo(&heard) => {
+                    return Err(ArmError::Busy {
+                        port: self.wire.port(),
+                        waited: timeout,
+                    });
                 }
                 Err(ArmError::Silence { heard, .. } | ArmError::Garbled { heard, .. }) => {
                     return Err(self.wire.garbled("CR", expected, &heard));
@@ -81,10 +131,7 @@ impl<T: Transport> Val2Client<T> {
             let answer: &[u8] = match reply.ending {
                 Ending::Idle => break,
                 Ending::Running if self.wire.config.abort_running_program => b"ABORT\r",
-                Ending::Running => {
-                    let heard = "the prompt of a monitor under which a program runs";
-                    return Err(self.wire.garbled("CR", "an idle monitor", heard));
-                }
+                Ending::Running => break,
                 Ending::Question if is_boot_question(&reply.text) => {
                     // Whatever may be the question that erases the memory is answered as that one.
                     let config = &self.wire.config;
@@ -96,8 +143,15 @@ impl<T: Transport> Val2Client<T> {
                     if yes { b"Y\r" } else { b"N\r" }
                 }
                 Ending::Question => {
+                    let way = way_out(&reply.text, ways);
                     ways += 1;
-                    way_out(&reply.text, ways - 1)
+                    if ways == 1 && way == CANCEL && !self.wire.config.abort_running_program {
+                        return Err(ArmError::Asked {
+                            port: self.wire.port(),
+                            question: shortened(last_line(&reply.text)),
+                        });
+                    }
+                    way
                 }
             };
             if questions >= 20 || left.is_zero() {

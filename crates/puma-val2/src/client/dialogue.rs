@@ -2,7 +2,11 @@
 
 /// Deletes a half-typed line, or spoils it where Ctrl-U is unknown, so that it cannot be carried
 /// out. Ctrl-Q comes first: a flipped bit can make a Ctrl-S, which holds all output.
-pub(super) const SPOIL: &[u8] = b"\x11\x15!?\r";
+pub(super) const SPOIL: &[u8] = b"\x11\x15!!\r";
+
+/// Stops the arm and a program, without a prompt. The first `PANIC` may end a half-typed line, which
+/// it spoils.
+pub(super) const STOP: &[u8] = b"\x11PANIC\rPANIC\r\x03";
 
 /// Asks for the prompt.
 pub(super) const NUDGE: &[u8] = b"\x11\r";
@@ -55,15 +59,24 @@ pub(super) fn last_question(text: &str) -> String {
         .to_ascii_uppercase()
 }
 
-fn last_line(text: &str) -> &str {
+pub(super) fn last_line(text: &str) -> &str {
     text.trim_end()
         .rsplit(['\r', '\n'])
         .next()
         .unwrap_or_default()
 }
 
-/// Returns the end of a text, short enough for a message.
+/// Returns `true` for a text that is nothing but the echo of [`SPOIL`].
+pub(super) fn is_own_echo(text: &str) -> bool {
+    let echo = |c: char| c.is_whitespace() || "!^UQ".contains(c);
+    text.contains('!') && text.chars().all(echo)
+}
+
+/// Returns the end of a text, short enough for a message and without blank lines.
 pub(super) fn shortened(text: &str) -> String {
+    let mut lines: Vec<&str> = text.split(['\r', '\n']).collect();
+    lines.dedup();
+    let text = lines.join("\r\n");
     let count = text.chars().count();
     if count <= 120 {
         text.to_owned()

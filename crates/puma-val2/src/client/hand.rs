@@ -1,5 +1,7 @@
 //! Motions of the hand.
 
+use std::time::Duration;
+
 use nalgebra::Isometry3;
 
 use crate::client::number::plain;
@@ -29,11 +31,12 @@ impl<T: Transport> Val2Client<T> {
                 allowed: "six finite numbers",
             });
         }
+        let limit = self.longest_motion();
         let mut tries = 0;
         loop {
             // The pose is absolute: commanding it again leads to the same place.
-            let outcome = self.send_hand(hand, if straight { "MOVES" } else { "MOVE" });
-            let doubt = self.doubt(outcome)?;
+            let outcome = self.send_hand(hand, if straight { "MOVES" } else { "MOVE" }, limit);
+            let doubt = self.doubt(outcome, limit)?;
             let stands = self.stand_anywhere().map_err(|error| self.lost(error))?;
             self.check_guard(stands, doubt.is_some())?;
             let location = self.where_().map_err(|error| self.lost(error))?;
@@ -55,29 +58,24 @@ impl<T: Transport> Val2Client<T> {
 
     /// Commands a motion of the hand: in one line where its echo is checked, otherwise as a point
     /// whose display is checked.
-    fn send_hand(&mut self, hand: &Xyzoat, word: &str) -> Result<(), Failed> {
+    fn send_hand(&mut self, hand: &Xyzoat, word: &str, limit: Duration) -> Result<(), Failed> {
         let move_to_pose = format!("{word} TRANS({})", hand.val().map(plain).join(","));
         if let Some(signal) = self.guard {
-            return self.run_guarded_once(signal, &[move_to_pose]);
+            return self.run_guarded_once(signal, &[move_to_pose], limit);
         }
         if self.wire.checks_echo() {
             let line = format!("DO {move_to_pose}");
-            let timeout = self.wire.config.motion_timeout;
-            self.command_once(&line, timeout).map(drop)
+            self.command_once(&line, limit).map(drop)
         } else {
             let name = self.wire.config.point_name.clone();
-            self.define_point(&name, hand.val(), &|shown| {
-                let shown = Xyzoat::from_val(shown.map(|(value, _)| value));
-                let (off, turned) = apart(&hand.pose(), &shown.pose());
-                off < 2e-5 && turned < 0.02
-            })?;
-            self.move_to_point(word, &name)
+            self.define_place(&name, hand.val())?;
+            self.move_to_point(word, &name, limit)
         }
     }
 }
 
 /// Returns the distance of two poses, metres and degrees.
-fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+pub(super) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     let off = (a.translation.vector - b.translation.vector).norm();
     (off, a.rotation.angle_to(&b.rotation).to_degrees())
 }

@@ -1,5 +1,6 @@
 //! The client: typed calls to a VAL II controller over any line.
 
+mod backup;
 pub(crate) mod config;
 pub(crate) mod connect;
 mod dialogue;
@@ -8,6 +9,7 @@ pub(crate) mod hand;
 pub(crate) mod motion;
 mod number;
 pub(crate) mod point;
+pub(crate) mod programs;
 pub(crate) mod proximity;
 pub(crate) mod reader;
 pub(crate) mod resident;

@@ -31,6 +31,16 @@ enum Means {
     Ready,
 }
 
+impl Means {
+    /// Returns the speed in percent of the monitor's.
+    fn percent(self) -> f64 {
+        match self {
+            Self::Drive(speed) | Self::Guarded(Some(speed)) => speed,
+            _ => 100.0,
+        }
+    }
+}
+
 /// Doubt about what the controller has understood of a motion.
 #[derive(Debug)]
 pub(super) struct Doubt {
@@ -130,10 +140,11 @@ impl<T: Transport> Val2Client<T> {
         mut means: Means,
     ) -> Result<Joints, ArmError> {
         self.check_means(means)?;
+        let limit = self.motion_limit(self.last_known(), target, means.percent());
         let mut from = start;
         let mut tries = 0;
         loop {
-            let outcome = self.set_off(from, target, means);
+            let outcome = self.set_off(from, target, means, limit);
             if let Err(failed) = &outcome
                 && means == Means::Ppoint
                 && !failed.maybe_done
@@ -151,8 +162,9 @@ impl<T: Transport> Val2Client<T> {
                     continue;
                 }
             }
-            let doubt = self.doubt(outcome)?;
-            let stands = self.stand(target).map_err(|error| self.lost(error))?;
+            let doubt = self.doubt(outcome, limit)?;
+            let stands = self.stand(target, limit);
+            let stands = stands.map_err(|error| self.lost(error))?;
             let stands = self.check_guard(stands, doubt.is_some())?;
             if furthest(&stands, &target).1 <= self.wire.config.tolerance {
                 return Ok(stands);
@@ -202,13 +214,16 @@ impl<T: Transport> Val2Client<T> {
 
     /// Returns the doubt that a motion was commanded in, if any. Afterwards the monitor has its
     /// prompt again, or the arm has been told to stop.
-    pub(super) fn doubt(&mut self, outcome: Result<(), Failed>) -> Result<Option<Doubt>, ArmError> {
+    pub(super) fn doubt(
+        &mut self,
+        outcome: Result<(), Failed>,
+        limit: Duration,
+    ) -> Result<Option<Doubt>, ArmError> {
         let error = match outcome {
             Ok(()) => return Ok(None),
             Err(failed) if self.is_doubtful(&failed.error) => failed.error,
             Err(failed) => return Err(self.given_up(failed)),
         };
-        let limit = self.wire.config.motion_timeout;
         let overdue = matches!(error, ArmError::Silence { waited, .. } if waited >= limit);
         if overdue {
             let _ = self.panic_stop();
@@ -218,9 +233,35 @@ impl<T: Transport> Val2Client<T> {
         Ok(Some(Doubt { error, overdue }))
     }
 
+    /// Returns the longest time of a motion from `from`, if that is known, at `percent` of the
+    /// monitor's speed.
+    pub(super) fn motion_limit(&self, from: Option<Joints>, to: Joints, percent: f64) -> Duration {
+        let config = &self.wire.config;
+        let ranges = config.params.ranges.iter();
+        let seconds = ranges.enumerate().map(|(i, range)| {
+            let whole = range.max - range.min;
+            from.map_or(whole, |from| (to.0[i] - from.0[i]).abs()) / range.speed
+        });
+        // Without a known speed the slowest is assumed. Ramps take less than a second each.
+        let share = self.speed.unwrap_or(1.0).min(100.0) / 100.0 * percent.min(100.0) / 100.0;
+        let longest = 2.0 * (seconds.fold(0.0, f64::max) / share + 2.0);
+        let needed = Duration::try_from_secs_f64(longest).unwrap_or(Duration::MAX);
+        config.motion_timeout.max(needed)
+    }
+
+    /// Returns the longest time of any motion.
+    pub(super) fn longest_motion(&self) -> Duration {
+        self.motion_limit(None, Joints::READY, 100.0)
+    }
+
     /// Commands the motion. `Ok` says that the controller took all its parts.
-    fn set_off(&mut self, from: Joints, target: Joints, means: Means) -> Result<(), Failed> {
-        let patience = self.wire.config.motion_timeout;
+    fn set_off(
+        &mut self,
+        from: Joints,
+        target: Joints,
+        means: Means,
+        limit: Duration,
+    ) -> Result<(), Failed> {
         match means {
             Means::Drive(speed) => {
                 let mut under_way = false;
@@ -230,7 +271,7 @@ impl<T: Transport> Val2Client<T> {
                         let by = plain(by.to_degrees());
                         let line = format!("DO DRIVE {},{by},{}", joint.number(), plain(speed));
                         // Whatever becomes of this one, those before it have moved the arm.
-                        self.command_once(&line, patience).map_err(|mut failed| {
+                        self.command_once(&line, limit).map_err(|mut failed| {
                             failed.maybe_done |= under_way;
                             failed
                         })?;
@@ -241,23 +282,24 @@ impl<T: Transport> Val2Client<T> {
             }
             Means::Ppoint => {
                 let line = format!("DO MOVE #PPOINT({})", target.degrees().map(plain).join(","));
-                self.command_once(&line, patience).map(drop)
+                self.command_once(&line, limit).map(drop)
             }
             Means::Point => {
                 self.define_goal(&target)?;
-                self.move_to_point("MOVE", &format!("#{}", self.wire.config.point_name))
+                let name = format!("#{}", self.wire.config.point_name);
+                self.move_to_point("MOVE", &name, limit)
             }
             Means::Guarded(speed) => {
                 self.define_goal(&target)?;
-                self.run_guarded(speed)
+                self.run_guarded(speed, limit)
             }
-            Means::Ready => self.command_once("DO READY", patience).map(drop),
+            Means::Ready => self.command_once("DO READY", limit).map(drop),
         }
     }
 
     /// Reads the position until the arm is at `target` or stands elsewhere.
-    fn stand(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let until = self.wire.after(self.wire.config.motion_timeout);
+    fn stand(&mut self, target: Joints, limit: Duration) -> Result<Joints, ArmError> {
+        let until = self.wire.after(limit);
         let mut before = self.where_()?.joints;
         let mut equal = 0;
         loop {
@@ -296,6 +338,11 @@ impl<T: Transport> Val2Client<T> {
     /// that is possible.
     fn given_up(&mut self, failed: Failed) -> ArmError {
         let refused = matches!(failed.error, ArmError::Refused { .. });
+        if refused && self.wire.running {
+            // Whatever moves the arm is the program of somebody else.
+            self.last_known = None;
+            return failed.error;
+        }
         // A part of the motion may have been made before a refusal.
         let lost = if refused {
             self.stand_anywhere().is_err()
@@ -312,7 +359,7 @@ impl<T: Transport> Val2Client<T> {
     /// Waits until the arm stands anywhere.
     pub(super) fn stand_anywhere(&mut self) -> Result<Joints, ArmError> {
         let nowhere = Joints([f64::MAX; 6]);
-        self.stand(nowhere)
+        self.stand(nowhere, self.wire.config.motion_timeout)
     }
 
     /// Tells an arm to stop whose position cannot be read after a motion was commanded.

@@ -1,27 +1,41 @@
 //! Points typed to the controller and compared with its display.
 
+use crate::client::hand::apart;
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
 use crate::error::ArmError;
 use crate::joints::Joints;
+use crate::kinematics::xyzoat::Xyzoat;
 use crate::transport::Transport;
 
 /// Six values displayed, each with its error of rounding.
 type Shown = [(f64, f64); 6];
 
 /// Test of the values displayed against the values meant.
-pub(super) type Fits<'a> = &'a dyn Fn(&Shown) -> bool;
+type Fits<'a> = &'a dyn Fn(&Shown) -> bool;
 
 impl<T: Transport> Val2Client<T> {
     /// Defines the precision point that the client moves to.
     pub(super) fn define_goal(&mut self, target: &Joints) -> Result<(), ArmError> {
         let name = format!("#{}", self.wire.config.point_name);
-        let wanted = target.degrees();
-        self.define_point(&name, wanted, &|shown| same(shown, wanted))
+        self.define_place(&name, target.degrees())
+    }
+
+    /// Defines a location: a precision point if its name begins with `#`, otherwise a pose.
+    pub(super) fn define_place(&mut self, name: &str, values: [f64; 6]) -> Result<(), ArmError> {
+        if name.starts_with('#') {
+            return self.define_point(name, values, &|shown| same(shown, values));
+        }
+        let pose = Xyzoat::from_val(values).pose();
+        self.define_point(name, values, &|shown| {
+            let shown = Xyzoat::from_val(shown.map(|(value, _)| value));
+            let (off, turned) = apart(&pose, &shown.pose());
+            off < 2e-5 && turned < 0.02
+        })
     }
 
     /// Types `POINT name`, the values and an empty line, and compares the display with the values.
-    pub(super) fn define_point(
+    fn define_point(
         &mut self,
         name: &str,
         values: [f64; 6],
@@ -88,7 +102,7 @@ impl<T: Transport> Val2Client<T> {
     }
 
     /// Types a line of the dialogue and returns the values displayed.
-    fn ask_point(&mut self, typed: &str) -> Result<Option<Shown>, ArmError> {
+    pub(super) fn ask_point(&mut self, typed: &str) -> Result<Option<Shown>, ArmError> {
         let reply = self.say(typed)?;
         self.without_message(typed, &reply)?;
         if reply.ending != Ending::Question {
@@ -99,7 +113,7 @@ impl<T: Transport> Val2Client<T> {
         Ok(lines.filter_map(shown_values).next_back())
     }
 
-    fn leave_point(&mut self) -> Result<(), ArmError> {
+    pub(super) fn leave_point(&mut self) -> Result<(), ArmError> {
         let left = self.command_once("", self.wire.config.patience());
         left.map(drop).map_err(ArmError::from)
     }

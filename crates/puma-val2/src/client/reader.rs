@@ -97,6 +97,21 @@ pub(super) fn messages(reply: &str) -> Vec<String> {
         .collect()
 }
 
+/// Returns the lines that a reply says, without blank ones, the echo of `line` and the prompt.
+pub(super) fn lines_said(reply: &str, line: &str) -> Vec<String> {
+    let mut lines: Vec<&str> = reply.split(['\r', '\n']).map(str::trim).collect();
+    // The prompt or the question.
+    lines.pop();
+    let is_echo = |l: &&str| {
+        l.trim_start_matches(['.', '*'])
+            .eq_ignore_ascii_case(line.trim())
+    };
+    let echo = lines.iter().position(|l| is_echo(l));
+    lines.drain(..echo.map_or(0, |at| at + 1));
+    let said = lines.into_iter().filter(|line| !line.is_empty());
+    said.map(str::to_owned).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

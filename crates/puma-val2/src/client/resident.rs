@@ -84,7 +84,7 @@ impl<T: Transport> Val2Client<T> {
                 allowed: "only on a line whose echo is checked, without a proximity guard",
             });
         }
-        self.store_program(NAME, &STEPS.map(str::to_owned))?;
+        self.type_program(NAME, &STEPS.map(str::to_owned))?;
         let line = format!("EXECUTE {NAME}");
         let timeout = self.wire.config.patience();
         let reply = self.wire.exchange_to_end(&line, timeout)?;
@@ -157,7 +157,7 @@ impl<T: Transport> Resident<'_, T> {
         let mut tries = 0;
         loop {
             let client = &mut *self.client;
-            let timeout = client.wire.config.motion_timeout;
+            let timeout = client.longest_motion();
             let failed = match client.wire.exchange_to_end(answer, timeout) {
                 Ok(reply) if reply.ending == Ending::Question => return Ok(reply),
                 Ok(reply) => {
@@ -188,8 +188,9 @@ impl<T: Transport> Resident<'_, T> {
 
     /// Waits until the program asks again, or is no more.
     fn regain(&mut self) -> Result<Ending, ArmError> {
+        let limit = self.client.longest_motion();
         let wire = &mut self.client.wire;
-        let until = wire.after(wire.config.motion_timeout);
+        let until = wire.after(limit);
         let mut ending = wire.spoil()?.ending;
         while ending == Ending::Running {
             ending = wire.read_reply("an empty line", wire.left(until))?.ending;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::client::config::ClientConfig;
+use crate::client::dialogue::STOP;
 use crate::client::number::{check_percent, plain};
 use crate::client::reader;
 use crate::client::reader::Ending;
@@ -38,6 +39,8 @@ pub struct Val2Client<T: Transport> {
     pub(super) goal_program: Option<String>,
     /// The controller has turned out not to know `#PPOINT`.
     pub(super) lacks_ppoint: bool,
+    /// Monitor speed in percent, if this client has set it.
+    pub(super) speed: Option<f64>,
     /// Signal that stops the next motions.
     pub(super) guard: Option<u16>,
 }
@@ -136,7 +139,9 @@ impl<T: Transport> Val2Client<T> {
     /// controller.
     pub fn set_speed(&mut self, percent: f64) -> Result<(), ArmError> {
         check_percent(percent)?;
-        self.command(&format!("SPEED {}", plain(percent))).map(drop)
+        self.command(&format!("SPEED {}", plain(percent)))?;
+        self.speed = Some(percent);
+        Ok(())
     }
 
     /// Reads the arm's position.
@@ -231,12 +236,10 @@ impl<T: Transport> Val2Client<T> {
     /// Stops the arm by `PANIC` and Ctrl-C, without waiting for a prompt first. The client can be
     /// used again afterwards.
     ///
-    /// `PANIC` is sent twice: the first may end a half-typed line, which it spoils.
-    ///
     /// # Errors
     /// [`ArmError::Line`] if the line did not take it.
     pub(super) fn panic_stop(&mut self) -> Result<(), ArmError> {
-        self.wire.send(b"PANIC\rPANIC\r\x03", "PANIC")?;
+        self.wire.send(STOP, "PANIC")?;
         // Whatever is said to that, in whichever number of prompts, is of no interest; only a dead
         // line is.
         match self.wire.settle() {

@@ -66,6 +66,8 @@ pub(super) struct Wire<T> {
     /// Bytes that ask again for a reply that does not come. The program of another user may take an
     /// empty line for an answer.
     pub(super) nudge: &'static [u8],
+    /// The last reply ended with the prompt under which a program runs.
+    pub(super) running: bool,
     /// The start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
 }
@@ -79,6 +81,7 @@ impl<T: Transport> Wire<T> {
             notices: Vec::new(),
             half_typed: false,
             nudge: NUDGE,
+            running: false,
             restarted: false,
         }
     }
@@ -96,9 +99,13 @@ impl<T: Transport> Wire<T> {
     }
 
     pub(super) fn send(&mut self, bytes: &[u8], doing: &str) -> Result<(), ArmError> {
+        let mut bytes = bytes.to_vec();
+        if !self.config.control_characters {
+            bytes.retain(|byte| *byte == b'\r' || !byte.is_ascii_control());
+        }
         #[cfg(feature = "tracing")]
         tracing::trace!(port = self.line.name(), bytes = %bytes.escape_ascii(), "sent");
-        let sent = self.line.send(bytes);
+        let sent = self.line.send(&bytes);
         sent.map_err(|source| self.broken(doing, source))
     }
 
@@ -146,6 +153,7 @@ impl<T: Transport> Wire<T> {
     /// Returns the reply, or the error of a controller that asks its start-up questions in
     /// mid-session.
     fn not_restarted(&mut self, reply: Reply) -> Result<Reply, ArmError> {
+        self.running = reply.ending == Ending::Running;
         if reply.ending != Ending::Question || !is_boot_question(&reply.text) {
             return Ok(reply);
         }
@@ -292,12 +300,14 @@ impl<T: Transport> Wire<T> {
         let until = self.after(timeout);
         let at_the_latest = until.saturating_add(reply_timeout.max(quiet.saturating_mul(4)));
         let mut taken = 0;
+        // A busy controller answers every empty line later: each waits longer than the one before.
+        let mut patience = reply_timeout;
         loop {
             let ending = reader.ending();
             let left = self.left(until);
             let wait = match ending {
                 Some(_) => quiet,
-                None => reply_timeout.min(left).max(Duration::from_millis(1)),
+                None => patience.min(left).max(Duration::from_millis(1)),
             };
             if let Some(bytes) = self.receive(wait, sent)? {
                 reader.push(&bytes);
@@ -320,6 +330,7 @@ impl<T: Transport> Wire<T> {
             }
             if !self.nudge.is_empty() {
                 self.send(self.nudge, sent)?;
+                patience = patience.saturating_mul(2);
             }
         }
     }
@@ -400,6 +411,11 @@ impl<T: Transport> Wire<T> {
             expected: expected.to_owned(),
             heard: shortened(heard),
             waited,
+            setting: if waited > self.config.patience() {
+                "motion_timeout"
+            } else {
+                "reply_timeout"
+            },
         }
     }
 

@@ -7,6 +7,7 @@ mod tcp;
 mod transcript;
 
 use std::io;
+use std::ops::DerefMut;
 use std::time::Duration;
 
 pub use memory::MemoryLine;
@@ -39,7 +40,7 @@ pub trait Transport {
     fn name(&self) -> &str;
 }
 
-impl<T: Transport + ?Sized> Transport for Box<T> {
+impl<P: DerefMut<Target: Transport>> Transport for P {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         (**self).send(bytes)
     }

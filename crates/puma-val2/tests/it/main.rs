@@ -20,6 +20,7 @@ macro_rules! assert_matches {
     };
 }
 
+mod backup;
 mod budget;
 mod client;
 mod client_robustness;
@@ -35,5 +36,6 @@ mod program;
 mod pty;
 #[cfg(unix)]
 mod pyserial;
+mod regression;
 mod session;
 mod tcp;

@@ -95,6 +95,7 @@ fn real_time_takes_the_time_of_the_motion() {
         EmulatorServer::pty(Emulator::new(PumaParams::unimation(), profile), config).unwrap();
     let line = SerialLine::open(server.address(), 9600).unwrap();
     let mut client = Val2Client::connect(line, ClientConfig::for_emulator()).unwrap();
+    client.set_speed(50.0).unwrap();
     let begun = std::time::Instant::now();
     client
         .move_by(JointDelta::from_degrees([41.0, 0.0, 0.0, 0.0, 0.0, 0.0]))

@@ -142,7 +142,9 @@ fn a_controller_that_stops_short_is_found_out() {
 #[test]
 fn a_motion_that_never_ends_is_stopped() {
     let mut client = client(Profile::val2(), MoveWay::Automatic);
-    client.set_speed(0.05).unwrap();
+    let emulator = client.line_mut().inner.emulator_mut();
+    // Somebody else makes the controller slower than this client knows.
+    emulator.feed(b"SPEED 0.05\r", emulator.now());
     let start = truth(&client);
     let outcome = client.move_by(STEP);
     assert_matches!(outcome, Err(ArmError::Silence { .. }));

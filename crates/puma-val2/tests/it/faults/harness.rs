@@ -17,6 +17,7 @@ pub(crate) fn config(way: MoveWay) -> ClientConfig {
         reply_timeout: Duration::from_millis(300),
         motion_timeout: Duration::from_secs(20),
         speed_percent: Some(100.0),
+        abort_running_program: true,
         ..ClientConfig::default()
     }
 }

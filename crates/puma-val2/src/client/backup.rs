@@ -1,0 +1,332 @@
+//! Everything in the controller's memory as text, and back.
+
+use crate::client::programs::check_line;
+use crate::client::reader::Ending;
+use crate::client::val2_client::Val2Client;
+use crate::error::ArmError;
+use crate::transport::Transport;
+
+/// Contents of a controller, or of a backup of one: names and their values, in order.
+#[derive(Debug, Default, PartialEq)]
+struct Contents {
+    /// Programs and their steps.
+    programs: Vec<(String, Vec<String>)>,
+    /// Locations; the name of a precision point begins with `#`.
+    places: Vec<(String, [f64; 6])>,
+    reals: Vec<(String, f64)>,
+}
+
+/// Name of the program of this number while the programs of a backup are typed.
+fn scratch(number: usize) -> String {
+    format!("PGN{number}")
+}
+
+impl<T: Transport> Val2Client<T> {
+    /// Returns all programs, locations and real variables as text, for [`Val2Client::restore`] and
+    /// [`Emulator::load_text`](crate::Emulator::load_text). Each listing is read until it is shown
+    /// the same twice; two backups of one state are equal.
+    ///
+    /// # Errors
+    /// Errors of the line or the controller.
+    pub fn backup(&mut self) -> Result<String, ArmError> {
+        Ok(self.contents()?.text())
+    }
+
+    fn contents(&mut self) -> Result<Contents, ArmError> {
+        let mut contents = Contents::default();
+        for name in self.programs()? {
+            let steps = self.program(&name)?;
+            contents.programs.push((name, steps));
+        }
+        for line in self.listing("LISTL")? {
+            let mut words = line.split_whitespace();
+            let name = words.next().unwrap_or_default().to_owned();
+            let values: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
+            // The heading holds no numbers.
+            if let Some(values) = values.and_then(|values| values.try_into().ok()) {
+                contents.places.push((name, values));
+            }
+        }
+        for line in self.listing("LISTR")? {
+            let value = line
+                .split_once(' ')
+                .and_then(|(name, value)| Some((name.to_owned(), value.trim().parse().ok()?)));
+            contents.reals.extend(value);
+        }
+        Ok(contents)
+    }
+
+    /// Returns what [`Val2Client::restore`] would do, a line for each name: `keep`, `store` or
+    /// `replace`, the kind and the name. Nothing is changed.
+    ///
+    /// # Errors
+    /// [`ArmError::Text`] for a text that is no backup; otherwise errors of the line or the
+    /// controller.
+    pub fn restore_plan(&mut self, text: &str) -> Result<Vec<String>, ArmError> {
+        let wanted = Contents::parse(text)?;
+        Ok(plan(&wanted, &self.contents()?))
+    }
+
+    /// Stores the programs, locations and real variables of a backup, and compares everything with
+    /// the controller's listings. What the controller holds with the same contents is left alone.
+    ///
+    /// All programs are typed under other names (`PGN0` and up) before the first one is put in
+    /// place: a step that is refused leaves the controller as it was.
+    ///
+    /// # Errors
+    /// [`ArmError::Text`] for a text that is no backup; [`ArmError::Conflict`] unless `replace`, if
+    /// the controller holds other contents of the same name; both before anything is changed.
+    /// [`ArmError::Refused`] for a step that the controller does not take; otherwise errors of the
+    /// line.
+    pub fn restore(&mut self, text: &str, replace: bool) -> Result<Vec<String>, ArmError> {
+        let wanted = Contents::parse(text)?;
+        let plan = plan(&wanted, &self.contents()?);
+        let replaced = plan.iter().filter_map(|line| line.strip_prefix("replace "));
+        let names: Vec<&str> = replaced.collect();
+        if !names.is_empty() && !replace {
+            return Err(ArmError::Conflict {
+                port: self.wire.port(),
+                names: names.join(", "),
+            });
+        }
+        let changes = |kind: &str, name: &str| {
+            let kept = format!("keep {kind} {name}");
+            !plan.iter().any(|line| *line == kept)
+        };
+        let programs = wanted.programs.iter().filter(|p| changes("program", &p.0));
+        let programs: Vec<_> = programs.collect();
+        for (i, (_, steps)) in programs.iter().enumerate() {
+            if let Err(error) = self.type_program(&scratch(i), steps) {
+                // A line that is gone cannot take the unfinished programs away either.
+                let deleted = (0..=i).map(|i| self.delete('P', &scratch(i)));
+                let _ = deleted.filter(Result::is_err).count();
+                return Err(error);
+            }
+        }
+        for (name, values) in &wanted.places {
+            if changes("location", name) {
+                self.define_place(name, *values)?;
+            }
+        }
+        for (name, value) in &wanted.reals {
+            if changes("real", name) {
+                self.command(&format!("DO {name} = {value}"))?;
+            }
+        }
+        for (i, (name, _)) in programs.iter().enumerate() {
+            self.put_in_place(name, &scratch(i))?;
+        }
+        let missing = self.restore_plan(text)?;
+        let missing = missing.iter().find(|line| !line.starts_with("keep "));
+        match missing {
+            None => Ok(plan),
+            Some(name) => Err(self.wire.garbled("LISTP", "all of the backup", name)),
+        }
+    }
+
+    /// Deletes what has this name: a program, a location or a real variable.
+    ///
+    /// # Errors
+    /// [`ArmError::Refused`] if nothing has this name; otherwise errors of the line.
+    pub fn remove(&mut self, name: &str) -> Result<(), ArmError> {
+        check_line("a name", name)?;
+        let contents = self.contents()?;
+        let same = |other: &String| other.eq_ignore_ascii_case(name);
+        let kind = if contents.programs.iter().any(|p| same(&p.0)) {
+            'P'
+        } else if contents.reals.iter().any(|r| same(&r.0)) {
+            'R'
+        } else {
+            'L'
+        };
+        self.delete(kind, name)
+    }
+
+    /// Defines a location as the arm's present position and returns the values that the controller
+    /// shows: joint angles for a name that begins with `#`, otherwise X Y Z O A T.
+    ///
+    /// # Errors
+    /// [`ArmError::Garbled`] if the values are not those of `WHERE`; otherwise errors of the line
+    /// or the controller.
+    pub fn here(&mut self, name: &str) -> Result<[f64; 6], ArmError> {
+        check_line("the name of a location", name)?;
+        let place = self.where_()?;
+        let stands = if name.starts_with('#') {
+            place.joints.degrees()
+        } else {
+            place.hand.val()
+        };
+        let line = format!("HERE {name}");
+        let shown = self
+            .ask_point(&line)?
+            .map(|shown| shown.map(|(value, _)| value));
+        let shown = shown.filter(|shown| near(shown, &stands));
+        let Some(shown) = shown else {
+            self.wire.settle()?;
+            return Err(self
+                .wire
+                .garbled(&line, "the position that WHERE shows", "another"));
+        };
+        self.leave_point()?;
+        Ok(shown)
+    }
+
+    /// Sets an output or a soft signal; a negative number switches it off.
+    ///
+    /// # Errors
+    /// Errors of the line or the controller: there is no such signal, for instance.
+    pub fn set_signal(&mut self, number: i32) -> Result<(), ArmError> {
+        self.command(&format!("SIGNAL {number}")).map(drop)
+    }
+
+    /// Starts a program and does not wait for its end. `cycles` is the number of its runs, a
+    /// negative one stands for runs without end.
+    ///
+    /// # Errors
+    /// [`ArmError::Setting`] for a name that is not one line of printable characters; otherwise
+    /// errors of the line or the controller.
+    pub fn start(&mut self, program: &str, cycles: i32) -> Result<(), ArmError> {
+        check_line("the name of a program", program)?;
+        self.refuse_under_guard("a program")?;
+        self.last_known = None;
+        let line = format!("EXECUTE {program},{cycles}");
+        let reply = self.say(&line)?;
+        self.without_message(&line, &reply)?;
+        if reply.ending == Ending::Question {
+            return Err(self
+                .wire
+                .garbled(&line, "a program that asks for nothing", &reply.text));
+        }
+        Ok(())
+    }
+}
+
+/// Returns `true` for values that differ by no more than a display does: of millimetres in
+/// hundredths, of degrees in thousandths.
+fn near(a: &[f64; 6], b: &[f64; 6]) -> bool {
+    let digit = |i: usize| if i < 3 { 0.006 } else { 0.000_6 };
+    (0..6).all(|i| (a[i] - b[i]).abs() < digit(i))
+}
+
+/// Returns a line for each name of `wanted`.
+fn plan(wanted: &Contents, held: &Contents) -> Vec<String> {
+    fn lines<'a, V>(
+        kind: &'a str,
+        wanted: &'a [(String, V)],
+        held: &'a [(String, V)],
+        equal: impl Fn(&V, &V) -> bool + 'a,
+    ) -> impl Iterator<Item = String> + 'a {
+        wanted.iter().map(move |(name, value)| {
+            let word = match held.iter().find(|(other, _)| other == name) {
+                None => "store",
+                Some((_, other)) if equal(value, other) => "keep",
+                Some(_) => "replace",
+            };
+            format!("{word} {kind} {name}")
+        })
+    }
+    let steps = |a: &Vec<String>, b: &Vec<String>| a == b;
+    let real = |a: &f64, b: &f64| (a - b).abs() <= 1e-4;
+    lines("program", &wanted.programs, &held.programs, steps)
+        .chain(lines("location", &wanted.places, &held.places, near))
+        .chain(lines("real", &wanted.reals, &held.reals, real))
+        .collect()
+}
+
+impl Contents {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for (name, steps) in &self.programs {
+            text.push_str(&format!(".PROGRAM {name}\n"));
+            for step in steps {
+                text.push_str(&format!(" {step}\n"));
+            }
+            text.push_str(".END\n");
+        }
+        let places = self.places.iter().map(|(name, values)| {
+            let values = values.map(|v| v.to_string()).join(",");
+            format!("{name} {values}\n")
+        });
+        let reals = self
+            .reals
+            .iter()
+            .map(|(name, value)| format!("{name} {value}\n"));
+        for (heading, lines) in [
+            (".LOCATIONS", places.collect::<String>()),
+            (".REALS", reals.collect()),
+        ] {
+            if !lines.is_empty() {
+                text.push_str(&format!("{heading}\n{lines}.END\n"));
+            }
+        }
+        text
+    }
+
+    fn parse(text: &str) -> Result<Self, ArmError> {
+        let mut contents = Self::default();
+        let mut section = String::new();
+        for (index, line) in text.lines().enumerate() {
+            let line = line.trim();
+            let upper = line.to_ascii_uppercase();
+            let wrong = |problem| ArmError::Text {
+                line: index + 1,
+                text: line.chars().take(80).collect(),
+                problem,
+            };
+            if upper == ".END" && !section.is_empty() {
+                section.clear();
+            } else if section == ".PROGRAM" {
+                if let Some((_, steps)) = contents.programs.last_mut() {
+                    check_line("a step of a program", line).map_err(|_| wrong("is no step"))?;
+                    steps.push(line.to_owned());
+                }
+            } else if section.is_empty() {
+                let (head, name) = upper.split_once(' ').unwrap_or((&upper, ""));
+                match (head, name.trim()) {
+                    ("", _) => continue,
+                    (".PROGRAM", name) if is_name(name) => {
+                        contents.programs.push((name.to_owned(), Vec::new()));
+                    }
+                    (".LOCATIONS" | ".REALS", "") => {}
+                    _ => return Err(wrong("begins no program, locations or reals")),
+                }
+                head.clone_into(&mut section);
+            } else {
+                let (name, values) = upper.split_once(' ').unwrap_or((&upper, ""));
+                let values: Option<Vec<f64>> = values.split(',').map(number).collect();
+                let values = values.unwrap_or_default();
+                if section == ".REALS" && is_name(name) && values.len() == 1 {
+                    contents.reals.push((name.to_owned(), values[0]));
+                    continue;
+                }
+                let plain = name.strip_prefix('#').unwrap_or(name);
+                match values.try_into() {
+                    Ok(values) if section == ".LOCATIONS" && is_name(plain) => {
+                        contents.places.push((name.to_owned(), values));
+                    }
+                    _ => return Err(wrong("is no name with its value or six values")),
+                }
+            }
+        }
+        if section.is_empty() {
+            return Ok(contents);
+        }
+        Err(ArmError::Text {
+            line: text.lines().count(),
+            text: section,
+            problem: "is not closed by .END",
+        })
+    }
+}
+
+/// Parses a finite number; words are refused.
+fn number(text: &str) -> Option<f64> {
+    let value: f64 = text.trim().parse().ok()?;
+    value.is_finite().then_some(value)
+}
+
+/// Returns `true` for the name of a program, location or variable, possibly with an index.
+fn is_name(name: &str) -> bool {
+    let letter = |c: char| c.is_ascii_alphanumeric() || "._[]".contains(c);
+    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(letter)
+}
