@@ -33,22 +33,20 @@ pub enum ArmError {
     },
     /// No complete answer came in time.
     #[error(
-        "{port}: no complete answer to `{sent}` within {waited:?} (the setting `{setting}`): \
-         expected {expected}, heard {heard:?}"
+        "{port}: no complete answer to `{sent}` within {waited:?}: expected {expected}, heard \
+         {heard:?}"
     )]
     Silence {
         /// The line.
         port: String,
         /// Line sent.
         sent: String,
-        /// Description of a complete answer.
+        /// Description of a complete answer, and the setting that limits the time.
         expected: String,
         /// Text that had come, shortened.
         heard: String,
         /// Time waited.
         waited: Duration,
-        /// Setting that limits this time.
-        setting: &'static str,
     },
     /// The controller shows no prompt: it hears nothing, or waits for the end of a motion.
     #[error(

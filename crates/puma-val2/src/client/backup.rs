@@ -89,10 +89,7 @@ impl<T: Transport> Val2Client<T> {
                 names: names.join(", "),
             });
         }
-        let changes = |kind: &str, name: &str| {
-            let kept = format!("keep {kind} {name}");
-            !plan.iter().any(|line| *line == kept)
-        };
+        let changes = |kind: &str, name: &str| !plan.contains(&format!("keep {kind} {name}"));
         let programs = wanted.programs.iter().filter(|p| changes("program", &p.0));
         let programs: Vec<_> = programs.collect();
         for (i, (_, steps)) in programs.iter().enumerate() {

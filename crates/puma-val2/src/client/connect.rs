@@ -111,10 +111,9 @@ impl<T: Transport> Val2Client<T> {
                     return Err(ArmError::Silence {
                         port: self.wire.port(),
                         sent: "CR".to_owned(),
-                        expected: expected.to_owned(),
+                        expected: format!("{expected} (limit: `connect_timeout`)"),
                         heard,
                         waited: timeout,
-                        setting: "connect_timeout",
                     });
                 }
                 Err(ArmError::Silence { heard, .. }) if is_own_echo(&heard) => {

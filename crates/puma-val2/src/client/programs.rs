@@ -48,11 +48,11 @@ impl<T: Transport> Val2Client<T> {
             match self.wire.exchange(line, LISTING_TIME) {
                 Ok(reply) => {
                     self.without_message(line, &reply)?;
-                    let lines = Some(lines_said(&reply.text, line));
-                    if lines == before {
-                        return Ok(lines.unwrap_or_default());
+                    let lines = lines_said(&reply.text, line);
+                    if before.as_ref() == Some(&lines) {
+                        return Ok(lines);
                     }
-                    before = lines;
+                    before = Some(lines);
                 }
                 Err(failed) if is_doubt(&failed.error) => drop(self.wire.settle()?),
                 Err(failed) => return Err(failed.error),

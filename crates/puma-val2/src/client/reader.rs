@@ -106,7 +106,7 @@ pub(super) fn lines_said(reply: &str, line: &str) -> Vec<String> {
         l.trim_start_matches(['.', '*'])
             .eq_ignore_ascii_case(line.trim())
     };
-    let echo = lines.iter().position(|l| is_echo(l));
+    let echo = lines.iter().position(is_echo);
     lines.drain(..echo.map_or(0, |at| at + 1));
     let said = lines.into_iter().filter(|line| !line.is_empty());
     said.map(str::to_owned).collect()

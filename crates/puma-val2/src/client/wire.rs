@@ -405,17 +405,17 @@ impl<T: Transport> Wire<T> {
         heard: &str,
         waited: Duration,
     ) -> ArmError {
+        let setting = if waited > self.config.patience() {
+            "motion_timeout"
+        } else {
+            "reply_timeout"
+        };
         ArmError::Silence {
             port: self.port(),
             sent: sent.to_owned(),
-            expected: expected.to_owned(),
+            expected: format!("{expected} (limit: `{setting}`)"),
             heard: shortened(heard),
             waited,
-            setting: if waited > self.config.patience() {
-                "motion_timeout"
-            } else {
-                "reply_timeout"
-            },
         }
     }
 
