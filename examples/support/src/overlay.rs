@@ -31,7 +31,7 @@ impl Overlay {
         Self(DynamicImage::ImageLuma8(frame.clone()).into_rgb8())
     }
 
-    fn stroke<S>(&mut self, shape: S, style: PrimitiveStyle<Rgb888>)
+    fn stroke<S>(&mut self, shape: &S, style: PrimitiveStyle<Rgb888>)
     where
         S: StyledDrawable<PrimitiveStyle<Rgb888>, Color = Rgb888, Output = ()>,
     {
@@ -42,26 +42,26 @@ impl Overlay {
     pub fn circle(&mut self, circle: &Circle) {
         let diameter = (2.0 * circle.radius).round().max(1.0) as u32;
         let ring = Ring::with_center(point((circle.x, circle.y)), diameter);
-        self.stroke(ring, PrimitiveStyle::with_stroke(FOUND, 3));
+        self.stroke(&ring, PrimitiveStyle::with_stroke(FOUND, 3));
         let arm = ((circle.radius * 0.15) as i32).clamp(3, 12);
         for along in [Point::new(arm, 0), Point::new(0, arm)] {
             let centre = point((circle.x, circle.y));
             let cross = Line::new(centre - along, centre + along);
-            self.stroke(cross, PrimitiveStyle::with_stroke(FOUND, 1));
+            self.stroke(&cross, PrimitiveStyle::with_stroke(FOUND, 1));
         }
     }
 
     /// Draws a straight line.
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: Rgb888, width: u32) {
         let line = Line::new(point(from), point(to));
-        self.stroke(line, PrimitiveStyle::with_stroke(colour, width));
+        self.stroke(&line, PrimitiveStyle::with_stroke(colour, width));
     }
 
     /// Draws a filled disc.
     pub fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb888) {
         let diameter = (2.0 * radius).round().max(1.0) as u32;
         let disc = Ring::with_center(point(centre), diameter);
-        self.stroke(disc, PrimitiveStyle::with_fill(colour));
+        self.stroke(&disc, PrimitiveStyle::with_fill(colour));
     }
 
     /// Draws a closed curve, given as a function of an angle.

@@ -1,7 +1,7 @@
 //! Updates per second on the paper's 90 states by 81 actions, and the cost of files and plans.
 //!
-//! `cargo bench -p qtable`. The comparison with other crates, with all optimisation across crates,
-//! is in `benches/peers` of the repository.
+//! `cargo bench -p library-benches --features all --bench learning`. The comparison with other
+//! crates, with all optimisation across crates, is in `benches/peers`.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -97,7 +97,6 @@ fn rebuilding(c: &mut Criterion) {
     });
 }
 
-#[cfg(feature = "files")]
 fn files(c: &mut Criterion) {
     let mut table = QTable::new(540, ACTIONS).unwrap();
     for state in 0..540 {
@@ -126,9 +125,6 @@ fn files(c: &mut Criterion) {
         b.iter(|| qtable::decode::<QTable>("table/1", &bytes).unwrap());
     });
 }
-
-#[cfg(not(feature = "files"))]
-fn files(_c: &mut Criterion) {}
 
 fn planning(c: &mut Criterion) {
     let taxi = toys::taxi().unwrap();
