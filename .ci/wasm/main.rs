@@ -3,7 +3,9 @@
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{CircleDetector, Heuristic, HeuristicConfig, detect_circles};
 use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
-use qtable::{EpsilonGreedy, QLearning, QTable, Schedule, Ties, Training, Until, toys};
+use qtable::{
+    EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Ties, Training, Until,
+};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let frame = GrayImage::from_fn(192, 144, |x, y| {
@@ -15,13 +17,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut heuristic = Heuristic::with_canny(HeuristicConfig::default())?;
     assert!((heuristic.detect(&frame)?[0].circle.radius - 33.0).abs() < 1.0);
 
-    let mut cliff = toys::cliff_walking()?;
+    let mut cliff = ModelEnvironment::cliff_walking()?;
     let learner = QLearning::new(Schedule::constant(0.5)?, 0.99)?;
     let policy = EpsilonGreedy::new(Schedule::linear(1.0, 0.0, 40_000)?)?.with_ties(Ties::Random);
     let mut training = Training::new(&cliff, QTable::new(48, 4)?, learner, policy)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     training.run(&mut cliff, Until::Actions(50_000), &mut rng)?;
-    let steps = cliff.compare(training.table(), 0.99, 500)?;
-    assert_eq!(steps.learned.steps, steps.optimal.steps);
+    let [learned, optimal] = cliff.compare(training.table(), 0.99, 500)?;
+    assert_eq!(learned.steps, optimal.steps);
     Ok(())
 }

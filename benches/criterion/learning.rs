@@ -13,8 +13,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use qtable::{
-    Action, Boltzmann, CachedBoltzmann, EpsilonGreedy, Policy, QLearning, QTable, Schedule, State,
-    Status, Step, toys,
+    Action, Boltzmann, CachedBoltzmann, EpsilonGreedy, ModelEnvironment, Policy, QLearning, QTable,
+    Schedule, State, Status, Step,
 };
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -127,7 +127,7 @@ fn files(c: &mut Criterion) {
 }
 
 fn planning(c: &mut Criterion) {
-    let taxi = toys::taxi().unwrap();
+    let taxi = ModelEnvironment::taxi().unwrap();
     c.bench_function("value iteration, taxi", |b| {
         b.iter(|| taxi.model().value_iteration(0.99, 1e-10).unwrap());
     });

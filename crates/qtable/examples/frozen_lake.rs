@@ -5,8 +5,8 @@
 
 use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 use qtable::{
-    EpsilonGreedy, Error, Estimate, ModelEnvironment, QLearning, QTable, Schedule, State, Training,
-    Until, over_seeds, toys,
+    Action, EpsilonGreedy, Error, Estimate, ModelEnvironment, Outcome, QLearning, QTable, Schedule,
+    State, Training, Until, over_seeds,
 };
 
 const GAMMA: f64 = 0.99;
@@ -15,29 +15,32 @@ const ACTIONS: u64 = 300_000;
 fn main() -> Result<(), Error> {
     let arguments: Vec<String> = std::env::args().collect();
     let given = |word: &str| arguments.iter().any(|argument| argument == word);
-    let (map, limit): (&[&str], u64) = if given("8x8") {
-        (&toys::FROZEN_LAKE_8X8, 200)
+    let (map, limit) = if given("8x8") {
+        ("8x8", 200)
     } else {
-        (&toys::FROZEN_LAKE_4X4, 100)
+        ("4x4", 100)
     };
-    let lake = toys::frozen_lake(map, given("slippery"))?;
+    let lake = ModelEnvironment::frozen_lake(map, given("slippery"))?;
     let tables = over_seeds(0..10, |seed| learn(&lake, limit, seed))?;
 
     let mut shares = Vec::new();
     for table in &tables {
         shares.push(lake.assess(&table.greedy(), GAMMA, limit)?.success);
     }
-    let optimal = lake.compare(&tables[0], GAMMA, limit)?.optimal.success;
+    let [_, optimal] = lake.compare(&tables[0], GAMMA, limit)?;
     let learned = Estimate::of(&shares);
     println!("success within {limit} steps: {learned} (mean of 10 seeds, 95 % interval)");
-    println!("the best there can be:        {optimal:.3}\nthe policy of seed 0:");
-    for (row, cells) in map.iter().enumerate() {
-        let signs = cells.bytes().enumerate().map(|(column, cell)| match cell {
-            b'H' => " ○",
-            b'G' => " ★",
-            _ => {
-                let state = State(row * cells.len() + column);
-                [" ←", " ↓", " →", " ↑"][tables[0].best(state).0]
+    let best = optimal.success;
+    println!("the best there can be:        {best:.3}\nthe policy of seed 0:");
+    let columns = limit as usize / 25;
+    for row in 0..columns {
+        let cells = (0..columns).map(|column| State(row * columns + column));
+        let signs = cells.map(|state| {
+            let ends = Outcome::certain(state, 0.0, true);
+            match lake.model().outcomes(state, Action(0)) == [ends] {
+                true if state.0 + 1 == columns * columns => " ★",
+                true => " ○",
+                false => [" ←", " ↓", " →", " ↑"][tables[0].best(state).0],
             }
         });
         println!("  {}", signs.collect::<String>());

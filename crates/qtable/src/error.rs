@@ -8,38 +8,29 @@ use crate::step::{Action, State, Step};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A table, mask or model without a single state or action.
-    #[error("{states} states and {actions} actions make an empty table: both must be at least 1")]
-    EmptyShape {
+    /// A table or model without a state or action, or one that does not fit into memory or whose
+    /// action index does not fit into 32 bits.
+    #[error("{states} states and {actions} actions make {problem}")]
+    Shape {
         /// States asked for.
         states: usize,
         /// Actions asked for.
         actions: usize,
-    },
-    /// A table that does not fit into memory, or whose action index does not fit into 32 bits.
-    #[error("a table of {states} states and {actions} actions is too large for this machine")]
-    TooLarge {
-        /// States asked for.
-        states: usize,
-        /// Actions asked for.
-        actions: usize,
+        /// The problem.
+        problem: &'static str,
     },
     /// Two objects that need the same number of states and actions and differ.
     #[error(
-        "{what} has {found_states} states and {found_actions} actions, \
-         but {states} and {actions} are needed"
+        "{what} has {} states and {} actions, but {} and {} are needed",
+        found.0, found.1, needed.0, needed.1
     )]
     ShapeMismatch {
         /// The object with the wrong shape, for example `"the environment"`.
         what: &'static str,
-        /// States needed.
-        states: usize,
-        /// Actions needed.
-        actions: usize,
-        /// States found.
-        found_states: usize,
-        /// Actions found.
-        found_actions: usize,
+        /// States and actions needed.
+        needed: (usize, usize),
+        /// States and actions found.
+        found: (usize, usize),
     },
     /// A list of the wrong length, as a damaged or hand-made file may hold.
     #[error("{what} holds {found} entries, but {needed} are needed")]
@@ -51,24 +42,18 @@ pub enum Error {
         /// Entries found.
         found: usize,
     },
-    /// A state index outside the table. Typical cause: an environment that reports more states than
-    /// it counts.
-    #[error("state {} is outside 0..{states}", state.0)]
-    StateOutOfRange {
-        /// The state.
-        state: State,
-        /// Number of states.
-        states: usize,
+    /// An index outside its range. Typical cause: an environment that reports more states than it
+    /// counts, or a policy for another environment.
+    #[error("{what} {index} is outside 0..{count}")]
+    OutOfRange {
+        /// The kind of index: `"state"`, `"action"` or `"bin"`.
+        what: &'static str,
+        /// The index.
+        index: usize,
+        /// Number of states, actions or bins.
+        count: usize,
     },
-    /// An action index outside the table. Typical cause: a policy for another environment.
-    #[error("action {} is outside 0..{actions}", action.0)]
-    ActionOutOfRange {
-        /// The action.
-        action: Action,
-        /// Number of actions.
-        actions: usize,
-    },
-    /// An action that the mask forbids in this state.
+    /// An action that the state does not offer.
     #[error("action {} is not allowed in state {}", action.0, state.0)]
     ActionNotAllowed {
         /// The state.
@@ -82,53 +67,30 @@ pub enum Error {
         /// The state.
         state: State,
     },
-    /// A reward that is NaN or infinite. Typical cause: a division by a distance that became zero.
+    /// A reward or a value that is NaN or infinite, or that a cached table cannot hold as `f32`.
+    /// Typical causes: a division by a distance that became zero; rewards without bound at γ = 1.
     #[error(
-        "the reward of action {} in state {} is {reward}: it must be finite",
+        "the {what} of action {} in state {} is {value}: it must be finite",
         action.0,
         state.0
     )]
-    RewardNotFinite {
+    NotFinite {
+        /// `"reward"` or `"value"`.
+        what: &'static str,
         /// The state the action was taken in.
         state: State,
         /// The action.
         action: Action,
-        /// The reward as reported.
-        reward: f64,
-    },
-    /// A value that is NaN or infinite, or that a cached table cannot hold as `f32`.
-    #[error(
-        "the value of action {} in state {} would be {value}: it must be finite",
-        action.0,
-        state.0
-    )]
-    ValueNotFinite {
-        /// The state.
-        state: State,
-        /// The action.
-        action: Action,
-        /// The value that was refused.
+        /// The number.
         value: f64,
     },
-    /// A setting outside its range.
+    /// A setting, or a value of a schedule, outside its range.
     #[error("{name} is {value}, but must be {expected}")]
     Setting {
         /// Name of the setting.
         name: &'static str,
         /// The value given.
         value: f64,
-        /// The range in words.
-        expected: &'static str,
-    },
-    /// A schedule that leaves the range of its quantity.
-    #[error("the schedule of {name} runs from {low} to {high}, but must stay {expected}")]
-    ScheduleRange {
-        /// The quantity, for example `"alpha"`.
-        name: &'static str,
-        /// Smallest value of the schedule.
-        low: f64,
-        /// Largest value of the schedule.
-        high: f64,
         /// The range in words.
         expected: &'static str,
     },
@@ -143,14 +105,6 @@ pub enum Error {
         value: f64,
         /// The element before it.
         before: f64,
-    },
-    /// A bin outside the intervals.
-    #[error("bin {bin} is outside 0..{bins}")]
-    BinOutOfRange {
-        /// The bin.
-        bin: usize,
-        /// Number of bins.
-        bins: usize,
     },
     /// A quantity that is NaN and so lies in no interval.
     #[error("quantity {quantity} is NaN, which lies in no interval")]
@@ -224,10 +178,17 @@ pub enum Error {
         /// The action.
         action: Action,
     },
+    /// A new key beyond the bound of its [`Keys`](crate::Keys).
+    #[error("there are more than the {most} keys allowed: raise the bound, or merge states")]
+    TooManyKeys {
+        /// The bound.
+        most: usize,
+    },
     /// A failure inside an environment, for example a lost connection.
     #[error("the environment failed: {0}")]
     Environment(String),
-    /// An environment whose shape or mask is another one than at first.
+    /// An environment whose shape or mask is another one than at first, although it is not
+    /// [dynamic](crate::Environment::is_dynamic).
     #[error("after {steps} steps {what} of the environment is not what it was at first")]
     EnvironmentChanged {
         /// Steps taken before.
@@ -262,6 +223,16 @@ impl Error {
     pub fn environment(cause: impl std::fmt::Display) -> Self {
         Self::Environment(cause.to_string())
     }
+
+    /// Returns the error of a table too large for memory.
+    pub(crate) fn too_large(states: usize, actions: usize) -> Self {
+        let problem = "a table that is too large for this machine";
+        Self::Shape {
+            states,
+            actions,
+            problem,
+        }
+    }
 }
 
 /// Checks a setting against a range given in words.
@@ -272,32 +243,24 @@ pub(crate) fn check_setting(
     expected: &'static str,
 ) -> Result<(), Error> {
     if valid {
-        Ok(())
-    } else {
-        Err(Error::Setting {
-            name,
-            value,
-            expected,
-        })
-    }
-}
-
-/// Checks a discount factor γ.
-pub(crate) fn check_gamma(gamma: f64) -> Result<(), Error> {
-    check_setting("gamma", gamma, (0.0..=1.0).contains(&gamma), "in 0..=1")
-}
-
-/// Refuses a reward that is not finite.
-#[inline(always)]
-pub(crate) fn check_reward(state: State, action: Action, reward: f64) -> Result<(), Error> {
-    if reward.is_finite() {
         return Ok(());
     }
-    Err(Error::RewardNotFinite {
-        state,
-        action,
-        reward,
+    Err(Error::Setting {
+        name,
+        value,
+        expected,
     })
+}
+
+/// Checks a setting that must be a fraction, such as a discount factor γ.
+pub(crate) fn check_fraction(name: &'static str, value: f64) -> Result<(), Error> {
+    check_setting(name, value, (0.0..=1.0).contains(&value), "in 0..=1")
+}
+
+/// Checks a setting that must be finite and not negative.
+pub(crate) fn check_not_negative(name: &'static str, value: f64) -> Result<(), Error> {
+    let valid = value.is_finite() && value >= 0.0;
+    check_setting(name, value, valid, "finite and not negative")
 }
 
 /// Refuses a count of 0.
@@ -308,4 +271,44 @@ pub(crate) fn positive(name: &'static str, count: u64) -> Result<NonZeroU64, Err
         expected: "at least 1",
     };
     NonZeroU64::new(count).ok_or(refused)
+}
+
+/// Checks the length of a list.
+pub(crate) fn check_length(what: &'static str, needed: usize, found: usize) -> Result<(), Error> {
+    if found == needed {
+        return Ok(());
+    }
+    Err(Error::WrongLength {
+        what,
+        needed,
+        found,
+    })
+}
+
+/// Checks an index.
+#[inline(always)]
+pub(crate) fn check_index(what: &'static str, index: usize, count: usize) -> Result<(), Error> {
+    if index < count {
+        return Ok(());
+    }
+    Err(Error::OutOfRange { what, index, count })
+}
+
+/// Refuses a `"reward"` or `"value"` that is not finite.
+#[inline(always)]
+pub(crate) fn check_finite(
+    what: &'static str,
+    state: State,
+    action: Action,
+    value: f64,
+) -> Result<(), Error> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::NotFinite {
+        what,
+        state,
+        action,
+        value,
+    })
 }

@@ -15,7 +15,7 @@ use serde::de::DeserializeOwned;
 
 const MAGIC: [u8; 8] = *b"\x89QTBL\r\n\x1a";
 /// Changes whenever a type of this crate is stored in another way.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const CHECKSUM: u64 = 4;
 /// Most bytes of a kind, and of the names of types.
 const NAME_LIMIT: usize = 255;

@@ -3,15 +3,17 @@
 mod double;
 mod dyna;
 mod n_step;
-mod one_step;
+mod q_learning;
 mod rule;
 mod sweeping;
+mod target;
 mod traces;
 
 pub use double::DoubleQLearning;
 pub use dyna::DynaQ;
-pub use n_step::NStepQ;
-pub use one_step::{ExpectedSarsa, QLearning, Sarsa};
+pub use n_step::NStep;
+pub use q_learning::QLearning;
 pub use rule::{Experience, Learner};
 pub use sweeping::PrioritizedSweeping;
-pub use traces::{QLambda, SarsaLambda};
+pub use target::Target;
+pub use traces::Traces;

@@ -88,7 +88,7 @@ mod schedule;
 mod scratch;
 mod step;
 mod table;
-pub mod toys;
+mod toys;
 mod training;
 mod validated;
 
@@ -98,15 +98,15 @@ pub use error::Error;
 #[cfg(feature = "files")]
 pub use files::{FileError, decode, encode, load, save};
 pub use learner::{
-    DoubleQLearning, DynaQ, ExpectedSarsa, Experience, Learner, NStepQ, PrioritizedSweeping,
-    QLambda, QLearning, Sarsa, SarsaLambda,
+    DoubleQLearning, DynaQ, Experience, Learner, NStep, PrioritizedSweeping, QLearning, Target,
+    Traces,
 };
-pub use model::{Assessment, Comparison, Model, ModelEnvironment, ModelEstimate, Outcome, Plan};
+pub use model::{Assessment, Model, ModelEnvironment, ModelEstimate, Outcome, Plan};
 pub use policy::{Boltzmann, EpsilonGreedy, Greedy, Policy, Ties, Ucb};
 pub use problem::{Environment, Intervals, Product, TimeLimit};
 pub use schedule::Schedule;
 pub use step::{Action, State, Status, Step};
-pub use table::{ActionMask, QTable};
+pub use table::{Keys, QTable};
 pub use training::{
     CachedBoltzmann, EnvironmentReport, Estimate, Evaluation, Record, Training, Until, check_env,
     evaluate, over_seeds,

@@ -6,7 +6,7 @@ mod estimate;
 mod plan;
 mod played;
 
-pub use assess::{Assessment, Comparison};
+pub use assess::Assessment;
 pub use dynamics::{Model, Outcome};
 pub use estimate::ModelEstimate;
 pub use plan::Plan;

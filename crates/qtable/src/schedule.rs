@@ -253,15 +253,8 @@ impl Schedule {
         expected: &'static str,
     ) -> Result<(), Error> {
         let (least, most) = self.range();
-        if least >= low && most <= high {
-            return Ok(());
-        }
-        Err(Error::ScheduleRange {
-            name,
-            low: least,
-            high: most,
-            expected,
-        })
+        let value = if most > high { most } else { least };
+        check_setting(name, value, least >= low && most <= high, expected)
     }
 
     fn of(shape: Shape) -> Result<Self, Error> {

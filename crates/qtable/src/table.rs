@@ -1,10 +1,10 @@
-//! Tables of action values, their masks, and their text form.
+//! The table: values, visits and the actions that each state offers.
 
 mod csv;
+mod keys;
 mod mask;
 mod qtable;
 
-pub use mask::ActionMask;
-pub(crate) use mask::checked_entries;
+pub use keys::Keys;
 pub use qtable::QTable;
-pub(crate) use qtable::check_value;
+pub(crate) use qtable::checked_entries;

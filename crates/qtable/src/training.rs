@@ -6,6 +6,7 @@ mod check_env;
 mod course;
 mod curve;
 mod driver;
+mod episode;
 mod evaluate;
 mod seeds;
 

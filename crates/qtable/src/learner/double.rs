@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 
 use crate::error::Error;
-use crate::learner::rule::{Experience, Learner, Rates, check};
+use crate::learner::rule::{Experience, Learner, Rates};
 use crate::policy::Policy;
 use crate::schedule::Schedule;
 use crate::step::{Action, State};
@@ -22,6 +22,17 @@ validated! {
     ///
     /// A learner belongs to the table it was made for; another table, or one changed by hand, is
     /// refused with [`Error::OtherTable`].
+    ///
+    /// ```
+    /// use qtable::{DoubleQLearning, QTable, Schedule};
+    ///
+    /// fn main() -> Result<(), qtable::Error> {
+    ///     let table = QTable::new(48, 4)?;
+    ///     let learner = DoubleQLearning::new(&table, Schedule::constant(0.1)?, 0.99)?;
+    ///     // Training::new(&environment, table, learner, policy)?
+    ///     Ok(())
+    /// }
+    /// ```
     #[derive(Clone, Debug, PartialEq)]
     pub struct DoubleQLearning {
         rates: Rates,
@@ -34,7 +45,7 @@ impl DoubleQLearning {
     /// and the discount factor γ.
     ///
     /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
+    /// [`Error::Setting`] if α or γ leaves `0..=1`.
     pub fn new(table: &QTable, alpha: Schedule, gamma: f64) -> Result<Self, Error> {
         Ok(Self {
             rates: Rates::new(alpha, gamma)?,
@@ -48,6 +59,20 @@ impl DoubleQLearning {
         0.5 * a.value(state, action) + 0.5 * b.value(state, action)
     }
 
+    /// Returns the best action of a state by one of the two tables. The caller's table knows which
+    /// actions there are.
+    fn choice(&self, learning: usize, table: &QTable, state: State) -> Action {
+        let own = &self.tables[learning];
+        if table.mask_row(state).is_none() {
+            return own.best(state);
+        }
+        let higher = |best: Action, action: Action| {
+            let better = own.value(state, action) > own.value(state, best);
+            if better { action } else { best }
+        };
+        table.offered(state).reduce(higher).unwrap_or_default()
+    }
+
     /// Refuses a table that does not show the mean.
     fn check_mean(&self, table: &QTable, state: State, action: Action) -> Result<(), Error> {
         if table.value(state, action).to_bits() == self.mean(state, action).to_bits() {
@@ -59,7 +84,7 @@ impl DoubleQLearning {
     #[cfg(feature = "serde")]
     fn restore(self) -> Result<Self, Error> {
         let [a, b] = &self.tables;
-        a.check_shape("the second table", b.states(), b.actions())?;
+        a.check_shape("the second table", b.shape())?;
         Ok(self)
     }
 }
@@ -76,12 +101,14 @@ impl Learner for DoubleQLearning {
         _policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
+        experience.check(table)?;
         let (state, action, step) = (experience.state, experience.action, &experience.step);
-        check(table, state, action, step)?;
-        let (states, actions) = (self.tables[0].states(), self.tables[0].actions());
-        table.check_shape("the learner's own table", states, actions)?;
+        for own in &mut self.tables {
+            own.grow(table.states())?;
+        }
+        table.check_shape("the learner's own table", self.tables[0].shape())?;
         let (learning, valuing) = if rng.random() { (0, 1) } else { (1, 0) };
-        let choice = self.tables[learning].best(step.observation);
+        let choice = self.choice(learning, table, step.observation);
         self.check_mean(table, state, action)?;
         self.check_mean(table, step.observation, choice)?;
         let target = self.rates.target(step, || {

@@ -2,9 +2,9 @@
 
 use rand::{Rng, RngExt};
 
-use crate::error::{Error, check_setting};
-use crate::learner::one_step::QLearning;
-use crate::learner::rule::{Experience, Learner, check};
+use crate::error::{Error, check_index, check_length, check_not_negative, check_setting};
+use crate::learner::q_learning::QLearning;
+use crate::learner::rule::{Experience, Learner};
 use crate::model::ModelEstimate;
 use crate::policy::Policy;
 use crate::schedule::Schedule;
@@ -24,6 +24,18 @@ validated! {
     ///
     /// A learner belongs to the table it was made for; another table is refused with
     /// [`Error::OtherTable`].
+    ///
+    /// ```
+    /// use qtable::{DynaQ, QTable, Schedule};
+    ///
+    /// fn main() -> Result<(), qtable::Error> {
+    ///     let table = QTable::new(54, 4)?;
+    ///     let dyna = DynaQ::new(&table, Schedule::constant(0.5)?, 0.95)?.with_planning_steps(50);
+    ///     let dyna_plus = dyna.clone().with_last_outcome().with_bonus(1e-3)?;
+    ///     // Training::new(&environment, table, dyna_plus, policy)?
+    ///     Ok(())
+    /// }
+    /// ```
     #[derive(Clone, Debug, PartialEq)]
     pub struct DynaQ {
         real: QLearning,
@@ -45,7 +57,7 @@ impl DynaQ {
     /// and the discount factor γ.
     ///
     /// # Errors
-    /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
+    /// [`Error::Setting`] if α or γ leaves `0..=1`.
     pub fn new(table: &QTable, alpha: Schedule, gamma: f64) -> Result<Self, Error> {
         Ok(Self {
             real: QLearning::new(alpha, gamma)?,
@@ -83,11 +95,9 @@ impl DynaQ {
     /// # Errors
     /// [`Error::Setting`] if κ is negative or not finite.
     pub fn with_bonus(self, kappa: f64) -> Result<Self, Error> {
-        let bonus = kappa;
-        let entries = self.model.states() * self.model.actions();
-        let last_tried = vec![0; entries];
+        let last_tried = vec![0; self.model.states() * self.model.actions()];
         Self {
-            bonus,
+            bonus: kappa,
             last_tried,
             ..self
         }
@@ -114,33 +124,36 @@ impl DynaQ {
             reward: 0.0,
             status: Status::Continuing,
         };
-        let mut step = self
-            .model
-            .draw_outcome(state, action, rng)
-            .unwrap_or(untried);
+        let known = self.model.draw_outcome(state, action, rng);
+        let mut step = known.unwrap_or(untried);
         step.reward += self.bonus * ((self.steps - tried_last) as f64).sqrt();
         Some((state, action, step))
     }
 
+    /// Notes that a pair is tried now.
+    fn note_trial(&mut self, state: State, action: Action) {
+        let actions = self.model.actions();
+        let entries = self.model.states() * actions;
+        self.last_tried.resize(entries, 0);
+        let row = &mut self.last_tried[state.0 * actions..][..actions];
+        if row.iter().all(|&step| step == 0) {
+            self.met.push(state);
+        }
+        self.steps = self.steps.saturating_add(1);
+        row[action.0] = self.steps;
+    }
+
     fn restore(self) -> Result<Self, Error> {
-        let valid = self.bonus.is_finite() && self.bonus >= 0.0;
-        check_setting("kappa", self.bonus, valid, "finite and not negative")?;
-        let (states, needed) = (
-            self.model.states(),
-            self.model.states() * self.model.actions(),
-        );
-        let found = self.last_tried.len();
-        if found != 0 && found != needed {
-            let what = "the list of trials";
-            return Err(Error::WrongLength {
-                what,
-                needed,
-                found,
-            });
-        }
-        if let Some(&state) = self.met.iter().find(|state| state.0 >= states) {
-            return Err(Error::StateOutOfRange { state, states });
-        }
+        check_not_negative("kappa", self.bonus)?;
+        let (states, found) = (self.model.states(), self.last_tried.len());
+        let needed = if found == 0 {
+            0
+        } else {
+            states * self.model.actions()
+        };
+        check_length("the list of trials", needed, found)?;
+        let mut met = self.met.iter();
+        met.try_for_each(|state| check_index("state", state.0, states))?;
         let latest = self.last_tried.iter().copied().max().unwrap_or(0);
         let valid = latest <= self.steps;
         check_setting("the step of a trial", latest as f64, valid, "a past step")?;
@@ -160,25 +173,13 @@ impl Learner for DynaQ {
         _policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
+        experience.check(table)?;
         let (state, action, step) = (experience.state, experience.action, &experience.step);
-        check(table, state, action, step)?;
-        self.model.check_table(table)?;
+        self.model.follow(table)?;
         let error = self.real.update(table, state, action, step)?;
-        if self.last_only {
-            self.model.replace(state, action, step)?;
-        } else {
-            self.model.observe(state, action, step)?;
-        }
+        self.model.note(state, action, step, self.last_only)?;
         if !self.last_tried.is_empty() {
-            let row = state.0 * table.actions();
-            if self.last_tried[row..][..table.actions()]
-                .iter()
-                .all(|&at| at == 0)
-            {
-                self.met.push(state);
-            }
-            self.steps = self.steps.saturating_add(1);
-            self.last_tried[row + action.0] = self.steps;
+            self.note_trial(state, action);
         }
         for _ in 0..self.planning_steps {
             if let Some((state, action, step)) = self.imagine(table, rng) {

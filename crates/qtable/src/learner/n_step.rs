@@ -1,4 +1,4 @@
-//! Q-learning with n-step returns.
+//! Learning from the rewards of n steps.
 
 use std::collections::VecDeque;
 
@@ -6,30 +6,64 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_setting};
-use crate::learner::rule::{Experience, Learner, Rates, check, constructor, is_greedy};
+use crate::error::{Error, check_not_negative, check_setting};
+use crate::learner::rule::{Experience, Learner, Rates, is_greedy};
+use crate::learner::target::{Target, probabilities};
 use crate::policy::Policy;
 use crate::schedule::Schedule;
-use crate::step::{Action, State, Status};
+use crate::scratch::Scratch;
+use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
 use crate::validated::validated;
 
 validated! {
-    /// n-step Q-learning: `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n max over b of
-    /// Q(sn,b) - Q(s0,a0))`.
+    /// SARSA, Expected SARSA, Q-learning and tree backup with returns of n steps:
+    /// `Q(s0,a0) <- Q(s0,a0) + α (r1 + γ r2 + … + γ^(n-1) rn + γ^n V(sn) - Q(s0,a0))`, with V by
+    /// the [`Target`].
     ///
-    /// A return is closed early when the episode ends, and, after Watkins (1989), before an
-    /// exploratory action: what comes after it is not what the greedy policy would have met.
-    /// [`uncut`](NStepQ::uncut) lets the return run on (as in Mnih and others 2016), which is
-    /// quicker while much is explored and biased as long as it is. Default: n = 4, cut. A pair is
-    /// updated up to n steps after its visit; the visit is counted at once.
+    /// | method | Sutton and Barto | made by |
+    /// |---|---|---|
+    /// | SARSA | 6.4 | `NStep::new(Target::Sarsa, 1, alpha, gamma)` |
+    /// | Expected SARSA | 6.6 | `NStep::new(Target::ExpectedSarsa, 1, alpha, gamma)` |
+    /// | n-step SARSA | 7.2 | `NStep::new(Target::Sarsa, n, alpha, gamma)` |
+    /// | n-step tree backup | 7.5 | `NStep::new(Target::TreeBackup, n, alpha, gamma)` |
+    /// | Monte Carlo control, every visit | 5.4 | `NStep::new(Target::Sarsa, usize::MAX, alpha, gamma)` |
+    /// | differential SARSA | 10.3 | [`with_average_reward`](NStep::with_average_reward) |
+    ///
+    /// A return is closed early when the episode ends. A pair is updated up to n steps after its
+    /// visit; the visit is counted at once. For means over all returns, as in the book's Monte
+    /// Carlo methods, α is [`Schedule::inverse_visits`]`(1.0, 1.0)`.
+    ///
+    /// ```
+    /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+    /// use qtable::{
+    ///     EpsilonGreedy, ModelEnvironment, NStep, QTable, Schedule, Target, Training, Until,
+    /// };
+    ///
+    /// fn main() -> Result<(), qtable::Error> {
+    ///     let mut cliff = ModelEnvironment::cliff_walking()?;
+    ///     let sarsa = NStep::new(Target::Sarsa, 1, Schedule::constant(0.5)?, 1.0)?;
+    ///     let policy = EpsilonGreedy::new(Schedule::constant(0.1)?)?;
+    ///     let mut training = Training::new(&cliff, QTable::new(48, 4)?, sarsa, policy)?;
+    ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    ///     training.run(&mut cliff, Until::Episodes(1_000), &mut rng)?;
+    ///     // Away from the edge.
+    ///     let walked = cliff.assess(&training.table().greedy(), 1.0, 100)?;
+    ///     assert!(walked.steps > 13.0);
+    ///     Ok(())
+    /// }
+    /// ```
     #[derive(Clone, Debug, PartialEq)]
-    pub struct NStepQ {
+    pub struct NStep {
         rates: Rates,
+        target: Target,
         n: usize,
-        cut: bool,
+        /// Rate of the average reward in units of α, and the average.
+        average: (f64, f64),
         /// Pairs not yet updated, oldest first.
         pending: VecDeque<Pending>,
+        #[cfg_attr(feature = "serde", serde(skip))]
+        probabilities: Scratch,
     }
 }
 
@@ -45,74 +79,160 @@ struct Pending {
     visits: u32,
 }
 
-impl NStepQ {
-    constructor!(n: 4, cut: true, pending: VecDeque::new());
+/// The state in which a return ends, and the action chosen there; `None` after a termination.
+type End = Option<(State, Option<Action>)>;
 
-    /// Sets n, at least 1; 1 is one-step Q-learning.
+impl NStep {
+    /// Creates the learner with a number of steps, at least 1, a schedule of α over its updates,
+    /// episodes or visits, and the discount factor γ.
     ///
     /// # Errors
-    /// [`Error::Setting`].
-    pub fn with_steps(self, n: usize) -> Result<Self, Error> {
-        Self { n, ..self }.restore()
+    /// [`Error::Setting`] if `n` is 0, or α or γ leaves `0..=1`.
+    pub fn new(target: Target, n: usize, alpha: Schedule, gamma: f64) -> Result<Self, Error> {
+        Self {
+            rates: Rates::new(alpha, gamma)?,
+            target,
+            n,
+            average: (0.0, 0.0),
+            pending: VecDeque::new(),
+            probabilities: Scratch::default(),
+        }
+        .restore()
     }
 
-    /// Lets a return run on through exploratory actions.
-    #[must_use]
-    pub fn uncut(self) -> Self {
-        Self { cut: false, ..self }
+    /// Learns how much better than the average reward each pair is, for tasks without an end
+    /// (differential SARSA, Sutton and Barto 10.3; with [`Target::Q`] the differential Q-learning
+    /// of Wan and others 2021). The average, at first 0, moves by `eta` α times each error.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if γ is not 1, or `eta` is negative or not finite.
+    pub fn with_average_reward(self, eta: f64) -> Result<Self, Error> {
+        let gamma = self.rates.gamma;
+        check_setting("gamma", gamma, gamma >= 1.0, "1 with an average reward")?;
+        let average = (eta, 0.0);
+        Self { average, ..self }.restore()
+    }
+
+    /// Returns the average reward of a step, 0 unless it is learned.
+    pub fn average_reward(&self) -> f64 {
+        self.average.1
     }
 
     fn restore(self) -> Result<Self, Error> {
         check_setting("n", self.n as f64, self.n > 0, "at least 1")?;
+        check_not_negative("eta", self.average.0)?;
+        let average = self.average.1;
+        check_setting("the average reward", average, average.is_finite(), "finite")?;
         Ok(self)
     }
 
-    /// Updates the oldest pending pair with its rewards and the value of what follows the last of
-    /// them.
-    fn close_oldest(&mut self, table: &mut QTable, following: f64) -> Result<(), Error> {
-        let rewards = self.pending.iter().rev();
-        let target = rewards.fold(following, |rest, visit| {
-            visit.reward + self.rates.gamma * rest
-        });
-        if let Some(visit) = self.pending.pop_front() {
-            let (state, action) = (visit.state, visit.action);
-            table.check(state, action)?;
-            let alpha = self.rates.alpha.now(&self.rates.clock, visit.visits);
-            let old = table.value(state, action);
-            table.store(state, action, old + alpha * (target - old))?;
-            self.rates.clock.tick();
+    /// Returns the value of the end of a return.
+    #[inline(always)]
+    fn tail(&mut self, table: &QTable, end: End, policy: &dyn Policy) -> Result<f64, Error> {
+        end.map_or(Ok(0.0), |(state, next_action)| {
+            self.target
+                .value(table, state, next_action, policy, &mut self.probabilities)
+        })
+    }
+
+    /// Computes the returns of all pending pairs, newest first, up to an end of value `tail`.
+    /// Returns the last one, that of the oldest pair.
+    #[inline(always)]
+    fn returns(
+        &mut self,
+        table: &QTable,
+        tail: f64,
+        policy: &dyn Policy,
+        mut on_return: impl FnMut(f64),
+    ) -> Result<f64, Error> {
+        let (mut rest, mut whole) = (tail, tail);
+        for visit in self.pending.iter().rev() {
+            whole = visit.reward - self.average.1 + self.rates.gamma * rest;
+            rest = whole;
+            on_return(whole);
+            if self.target == Target::TreeBackup {
+                let (state, action) = (visit.state, visit.action);
+                table.check(state, action)?;
+                let p = probabilities(table, state, policy, &mut self.probabilities)?;
+                let row = table.row(state);
+                let mean: f64 = p.iter().zip(row).map(|(p, q)| p * q).sum();
+                rest = mean + p[action.0] * (rest - row[action.0]);
+            }
         }
+        Ok(whole)
+    }
+
+    /// Moves the oldest pending pair toward its return.
+    #[inline]
+    fn update_oldest(&mut self, table: &mut QTable, target: f64) -> Result<(), Error> {
+        let Some(visit) = self.pending.pop_front() else {
+            return Ok(());
+        };
+        let (state, action) = (visit.state, visit.action);
+        table.check(state, action)?;
+        let alpha = self.rates.alpha.now(&self.rates.clock, visit.visits);
+        let old = table.value(state, action);
+        let error = target - old;
+        table.store(state, action, old + alpha * error)?;
+        self.average.1 += self.average.0 * alpha * error;
+        self.rates.clock.tick();
         Ok(())
     }
 
-    fn close_all(&mut self, table: &mut QTable, end: Option<State>) -> Result<(), Error> {
+    /// Updates all pending pairs, oldest first, with returns that end here.
+    fn close(&mut self, table: &mut QTable, end: End, policy: &dyn Policy) -> Result<(), Error> {
+        let mut returns = Vec::new();
         while !self.pending.is_empty() {
-            // Asked again each time: the update before may have changed it.
-            self.close_oldest(table, end.map_or(0.0, |state| table.max(state)))?;
+            let tail = self.tail(table, end, policy)?;
+            returns.clear();
+            self.returns(table, tail, policy, |whole| returns.push(whole))?;
+            while let Some(target) = returns.pop() {
+                self.update_oldest(table, target)?;
+                // An update may change the values that the next returns are made of.
+                let steady = self.average.0 <= 0.0 && self.target != Target::TreeBackup;
+                if !steady || self.tail(table, end, policy)?.to_bits() != tail.to_bits() {
+                    break;
+                }
+            }
         }
         Ok(())
     }
-}
 
-impl Learner for NStepQ {
-    fn begin_episode(&mut self) {
-        self.rates.clock.begin_episode();
-        self.pending.clear();
-    }
-
-    fn learn(
+    /// Learns by one step, which needs no list of pending pairs.
+    #[inline(never)]
+    fn learn_one(
         &mut self,
         table: &mut QTable,
         experience: &Experience,
-        _policy: &dyn Policy,
-        _rng: &mut dyn Rng,
+        policy: &dyn Policy,
     ) -> Result<f64, Error> {
         let (state, action, step) = (experience.state, experience.action, &experience.step);
-        check(table, state, action, step)?;
-        if self.cut && !is_greedy(table, state, action) {
-            self.close_all(table, Some(state))?;
+        let tail = self.tail(table, experience.end(), policy)?;
+        let reward = step.reward - self.average.1;
+        let target = self.rates.target(&Step { reward, ..*step }, || tail);
+        if self.average.0 > 0.0 {
+            let alpha = self.rates.alpha(table, state, action);
+            let error = target - table.value(state, action);
+            self.average.1 += self.average.0 * alpha * error;
         }
-        let target = self.rates.greedy_target(table, step);
+        self.rates.learn(table, state, action, target)
+    }
+
+    #[inline(never)]
+    fn learn_several(
+        &mut self,
+        table: &mut QTable,
+        experience: &Experience,
+        policy: &dyn Policy,
+    ) -> Result<f64, Error> {
+        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        if self.target == Target::Q && !is_greedy(table, state, action) {
+            self.close(table, Some((state, None)), policy)?;
+        }
+        let end = experience.end();
+        let tail = self.tail(table, end, policy)?;
+        let reward = step.reward - self.average.1;
+        let target = self.rates.target(&Step { reward, ..*step }, || tail);
         let error = target - table.value(state, action);
         self.pending.push_back(Pending {
             state,
@@ -122,13 +242,47 @@ impl Learner for NStepQ {
         });
         table.visit(state, action)?;
         match step.status {
-            Status::Terminated => self.close_all(table, None)?,
-            Status::Truncated => self.close_all(table, Some(step.observation))?,
+            Status::Terminated | Status::Truncated => self.close(table, end, policy)?,
             Status::Continuing if self.pending.len() >= self.n => {
-                self.close_oldest(table, table.max(step.observation))?;
+                let target = self.returns(table, tail, policy, |_| ())?;
+                self.update_oldest(table, target)?;
             }
             Status::Continuing => {}
         }
         Ok(error)
+    }
+}
+
+impl Experience {
+    /// Returns the state that a return may end in.
+    fn end(&self) -> End {
+        let goes_on = self.step.status != Status::Terminated;
+        goes_on.then_some((self.step.observation, self.next_action))
+    }
+}
+
+impl Learner for NStep {
+    fn needs_next_action(&self) -> bool {
+        self.target == Target::Sarsa
+    }
+
+    fn begin_episode(&mut self) {
+        self.rates.clock.begin_episode();
+        self.pending.clear();
+    }
+
+    fn learn(
+        &mut self,
+        table: &mut QTable,
+        experience: &Experience,
+        policy: &dyn Policy,
+        _rng: &mut dyn Rng,
+    ) -> Result<f64, Error> {
+        experience.check(table)?;
+        if self.n == 1 {
+            self.learn_one(table, experience, policy)
+        } else {
+            self.learn_several(table, experience, policy)
+        }
     }
 }

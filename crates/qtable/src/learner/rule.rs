@@ -2,7 +2,7 @@
 
 use rand::Rng;
 
-use crate::error::{Error, check_gamma, check_reward};
+use crate::error::{Error, check_finite, check_fraction};
 use crate::policy::Policy;
 use crate::schedule::{Clock, Schedule};
 use crate::step::{Action, State, Status, Step};
@@ -23,11 +23,53 @@ pub struct Experience {
     pub next_action: Option<Action>,
 }
 
+impl Experience {
+    /// Checks that the experience fits the table.
+    #[inline(always)]
+    pub(super) fn check(&self, table: &QTable) -> Result<(), Error> {
+        table.check(self.state, self.action)?;
+        table.check_state(self.step.observation)?;
+        check_finite("reward", self.state, self.action, self.step.reward)
+    }
+}
+
 /// A rule that improves a table.
 ///
 /// The table is the caller's: policies act on it and reports show it. A learner keeps what else it
 /// needs itself (traces, a model, a second table), so that table and learner together are the whole
-/// state of the learning.
+/// state of the learning. [`Training`](crate::Training) runs it; a loop of your own looks so:
+///
+/// ```
+/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::{
+///     Environment, EpsilonGreedy, Experience, Learner, ModelEnvironment, Policy, QLearning, QTable,
+///     Schedule, State, Status,
+/// };
+///
+/// fn main() -> Result<(), qtable::Error> {
+///     let mut chain = ModelEnvironment::chain(4)?;
+///     let mut table = QTable::new(4, 2)?;
+///     let mut learner = QLearning::new(Schedule::constant(0.5)?, 0.9)?;
+///     let mut policy = EpsilonGreedy::new(Schedule::constant(0.3)?)?;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     for _ in 0..100 {
+///         let mut state = chain.reset(&mut rng)?;
+///         learner.begin_episode();
+///         loop {
+///             let action = policy.choose(&table, state, &mut rng);
+///             let step = chain.step(action, &mut rng)?;
+///             let experience = Experience { state, action, step, next_action: None };
+///             learner.learn(&mut table, &experience, &policy, &mut rng)?;
+///             state = step.observation;
+///             if step.status != Status::Continuing {
+///                 break;
+///             }
+///         }
+///     }
+///     assert!((table.max(State(0)) - 0.81).abs() < 0.01);
+///     Ok(())
+/// }
+/// ```
 pub trait Learner {
     /// Returns `true` if the learner needs the action that will be taken next
     /// ([`Experience::next_action`]). Then that action is chosen before the update, otherwise
@@ -100,7 +142,7 @@ impl Rates {
 
     fn restore(self) -> Result<Self, Error> {
         self.alpha.check("alpha", 0.0, 1.0, "in 0..=1")?;
-        check_gamma(self.gamma)?;
+        check_fraction("gamma", self.gamma)?;
         Ok(self)
     }
 
@@ -145,53 +187,7 @@ impl Rates {
     }
 }
 
-/// Checks that an experience fits the table.
-#[inline(always)]
-pub(super) fn check(
-    table: &QTable,
-    state: State,
-    action: Action,
-    step: &Step,
-) -> Result<(), Error> {
-    table.check(state, action)?;
-    table.check_state(step.observation)?;
-    check_reward(state, action, step.reward)
-}
-
-/// Returns the value of the action that the policy has chosen next.
-pub(super) fn next_value(table: &QTable, experience: &Experience) -> Result<f64, Error> {
-    if experience.step.status == Status::Terminated {
-        return Ok(0.0);
-    }
-    let state = experience.step.observation;
-    let action = experience
-        .next_action
-        .ok_or(Error::NextActionMissing { state })?;
-    table.check(state, action)?;
-    Ok(table.value(state, action))
-}
-
 /// Returns `true` if the action is one of the best of its state.
 pub(super) fn is_greedy(table: &QTable, state: State, action: Action) -> bool {
     table.value(state, action) >= table.max(state)
 }
-
-/// Writes the constructor of a learner that has learning rate, discount factor and clock, and no
-/// further state than the fields given.
-macro_rules! constructor {
-    ($($field:ident: $value:expr),*) => {
-        /// Creates the learner with a schedule of α over its updates, episodes or visits, and the
-        /// discount factor γ.
-        ///
-        /// # Errors
-        /// [`Error::ScheduleRange`] if α leaves `0..=1`, [`Error::Setting`] if γ does.
-        pub fn new(alpha: Schedule, gamma: f64) -> Result<Self, Error> {
-            Ok(Self {
-                rates: Rates::new(alpha, gamma)?,
-                $($field: $value),*
-            })
-        }
-    };
-}
-
-pub(super) use constructor;

@@ -1,13 +1,12 @@
 //! Prioritized sweeping: planning where it changes most.
 
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_gamma, check_setting};
-use crate::learner::rule::{Experience, Learner, check};
+use crate::error::{Error, check_fraction, check_length, check_not_negative, positive};
+use crate::learner::rule::{Experience, Learner};
 use crate::model::ModelEstimate;
 use crate::policy::Policy;
 use crate::step::{Action, State, Status};
@@ -24,12 +23,26 @@ validated! {
     ///
     /// A learner belongs to the table it was made for; another table is refused with
     /// [`Error::OtherTable`].
+    ///
+    /// ```
+    /// use qtable::{PrioritizedSweeping, QTable};
+    ///
+    /// fn main() -> Result<(), qtable::Error> {
+    ///     let table = QTable::new(54, 4)?;
+    ///     let learner = PrioritizedSweeping::new(&table, 0.95)?.with_backups(10)?;
+    ///     // Training::new(&environment, table, learner, policy)?
+    ///     Ok(())
+    /// }
+    /// ```
     #[derive(Clone, Debug, PartialEq)]
     pub struct PrioritizedSweeping {
         gamma: f64,
         backups: u32,
         threshold: f64,
         model: ModelEstimate,
+        /// Change that the backup of each pair would make, 0 for pairs that are not queued.
+        priorities: Vec<f64>,
+        #[cfg_attr(feature = "serde", serde(skip))]
         queue: Queue,
     }
 }
@@ -45,6 +58,7 @@ impl PrioritizedSweeping {
             backups: 5,
             threshold: 0.0,
             model: ModelEstimate::new(table.states(), table.actions())?,
+            priorities: Vec::new(),
             queue: Queue::default(),
         }
         .restore()
@@ -77,49 +91,47 @@ impl PrioritizedSweeping {
             .backup(state, action, self.gamma, |next| table.max(next))
     }
 
-    /// Queues a pair if its backup would change its value by more than the threshold. A change that
-    /// is not finite is the most urgent; its backup is refused if its value is not finite.
+    /// Queues a pair, or moves it forward, if its backup would change its value by more than the
+    /// threshold. A change that is not finite is the most urgent; its backup is refused if its
+    /// value is not finite.
     fn raise(&mut self, table: &QTable, state: State, action: Action) {
         if let Some(value) = self.backup(table, state, action) {
             let change = (value - table.value(state, action)).abs().min(f64::MAX);
-            if change > self.threshold {
-                self.queue.raise(&self.model, state, action, change);
+            let pair = state.0 * self.model.actions() + action.0;
+            if change > self.threshold && change > self.priorities[pair] {
+                self.priorities[pair] = change;
+                self.queue.0.push((change.to_bits(), Reverse(pair)));
             }
         }
     }
 
-    fn restore(self) -> Result<Self, Error> {
-        check_gamma(self.gamma)?;
-        check_setting(
-            "backups",
-            f64::from(self.backups),
-            self.backups > 0,
-            "at least 1",
-        )?;
-        let valid = self.threshold.is_finite() && self.threshold >= 0.0;
-        check_setting(
-            "threshold",
-            self.threshold,
-            valid,
-            "finite and not negative",
-        )?;
-        let needed = self.model.states() * self.model.actions();
-        let found = self.queue.priorities.len();
-        if found != 0 && found != needed {
-            return Err(Error::WrongLength {
-                what: "the queue",
-                needed,
-                found,
-            });
+    /// Takes the pair of the largest change from the queue.
+    fn pop(&mut self) -> Option<(State, Action)> {
+        while let Some((bits, Reverse(pair))) = self.queue.0.pop() {
+            if self.priorities[pair].to_bits() == bits {
+                self.priorities[pair] = 0.0;
+                return Some(self.model.pair(pair));
+            }
         }
-        if let Some(&priority) = self
-            .queue
-            .priorities
+        None
+    }
+
+    fn restore(mut self) -> Result<Self, Error> {
+        check_fraction("gamma", self.gamma)?;
+        positive("backups", u64::from(self.backups))?;
+        check_not_negative("threshold", self.threshold)?;
+        self.priorities
             .iter()
-            .find(|p| !p.is_finite() || **p < 0.0)
-        {
-            check_setting("a priority", priority, false, "finite and not negative")?;
+            .try_for_each(|&priority| check_not_negative("a priority", priority))?;
+        let needed = self.model.states() * self.model.actions();
+        if self.priorities.is_empty() {
+            self.priorities.resize(needed, 0.0);
         }
+        check_length("the queue", needed, self.priorities.len())?;
+        let entries = self.priorities.iter().enumerate();
+        let queued = entries.filter(|&(_, &priority)| priority > 0.0);
+        let queued = queued.map(|(pair, priority)| (priority.to_bits(), Reverse(pair)));
+        self.queue = Queue(queued.collect());
         Ok(self)
     }
 }
@@ -132,9 +144,11 @@ impl Learner for PrioritizedSweeping {
         _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
+        experience.check(table)?;
         let (state, action, step) = (experience.state, experience.action, &experience.step);
-        check(table, state, action, step)?;
-        self.model.check_table(table)?;
+        self.model.follow(table)?;
+        let entries = self.model.states() * self.model.actions();
+        self.priorities.resize(entries, 0.0);
         let next = match step.status {
             Status::Terminated => 0.0,
             Status::Continuing | Status::Truncated => table.max(step.observation),
@@ -147,7 +161,7 @@ impl Learner for PrioritizedSweeping {
 
         self.raise(table, state, action);
         for _ in 0..self.backups {
-            let Some((state, action)) = self.queue.pop(&self.model) else {
+            let Some((state, action)) = self.pop() else {
                 break;
             };
             let before = table.max(state);
@@ -166,69 +180,14 @@ impl Learner for PrioritizedSweeping {
     }
 }
 
-/// Pairs by the change that their backup would make. Of equal changes the lower pair comes first,
-/// so that the order does not depend on how the queue grew.
+/// Bits of each queued pair's priority (ordered as the positive number itself) and the pair. Of
+/// equal changes the lower pair comes first, so that the order does not depend on how the queue
+/// grew. Outdated entries stay until they are met; the priorities alone are the queue's state.
 #[derive(Clone, Debug, Default)]
-#[cfg_attr(
-    feature = "serde",
-    derive(Serialize, Deserialize),
-    serde(from = "Vec<f64>", into = "Vec<f64>")
-)]
-struct Queue {
-    /// Priority of each pair, 0 for those not queued.
-    priorities: Vec<f64>,
-    /// Bits of the priority (ordered as the positive number itself) and the pair; outdated entries
-    /// stay until they are met.
-    heap: BinaryHeap<(u64, std::cmp::Reverse<usize>)>,
-}
+struct Queue(BinaryHeap<(u64, Reverse<usize>)>);
 
 impl PartialEq for Queue {
-    fn eq(&self, other: &Self) -> bool {
-        self.priorities == other.priorities
-    }
-}
-
-impl From<Vec<f64>> for Queue {
-    fn from(priorities: Vec<f64>) -> Self {
-        let queued = |&(_, &p): &(usize, &f64)| p > 0.0;
-        let heap = priorities
-            .iter()
-            .enumerate()
-            .filter(queued)
-            .map(|(pair, p)| (p.to_bits(), std::cmp::Reverse(pair)))
-            .collect();
-        Self { priorities, heap }
-    }
-}
-
-impl From<Queue> for Vec<f64> {
-    fn from(queue: Queue) -> Self {
-        queue.priorities
-    }
-}
-
-impl Queue {
-    /// Queues a pair, or moves it forward.
-    fn raise(&mut self, model: &ModelEstimate, state: State, action: Action, change: f64) {
-        self.priorities
-            .resize(model.states() * model.actions(), 0.0);
-        let pair = state.0 * model.actions() + action.0;
-        if change > self.priorities[pair] {
-            self.priorities[pair] = change;
-            self.heap.push((change.to_bits(), std::cmp::Reverse(pair)));
-        }
-    }
-
-    fn pop(&mut self, model: &ModelEstimate) -> Option<(State, Action)> {
-        while let Some((bits, std::cmp::Reverse(pair))) = self.heap.pop() {
-            if self.priorities[pair].to_bits() == bits {
-                self.priorities[pair] = 0.0;
-                return Some((
-                    State(pair / model.actions()),
-                    Action(pair % model.actions()),
-                ));
-            }
-        }
-        None
+    fn eq(&self, _other: &Self) -> bool {
+        true
     }
 }

@@ -1,6 +1,6 @@
 //! The quality of a policy under a known model, exactly.
 
-use crate::error::{Error, check_gamma, check_setting, positive};
+use crate::error::{Error, check_fraction, check_index, check_setting, positive};
 use crate::model::dynamics::Model;
 use crate::model::played::ModelEnvironment;
 use crate::problem::Environment;
@@ -22,15 +22,6 @@ pub struct Assessment {
     pub value: f64,
 }
 
-/// A learned policy beside an optimal one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Comparison {
-    /// Results of the learned policy.
-    pub learned: Assessment,
-    /// Results of an optimal policy.
-    pub optimal: Assessment,
-}
-
 impl ModelEnvironment {
     /// Returns the expected results of a deterministic policy from the first states, in episodes
     /// that are truncated after `limit` steps.
@@ -39,7 +30,7 @@ impl ModelEnvironment {
     /// A policy of the wrong length or with an action that is not offered, γ outside `0..=1`, or a
     /// limit of 0.
     pub fn assess(&self, policy: &[Action], gamma: f64, limit: u64) -> Result<Assessment, Error> {
-        check_gamma(gamma)?;
+        check_fraction("gamma", gamma)?;
         positive("limit", limit)?;
         self.model().check_policy(policy)?;
         let mut present = self.model().spread_start(self.start())?;
@@ -75,16 +66,19 @@ impl ModelEnvironment {
         Ok(sums)
     }
 
-    /// Assesses the greedy policy of a table and an optimal policy for γ.
+    /// Returns the results of the greedy policy of a table, then those of an optimal policy for γ.
     ///
     /// # Errors
     /// [`assess`](ModelEnvironment::assess) and [`Model::value_iteration`] list them.
-    pub fn compare(&self, table: &QTable, gamma: f64, limit: u64) -> Result<Comparison, Error> {
+    pub fn compare(
+        &self,
+        table: &QTable,
+        gamma: f64,
+        limit: u64,
+    ) -> Result<[Assessment; 2], Error> {
         let plan = self.model().value_iteration(gamma, 1e-10)?;
-        Ok(Comparison {
-            learned: self.assess(&table.greedy(), gamma, limit)?,
-            optimal: self.assess(&plan.table.greedy(), gamma, limit)?,
-        })
+        let learned = self.assess(&table.greedy(), gamma, limit)?;
+        Ok([learned, self.assess(&plan.table.greedy(), gamma, limit)?])
     }
 }
 
@@ -93,12 +87,7 @@ impl Model {
     pub(super) fn spread_start(&self, start: &[(State, f64)]) -> Result<Vec<f64>, Error> {
         let mut spread = vec![0.0; self.states];
         for &(state, probability) in start {
-            if state.0 >= self.states {
-                return Err(Error::StateOutOfRange {
-                    state,
-                    states: self.states,
-                });
-            }
+            check_index("state", state.0, self.states)?;
             let valid = (0.0..=1.0).contains(&probability);
             check_setting(
                 "the probability of a first state",

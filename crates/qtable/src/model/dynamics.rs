@@ -3,9 +3,9 @@
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_reward, positive};
+use crate::error::{Error, check_finite, check_index, check_length, positive};
 use crate::step::{Action, State, Status, Step};
-use crate::table::{ActionMask, checked_entries};
+use crate::table::checked_entries;
 use crate::validated::validated;
 
 /// One possible outcome of an action.
@@ -35,10 +35,9 @@ impl Outcome {
 
     /// Returns the outcome as an environment would report it.
     pub fn step(&self) -> Step {
-        let status = if self.terminated {
-            Status::Terminated
-        } else {
-            Status::Continuing
+        let status = match self.terminated {
+            true => Status::Terminated,
+            false => Status::Continuing,
         };
         Step {
             observation: self.next,
@@ -78,8 +77,6 @@ validated! {
         starts: Vec<usize>,
         outcomes: Vec<Outcome>,
         pub(super) most_sweeps: u64,
-        #[cfg_attr(feature = "serde", serde(skip))]
-        pub(super) mask: Option<ActionMask>,
     }
 }
 
@@ -97,9 +94,8 @@ impl Model {
     ) -> Result<Self, Error> {
         let entries = checked_entries(states, actions)?;
         let mut starts = Vec::new();
-        starts
-            .try_reserve_exact(entries + 1)
-            .map_err(|_| Error::TooLarge { states, actions })?;
+        let reserved = starts.try_reserve_exact(entries + 1);
+        reserved.map_err(|_| Error::too_large(states, actions))?;
         starts.push(0);
         let mut all = Vec::new();
         for pair in 0..entries {
@@ -112,7 +108,6 @@ impl Model {
             starts,
             outcomes: all,
             most_sweeps: 1_000_000,
-            mask: None,
         }
         .restore()
     }
@@ -163,71 +158,65 @@ impl Model {
         gamma: f64,
         value: impl Fn(State) -> f64,
     ) -> f64 {
-        self.outcomes(state, action)
-            .iter()
-            .map(|outcome| {
-                let next = if outcome.terminated {
-                    0.0
-                } else {
-                    gamma * value(outcome.next)
-                };
-                outcome.probability * (outcome.reward + next)
-            })
-            .sum()
+        expected(self.outcomes(state, action), 1.0, gamma, value)
     }
 
     fn restore(mut self) -> Result<Self, Error> {
         let (states, actions) = (self.states, self.actions);
-        let needed = checked_entries(states, actions)? + 1;
-        let found = self.starts.len();
-        if found != needed {
-            return Err(Error::WrongLength {
-                what: "the model",
-                needed,
-                found,
-            });
-        }
+        let pairs = checked_entries(states, actions)?;
+        check_length("the model", pairs + 1, self.starts.len())?;
         let in_order = self.starts[0] == 0 && self.starts.is_sorted();
-        if !in_order || self.starts[needed - 1] != self.outcomes.len() {
-            return Err(Error::WrongLength {
-                what: "the list of the model's outcomes",
-                needed: self.starts[needed - 1],
-                found: self.outcomes.len(),
-            });
-        }
-        for pair in 0..needed - 1 {
+        let needed = if in_order {
+            self.starts[pairs]
+        } else {
+            usize::MAX
+        };
+        check_length(
+            "the list of the model's outcomes",
+            needed,
+            self.outcomes.len(),
+        )?;
+        for pair in 0..pairs {
             self.check_pair(State(pair / actions), Action(pair % actions))?;
         }
         let terminal: Vec<bool> = (0..states).map(|s| self.is_terminal(State(s))).collect();
         for outcome in &mut self.outcomes {
             outcome.terminated |= terminal[outcome.next.0];
         }
-        let mask = ActionMask::new(states, actions, |state, action| {
-            !self.outcomes(state, action).is_empty()
-        })?;
-        self.mask = mask.restricts().then_some(mask);
         positive("most_sweeps", self.most_sweeps)?;
         Ok(self)
     }
 
     fn check_pair(&self, state: State, action: Action) -> Result<(), Error> {
         let outcomes = self.outcomes(state, action);
+        let mut valid = true;
         for outcome in outcomes {
-            let (next, states) = (outcome.next, self.states);
-            if next.0 >= states {
-                let state = next;
-                return Err(Error::StateOutOfRange { state, states });
-            }
-            check_reward(state, action, outcome.reward)?;
+            check_index("state", outcome.next.0, self.states)?;
+            check_finite("reward", state, action, outcome.reward)?;
+            valid &= (0.0..=1.0).contains(&outcome.probability);
         }
         let sum: f64 = outcomes.iter().map(|outcome| outcome.probability).sum();
-        let each_valid = outcomes
-            .iter()
-            .all(|outcome| (0.0..=1.0).contains(&outcome.probability));
-        if outcomes.is_empty() || (each_valid && (sum - 1.0).abs() <= 1e-6) {
-            Ok(())
-        } else {
-            Err(Error::NotADistribution { state, action, sum })
+        if outcomes.is_empty() || (valid && (sum - 1.0).abs() <= 1e-6) {
+            return Ok(());
         }
+        Err(Error::NotADistribution { state, action, sum })
     }
+}
+
+/// Returns the expected `r + γ value(s')` over outcomes whose probabilities sum to `whole`.
+#[inline(always)]
+pub(super) fn expected(
+    outcomes: &[Outcome],
+    whole: f64,
+    gamma: f64,
+    value: impl Fn(State) -> f64,
+) -> f64 {
+    let outcomes = outcomes.iter().map(|outcome| {
+        let next = match outcome.terminated {
+            true => 0.0,
+            false => gamma * value(outcome.next),
+        };
+        outcome.probability / whole * (outcome.reward + next)
+    });
+    outcomes.sum()
 }

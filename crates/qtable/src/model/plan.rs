@@ -1,6 +1,6 @@
 //! The optimum of a known model, by dynamic programming.
 
-use crate::error::{Error, check_gamma, check_setting};
+use crate::error::{Error, check_fraction, check_index, check_length, check_setting};
 use crate::model::dynamics::Model;
 use crate::step::{Action, State};
 use crate::table::QTable;
@@ -222,26 +222,16 @@ impl Model {
             let known: f64 = (state + 1..n).map(|next| row[next] * values[next]).sum();
             values[state] = (row[n] - known) / row[state];
         }
-        values
-            .iter()
-            .all(|value| value.is_finite())
-            .then_some(values)
+        let finite = values.iter().all(|value| value.is_finite());
+        finite.then_some(values)
     }
 
     /// Refuses a policy that does not name an offered action for each state that has one.
     pub(super) fn check_policy(&self, policy: &[Action]) -> Result<(), Error> {
-        if policy.len() != self.states {
-            return Err(Error::WrongLength {
-                what: "the policy",
-                needed: self.states,
-                found: policy.len(),
-            });
-        }
+        check_length("the policy", self.states, policy.len())?;
         for (state, &action) in policy.iter().enumerate() {
-            let (state, actions) = (State(state), self.actions);
-            if action.0 >= actions {
-                return Err(Error::ActionOutOfRange { action, actions });
-            }
+            let state = State(state);
+            check_index("action", action.0, self.actions)?;
             if self.outcomes(state, action).is_empty() && !self.is_terminal(state) {
                 return Err(Error::ActionNotAllowed { state, action });
             }
@@ -257,13 +247,13 @@ impl Model {
 
     fn empty_table(&self) -> Result<QTable, Error> {
         let mut table = QTable::new(self.states, self.actions)?;
-        table.set_mask(self.mask.clone())?;
+        table.restrict(|state, action| !self.outcomes(state, action).is_empty());
         Ok(table)
     }
 }
 
 fn check_limits(gamma: f64, tolerance: f64) -> Result<(), Error> {
-    check_gamma(gamma)?;
+    check_fraction("gamma", gamma)?;
     let positive = tolerance.is_finite() && tolerance > 0.0;
     check_setting("tolerance", tolerance, positive, "positive and finite")
 }

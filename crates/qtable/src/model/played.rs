@@ -2,14 +2,31 @@
 
 use rand::{Rng, RngExt};
 
-use crate::error::Error;
-use crate::model::dynamics::Model;
+use crate::error::{Error, check_index};
+use crate::model::dynamics::{Model, Outcome};
 use crate::problem::Environment;
 use crate::step::{Action, State, Status, Step};
 use crate::validated::validated;
 
 validated! {
     /// An [`Environment`] that draws from a [`Model`]: a problem whose optimum is known.
+    ///
+    /// Its presets have the rules and the numbering of
+    /// [Gymnasium](https://gymnasium.farama.org/environments/toy_text/). A time limit is not part of
+    /// the dynamics; Gymnasium sets 100 steps for the 4x4 lake, 200 for the 8x8 lake and the taxi,
+    /// and none for the cliff. [`TimeLimit`](crate::TimeLimit) and the episode limit of training set
+    /// one.
+    ///
+    /// ```
+    /// use qtable::{ModelEnvironment, State};
+    ///
+    /// fn main() -> Result<(), qtable::Error> {
+    ///     let lake = ModelEnvironment::frozen_lake("4x4", true)?;
+    ///     let plan = lake.model().value_iteration(0.99, 1e-12)?;
+    ///     assert!((plan.table.max(State(0)) - 0.5420).abs() < 1e-4);
+    ///     Ok(())
+    /// }
+    /// ```
     ///
     /// Before the first `reset` it stands in the first of its first states. An action that the
     /// present state does not offer changes nothing and pays nothing.
@@ -60,14 +77,8 @@ impl ModelEnvironment {
 
     fn restore(self) -> Result<Self, Error> {
         self.model.spread_start(&self.start)?;
-        if self.state.0 < self.model.states() {
-            Ok(self)
-        } else {
-            Err(Error::StateOutOfRange {
-                state: self.state,
-                states: self.model.states(),
-            })
-        }
+        check_index("state", self.state.0, self.model.states())?;
+        Ok(self)
     }
 }
 
@@ -88,20 +99,16 @@ impl Environment for ModelEnvironment {
     /// # Panics
     /// If the action is out of range.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error> {
-        let outcomes = self.model.outcomes(self.state, action);
-        let step = match draw(
-            outcomes
-                .iter()
-                .map(|outcome| (outcome, outcome.probability)),
-            rng,
-        ) {
-            Some(outcome) => outcome.step(),
-            None => Step {
+        let outcomes = self.model.outcomes(self.state, action).iter();
+        let drawn = draw(outcomes.map(|outcome| (outcome, outcome.probability)), rng);
+        let step = drawn.map_or(
+            Step {
                 observation: self.state,
                 reward: 0.0,
                 status: Status::Continuing,
             },
-        };
+            Outcome::step,
+        );
         self.state = step.observation;
         Ok(step)
     }

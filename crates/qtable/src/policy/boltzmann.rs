@@ -35,7 +35,7 @@ impl Boltzmann {
     /// units of the values.
     ///
     /// # Errors
-    /// [`Error::ScheduleRange`] if the temperature falls below 1e-6.
+    /// [`Error::Setting`] if the temperature falls below 1e-6.
     pub fn new(temperature: Schedule) -> Result<Self, Error> {
         Self {
             temperature,
@@ -108,8 +108,8 @@ fn boltzmann_weights(table: &QTable, state: State, temperature: f64, weights: &m
             exp_within(exponent)
         };
     }
-    if let Some(mask) = table.mask() {
-        for (weight, &allowed) in weights.iter_mut().zip(mask.row(state)) {
+    if let Some(mask) = table.mask_row(state) {
+        for (weight, &allowed) in weights.iter_mut().zip(mask) {
             if !allowed {
                 *weight = 0.0;
             }

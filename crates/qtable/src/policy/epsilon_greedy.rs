@@ -25,7 +25,7 @@ impl EpsilonGreedy {
     /// Creates the policy with a schedule of ε over its choices, or over episodes.
     ///
     /// # Errors
-    /// [`Error::ScheduleRange`] if ε leaves `0..=1`.
+    /// [`Error::Setting`] if ε leaves `0..=1`.
     pub fn new(epsilon: Schedule) -> Result<Self, Error> {
         let (ties, clock) = (Ties::default(), Clock::default());
         Self {
@@ -76,10 +76,10 @@ impl Policy for EpsilonGreedy {
                 equals => self.draw(table, state, equals, rng),
             };
         }
-        let Some(mask) = table.mask() else {
+        let Some(mask) = table.mask_row(state) else {
             return Action(rng.random_range(0..table.actions()));
         };
-        let offered = mask.row(state).iter().filter(|&&offered| offered).count();
+        let offered = mask.iter().filter(|&&offered| offered).count();
         let drawn = rng.random_range(0..offered.max(1));
         table.offered(state).nth(drawn).unwrap_or(lowest)
     }

@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use crate::elementary::ln;
-use crate::error::{Error, check_setting};
+use crate::error::{Error, check_not_negative};
 use crate::policy::rule::{Policy, Ties};
 use crate::step::{Action, State};
 use crate::table::QTable;
@@ -62,8 +62,7 @@ impl Ucb {
     }
 
     fn restore(self) -> Result<Self, Error> {
-        let valid = self.width.is_finite() && self.width >= 0.0;
-        check_setting("c", self.width, valid, "finite and not negative")?;
+        check_not_negative("c", self.width)?;
         Ok(self)
     }
 }

@@ -1,6 +1,6 @@
 //! States from measured quantities: intervals of one quantity, and products of intervals.
 
-use crate::error::Error;
+use crate::error::{Error, check_index, check_length, check_setting};
 use crate::step::State;
 use crate::validated::validated;
 
@@ -47,7 +47,7 @@ impl Intervals {
     /// Names a bin the goal and closes it at both ends.
     ///
     /// # Errors
-    /// [`Error::BinOutOfRange`].
+    /// [`Error::OutOfRange`].
     pub fn with_goal(self, bin: usize) -> Result<Self, Error> {
         let goal = Some(bin);
         Self { goal, ..self }.restore()
@@ -95,17 +95,12 @@ impl Intervals {
     }
 
     fn check_bin(&self, bin: usize) -> Result<(), Error> {
-        let bins = self.bins();
-        if bin < bins {
-            Ok(())
-        } else {
-            Err(Error::BinOutOfRange { bin, bins })
-        }
+        check_index("bin", bin, self.bins())
     }
 
     fn restore(self) -> Result<Self, Error> {
         for &edge in &self.edges {
-            crate::error::check_setting("an edge", edge, edge.is_finite(), "finite")?;
+            check_setting("an edge", edge, edge.is_finite(), "finite")?;
         }
         if let Some(before) = self.edges.windows(2).position(|pair| pair[0] >= pair[1]) {
             return Err(Error::NotAscending {
@@ -152,7 +147,7 @@ impl Product {
     /// gives a single state.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] if the number of states does not fit into a `usize`.
+    /// [`Error::Shape`] if the number of states does not fit into a `usize`.
     pub fn new(quantities: Vec<Intervals>) -> Result<Self, Error> {
         let states = 0;
         Self { quantities, states }.restore()
@@ -163,7 +158,7 @@ impl Product {
     /// # Errors
     /// A wrong number of values, or NaN among them.
     pub fn index(&self, values: &[f64]) -> Result<State, Error> {
-        self.check_count(values.len())?;
+        check_length(QUANTITIES, self.quantities.len(), values.len())?;
         let mut state = 0;
         for (quantity, (intervals, &value)) in self.quantities.iter().zip(values).enumerate() {
             let bin = intervals
@@ -179,7 +174,7 @@ impl Product {
     /// # Errors
     /// A wrong number of bins, or one out of range.
     pub fn state(&self, bins: &[usize]) -> Result<State, Error> {
-        self.check_count(bins.len())?;
+        check_length(QUANTITIES, self.quantities.len(), bins.len())?;
         let mut state = 0;
         for (intervals, &bin) in self.quantities.iter().zip(bins) {
             intervals.check_bin(bin)?;
@@ -228,26 +223,12 @@ impl Product {
         &self.quantities
     }
 
-    fn check_count(&self, found: usize) -> Result<(), Error> {
-        let (what, needed) = ("the list of quantities", self.quantities.len());
-        if found == needed {
-            return Ok(());
-        }
-        Err(Error::WrongLength {
-            what,
-            needed,
-            found,
-        })
-    }
-
     fn restore(mut self) -> Result<Self, Error> {
         let mut bins = self.quantities.iter().map(Intervals::bins);
-        self.states = bins
-            .try_fold(1usize, usize::checked_mul)
-            .ok_or(Error::TooLarge {
-                states: usize::MAX,
-                actions: 1,
-            })?;
+        let states = bins.try_fold(1usize, usize::checked_mul);
+        self.states = states.ok_or_else(|| Error::too_large(usize::MAX, 1))?;
         Ok(self)
     }
 }
+
+const QUANTITIES: &str = "the list of quantities";

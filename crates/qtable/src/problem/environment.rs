@@ -10,39 +10,10 @@ use crate::step::{Action, State, Step};
 /// An episode starts with [`reset`](Environment::reset) and goes on with
 /// [`step`](Environment::step) until the status is other than `Continuing`; then only
 /// `reset` may follow. All randomness comes from the generator handed in, so that the same seed
-/// gives the same episode.
-///
-/// ```
-/// use qtable::rand::Rng;
-/// use qtable::{Action, Environment, Error, State, Status, Step};
-///
-/// /// Five cells in a row; the right end pays 1.
-/// struct Row(usize);
-///
-/// impl Environment for Row {
-///     fn states(&self) -> usize {
-///         5
-///     }
-///     fn actions(&self) -> usize {
-///         2
-///     }
-///     fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
-///         self.0 = 0;
-///         Ok(State(self.0))
-///     }
-///     fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
-///         self.0 = if action == Action(1) { self.0 + 1 } else { self.0.saturating_sub(1) };
-///         let done = self.0 == 4;
-///         Ok(Step {
-///             observation: State(self.0),
-///             reward: if done { 1.0 } else { 0.0 },
-///             status: if done { Status::Terminated } else { Status::Continuing },
-///         })
-///     }
-/// }
-/// ```
+/// gives the same episode. The example at the top of this crate implements one.
 pub trait Environment {
-    /// Returns the number of states, at least 1. Every observation is below it.
+    /// Returns the number of states, at least 1. Every observation is below it. It stays unless the
+    /// environment [is dynamic](Environment::is_dynamic).
     fn states(&self) -> usize;
 
     /// Returns the number of actions, at least 1.
@@ -60,11 +31,26 @@ pub trait Environment {
     /// A failure of the environment. Training gives the episode up and keeps what it has learned.
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error>;
 
-    /// Returns `true` if a state offers an action (the action mask). The answer must not change,
-    /// and a state without any action must end the episode. By default all actions are offered.
+    /// Returns `true` if a state offers an action (the action mask). A state without any action
+    /// must end the episode. By default all actions are offered.
+    ///
+    /// The answer must not change, unless the environment [is dynamic](Environment::is_dynamic).
     fn allows(&self, state: State, action: Action) -> bool {
         let _ = (state, action);
         true
+    }
+
+    /// Returns `true` if the number of states or the actions that a state offers may change. Then
+    /// both are asked at each step, and tables and learners grow with the environment
+    /// ([`Keys`](crate::Keys) numbers states as they are met). By default `false`.
+    fn is_dynamic(&self) -> bool {
+        false
+    }
+
+    /// Returns the player who acts next, 0 or 1, in a game for two
+    /// ([`Training::run_against`](crate::Training::run_against)). By default always 0.
+    fn player(&self) -> usize {
+        0
     }
 
     /// Returns whether an episode that ended with this step was a success, for reports only. By
@@ -97,6 +83,14 @@ macro_rules! forwarded {
 
             fn allows(&self, state: State, action: Action) -> bool {
                 (**self).allows(state, action)
+            }
+
+            fn is_dynamic(&self) -> bool {
+                (**self).is_dynamic()
+            }
+
+            fn player(&self) -> usize {
+                (**self).player()
             }
 
             fn succeeded(&self, last: &Step) -> Option<bool> {

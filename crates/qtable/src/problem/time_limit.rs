@@ -61,6 +61,14 @@ impl<E: Environment> Environment for TimeLimit<E> {
         self.inner.allows(state, action)
     }
 
+    fn is_dynamic(&self) -> bool {
+        self.inner.is_dynamic()
+    }
+
+    fn player(&self) -> usize {
+        self.inner.player()
+    }
+
     fn succeeded(&self, last: &Step) -> Option<bool> {
         self.inner.succeeded(last)
     }

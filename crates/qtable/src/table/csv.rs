@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
+#[cfg(feature = "csv")]
+use crate::error::{Error, check_length};
 use crate::step::{Action, State};
 use crate::table::qtable::QTable;
-#[cfg(feature = "csv")]
-use crate::{error::Error, table::mask::ActionMask};
 
 /// One line of the text.
 #[cfg(feature = "csv")]
@@ -79,13 +79,7 @@ impl QTable {
             highest.map_or(0, |highest| highest.saturating_add(1))
         };
         let (states, actions) = (beyond(|line| line.state), beyond(|line| line.action));
-        if states.checked_mul(actions) != Some(lines.len()) {
-            return Err(Error::WrongLength {
-                what: "the CSV text",
-                needed: states.saturating_mul(actions),
-                found: lines.len(),
-            });
-        }
+        check_length("the CSV text", states.saturating_mul(actions), lines.len())?;
         let mut table = Self::new(states, actions)?;
         let mut allowed = vec![None; lines.len()];
         for (line, number) in lines.iter().zip(2..) {
@@ -108,10 +102,7 @@ impl QTable {
             table.set(state, action, line.value)?;
             table.set_visits(state, action, visits);
         }
-        let mask = ActionMask::new(states, actions, |state, action| {
-            allowed[state.0 * actions + action.0] == Some(true)
-        })?;
-        table.set_mask(mask.restricts().then_some(mask))?;
+        table.restrict(|state, action| allowed[state.0 * actions + action.0] == Some(true));
         Ok(table)
     }
 }

@@ -1,103 +1,83 @@
-//! The actions that a state offers.
+//! The actions that each state of a table offers.
 
 use crate::error::Error;
 use crate::problem::Environment;
 use crate::step::{Action, State};
-use crate::validated::validated;
+use crate::table::qtable::QTable;
 
-validated! {
-    /// The actions that each state offers, `A(s)` in the literature: a dense table of `states` by
-    /// `actions` truth values. A state without any action is a terminal one.
-    ///
-    /// A [`QTable`](crate::QTable) with a mask never reports a forbidden action as its best, and no
-    /// policy chooses one.
-    #[derive(Clone, Debug, PartialEq, Eq)]
-    pub struct ActionMask {
-        actions: usize,
-        allowed: Vec<bool>,
+impl QTable {
+    /// Restricts every state to the actions for which `allows` returns `true`; if that is all of
+    /// them, the restriction is lifted. Values stay.
+    pub fn restrict(&mut self, mut allows: impl FnMut(State, Action) -> bool) {
+        let pairs = (0..self.states())
+            .flat_map(|state| (0..self.actions).map(move |action| (State(state), Action(action))));
+        let mask: Vec<bool> = pairs.map(|(state, action)| allows(state, action)).collect();
+        self.mask = mask.contains(&false).then_some(mask);
+        self.find_all_best();
     }
-}
 
-impl ActionMask {
-    /// Creates a mask by asking `allows` for every pair.
-    ///
-    /// # Errors
-    /// An empty shape, or one that does not fit into memory.
-    pub fn new(
-        states: usize,
-        actions: usize,
-        mut allows: impl FnMut(State, Action) -> bool,
-    ) -> Result<Self, Error> {
-        let entries = checked_entries(states, actions)?;
-        let mut allowed = Vec::new();
-        allowed
-            .try_reserve_exact(entries)
-            .map_err(|_| Error::TooLarge { states, actions })?;
-        for state in 0..states {
-            allowed.extend((0..actions).map(|action| allows(State(state), Action(action))));
+    /// Takes over the mask of an environment that restricts its actions. Returns `true` if that
+    /// changes the table.
+    pub(crate) fn restrict_as<E: Environment + ?Sized>(&mut self, environment: &E) -> bool {
+        let before = self.mask.take();
+        self.restrict(|state, action| environment.allows(state, action));
+        if self.mask.is_none() {
+            self.mask = before;
+            self.find_all_best();
+            return false;
         }
-        Self { actions, allowed }.restore()
+        self.mask != before
     }
 
-    /// Returns the mask of an environment, or `None` if it offers every action in every state.
-    ///
-    /// # Errors
-    /// [`ActionMask::new`] lists them.
-    pub fn of<E: Environment + ?Sized>(environment: &E) -> Result<Option<Self>, Error> {
-        let (states, actions) = (environment.states(), environment.actions());
-        let mask = Self::new(states, actions, |s, a| environment.allows(s, a))?;
-        Ok(mask.restricts().then_some(mask))
+    /// Adds the states that a dynamic environment has met, and asks for the actions that `state`
+    /// offers now.
+    pub(crate) fn meet<E: Environment + ?Sized>(
+        &mut self,
+        environment: &E,
+        state: State,
+    ) -> Result<(), Error> {
+        self.dynamic = true;
+        for new in self.states()..environment.states() {
+            self.grow(new + 1)?;
+            self.ask(environment, State(new));
+        }
+        self.check_state(state)?;
+        self.ask(environment, state);
+        Ok(())
     }
 
-    /// Returns `true` if an action of any state is forbidden.
-    pub(crate) fn restricts(&self) -> bool {
-        self.allowed.contains(&false)
+    /// Restricts a state to the actions that an environment allows there now.
+    fn ask<E: Environment + ?Sized>(&mut self, environment: &E, state: State) {
+        for action in (0..self.actions).map(Action) {
+            let allowed = environment.allows(state, action);
+            if allowed == self.allows(state, action) {
+                continue;
+            }
+            let entry = self.start(state) + action.0;
+            let all = || vec![true; self.values.len()];
+            self.mask.get_or_insert_with(all)[entry] = allowed;
+            self.find_best(state);
+        }
     }
 
-    /// Returns the number of states.
-    pub(crate) fn states(&self) -> usize {
-        self.allowed.len() / self.actions
-    }
-
-    /// Returns the number of actions.
-    pub(crate) fn actions(&self) -> usize {
-        self.actions
-    }
-
-    /// Returns one truth value for each action of a state.
-    ///
-    /// # Panics
-    /// If the state is outside the mask.
+    /// Returns one truth value for each action of a state if the table is restricted.
     #[inline]
-    pub fn row(&self, state: State) -> &[bool] {
-        // A product that wraps would lead to another row.
-        &self.allowed[state.0.saturating_mul(self.actions)..][..self.actions]
+    pub(crate) fn mask_row(&self, state: State) -> Option<&[bool]> {
+        let mask = self.mask.as_ref()?;
+        Some(&mask[self.start(state)..][..self.actions])
     }
 
-    fn restore(self) -> Result<Self, Error> {
-        let states = self.allowed.len() / self.actions.max(1);
-        let needed = checked_entries(states, self.actions)?;
-        if needed == self.allowed.len() {
-            return Ok(self);
-        }
-        Err(Error::WrongLength {
-            what: "the mask",
-            needed,
-            found: self.allowed.len(),
-        })
+    /// Returns `true` if a state offers an action.
+    #[inline]
+    pub fn allows(&self, state: State, action: Action) -> bool {
+        self.mask_row(state).is_none_or(|row| row[action.0])
     }
-}
 
-/// Returns `states * actions` where both are positive, the action index fits into 32 bits and the
-/// product into memory.
-pub(crate) fn checked_entries(states: usize, actions: usize) -> Result<usize, Error> {
-    if states == 0 || actions == 0 {
-        return Err(Error::EmptyShape { states, actions });
-    }
-    match states.checked_mul(actions) {
-        Some(entries) if entries <= isize::MAX as usize / 8 && u32::try_from(actions).is_ok() => {
-            Ok(entries)
-        }
-        _ => Err(Error::TooLarge { states, actions }),
+    /// Returns the actions that a state offers, by ascending index.
+    pub fn offered(&self, state: State) -> impl Iterator<Item = Action> + '_ {
+        let row = self.mask_row(state);
+        (0..self.actions)
+            .filter(move |&action| row.is_none_or(|row| row[action]))
+            .map(Action)
     }
 }

@@ -1,8 +1,7 @@
 //! The Q-table: one value for every pair of a state and an action.
 
-use crate::error::Error;
+use crate::error::{Error, check_finite, check_index, check_length};
 use crate::step::{Action, State};
-use crate::table::mask::{ActionMask, checked_entries};
 use crate::validated::validated;
 
 validated! {
@@ -11,6 +10,10 @@ validated! {
     ///
     /// The table keeps the best action of every row. A write costs one comparison; the row is
     /// searched again only when its best value falls. No value is ever infinite or NaN.
+    ///
+    /// A table may be restricted to the actions that each state offers, `A(s)` in the literature
+    /// ([`restrict`](QTable::restrict)). Then it never reports another action as its best, and no
+    /// policy chooses one. A state without any action is a terminal one.
     ///
     /// Methods that take a [`State`] or an [`Action`] and return no `Result` panic outside the
     /// table, like an index into a slice. [`get`](QTable::get) does not.
@@ -30,13 +33,20 @@ validated! {
     /// ```
     #[derive(Clone, Debug, PartialEq)]
     pub struct QTable {
-        actions: usize,
-        values: Vec<f64>,
+        pub(super) actions: usize,
+        /// Value of an entry that was never written, also in states added later.
+        initial: f64,
+        pub(super) values: Vec<f64>,
         visits: Vec<u32>,
-        mask: Option<ActionMask>,
+        /// For each entry, `true` if the state offers the action; `None` if all are offered.
+        pub(super) mask: Option<Vec<bool>>,
         /// The best action of each state.
         #[cfg_attr(feature = "serde", serde(skip))]
         best: Vec<Best>,
+        /// `true` once a dynamic environment was met: the mask is that of the present, and values
+        /// of actions that were offered before may still be learned.
+        #[cfg_attr(feature = "serde", serde(skip))]
+        pub(super) dynamic: bool,
     }
 }
 
@@ -64,34 +74,47 @@ impl QTable {
     /// # Errors
     /// An empty shape, one that does not fit into memory, or a value that is not finite.
     pub fn filled(states: usize, actions: usize, value: f64) -> Result<Self, Error> {
-        let entries = checked_entries(states, actions)?;
-        let too_large = |_| Error::TooLarge { states, actions };
-        let (mut values, mut visits) = (Vec::new(), Vec::new());
-        values.try_reserve_exact(entries).map_err(too_large)?;
-        visits.try_reserve_exact(entries).map_err(too_large)?;
-        values.resize(entries, value);
-        visits.resize(entries, 0);
-        let (mask, best) = (None, Vec::new());
-        Self {
+        let mut table = Self {
             actions,
-            values,
-            visits,
-            mask,
-            best,
-        }
-        .restore()
+            initial: value,
+            values: Vec::new(),
+            visits: Vec::new(),
+            mask: None,
+            best: Vec::new(),
+            dynamic: false,
+        };
+        table.resize(states)?;
+        table.restore()
     }
 
-    /// Restricts every state to the actions of a mask; `None` lifts the restriction. Values stay.
-    ///
-    /// # Errors
-    /// [`Error::ShapeMismatch`].
-    pub fn set_mask(&mut self, mask: Option<ActionMask>) -> Result<(), Error> {
-        if let Some(mask) = &mask {
-            self.check_shape("the mask", mask.states(), mask.actions())?;
+    /// Adds or removes states at the end.
+    fn resize(&mut self, states: usize) -> Result<(), Error> {
+        let entries = checked_entries(states, self.actions)?;
+        let too_large = |_| Error::too_large(states, self.actions);
+        let new = entries.saturating_sub(self.values.len());
+        self.values.try_reserve(new).map_err(too_large)?;
+        self.visits.try_reserve(new).map_err(too_large)?;
+        self.values.resize(entries, self.initial);
+        self.visits.resize(entries, 0);
+        if let Some(mask) = &mut self.mask {
+            mask.resize(entries, true);
         }
-        self.mask = mask;
-        self.find_all_best();
+        Ok(())
+    }
+
+    /// Adds states at the end until there are `states`, with the value of a new table.
+    pub(crate) fn grow(&mut self, states: usize) -> Result<(), Error> {
+        let before = self.states();
+        if states > before {
+            self.resize(states)?;
+            let (value, action, equals) = (self.initial, 0, self.actions as u32);
+            let best = Best {
+                value,
+                action,
+                equals,
+            };
+            self.best.resize(states, best);
+        }
         Ok(())
     }
 
@@ -171,71 +194,45 @@ impl QTable {
         &self.visits[self.start(state)..][..self.actions]
     }
 
-    /// Returns the mask, if one restricts the table.
-    #[inline]
-    pub fn mask(&self) -> Option<&ActionMask> {
-        self.mask.as_ref()
-    }
-
-    /// Returns `true` if a state offers an action.
-    #[inline]
-    pub fn allows(&self, state: State, action: Action) -> bool {
-        self.mask
-            .as_ref()
-            .is_none_or(|mask| mask.row(state)[action.0])
-    }
-
-    /// Returns the actions that a state offers, by ascending index.
-    pub fn offered(&self, state: State) -> impl Iterator<Item = Action> + '_ {
-        let row = self.mask.as_ref().map(|mask| mask.row(state));
-        (0..self.actions)
-            .filter(move |&action| row.is_none_or(|row| row[action]))
-            .map(Action)
-    }
-
     /// Returns the best action of every state.
     pub fn greedy(&self) -> Vec<Action> {
         (0..self.states()).map(|s| self.best(State(s))).collect()
     }
 
     /// Checks that a pair lies in the table and is offered.
-    ///
-    /// # Errors
-    /// A state or action out of range, or an action that the mask forbids.
     #[inline(always)]
     pub(crate) fn check(&self, state: State, action: Action) -> Result<(), Error> {
         self.entry(state, action).map(|_| ())
     }
 
     /// Checks that a state lies in the table.
-    ///
-    /// # Errors
-    /// [`Error::StateOutOfRange`].
     #[inline(always)]
     pub(crate) fn check_state(&self, state: State) -> Result<(), Error> {
         if state.0 < self.states() {
-            Ok(())
-        } else {
-            Err(self.refuse(state, Action(0)))
+            return Ok(());
         }
+        Err(self.refuse(state, Action(0)))
+    }
+
+    /// Returns the number of states and actions.
+    pub(crate) fn shape(&self) -> (usize, usize) {
+        (self.states(), self.actions)
     }
 
     /// Checks that `what` has the shape of the table.
     pub(crate) fn check_shape(
         &self,
         what: &'static str,
-        states: usize,
-        actions: usize,
+        found: (usize, usize),
     ) -> Result<(), Error> {
-        if (states, actions) == (self.states(), self.actions) {
+        let needed = self.shape();
+        if found == needed {
             return Ok(());
         }
         Err(Error::ShapeMismatch {
             what,
-            states: self.states(),
-            actions: self.actions,
-            found_states: states,
-            found_actions: actions,
+            needed,
+            found,
         })
     }
 
@@ -248,7 +245,7 @@ impl QTable {
     /// Returns the first entry of a state, which panics outside the table: a product that wraps
     /// would lead to another row.
     #[inline(always)]
-    fn start(&self, state: State) -> usize {
+    pub(super) fn start(&self, state: State) -> usize {
         assert!(
             state.0 < self.best.len(),
             "{}",
@@ -262,25 +259,32 @@ impl QTable {
     pub(crate) fn entry(&self, state: State, action: Action) -> Result<usize, Error> {
         let inside = state.0 < self.states() && action.0 < self.actions;
         let index = state.0.wrapping_mul(self.actions).wrapping_add(action.0);
-        let masked = self.mask.as_ref();
-        if inside && masked.is_none_or(|mask| mask.row(state)[action.0]) {
-            Ok(index)
-        } else {
-            Err(self.refuse(state, action))
+        if inside && self.mask.as_ref().is_none_or(|mask| mask[index]) {
+            return Ok(index);
         }
+        if inside && self.dynamic {
+            return Ok(index);
+        }
+        Err(self.refuse(state, action))
     }
 
     /// Returns the error for a pair that is refused.
     #[cold]
     fn refuse(&self, state: State, action: Action) -> Error {
-        let (states, actions) = (self.states(), self.actions);
-        if state.0 >= states {
-            Error::StateOutOfRange { state, states }
-        } else if action.0 >= actions {
-            Error::ActionOutOfRange { action, actions }
-        } else {
-            Error::ActionNotAllowed { state, action }
+        check_index("state", state.0, self.states())
+            .and_then(|()| check_index("action", action.0, self.actions))
+            .err()
+            .unwrap_or(Error::ActionNotAllowed { state, action })
+    }
+
+    /// Checks a choice: a pair in the table that is offered now.
+    #[inline(always)]
+    pub(crate) fn check_choice(&self, state: State, action: Action) -> Result<(), Error> {
+        self.check(state, action)?;
+        if self.dynamic && !self.allows(state, action) {
+            return Err(Error::ActionNotAllowed { state, action });
         }
+        Ok(())
     }
 
     /// Returns value and visits of an entry.
@@ -305,12 +309,12 @@ impl QTable {
     /// Writes a value at a pair that was checked, if it is finite, and keeps the best action.
     #[inline(always)]
     pub(crate) fn store(&mut self, state: State, action: Action, value: f64) -> Result<(), Error> {
-        check_value(state, action, value)?;
+        check_finite("value", state, action, value)?;
         let entry = state.0 * self.actions + action.0;
         let old = std::mem::replace(&mut self.values[entry], value);
         let best = &mut self.best[state.0];
         let index = action.0 as u32;
-        if index == best.action {
+        if index == best.action && best.equals > 0 {
             best.value = value;
             if value < old {
                 self.find_best(state);
@@ -345,7 +349,7 @@ impl QTable {
     }
 
     #[inline(never)]
-    fn find_best(&mut self, state: State) {
+    pub(super) fn find_best(&mut self, state: State) {
         let row = &self.values[state.0 * self.actions..][..self.actions];
         let higher = |a: f64, b: f64| if b > a { b } else { a };
         let mut found = Best {
@@ -353,7 +357,7 @@ impl QTable {
             action: 0,
             equals: 0,
         };
-        match &self.mask {
+        match self.mask_row(state) {
             None => {
                 // Lane by lane, so that it is done with vectors.
                 let (chunks, rest) = row.as_chunks::<8>();
@@ -370,8 +374,7 @@ impl QTable {
                 let first = row.iter().position(|&value| value >= found.value);
                 found.action = first.unwrap_or(0) as u32;
             }
-            Some(mask) => {
-                let offered = mask.row(state);
+            Some(offered) => {
                 for (action, (&value, &offered)) in row.iter().zip(offered).enumerate() {
                     if offered && (found.equals == 0 || value > found.value) {
                         (found.value, found.action, found.equals) = (value, action as u32, 1);
@@ -388,7 +391,7 @@ impl QTable {
         self.best[state.0] = found;
     }
 
-    fn find_all_best(&mut self) {
+    pub(super) fn find_all_best(&mut self) {
         for state in 0..self.states() {
             self.find_best(State(state));
         }
@@ -399,49 +402,48 @@ impl QTable {
         let actions = self.actions;
         let states = self.values.len() / actions.max(1);
         let needed = checked_entries(states, actions)?;
-        for (what, found) in [
-            ("the table", self.values.len()),
-            ("the list of visit counts", self.visits.len()),
-        ] {
-            if found != needed {
-                return Err(Error::WrongLength {
-                    what,
-                    needed,
-                    found,
-                });
-            }
+        check_length("the table", needed, self.values.len())?;
+        check_length("the list of visit counts", needed, self.visits.len())?;
+        let masked = self.mask.as_ref().map_or(needed, Vec::len);
+        check_length("the mask", needed, masked)?;
+        let entries = [self.initial]
+            .into_iter()
+            .chain(self.values.iter().copied());
+        for (entry, value) in entries.enumerate() {
+            let index = entry.saturating_sub(1);
+            let (state, action) = (State(index / actions), Action(index % actions));
+            check_finite("value", state, action, value)?;
         }
-        for (index, &value) in self.values.iter().enumerate() {
-            check_value(State(index / actions), Action(index % actions), value)?;
-        }
-        let too_large = |_| Error::TooLarge { states, actions };
         self.best.clear();
-        self.best.try_reserve_exact(states).map_err(too_large)?;
-        let (value, action, equals) = (self.values[0], 0, 0);
-        self.best.resize(
-            states,
-            Best {
-                value,
-                action,
-                equals,
-            },
-        );
-        let mask = self.mask.take();
-        self.set_mask(mask)?;
+        let reserved = self.best.try_reserve_exact(states);
+        reserved.map_err(|_| Error::too_large(states, actions))?;
+        let (value, action, equals) = (self.initial, 0, 0);
+        let best = Best {
+            value,
+            action,
+            equals,
+        };
+        self.best.resize(states, best);
+        self.find_all_best();
         Ok(self)
     }
 }
 
-/// Refuses a value that is not finite.
-#[inline(always)]
-pub(crate) fn check_value(state: State, action: Action, value: f64) -> Result<(), Error> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(Error::ValueNotFinite {
-            state,
-            action,
-            value,
-        })
+/// Returns `states * actions` where both are positive, the action index fits into 32 bits and the
+/// product into memory.
+pub(crate) fn checked_entries(states: usize, actions: usize) -> Result<usize, Error> {
+    if states == 0 || actions == 0 {
+        let problem = "an empty table: both must be at least 1";
+        return Err(Error::Shape {
+            states,
+            actions,
+            problem,
+        });
+    }
+    match states.checked_mul(actions) {
+        Some(entries) if entries <= isize::MAX as usize / 8 && u32::try_from(actions).is_ok() => {
+            Ok(entries)
+        }
+        _ => Err(Error::too_large(states, actions)),
     }
 }

@@ -19,32 +19,27 @@ const OPEN_TO_THE_EAST: [[bool; 4]; 5] = [
     [false, true, false, true],
 ];
 
-/// Creates Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a 5x5
-/// grid with walls.
-///
-/// States are `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at stand 0
-/// to 3 (red, green, yellow, blue), or 4 for in the taxi. Actions: 0 south, 1 north, 2 east, 3
-/// west, 4 pick up, 5 drop off; a move into a wall stays. Every action pays -1, an impossible
-/// pick-up or drop-off -10, the drop-off at the destination 20 and ends the episode. A drop-off at
-/// another stand leaves the passenger there. The 300 first states, with the passenger at a stand
-/// other than the destination, are equally likely.
-///
-/// # Errors
-/// None for this map; the type is that of all toys.
-pub fn taxi() -> Result<ModelEnvironment, Error> {
-    let model = Model::new(500, 6, |state, action| vec![outcome(state, action)])?;
-    let mut start = Vec::with_capacity(300);
-    for place in 0..25 {
-        for passenger in 0..4 {
-            for destination in (0..4).filter(|&destination| destination != passenger) {
-                start.push((
-                    taxi_state(place / 5, place % 5, passenger, destination),
-                    1.0 / 300.0,
-                ));
-            }
-        }
+impl ModelEnvironment {
+    /// Creates Taxi-v4: fetch the passenger at one of four stands and bring them to another, on a
+    /// 5x5 grid with walls.
+    ///
+    /// States are `((row * 5 + column) * 5 + passenger) * 4 + destination`; the passenger is at
+    /// stand 0 to 3 (red, green, yellow, blue), or 4 for in the taxi. Actions: 0 south, 1 north, 2
+    /// east, 3 west, 4 pick up, 5 drop off; a move into a wall stays. Every action pays -1, an
+    /// impossible pick-up or drop-off -10, the drop-off at the destination 20 and ends the episode.
+    /// A drop-off at another stand leaves the passenger there. The 300 first states, with the
+    /// passenger at a stand other than the destination, are equally likely.
+    ///
+    /// # Errors
+    /// None for this map; the type is that of all presets.
+    pub fn taxi() -> Result<Self, Error> {
+        let model = Model::new(500, 6, |state, action| vec![outcome(state, action)])?;
+        // The passenger is at a stand other than the destination.
+        let is_start = |state: &usize| state / 4 % 5 != IN_TAXI && state / 4 % 5 != state % 4;
+        let starts = (0..500).filter(is_start);
+        let start: Vec<_> = starts.map(|state| (State(state), 1.0 / 300.0)).collect();
+        Self::new(model, &start)
     }
-    ModelEnvironment::new(model, &start)
 }
 
 /// Returns the number of a state.

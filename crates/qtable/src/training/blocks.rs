@@ -12,7 +12,8 @@ use crate::step::{Action, State, Step};
 use crate::training::cached::CachedBoltzmann;
 use crate::training::course::Actor;
 use crate::training::curve::Record;
-use crate::training::driver::{Training, Until, check_fit};
+use crate::training::driver::{Training, Until};
+use crate::training::episode::check_fit;
 
 /// Actions below which the plain policy is faster than cached weights.
 const FEW: usize = 8;
@@ -23,7 +24,7 @@ impl Training<QLearning, Boltzmann> {
     /// are drawn from a [`CachedBoltzmann`].
     ///
     /// Below 8 actions the plain policy is the faster one, and this is
-    /// [`run_with`](Training::run_with). With 256 to 1024 blocks in a run nothing of the course of
+    /// [`run_with`](Training::run_with), as it is with a dynamic environment. With 256 to 1024 blocks in a run nothing of the course of
     /// the schedules is lost. (An α by visits changes at every visit all the same.) Values are kept
     /// as `f32` while it runs and written back before `on_record` is called and at the end, also
     /// after an error. The result is another one than that of [`run`](Training::run) from the same
@@ -43,7 +44,7 @@ impl Training<QLearning, Boltzmann> {
         mut on_record: impl FnMut(&Record, &mut Self) -> ControlFlow<()>,
     ) -> Result<bool, Error> {
         positive("blocks", blocks)?;
-        if self.table.actions() < FEW {
+        if self.table.actions() < FEW || environment.is_dynamic() {
             return self.run_with(environment, until, rng, on_record);
         }
         check_fit(environment, &self.table)?;
@@ -77,7 +78,7 @@ impl Training<QLearning, Boltzmann> {
     ) -> Result<Option<Record>, Error> {
         // Makes all weights from the values alone: nothing of the blocks before is left in them.
         cached.set_temperature(self.policy.temperature())?;
-        let (place, every) = self.course.place();
+        let (place, every) = (self.course.tally.actions, self.course.record_every.get());
         let mut actor = Blocked {
             cached,
             alpha: self.learner.alpha(0),
@@ -121,6 +122,10 @@ impl Actor for Blocked<'_> {
     fn begin_episode(&mut self) {
         self.learner.begin_episode();
         self.policy.begin_episode();
+    }
+
+    fn meet<E: Environment + ?Sized>(&mut self, _: &E, state: State) -> Result<(), Error> {
+        self.cached.check_state(state)
     }
 
     #[inline]

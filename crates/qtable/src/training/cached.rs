@@ -1,11 +1,12 @@
 //! Boltzmann exploration on cached weights.
 
 use std::f64::consts::LOG2_E;
+use std::ops::Range;
 
 use rand::Rng;
 
 use crate::elementary::{PARTS, exp2_parts};
-use crate::error::{Error, check_reward, check_setting};
+use crate::error::{Error, check_finite, check_index, check_setting};
 use crate::policy::Boltzmann;
 use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
@@ -32,23 +33,34 @@ const DRIFT: f64 = 30.0;
 /// weights, so it is made in blocks of many actions:
 /// [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions [`Boltzmann`]
 /// itself is faster.
+///
+/// ```
+/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::{CachedBoltzmann, QTable, State, Status, Step};
+///
+/// fn main() -> Result<(), qtable::Error> {
+///     let mut table = QTable::new(1, 81)?;
+///     let mut cached = CachedBoltzmann::new(&table, 0.5)?;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     let action = cached.choose(State(0), &mut rng);
+///     let step = Step { observation: State(0), reward: 1.0, status: Status::Terminated };
+///     cached.update(State(0), action, &step, 0.1, 0.9)?;
+///     cached.write_to(&mut table)?;
+///     assert_eq!(table.best(State(0)), action);
+///     Ok(())
+/// }
+/// ```
 #[derive(Clone, Debug)]
 pub struct CachedBoltzmann {
     actions: usize,
-    shape: Shape,
+    groups_per_row: usize,
+    /// Groups of a block, as a power of two: 0 for up to 128 actions.
+    block_shift: u32,
     temperature: f64,
     /// Growth of a weight's exponent with the value, in parts of an octave.
     slope: f64,
     heads: Vec<Head>,
     groups: Vec<Group>,
-}
-
-/// Division of a row into groups and blocks.
-#[derive(Clone, Copy, Debug)]
-struct Shape {
-    groups_per_row: usize,
-    /// Groups of a block, as a power of two: 0 for up to 128 actions.
-    block_shift: u32,
 }
 
 /// Data of a state, aligned so that no vector lies across two cache lines.
@@ -104,10 +116,8 @@ impl CachedBoltzmann {
             .trailing_zeros();
         let mut cached = Self {
             actions,
-            shape: Shape {
-                groups_per_row,
-                block_shift,
-            },
+            groups_per_row,
+            block_shift,
             temperature: 1.0,
             slope: 1.0,
             heads: vec![Head::default(); states],
@@ -117,7 +127,9 @@ impl CachedBoltzmann {
             for action in table.offered(state) {
                 let value = table.value(state, action);
                 let group = &mut cached.groups[state.0 * groups_per_row + action.0 / GROUP];
-                group.values[action.0 % GROUP] = finite(state, action, value)?;
+                let stored = value as f32;
+                check_finite("value", state, action, f64::from(stored))?;
+                group.values[action.0 % GROUP] = stored;
                 group.visits[action.0 % GROUP] = table.visits(state, action);
             }
             cached.find_best(state);
@@ -157,7 +169,7 @@ impl CachedBoltzmann {
         alpha: f64,
         gamma: f64,
     ) -> Result<f64, Error> {
-        let at = state.0 * self.shape.groups_per_row + action.0 / GROUP;
+        let at = state.0 * self.groups_per_row + action.0 / GROUP;
         let next = self.heads.get(step.observation.0).map(|head| head.max);
         let (true, Some(next), Some(head), Some(group)) = (
             action.0 < self.actions,
@@ -192,11 +204,12 @@ impl CachedBoltzmann {
         head.best = if leads { index } else { head.best };
 
         group.weights[lane] = exp2_parts((f64::from(value) - head.offset) * self.slope);
-        if self.shape.block_shift == 0 {
-            head.sums[(action.0 / GROUP) % BLOCKS] = group.sum(-0.0);
+        let block = ((action.0 / GROUP) >> self.block_shift) % BLOCKS;
+        if self.block_shift == 0 {
+            head.sums[block] = group.sum(-0.0);
         } else {
-            let block = (action.0 / GROUP) >> self.shape.block_shift;
-            head.sums[block % BLOCKS] = self.shape.sum_block(&mut self.groups, state, block);
+            let groups = block_of(state, block, self.groups_per_row, self.block_shift);
+            head.sums[block] = sum_block(&mut self.groups[groups]);
         }
         head.sum();
         if falls | (value > head.ceiling) {
@@ -209,22 +222,31 @@ impl CachedBoltzmann {
     #[cold]
     #[inline(never)]
     fn fault(&self, state: State, action: Action, step: &Step, value: f64) -> Error {
-        let outside = |state: State| self.check_state(state).err();
-        if let Some(error) = outside(state).or_else(|| outside(step.observation)) {
-            error
-        } else if action.0 >= self.actions {
-            let actions = self.actions;
-            Error::ActionOutOfRange { action, actions }
-        } else if self.value(state, action) == f32::NEG_INFINITY {
-            Error::ActionNotAllowed { state, action }
-        } else if let Err(error) = check_reward(state, action, step.reward) {
-            error
+        let states = self.heads.len();
+        let checked = check_index("state", state.0, states)
+            .and_then(|()| check_index("state", step.observation.0, states))
+            .and_then(|()| check_index("action", action.0, self.actions));
+        if let Err(error) = checked {
+            return error;
+        }
+        if self.value(state, action) == f32::NEG_INFINITY {
+            return Error::ActionNotAllowed { state, action };
+        }
+        let what = if step.reward.is_finite() {
+            "value"
         } else {
-            Error::ValueNotFinite {
-                state,
-                action,
-                value,
-            }
+            "reward"
+        };
+        let value = if step.reward.is_finite() {
+            value
+        } else {
+            step.reward
+        };
+        Error::NotFinite {
+            what,
+            state,
+            action,
+            value,
         }
     }
 
@@ -233,17 +255,13 @@ impl CachedBoltzmann {
     /// # Errors
     /// [`Error::ShapeMismatch`], or a table that forbids an action that was allowed here.
     pub fn write_to(&self, table: &mut QTable) -> Result<(), Error> {
-        table.check_shape("the cached table", self.heads.len(), self.actions)?;
+        table.check_shape("the cached table", (self.heads.len(), self.actions))?;
         for state in (0..self.heads.len()).map(State) {
             for action in (0..self.actions).map(Action) {
-                let group = &self.groups[state.0 * self.shape.groups_per_row + action.0 / GROUP];
-                let (value, visits) = (
-                    group.values[action.0 % GROUP],
-                    group.visits[action.0 % GROUP],
-                );
+                let value = self.value(state, action);
                 if value > f32::NEG_INFINITY {
                     table.set(state, action, f64::from(value))?;
-                    table.set_visits(state, action, visits);
+                    table.set_visits(state, action, self.visits(state, action));
                 }
             }
         }
@@ -263,11 +281,11 @@ impl CachedBoltzmann {
         // The first block starts at 0, so it is counted always.
         let block = count_up_to(&head.starts[1..], drawn) % BLOCKS;
         let rest = drawn - head.starts[block];
-        if self.shape.block_shift > 0 {
+        if self.block_shift > 0 {
             return self.choose_within(state, block, rest);
         }
         let lane = count_up_to(
-            &self.groups[state.0 * self.shape.groups_per_row + block].ends,
+            &self.groups[state.0 * self.groups_per_row + block].ends,
             rest,
         );
         // Rounding may lead past the last weight.
@@ -278,17 +296,14 @@ impl CachedBoltzmann {
         }
     }
 
-    /// The action within a block of several groups.
+    /// Returns the action within a block of several groups.
     #[inline(never)]
     fn choose_within(&self, state: State, block: usize, rest: f32) -> Action {
-        let (first, last) = self.shape.groups_of(block);
-        let groups = &self.row(state)[first..last];
-        let place: usize = groups
-            .iter()
-            .map(|group| count_up_to(&group.ends, rest))
-            .sum();
+        let groups = block_of(state, block, self.groups_per_row, self.block_shift);
+        let ends = self.groups[groups.clone()].iter().map(|group| &group.ends);
+        let place: usize = ends.map(|ends| count_up_to(ends, rest)).sum();
         if place < groups.len() * GROUP {
-            Action(first * GROUP + place)
+            Action((block << self.block_shift) * GROUP + place)
         } else {
             self.best(state)
         }
@@ -299,14 +314,10 @@ impl CachedBoltzmann {
     /// # Panics
     /// If the state is out of range.
     pub fn probabilities(&self, state: State, probabilities: &mut [f64]) {
-        let weights = || {
-            self.row(state)
-                .iter()
-                .flat_map(|group| group.weights)
-                .map(f64::from)
-        };
-        let sum: f64 = weights().sum();
-        for (p, weight) in probabilities.iter_mut().zip(weights()) {
+        let weights = self.row(state).iter().flat_map(|group| group.weights);
+        let weights = weights.map(f64::from);
+        let sum: f64 = weights.clone().sum();
+        for (p, weight) in probabilities.iter_mut().zip(weights) {
             *p = weight / sum;
         }
     }
@@ -348,21 +359,16 @@ impl CachedBoltzmann {
     /// Checks that a state lies in the table.
     #[inline(always)]
     pub(crate) fn check_state(&self, state: State) -> Result<(), Error> {
-        let states = self.heads.len();
-        if state.0 < states {
-            Ok(())
-        } else {
-            Err(Error::StateOutOfRange { state, states })
-        }
+        check_index("state", state.0, self.heads.len())
     }
 
     fn row(&self, state: State) -> &[Group] {
-        &self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row]
+        &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row]
     }
 
     #[inline(never)]
     fn find_best(&mut self, state: State) {
-        let row = &self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row];
+        let row = &self.groups[state.0 * self.groups_per_row..][..self.groups_per_row];
         // Lane by lane, so that it is done with vectors.
         let mut lanes = [f32::NEG_INFINITY; GROUP];
         for group in row {
@@ -402,43 +408,30 @@ impl CachedBoltzmann {
         if f64::from(head.ceiling) > ceiling {
             head.ceiling = head.ceiling.next_down();
         }
-        for group in
-            &mut self.groups[state.0 * self.shape.groups_per_row..][..self.shape.groups_per_row]
-        {
+        let row = &mut self.groups[state.0 * self.groups_per_row..][..self.groups_per_row];
+        for group in row {
             for (weight, value) in group.weights.iter_mut().zip(group.values) {
                 *weight = exp2_parts((f64::from(value) - head.offset) * self.slope);
             }
         }
-        for block in 0..self
-            .shape
-            .groups_per_row
-            .div_ceil(1 << self.shape.block_shift)
-        {
-            head.sums[block] = self.shape.sum_block(&mut self.groups, state, block);
+        for block in 0..self.groups_per_row.div_ceil(1 << self.block_shift) {
+            let groups = block_of(state, block, self.groups_per_row, self.block_shift);
+            head.sums[block] = sum_block(&mut self.groups[groups]);
         }
         head.sum();
     }
 }
 
-impl Shape {
-    /// The first group of a block, and the one after its last.
-    fn groups_of(self, block: usize) -> (usize, usize) {
-        let first = block << self.block_shift;
-        (
-            first,
-            (first + (1 << self.block_shift)).min(self.groups_per_row),
-        )
-    }
+/// Returns the groups of a block.
+fn block_of(state: State, block: usize, per_row: usize, shift: u32) -> Range<usize> {
+    let (start, first) = (state.0 * per_row, block << shift);
+    start + first..start + (first + (1 << shift)).min(per_row)
+}
 
-    /// Sums a block anew.
-    #[inline(never)]
-    fn sum_block(self, groups: &mut [Group], state: State, block: usize) -> f32 {
-        let (first, last) = self.groups_of(block);
-        let start = state.0 * self.groups_per_row;
-        groups[start + first..start + last]
-            .iter_mut()
-            .fold(-0.0, |sum, group| group.sum(sum))
-    }
+/// Sums a block anew.
+#[inline(never)]
+fn sum_block(groups: &mut [Group]) -> f32 {
+    groups.iter_mut().fold(-0.0, |sum, group| group.sum(sum))
 }
 
 // Nothing is added to an old sum, so no error builds up. One weight after the other, not as a tree:
@@ -482,19 +475,4 @@ fn count_up_to(sums: &[f32], point: f32) -> usize {
         .map(|sum| (point - sum.to_bits() as i32) >> 31)
         .sum();
     (sums.len() as i32 + beyond) as usize
-}
-
-/// Returns a value as `f32`, if that is finite.
-#[inline(always)]
-fn finite(state: State, action: Action, value: f64) -> Result<f32, Error> {
-    let stored = value as f32;
-    if stored.is_finite() {
-        Ok(stored)
-    } else {
-        Err(Error::ValueNotFinite {
-            state,
-            action,
-            value,
-        })
-    }
 }

@@ -3,11 +3,11 @@
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use crate::error::{Error, check_reward, positive};
+use crate::error::{Error, positive};
 use crate::problem::Environment;
-use crate::step::{Action, Status, Step};
-use crate::table::{ActionMask, QTable};
-use crate::training::driver::check_choice;
+use crate::step::{Action, State, Status, Step};
+use crate::table::QTable;
+use crate::training::episode::play;
 
 /// The steps, endings and states that [`check_env`] has met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,14 +23,14 @@ pub struct EnvironmentReport {
 }
 
 /// Plays `steps` random steps and checks the contract of [`Environment`]: a shape and a mask that
-/// are possible and stay the same, observations in range, finite rewards, and episodes that repeat
-/// exactly when the seed and the actions do.
+/// are possible and stay the same (unless the environment is dynamic), observations in range,
+/// finite rewards, and episodes that repeat exactly when the seed and the actions do.
 ///
 /// ```
-/// use qtable::{check_env, toys};
+/// use qtable::{ModelEnvironment, check_env};
 ///
 /// fn main() -> Result<(), qtable::Error> {
-///     let report = check_env(&mut toys::taxi()?, 10_000, 1)?;
+///     let report = check_env(&mut ModelEnvironment::taxi()?, 10_000, 1)?;
 ///     assert!(report.states_met > 100);
 ///     Ok(())
 /// }
@@ -44,26 +44,23 @@ pub fn check_env<E: Environment + ?Sized>(
     seed: u64,
 ) -> Result<EnvironmentReport, Error> {
     positive("steps", steps)?;
-    let (states, actions) = (environment.states(), environment.actions());
-    let mut table = QTable::new(states, actions)?;
-    let mask = ActionMask::of(environment)?;
-    table.set_mask(mask.clone())?;
-
+    let shape = (environment.states(), environment.actions());
+    let mut table = QTable::new(shape.0, shape.1)?;
+    table.restrict_as(environment);
     let mut seeds = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut report = EnvironmentReport::default();
-    let mut met = vec![false; states];
-    let mut episode = 0;
+    let (mut met, mut episode) = (vec![false; shape.0], 0);
     while report.steps < steps {
         let limit = (steps - report.steps).min(1000);
         let episode_seed = seeds.random();
-        let first = play(environment, &table, limit, episode_seed, &[])?;
+        let first = record(environment, &mut table, limit, episode_seed, &[])?;
         if episode < 10 {
             // The actions are repeated, not drawn again, in case the environment counts on the
             // generator's state.
-            let taken: Vec<Action> = first.iter().skip(1).map(|(action, _)| *action).collect();
-            let second = play(environment, &table, limit, episode_seed, &taken)?;
+            let second = record(environment, &mut table, limit, episode_seed, &first)?;
             compare(&first, &second)?;
         }
+        met.resize(table.states(), false);
         for (_, step) in &first {
             met[step.observation.0] = true;
         }
@@ -73,76 +70,82 @@ pub fn check_env<E: Environment + ?Sized>(
             Some(Status::Truncated) => report.truncated += 1,
             _ => {}
         }
-        if (environment.states(), environment.actions()) != (states, actions) {
-            return Err(Error::EnvironmentChanged {
-                steps: report.steps,
-                what: "the shape",
-            });
+        let steps = report.steps;
+        let now = (environment.states(), environment.actions());
+        if now != shape && !environment.is_dynamic() {
+            let what = "the shape";
+            return Err(Error::EnvironmentChanged { steps, what });
         }
         episode += 1;
     }
-    if ActionMask::of(environment)? != mask {
-        return Err(Error::EnvironmentChanged {
-            steps: report.steps,
-            what: "the mask",
-        });
+    let steps = report.steps;
+    if !environment.is_dynamic() && !has_mask_of(&table, environment) {
+        let what = "the mask";
+        return Err(Error::EnvironmentChanged { steps, what });
     }
     if report.terminated + report.truncated == 0 {
-        return Err(Error::Endless {
-            steps: report.steps,
-        });
+        return Err(Error::Endless { steps });
     }
     report.states_met = met.into_iter().filter(|&met| met).count();
     Ok(report)
 }
 
-/// One episode of at most `limit` steps: the reset, then each action and its answer. Actions are
-/// random unless given.
-fn play<E: Environment + ?Sized>(
+/// Returns `true` if a table offers the actions that an environment allows.
+fn has_mask_of<E: Environment + ?Sized>(table: &QTable, environment: &E) -> bool {
+    let mut states = (0..table.states()).map(State);
+    states.all(|state| {
+        let mut actions = (0..table.actions()).map(Action);
+        actions.all(|action| environment.allows(state, action) == table.allows(state, action))
+    })
+}
+
+/// Plays one episode of at most `limit` steps and returns the reset, then each action and its
+/// answer. Actions are random beyond those of a recorded episode.
+fn record<E: Environment + ?Sized>(
     environment: &mut E,
-    table: &QTable,
+    table: &mut QTable,
     limit: u64,
     seed: u64,
-    given: &[Action],
+    given: &[(Action, Step)],
 ) -> Result<Vec<(Action, Step)>, Error> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     // Another generator, so that the environment's draws do not depend on where the actions come
     // from.
     let mut chooser = Xoshiro256PlusPlus::seed_from_u64(!seed);
-    let mut state = environment.reset(&mut rng)?;
-    table.check_state(state)?;
-    let mut episode = vec![(
-        Action(0),
-        Step {
-            observation: state,
-            reward: 0.0,
-            status: Status::Continuing,
+    let mut begin = None;
+    let mut given = given.iter().skip(1).map(|(action, _)| *action);
+    let mut episode = Vec::new();
+    let choose = |table: &QTable, state, _: &mut dyn rand::Rng| {
+        begin.get_or_insert(state);
+        given.next().unwrap_or_else(|| {
+            let offered: Vec<Action> = table.offered(state).collect();
+            offered[chooser.random_range(0..offered.len())]
+        })
+    };
+    play(
+        environment,
+        table,
+        limit,
+        &mut rng,
+        choose,
+        |_, action, step| {
+            episode.push((action, *step));
         },
-    )];
-    for taken in 0..limit as usize {
-        check_choice(table, state)?;
-        let offered: Vec<Action> = table.offered(state).collect();
-        let action = given
-            .get(taken)
-            .copied()
-            .unwrap_or_else(|| offered[chooser.random_range(0..offered.len())]);
-        let step = environment.step(action, &mut rng)?;
-        table.check_state(step.observation)?;
-        check_reward(state, action, step.reward)?;
-        episode.push((action, step));
-        state = step.observation;
-        if step.status != Status::Continuing {
-            break;
-        }
-    }
+    )?;
+    let reset = Step {
+        observation: begin.unwrap_or_default(),
+        reward: 0.0,
+        status: Status::Continuing,
+    };
+    episode.insert(0, (Action(0), reset));
     Ok(episode)
 }
 
 fn compare(first: &[(Action, Step)], second: &[(Action, Step)]) -> Result<(), Error> {
-    for (step, (&(_, first), &(_, second))) in first.iter().zip(second).enumerate() {
+    for (step, (&(_, first), &(_, second))) in (0..).zip(first.iter().zip(second)) {
         if first != second {
             return Err(Error::NotReproducible {
-                step: step as u64,
+                step,
                 first,
                 second,
             });

@@ -28,8 +28,8 @@ pub struct Record {
 /// Sums between two records.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
-pub(crate) struct Tally {
-    actions: u64,
+pub(super) struct Tally {
+    pub(super) actions: u64,
     reward: f64,
     td_error: f64,
     episodes: u64,
@@ -41,17 +41,13 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    pub(crate) fn actions(&self) -> u64 {
-        self.actions
-    }
-
-    pub(crate) fn add_action(&mut self, reward: f64, td_error: f64) {
+    pub(super) fn add_action(&mut self, reward: f64, td_error: f64) {
         self.actions = self.actions.saturating_add(1);
         self.reward += reward;
         self.td_error += td_error.abs();
     }
 
-    pub(crate) fn add_episode(&mut self, steps: u64, sum: f64, success: Option<bool>) {
+    pub(super) fn add_episode(&mut self, steps: u64, sum: f64, success: Option<bool>) {
         self.episodes = self.episodes.saturating_add(1);
         self.episode_steps = self.episode_steps.saturating_add(steps);
         self.episode_returns += sum;
@@ -62,7 +58,7 @@ impl Tally {
     }
 
     /// Returns the record of what was added, at the totals given.
-    pub(crate) fn record(&self, actions: u64, episodes: u64) -> Record {
+    pub(super) fn record(&self, actions: u64, episodes: u64) -> Record {
         let mean = |sum: f64, count: u64| (count > 0).then(|| sum / count as f64);
         Record {
             actions,

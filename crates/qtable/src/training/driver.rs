@@ -1,19 +1,21 @@
 //! A training run that can stop, be saved, and go on.
 
+use std::num::NonZeroU64;
 use std::ops::ControlFlow;
 
 use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::Error;
+use crate::error::{Error, positive};
 use crate::learner::{Experience, Learner};
 use crate::policy::Policy;
 use crate::problem::Environment;
 use crate::step::{Action, State, Status, Step};
-use crate::table::{ActionMask, QTable};
-use crate::training::course::{Actor, Course};
-use crate::training::curve::Record;
+use crate::table::QTable;
+use crate::training::course::{Actor, Course, Running};
+use crate::training::curve::{Record, Tally};
+use crate::training::episode::{check_choice, check_fit};
 
 /// The end of [`Training::run`]: a total since the training began, not since the call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,8 +39,8 @@ pub enum Until {
 /// use qtable::{EpsilonGreedy, QLambda, QTable, Schedule, Training, Until, decode, encode, toys};
 ///
 /// fn main() -> Result<(), Box<dyn std::error::Error>> {
-///     let mut lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, false)?;
-///     let learner = QLambda::new(Schedule::constant(0.1)?, 0.95)?;
+///     let mut lake = ModelEnvironment::frozen_lake("4x4", false)?;
+///     let learner = Traces::new(Target::Q, 0.8, Schedule::constant(0.1)?, 0.95)?;
 ///     let policy = EpsilonGreedy::new(Schedule::linear(1.0, 0.0, 10_000)?)?;
 ///     let mut training =
 ///         Training::new(&lake, QTable::new(16, 4)?, learner, policy)?.with_episode_limit(100)?;
@@ -86,14 +88,20 @@ impl<L: Learner, P: Policy> Training<L, P> {
         policy: P,
     ) -> Result<Self, Error> {
         check_fit(environment, &table)?;
-        if let Some(mask) = ActionMask::of(environment)? {
-            table.set_mask(Some(mask))?;
-        }
+        table.restrict_as(environment);
+        let course = Course {
+            episode_limit: NonZeroU64::MAX,
+            record_every: positive("record_every", 1000)?,
+            actions: 0,
+            episodes: 0,
+            running: None,
+            tally: Tally::default(),
+        };
         Ok(Self {
             table,
             learner,
             policy,
-            course: Course::new()?,
+            course,
             curve: Vec::new(),
         })
     }
@@ -104,7 +112,7 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// # Errors
     /// [`Error::Setting`].
     pub fn with_episode_limit(mut self, actions: u64) -> Result<Self, Error> {
-        self.course.limit_episodes(actions)?;
+        self.course.episode_limit = positive("episode_limit", actions)?;
         Ok(self)
     }
 
@@ -114,7 +122,7 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// # Errors
     /// [`Error::Setting`].
     pub fn with_record_every(mut self, actions: u64) -> Result<Self, Error> {
-        self.course.record_every(actions)?;
+        self.course.record_every = positive("record_every", actions)?;
         Ok(self)
     }
 
@@ -144,7 +152,7 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// use qtable::{EpsilonGreedy, QLearning, QTable, Schedule, Training, Until, toys};
     ///
     /// fn main() -> Result<(), qtable::Error> {
-    ///     let mut chain = toys::chain(5)?;
+    ///     let mut chain = ModelEnvironment::chain(5)?;
     ///     let learner = QLearning::new(Schedule::constant(0.5)?, 0.9)?;
     ///     let policy = EpsilonGreedy::new(Schedule::constant(0.5)?)?;
     ///     let mut training = Training::new(&chain, QTable::new(5, 2)?, learner, policy)?;
@@ -177,6 +185,128 @@ impl<L: Learner, P: Policy> Training<L, P> {
             }
         }
         Ok(false)
+    }
+
+    /// Plays episodes of a game for two against another run, and both learn: with the same
+    /// environment for both, self play.
+    ///
+    /// [`Environment::player`] says whose turn it is: 0 is this run, 1 the other one. The reward of
+    /// a step is that of the player who acted; the other one gets its negative. For each player a
+    /// step is all that happens from one turn of theirs to the next. Both see the last step of an
+    /// episode, and [`Environment::succeeded`] is asked with the reward of each.
+    ///
+    /// # Errors
+    /// [`run`](Training::run) lists them. The episode is given up.
+    pub fn run_against<L2: Learner, P2: Policy, E: Environment + ?Sized, R: Rng + ?Sized>(
+        &mut self,
+        other: &mut Training<L2, P2>,
+        environment: &mut E,
+        episodes: u64,
+        mut rng: &mut R,
+    ) -> Result<(), Error> {
+        let rng: &mut dyn Rng = &mut rng;
+        check_fit(environment, &self.table)?;
+        check_fit(environment, &other.table)?;
+        for _ in 0..episodes {
+            (self.course.running, other.course.running) = (None, None);
+            let played = self.play_against(other, environment, rng);
+            (self.course.running, other.course.running) = (None, None);
+            played?;
+        }
+        Ok(())
+    }
+
+    /// Plays one episode against another run.
+    fn play_against<L2: Learner, P2: Policy, E: Environment + ?Sized>(
+        &mut self,
+        other: &mut Training<L2, P2>,
+        environment: &mut E,
+        rng: &mut dyn Rng,
+    ) -> Result<(), Error> {
+        let mut open = [None, None];
+        self.parts().1.begin_episode();
+        other.parts().1.begin_episode();
+        let mut state = environment.reset(rng)?;
+        loop {
+            let player = environment.player().min(1);
+            let action = match player {
+                0 => self.take_turn(environment, &mut open[0], state, rng)?,
+                _ => other.take_turn(environment, &mut open[1], state, rng)?,
+            };
+            let step = environment.step(action, rng)?;
+            for (place, turn) in open.iter_mut().enumerate() {
+                if let Some(turn) = turn {
+                    turn.reward += if place == player {
+                        step.reward
+                    } else {
+                        -step.reward
+                    };
+                }
+            }
+            state = step.observation;
+            if step.status != Status::Continuing {
+                self.answer(environment, open[0].take(), state, step.status, rng)?;
+                return other.answer(environment, open[1].take(), state, step.status, rng);
+            }
+        }
+    }
+
+    /// Learns from a player's last turn, and chooses the next action.
+    fn take_turn<E: Environment + ?Sized>(
+        &mut self,
+        environment: &E,
+        open: &mut Option<Turn>,
+        state: State,
+        rng: &mut dyn Rng,
+    ) -> Result<Action, Error> {
+        self.answer(environment, open.take(), state, Status::Continuing, rng)?;
+        let (course, mut pair) = self.parts();
+        if environment.is_dynamic() {
+            pair.meet(environment, state)?;
+        }
+        let running = course.running.take().unwrap_or(Running::at(state));
+        let action = pair.choose(state, running.action, rng)?;
+        let reward = 0.0;
+        *open = Some(Turn {
+            running,
+            action,
+            reward,
+        });
+        Ok(action)
+    }
+
+    /// Learns from a turn that led to a state.
+    fn answer<E: Environment + ?Sized>(
+        &mut self,
+        environment: &E,
+        turn: Option<Turn>,
+        observation: State,
+        status: Status,
+        rng: &mut dyn Rng,
+    ) -> Result<(), Error> {
+        let Some(turn) = turn else {
+            return Ok(());
+        };
+        let step = Step {
+            observation,
+            reward: turn.reward,
+            status,
+        };
+        let (course, mut pair) = self.parts();
+        let taken = (turn.running, turn.action);
+        let record = course.learn(environment, &mut pair, taken, step, rng)?;
+        self.curve.extend(record);
+        Ok(())
+    }
+
+    /// Returns the counters beside the policy and the learner on their table.
+    fn parts(&mut self) -> (&mut Course, Pair<'_, L, P>) {
+        let pair = Pair {
+            table: &mut self.table,
+            learner: &mut self.learner,
+            policy: &mut self.policy,
+        };
+        (&mut self.course, pair)
     }
 
     /// Returns the table.
@@ -222,12 +352,12 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// Returns `true` if an episode is going on, so that the environment's own state belongs to the
     /// state of the run.
     pub fn is_in_episode(&self) -> bool {
-        self.course.is_in_episode()
+        self.course.running.is_some()
     }
 
     /// Gives up the episode that is going on: the next action begins another one.
     pub fn end_episode(&mut self) {
-        self.course.end_episode();
+        self.course.running = None;
     }
 
     /// Returns table, learner and policy.
@@ -252,12 +382,8 @@ impl<L: Learner, P: Policy> Training<L, P> {
     ) -> Result<Option<Record>, Error> {
         check_fit(environment, &self.table)?;
         while !self.has_reached(until) {
-            let mut pair = Pair {
-                table: &mut self.table,
-                learner: &mut self.learner,
-                policy: &mut self.policy,
-            };
-            let record = self.course.step(environment, &mut pair, &mut rng)?;
+            let (course, mut pair) = self.parts();
+            let record = course.step(environment, &mut pair, &mut rng)?;
             if record.is_some() {
                 return Ok(record);
             }
@@ -266,23 +392,11 @@ impl<L: Learner, P: Policy> Training<L, P> {
     }
 }
 
-/// Checks that a table has the shape of an environment.
-pub(super) fn check_fit<E: Environment + ?Sized>(
-    environment: &E,
-    table: &QTable,
-) -> Result<(), Error> {
-    let (states, actions) = (environment.states(), environment.actions());
-    table.check_shape("the environment", states, actions)
-}
-
-/// Refuses a state outside the table, or one without an action to choose.
-#[inline(always)]
-pub(super) fn check_choice(table: &QTable, state: State) -> Result<(), Error> {
-    table.check_state(state)?;
-    if table.equals(state) > 0 {
-        return Ok(());
-    }
-    Err(Error::NoActionAllowed { state })
+/// A turn of a player, whose reward grows until the player's next turn.
+struct Turn {
+    running: Running,
+    action: Action,
+    reward: f64,
 }
 
 /// A policy that acts on a table, and a learner that improves it.
@@ -296,6 +410,14 @@ impl<L: Learner, P: Policy> Actor for Pair<'_, L, P> {
     fn begin_episode(&mut self) {
         self.learner.begin_episode();
         self.policy.begin_episode();
+    }
+
+    fn meet<E: Environment + ?Sized>(
+        &mut self,
+        environment: &E,
+        state: State,
+    ) -> Result<(), Error> {
+        self.table.meet(environment, state)
     }
 
     #[inline]
@@ -312,7 +434,7 @@ impl<L: Learner, P: Policy> Actor for Pair<'_, L, P> {
                 self.policy.choose(self.table, state, rng)
             }
         };
-        self.table.check(state, action).map(|()| action)
+        self.table.check_choice(state, action).map(|()| action)
     }
 
     #[inline]

@@ -4,12 +4,12 @@ use rand::Rng;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, check_reward, positive};
+use crate::error::{Error, positive};
 use crate::policy::Policy;
 use crate::problem::Environment;
 use crate::step::Status;
-use crate::table::{ActionMask, QTable};
-use crate::training::driver::{check_choice, check_fit};
+use crate::table::QTable;
+use crate::training::episode::{check_fit, play};
 
 /// The results of a policy in a number of episodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,10 +35,10 @@ pub struct Evaluation {
 ///
 /// ```
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
-/// use qtable::{Greedy, evaluate, toys};
+/// use qtable::{Greedy, ModelEnvironment, evaluate};
 ///
 /// fn main() -> Result<(), qtable::Error> {
-///     let mut lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true)?;
+///     let mut lake = ModelEnvironment::frozen_lake("4x4", true)?;
 ///     let optimum = lake.model().value_iteration(0.99, 1e-9)?.table;
 ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
 ///     let found = evaluate(&mut lake, &optimum, &mut Greedy, 2_000, 100, &mut rng)?;
@@ -61,37 +61,35 @@ pub fn evaluate<E: Environment + ?Sized, P: Policy + ?Sized>(
     positive("episodes", episodes)?;
     positive("limit", limit)?;
     check_fit(environment, table)?;
-    let mut masked = None;
-    let mask = ActionMask::of(environment)?;
-    if mask.is_some() && table.mask() != mask.as_ref() {
-        masked.insert(table.clone()).set_mask(mask)?;
-    }
-    let table = masked.as_ref().unwrap_or(table);
+    let mut own = table.clone();
+    own.restrict_as(environment);
     let (mut successes, mut steps_of_successes, mut all_steps, mut told) = (0, 0, 0, false);
     // Mean and sum of squares about it, after Welford.
     let (mut mean, mut squares, mut total) = (0.0, 0.0, 0.0);
     for episode in 1..=episodes {
         policy.begin_episode();
-        let mut state = environment.reset(rng)?;
-        let mut sum = 0.0;
-        for taken in 1..=limit {
-            check_choice(table, state)?;
-            let action = policy.choose(table, state, rng);
-            table.check(state, action)?;
-            let step = environment.step(action, rng)?;
-            check_reward(state, action, step.reward)?;
-            all_steps += 1;
-            sum += step.reward;
-            state = step.observation;
-            if step.status != Status::Continuing {
-                told |= environment.succeeded(&step).is_some();
-                if environment.succeeded(&step) == Some(true) {
-                    successes += 1;
-                    steps_of_successes += taken;
+        let (mut sum, mut taken, mut success) = (0.0, 0_u64, None);
+        let choose = |table: &QTable, state, rng: &mut dyn Rng| policy.choose(table, state, rng);
+        play(
+            environment,
+            &mut own,
+            limit,
+            rng,
+            choose,
+            |world, _, step| {
+                sum += step.reward;
+                taken += 1;
+                if step.status != Status::Continuing {
+                    success = world.succeeded(step);
                 }
-                break;
-            }
+            },
+        )?;
+        told |= success.is_some();
+        if success == Some(true) {
+            successes += 1;
+            steps_of_successes += taken;
         }
+        all_steps += taken;
         total += sum;
         let off = sum - mean;
         mean += off / episode as f64;

@@ -19,7 +19,7 @@ use crate::training::curve::Record;
 ///
 /// fn main() -> Result<(), qtable::Error> {
 ///     let values = over_seeds(0..10, |seed| {
-///         let mut chain = toys::chain(4)?;
+///         let mut chain = ModelEnvironment::chain(4)?;
 ///         let learner = QLearning::new(Schedule::constant(0.5)?, 0.9)?;
 ///         let policy = EpsilonGreedy::new(Schedule::constant(0.5)?)?;
 ///         let mut training = Training::new(&chain, QTable::new(4, 2)?, learner, policy)?;

@@ -2,21 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use qtable::{
-    Action, ActionMask, Boltzmann, CachedBoltzmann, Environment, Error, Policy, QLearning, QTable,
-    Schedule, State, Status, Step, Training, Until, over_seeds,
-};
+use qtable::*;
 use rand::{Rng, RngExt};
 
-use crate::support::{Settings, constant, corridor, rng, step};
-
-fn plain_probabilities(table: &QTable, temperature: f64, state: State) -> Vec<f64> {
-    let mut p = vec![0.0; table.actions()];
-    Boltzmann::new(constant(temperature))
-        .unwrap()
-        .probabilities(table, state, &mut p);
-    p
-}
+use crate::support::{Settings, constant, corridor, q_learning, rng, step, zeros};
 
 /// After many updates of both forms: the same values, the same best actions, the same
 /// probabilities. Rows of all lengths around the sizes of groups and blocks; jumps far beyond what
@@ -35,12 +24,10 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
         (300, 1.0, 50.0),
         (1000, 10.0, 100.0),
     ] {
-        let mut rng = rng(actions as u64);
-        let mut table = QTable::filled(3, actions, 0.0).unwrap();
-        let mask = ActionMask::new(3, actions, |s, a| s != State(1) || a.0 % 3 == 0).unwrap();
-        table.set_mask(Some(mask)).unwrap();
+        let (mut rng, mut table) = (rng(actions as u64), zeros(3, actions));
+        table.restrict(|s, a| s != State(1) || a.0 % 3 == 0);
         let mut cached = CachedBoltzmann::new(&table, temperature).unwrap();
-        let mut learner = QLearning::new(constant(0.5), 0.9).unwrap();
+        let mut learner = q_learning(0.5, 0.9);
         for _ in 0..3_000 {
             let state = State(rng.random_range(0..3));
             let action = cached.choose(state, &mut rng);
@@ -59,22 +46,15 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
             table.set(state, action, rounded).unwrap();
             assert_eq!(cached.best(state), table.best(state));
         }
-        for state in (0..3).map(State) {
-            let mut p = vec![f64::NAN; actions];
-            cached.probabilities(state, &mut p);
-            for (action, wanted) in plain_probabilities(&table, temperature, state)
-                .into_iter()
-                .enumerate()
-            {
-                assert!(
-                    (p[action] - wanted).abs() < 1e-6,
-                    "{actions} actions: {} is not {wanted}",
-                    p[action]
-                );
-            }
-        }
+        let plain = Boltzmann::new(constant(temperature)).unwrap();
         let mut back = table.clone();
         for state in (0..3).map(State) {
+            let (mut found, mut wanted) = (vec![f64::NAN; actions], vec![0.0; actions]);
+            cached.probabilities(state, &mut found);
+            plain.probabilities(&table, state, &mut wanted);
+            for (found, wanted) in found.into_iter().zip(wanted) {
+                assert_near!(found, wanted, 1e-6);
+            }
             for action in table.offered(state) {
                 back.set(state, action, -1.0).unwrap();
             }
@@ -82,6 +62,20 @@ fn the_cached_table_stays_equal_to_the_plain_one() {
         cached.write_to(&mut back).unwrap();
         assert_eq!(back, table);
     }
+}
+
+type Run = Training<QLearning, Boltzmann>;
+
+fn in_blocks(
+    run: &mut Run,
+    environment: &mut dyn Environment,
+    actions: u64,
+    blocks: u64,
+    rng: &mut dyn Rng,
+) -> Result<bool, Error> {
+    run.run_in_blocks(environment, Until::Actions(actions), blocks, rng, |_, _| {
+        ControlFlow::Continue(())
+    })
 }
 
 /// Both reach the optimum, and are equally far half-way.
@@ -111,41 +105,22 @@ fn runs_in_blocks_learn_what_plain_runs_learn() {
         assert_eq!(visits.sum::<u32>(), 20_000);
         let middle = |run: &Run| run.curve()[4].mean_steps.unwrap();
         for run in [&plain, &fast] {
-            let both = toy.compare(run.table(), 0.95, 200)?;
-            assert!(both.learned.value > 0.999 * both.optimal.value, "{both:?}");
+            let [learned, optimal] = toy.compare(run.table(), 0.95, 200)?;
+            assert!(learned.value > 0.999 * optimal.value, "{learned:?}");
         }
         Ok::<_, Error>((middle(&plain), middle(&fast)))
     })
     .unwrap();
     let mean = |of: fn(&(f64, f64)) -> f64| outcomes.iter().map(of).sum::<f64>() / 8.0;
     let (plain, fast) = (mean(|o| o.0), mean(|o| o.1));
-    assert!(
-        (plain - fast).abs() < 0.1 * plain,
-        "half-way {plain} and {fast} steps"
-    );
-}
-
-type Run = Training<QLearning, Boltzmann>;
-
-fn in_blocks(
-    run: &mut Run,
-    environment: &mut dyn Environment,
-    actions: u64,
-    blocks: u64,
-    rng: &mut dyn Rng,
-) -> Result<(), Error> {
-    run.run_in_blocks(environment, Until::Actions(actions), blocks, rng, |_, _| {
-        ControlFlow::Continue(())
-    })
-    .map(|_| ())
+    assert_near!(plain, fast, 0.1 * plain);
 }
 
 #[test]
 fn more_blocks_than_actions_are_one_an_action() {
     let run = |blocks| {
         let mut chain = corridor();
-        let settings = Settings::new(300);
-        let mut run = settings.begin(&chain, QTable::new(16, 8).unwrap()).unwrap();
+        let mut run = Settings::new(300).begin(&chain, zeros(16, 8)).unwrap();
         in_blocks(&mut run, &mut chain, 300, blocks, &mut rng(4)).unwrap();
         run.into_parts().0
     };
@@ -159,80 +134,65 @@ fn records_of_a_run_in_blocks_see_the_table_and_can_stop_it() {
         record_every: 100,
         ..Settings::new(1_000)
     };
-    let mut run = settings.begin(&chain, QTable::new(16, 8).unwrap()).unwrap();
-    let stopped = run.run_in_blocks(
-        &mut chain,
-        Until::Actions(1_000),
-        7,
-        &mut rng(4),
-        |record, run| {
-            let visits = (0..16).flat_map(|s| run.table().visit_row(State(s)).to_vec());
-            assert_eq!(u64::from(visits.sum::<u32>()), record.actions);
-            match record.actions {
-                300 => ControlFlow::Break(()),
-                _ => ControlFlow::Continue(()),
-            }
-        },
-    );
-    assert_eq!(
-        (stopped, run.actions(), run.take_curve().len()),
-        (Ok(true), 300, 3)
-    );
+    let mut run = settings.begin(&chain, zeros(16, 8)).unwrap();
+    let until = Until::Actions(1_000);
+    let stopped = run.run_in_blocks(&mut chain, until, 7, &mut rng(4), |record, run| {
+        let visits = (0..16).flat_map(|s| run.table().visit_row(State(s)).to_vec());
+        assert_eq!(u64::from(visits.sum::<u32>()), record.actions);
+        match record.actions {
+            300 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    });
+    assert_eq!((stopped, run.actions()), (Ok(true), 300));
+    assert_eq!(run.take_curve().len(), 3);
     assert!(run.curve().is_empty());
 }
 
 #[test]
-fn faults_are_refused_and_what_was_learned_stays() {
-    let mut table = QTable::filled(2, 3, 0.0).unwrap();
-    table
-        .set_mask(Some(
-            ActionMask::new(2, 3, |_, action| action != Action(1)).unwrap(),
-        ))
-        .unwrap();
+fn faults_are_refused_and_change_nothing() {
+    let mut table = zeros(2, 3);
+    table.restrict(|_, action| action != Action(1));
     let mut cached = CachedBoltzmann::new(&table, 1.0).unwrap();
-    let step_to = |observation, reward| step(observation, reward, Status::Continuing);
-    let mut update =
-        |state, action, step: &Step| cached.update(State(state), Action(action), step, 1.0, 1.0);
-    assert!(matches!(
-        update(2, 0, &step_to(0, 0.0)),
-        Err(Error::StateOutOfRange {
-            state: State(2),
+    let mut update = |state, action, next, reward, alpha| {
+        let step = step(next, reward, Status::Continuing);
+        cached.update(State(state), Action(action), &step, alpha, 1.0)
+    };
+    assert_refused!(
+        update(2, 0, 0, 0.0, 1.0),
+        Error::OutOfRange {
+            what: "state",
+            index: 2,
             ..
-        })
-    ));
-    assert!(matches!(
-        update(0, 0, &step_to(7, 0.0)),
-        Err(Error::StateOutOfRange {
-            state: State(7),
+        }
+    );
+    assert_refused!(
+        update(0, 0, 7, 0.0, 1.0),
+        Error::OutOfRange {
+            what: "state",
+            index: 7,
             ..
-        })
-    ));
-    assert!(matches!(
-        update(0, 3, &step_to(0, 0.0)),
-        Err(Error::ActionOutOfRange { .. })
-    ));
-    assert!(matches!(
-        update(0, 1, &step_to(0, 0.0)),
-        Err(Error::ActionNotAllowed { .. })
-    ));
-    assert!(matches!(
-        update(0, 0, &step_to(0, f64::NAN)),
-        Err(Error::RewardNotFinite { .. })
-    ));
-    assert!(matches!(
-        update(0, 0, &step_to(0, 1e39)),
-        Err(Error::ValueNotFinite { .. })
-    ));
+        }
+    );
+    assert_refused!(
+        update(0, 3, 0, 0.0, 1.0),
+        Error::OutOfRange { what: "action", .. }
+    );
+    assert_refused!(update(0, 1, 0, 0.0, 1.0), Error::ActionNotAllowed { .. });
+    assert_refused!(
+        update(0, 0, 0, f64::NAN, 1.0),
+        Error::NotFinite { what: "reward", .. }
+    );
+    assert_refused!(
+        update(0, 0, 0, 1e39, 1.0),
+        Error::NotFinite { what: "value", .. }
+    );
     // Not even where the learning rate lets nothing in.
-    let mut update = |action, step: &Step| cached.update(State(0), Action(action), step, 0.0, 1.0);
-    assert!(matches!(
-        update(1, &step_to(0, 0.0)),
-        Err(Error::ActionNotAllowed { .. })
-    ));
-    assert!(matches!(
-        update(0, &step_to(0, f64::INFINITY)),
-        Err(Error::RewardNotFinite { .. })
-    ));
+    assert_refused!(update(0, 1, 0, 0.0, 0.0), Error::ActionNotAllowed { .. });
+    assert_refused!(
+        update(0, 0, 0, f64::INFINITY, 0.0),
+        Error::NotFinite { what: "reward", .. }
+    );
     let mut same = table.clone();
     cached.write_to(&mut same).unwrap();
     assert_eq!(same, table);
@@ -240,83 +200,74 @@ fn faults_are_refused_and_what_was_learned_stays() {
         assert!(CachedBoltzmann::new(&table, temperature).is_err());
         assert!(cached.set_temperature(temperature).is_err());
     }
-    assert!(cached.write_to(&mut QTable::new(3, 3).unwrap()).is_err());
-    let huge = QTable::filled(1, 1, 1e300).unwrap();
-    assert!(matches!(
-        CachedBoltzmann::new(&huge, 1.0),
-        Err(Error::ValueNotFinite { .. })
-    ));
+    assert!(cached.write_to(&mut zeros(3, 3)).is_err());
+    let huge = CachedBoltzmann::new(&QTable::filled(1, 1, 1e300).unwrap(), 1.0);
+    assert_refused!(huge, Error::NotFinite { what: "value", .. });
+}
 
-    /// Pays well twice, then breaks.
-    struct Breaks(u32);
-    impl Environment for Breaks {
-        fn states(&self) -> usize {
-            1
-        }
-        fn actions(&self) -> usize {
-            8
-        }
-        fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
-            Ok(State(0))
-        }
-        fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
-            self.0 += 1;
-            let reward = if self.0 > 2 { f64::INFINITY } else { 8.0 };
-            Ok(step(0, reward, Status::Terminated))
-        }
+/// Pays well twice, then breaks.
+struct Breaks(u32);
+
+impl Environment for Breaks {
+    fn states(&self) -> usize {
+        1
     }
+    fn actions(&self) -> usize {
+        8
+    }
+    fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
+        Ok(State(0))
+    }
+    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
+        self.0 += 1;
+        let reward = if self.0 > 2 { f64::INFINITY } else { 8.0 };
+        Ok(step(0, reward, Status::Terminated))
+    }
+}
+
+#[test]
+fn what_was_learned_before_a_fault_stays() {
     let mut breaks = Breaks(0);
     let settings = Settings {
         alpha: constant(0.5),
         temperature: constant(1e-6),
         ..Settings::new(10)
     };
-    let mut table = QTable::new(1, 8).unwrap();
+    let mut table = zeros(1, 8);
     table.set(State(0), Action(0), 1e-3).unwrap();
     let mut run = settings.begin(&breaks, table).unwrap();
     let outcome = in_blocks(&mut run, &mut breaks, 10, 1, &mut rng(0));
-    assert!(matches!(outcome, Err(Error::RewardNotFinite { .. })));
-    assert!((run.table().max(State(0)) - 6.0).abs() < 1e-3);
+    assert_refused!(outcome, Error::NotFinite { what: "reward", .. });
+    assert_near!(run.table().max(State(0)), 6.0, 1e-3);
     assert_eq!(run.table().visits(State(0), Action(0)), 2);
     let none = in_blocks(&mut run, &mut breaks, 10, 0, &mut rng(0));
-    assert!(matches!(none, Err(Error::Setting { name: "blocks", .. })));
+    assert_refused!(none, Error::Setting { name: "blocks", .. });
 }
 
 #[test]
 fn an_action_out_of_range_is_no_padding() {
-    let cached = CachedBoltzmann::new(&QTable::new(2, 5).unwrap(), 1.0).unwrap();
+    let cached = CachedBoltzmann::new(&zeros(2, 5), 1.0).unwrap();
     assert!(cached.value(State(1), Action(4)).abs() < 1e-30);
-    for action in [5, 15, 16] {
-        let action = Action(action);
+    for action in [5, 15, 16].map(Action) {
         assert!(std::panic::catch_unwind(|| cached.value(State(0), action)).is_err());
     }
 }
 
 #[test]
 fn of_equals_the_lowest_index_is_best() {
-    let mut cached = CachedBoltzmann::new(&QTable::new(1, 40).unwrap(), 1.0).unwrap();
-    let mut learn = |action, reward| {
-        let step = Step {
-            observation: State(0),
-            reward,
-            status: Status::Terminated,
-        };
-        cached
-            .update(State(0), Action(action), &step, 1.0, 0.0)
-            .unwrap();
-        cached.best(State(0)).0
-    };
+    let mut cached = CachedBoltzmann::new(&zeros(1, 40), 1.0).unwrap();
     // Risen above, level from below and from above, and fallen.
-    let best = [
-        (30, 2.0),
-        (7, 2.0),
-        (20, 2.0),
-        (7, 1.0),
-        (30, 0.0),
-        (20, -1.0),
-    ];
-    assert_eq!(
-        best.map(|(action, reward)| learn(action, reward)),
-        [30, 7, 7, 20, 20, 7]
-    );
+    for (action, reward, best) in [
+        (30, 2.0, 30),
+        (7, 2.0, 7),
+        (20, 2.0, 7),
+        (7, 1.0, 20),
+        (30, 0.0, 20),
+        (20, -1.0, 7),
+    ] {
+        let step = step(0, reward, Status::Terminated);
+        let updated = cached.update(State(0), Action(action), &step, 1.0, 0.0);
+        assert!(updated.is_ok());
+        assert_eq!(cached.best(State(0)).0, best);
+    }
 }

@@ -1,11 +1,9 @@
 //! Environments: masks, limits, lent and boxed ones, and the check of their contract.
 
-use qtable::{
-    Action, Environment, Error, QTable, State, Status, Step, TimeLimit, Until, check_env, toys,
-};
+use qtable::*;
 use rand::Rng;
 
-use crate::support::{Settings, constant, odd, rng, step};
+use crate::support::{Settings, constant, odd, rng, step, zeros};
 
 #[test]
 fn a_mask_keeps_its_actions_out_of_everything() {
@@ -36,13 +34,13 @@ fn a_mask_keeps_its_actions_out_of_everything() {
         ..Settings::new(500)
     };
     let mut training = settings.begin(&environment, table).unwrap();
-    training
-        .run(&mut environment, Until::Actions(500), &mut rng(5))
-        .unwrap();
+    let until = Until::Actions(500);
+    training.run(&mut environment, until, &mut rng(5)).unwrap();
     let mut table = training.into_parts().0;
     assert_eq!(table.best(State(0)), Action(2));
     assert_eq!(table.visits(State(0), Action(1)), 0);
-    assert!((table.value(State(0), Action(1)) - 50.0).abs() < 1e-12 && table.max(State(0)) < 50.0);
+    assert_near!(table.value(State(0), Action(1)), 50.0, 1e-12);
+    assert!(table.max(State(0)) < 50.0);
     let forbidden = Error::ActionNotAllowed {
         state: State(0),
         action: Action(1),
@@ -53,32 +51,24 @@ fn a_mask_keeps_its_actions_out_of_everything() {
 
 #[test]
 fn check_env_tells_what_is_wrong() {
-    let report = check_env(
-        &mut TimeLimit::new(toys::taxi().unwrap(), 200).unwrap(),
-        20_000,
-        3,
-    )
-    .unwrap();
+    let mut taxi = TimeLimit::new(ModelEnvironment::taxi().unwrap(), 200).unwrap();
+    let report = check_env(&mut taxi, 20_000, 3).unwrap();
+    assert_eq!(report.steps, 20_000);
     assert!(
-        report.steps == 20_000 && report.truncated > 50 && report.states_met > 300,
+        report.truncated > 50 && report.states_met > 300,
         "{report:?}"
     );
-    let endless = check_env(&mut odd(|_| step(0, 0.0, Status::Continuing)), 500, 1).unwrap_err();
-    assert_eq!(endless, Error::Endless { steps: 500 });
+    let endless = check_env(&mut odd(|_| step(0, 0.0, Status::Continuing)), 500, 1);
+    assert_eq!(endless, Err(Error::Endless { steps: 500 }));
     // What it answers depends on all the steps it ever took.
-    let forgetful = odd(|n| {
-        step(
-            (n % 3) as usize,
-            0.0,
-            if n % 7 == 0 {
-                Status::Terminated
-            } else {
-                Status::Continuing
-            },
-        )
+    let mut forgetful = odd(|n| match n % 7 {
+        0 => step((n % 3) as usize, 0.0, Status::Terminated),
+        _ => step((n % 3) as usize, 0.0, Status::Continuing),
     });
-    let fault = check_env(&mut { forgetful }, 500, 1).unwrap_err();
-    assert!(matches!(fault, Error::NotReproducible { .. }), "{fault}");
+    assert_refused!(
+        check_env(&mut forgetful, 500, 1),
+        Error::NotReproducible { .. }
+    );
 }
 
 /// An environment whose shape or mask is another one after some steps.
@@ -108,14 +98,13 @@ impl Environment for Shifting {
 
 #[test]
 fn check_env_tells_what_has_changed() {
-    for (grows, what) in [(true, "the shape"), (false, "the mask")] {
+    for (grows, wanted) in [(true, "the shape"), (false, "the mask")] {
         let still = check_env(&mut Shifting { steps: 0, grows }, 20, 1);
         assert!(still.is_ok(), "{still:?}");
-        let fault = check_env(&mut Shifting { steps: 0, grows }, 100, 1).unwrap_err();
-        let Error::EnvironmentChanged { what: found, .. } = fault else {
-            panic!("{fault}");
-        };
-        assert_eq!(found, what);
+        match check_env(&mut Shifting { steps: 0, grows }, 100, 1) {
+            Err(Error::EnvironmentChanged { what, .. }) => assert_eq!(what, wanted),
+            other => panic!("{other:?}"),
+        }
     }
 }
 
@@ -128,45 +117,34 @@ fn a_lent_or_boxed_environment_is_the_same_environment() {
         };
         settings.run(environment).unwrap().into_parts().0.to_csv()
     };
-    let mut chain = toys::chain(6).unwrap();
+    let mut chain = ModelEnvironment::chain(6).unwrap();
     let wanted = play(&mut chain.clone());
     assert_eq!(play(&mut Box::new(chain.clone())), wanted);
     let mut boxed: Box<dyn Environment> = Box::new(chain.clone());
     assert_eq!(play(&mut boxed), wanted);
     assert_eq!(play(&mut TimeLimit::new(&mut chain, 9).unwrap()), wanted);
     // A mask and a word on success come through.
-    let cliff: Box<dyn Environment> = Box::new(toys::cliff_walking().unwrap());
-    assert_eq!(
-        cliff.succeeded(&step(47, -1.0, Status::Terminated)),
-        Some(true)
-    );
-    assert!(
-        !Box::new(Shifting {
-            steps: 41,
-            grows: false
-        })
-        .allows(State(0), Action(1))
-    );
+    let cliff: Box<dyn Environment> = Box::new(ModelEnvironment::cliff_walking().unwrap());
+    let goal = step(47, -1.0, Status::Terminated);
+    assert_eq!(cliff.succeeded(&goal), Some(true));
+    let (steps, grows) = (41, false);
+    assert!(!Box::new(Shifting { steps, grows }).allows(State(0), Action(1)));
 }
 
 #[test]
 fn a_time_limit_truncates() {
-    let mut limited = TimeLimit::new(toys::chain(9).unwrap(), 3).unwrap();
+    let chain = || ModelEnvironment::chain(9).unwrap();
+    let mut limited = TimeLimit::new(chain(), 3).unwrap();
     let mut rng = rng(0);
     for _ in 0..2 {
         limited.reset(&mut rng).unwrap();
-        let ends: Vec<Status> = (0..3)
-            .map(|_| limited.step(Action(0), &mut rng).unwrap().status)
-            .collect();
+        let ends = [(); 3].map(|()| limited.step(Action(0), &mut rng).unwrap().status);
         assert_eq!(
             ends,
             [Status::Continuing, Status::Continuing, Status::Truncated]
         );
     }
-    assert!(matches!(
-        TimeLimit::new(toys::chain(9).unwrap(), 0),
-        Err(Error::Setting { .. })
-    ));
+    assert_refused!(TimeLimit::new(chain(), 0), Error::Setting { .. });
 }
 
 /// An environment that fails after some steps.
@@ -194,17 +172,13 @@ impl Environment for Failing {
 #[test]
 fn a_failing_environment_ends_the_episode_and_not_the_run() {
     let mut failing = Failing(0);
-    let settings = Settings::new(100);
-    let mut training = settings
-        .begin(&failing, QTable::new(1, 1).unwrap())
-        .unwrap();
+    let mut training = Settings::new(100).begin(&failing, zeros(1, 1)).unwrap();
     let failed = training.run(&mut failing, Until::Actions(10), &mut rng(0));
     let text = failed.unwrap_err().to_string();
     assert_eq!(text, "the environment failed: the serial line is gone");
     assert_eq!((training.actions(), training.is_in_episode()), (3, false));
     assert!(training.table().max(State(0)) > 0.0);
-    training
-        .run(&mut failing, Until::Actions(10), &mut rng(0))
-        .unwrap();
+    let until = Until::Actions(10);
+    training.run(&mut failing, until, &mut rng(0)).unwrap();
     assert_eq!(training.actions(), 10);
 }

@@ -5,9 +5,13 @@
     reason = "a test that cannot go on should fail"
 )]
 
+#[macro_use]
+mod support;
+
 mod cached;
 #[cfg(feature = "csv")]
 mod csv;
+mod dynamic;
 mod environments;
 mod experiments;
 mod learners;
@@ -17,7 +21,6 @@ mod persistence;
 mod regression;
 #[cfg(feature = "files")]
 mod resume;
-mod support;
 mod tables;
 mod toys;
 mod training;

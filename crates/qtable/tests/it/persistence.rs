@@ -2,17 +2,14 @@
 
 use std::path::Path;
 
-use qtable::{
-    Action, FileError, Intervals, Product, QLearning, QTable, Sarsa, Schedule, State, decode,
-    encode, load, save,
-};
+use qtable::*;
 use rand::{Rng, RngExt};
 
-use crate::support::{constant, rng, sealed};
+use crate::support::{q_learning, rng, sealed, zeros};
 
 fn learned(states: usize, actions: usize) -> QTable {
     let mut rng = rng(5);
-    let mut table = QTable::new(states, actions).unwrap();
+    let mut table = zeros(states, actions);
     for (state, action) in
         (0..states).flat_map(|s| (0..actions).map(move |a| (State(s), Action(a))))
     {
@@ -143,21 +140,27 @@ fn random_bytes_are_refused() {
 #[test]
 fn sound_envelopes_with_impossible_contents_are_refused() {
     let refused = |bytes: &[u8]| decode::<QTable>("k", bytes).unwrap_err();
-    let newer = refused(&sealed(3, "k", "QTable", &[]));
-    assert!(matches!(newer, FileError::Newer { found: 3, .. }));
-    let older = refused(&sealed(1, "k", "QTable", &[]));
-    assert!(older.to_string().starts_with("made by an earlier version"));
+    let newer = refused(&sealed(4, "k", "QTable", &[]));
+    assert!(matches!(newer, FileError::Newer { found: 4, .. }));
+    for format in [1, 2] {
+        let older = refused(&sealed(format, "k", "QTable", &[]));
+        assert!(older.to_string().starts_with("made by an earlier version"));
+    }
 
-    // A vector that claims 2^63 entries: actions 2, then bincode's 64-bit length.
-    let claim = [&[2u8, 253][..], &(1u64 << 63).to_le_bytes()].concat();
-    let claimed = refused(&sealed(2, "k", "QTable", &claim));
+    // A vector that claims 2^63 entries: actions 2, initial value 0, then bincode's 64-bit length.
+    let claim = [
+        &[2u8, 0, 0, 0, 0, 0, 0, 0, 0, 253][..],
+        &(1u64 << 63).to_le_bytes(),
+    ]
+    .concat();
+    let claimed = refused(&sealed(3, "k", "QTable", &claim));
     assert!(matches!(claimed, FileError::Contents(_)));
 
     let table = |actions: u64, values: &[f64], visits: &[u32]| {
         let config = bincode::config::standard();
-        let parts = (actions, values, visits, None::<(u64, Vec<bool>)>);
+        let parts = (actions, 0.0, values, visits, None::<Vec<bool>>);
         let payload = bincode::serde::encode_to_vec(parts, config).unwrap();
-        decode::<QTable>("k", &sealed(2, "k", "QTable", &payload))
+        decode::<QTable>("k", &sealed(3, "k", "QTable", &payload))
     };
     let sound = table(2, &[0.0, 1.0], &[3, 4]).unwrap();
     assert_eq!(sound.visits(State(0), Action(1)), 4);
@@ -175,25 +178,30 @@ fn sound_envelopes_with_impossible_contents_are_refused() {
             "{actions} {values:?}"
         );
     }
-    let left_over = decode::<u8>("k", &sealed(2, "k", "", &[7, 0]));
+    let left_over = decode::<u8>("k", &sealed(3, "k", "", &[7, 0]));
     assert!(matches!(left_over, Err(FileError::Contents(_))));
 }
 
 /// Stays as long as no stored type changes; then the format version goes up.
 #[test]
 fn the_bytes_of_this_format_stay() {
-    let mut table = QTable::new(2, 2).unwrap();
+    let mut table = zeros(2, 2);
     table.set(State(1), Action(0), 1.5).unwrap();
     table.visit(State(1), Action(0)).unwrap();
     let print = |bytes: Vec<u8>| (bytes.len(), crc32fast::hash(&bytes[..bytes.len() - 4]));
-    assert_eq!(print(encode("table/1", &table).unwrap()), (77, 0x922e_6a25));
+    assert_eq!(print(encode("table/1", &table).unwrap()), (85, 0x628a_d796));
 }
 
 #[test]
-fn learners_of_the_same_layout_are_told_apart() {
-    let bytes = encode("l", &QLearning::new(constant(0.5), 0.9).unwrap()).unwrap();
-    let text = decode::<Sarsa>("l", &bytes).unwrap_err().to_string();
-    assert_eq!(text, "it holds \"QLearning\", not \"Sarsa\"");
+fn types_of_the_same_layout_are_told_apart() {
+    let bytes = encode("l", &(q_learning(0.5, 0.9), Ties::Random)).unwrap();
+    let text = decode::<(QLearning, Target)>("l", &bytes)
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        text,
+        "it holds \"QLearning Ties\", not \"QLearning Target\""
+    );
 }
 
 #[test]
@@ -209,7 +217,7 @@ fn what_is_wide_in_memory_and_short_on_disk_comes_back() {
 fn a_claimed_text_that_is_not_there_is_refused() {
     for claimed in [1u64 << 25, 1 << 32, 1 << 44, u64::MAX] {
         let payload = [&[253u8][..], &claimed.to_le_bytes()].concat();
-        match decode::<String>("k", &sealed(2, "k", "", &payload)) {
+        match decode::<String>("k", &sealed(3, "k", "", &payload)) {
             Err(FileError::Contents(why)) => {
                 assert!(why.contains("LimitExceeded"), "{claimed}: {why}");
             }

@@ -2,18 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use qtable::{
-    Action, ActionMask, Boltzmann, DoubleQLearning, DynaQ, EpsilonGreedy, Error, ExpectedSarsa,
-    Experience, Greedy, Intervals, Learner, ModelEnvironment, NStepQ, Policy, PrioritizedSweeping,
-    QLambda, QLearning, QTable, Sarsa, SarsaLambda, Schedule, State, Status, Step, TimeLimit,
-    Training, Ucb, Until, decode, encode, toys,
-};
-use rand::SeedableRng;
+use qtable::*;
 use rand::rngs::Xoshiro256PlusPlus;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::support::{Settings, constant, corridor, forged};
+use crate::support::{Settings, constant, corridor, experience, forged, rng, step, zeros};
 
 type World = TimeLimit<ModelEnvironment>;
 
@@ -26,36 +20,26 @@ where
     L: Learner + Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned,
     P: Policy + Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned,
 {
-    let lake = toys::frozen_lake(&toys::FROZEN_LAKE_4X4, true).unwrap();
+    let lake = ModelEnvironment::frozen_lake("4x4", true).unwrap();
     let lake = TimeLimit::new(lake, 30).unwrap();
-    let begun = Training::new(&lake, begun(), learner, policy)
-        .unwrap()
-        .with_record_every(70)
-        .unwrap();
-    let rng = Xoshiro256PlusPlus::seed_from_u64(42);
-
-    let (mut whole, mut whole_lake, mut whole_rng) = (begun.clone(), lake.clone(), rng.clone());
-    whole
-        .run(&mut whole_lake, Until::Actions(1_000), &mut whole_rng)
-        .unwrap();
+    let begun = Training::new(&lake, begun(), learner, policy).unwrap();
+    let begun = (begun.with_record_every(70).unwrap(), lake, rng(42));
+    let mut whole = begun.clone();
+    let until = Until::Actions(1_000);
+    whole.0.run(&mut whole.1, until, &mut whole.2).unwrap();
 
     // Stops at each of several places, most of them within an episode and a record.
-    let mut bytes = encode("run", &(begun, lake, rng)).unwrap();
+    type Run<L, P> = (Training<L, P>, World, Xoshiro256PlusPlus);
+    let mut bytes = encode("run", &begun).unwrap();
     for stop in [1, 2, 3, 69, 70, 71, 333, 512, 999, 1_000] {
-        let (mut part, mut lake, mut rng): (Training<L, P>, World, Xoshiro256PlusPlus) =
-            decode("run", &bytes).unwrap();
-        part.run(&mut lake, Until::Actions(stop), &mut rng).unwrap();
-        bytes = encode("run", &(part, lake, rng)).unwrap();
+        let mut part: Run<L, P> = decode("run", &bytes).unwrap();
+        let until = Until::Actions(stop);
+        part.0.run(&mut part.1, until, &mut part.2).unwrap();
+        bytes = encode("run", &part).unwrap();
     }
-    let (part, part_lake, part_rng): (Training<L, P>, World, Xoshiro256PlusPlus) =
-        decode("run", &bytes).unwrap();
-    assert_eq!(part.table().to_csv(), whole.table().to_csv());
-    assert_eq!(part.curve().len(), 14);
-    assert_eq!((&part_lake, &part_rng), (&whole_lake, &whole_rng));
-    assert_eq!(
-        bytes,
-        encode("run", &(&whole, &whole_lake, &whole_rng)).unwrap()
-    );
+    assert_eq!(bytes, encode("run", &whole).unwrap());
+    let part: Run<L, P> = decode("run", &bytes).unwrap();
+    assert_eq!(part.0.curve().len(), 14);
     assert_eq!(part, whole);
 }
 
@@ -68,24 +52,33 @@ fn a_resumed_run_ends_as_an_uninterrupted_one() {
         QLearning::new(alpha(), gamma).unwrap(),
         Boltzmann::new(Schedule::exponential(10.0, 0.01, 900).unwrap()).unwrap(),
     );
+    let by_visits = Schedule::inverse_visits(1.0, 3.0).unwrap();
+    let learner = QLearning::new(by_visits, gamma).unwrap();
+    stopping_changes_nothing(learner, Ucb::new(0.5).unwrap());
+    for target in [
+        Target::Q,
+        Target::UncutQ,
+        Target::Sarsa,
+        Target::ExpectedSarsa,
+        Target::TreeBackup,
+    ] {
+        for n in [1, 4, usize::MAX] {
+            stopping_changes_nothing(NStep::new(target, n, alpha(), gamma).unwrap(), epsilon());
+        }
+        stopping_changes_nothing(Traces::new(target, 0.8, alpha(), gamma).unwrap(), epsilon());
+    }
+    let average = NStep::new(Target::Sarsa, 2, alpha(), 1.0).unwrap();
+    stopping_changes_nothing(average.with_average_reward(0.1).unwrap(), epsilon());
+    let dyna = DynaQ::new(&begun(), alpha(), gamma).unwrap();
+    stopping_changes_nothing(dyna.clone(), epsilon());
     stopping_changes_nothing(
-        QLearning::new(Schedule::inverse_visits(1.0, 3.0).unwrap(), gamma).unwrap(),
-        Ucb::new(0.5).unwrap(),
-    );
-    stopping_changes_nothing(Sarsa::new(alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(ExpectedSarsa::new(alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(
-        DoubleQLearning::new(&begun(), alpha(), gamma).unwrap(),
+        dyna.with_last_outcome().with_bonus(0.01).unwrap(),
         epsilon(),
     );
-    stopping_changes_nothing(QLambda::new(alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(SarsaLambda::new(alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(NStepQ::new(alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(DynaQ::new(&begun(), alpha(), gamma).unwrap(), epsilon());
-    stopping_changes_nothing(
-        PrioritizedSweeping::new(&begun(), gamma).unwrap(),
-        epsilon(),
-    );
+    let double = DoubleQLearning::new(&begun(), alpha(), gamma).unwrap();
+    stopping_changes_nothing(double, epsilon());
+    let sweeping = PrioritizedSweeping::new(&begun(), gamma).unwrap();
+    stopping_changes_nothing(sweeping, epsilon());
 }
 
 #[test]
@@ -102,18 +95,15 @@ fn a_run_in_blocks_goes_on_as_if_it_had_not_stopped() {
             ..Settings::new(1_000)
         };
         let mut lake = TimeLimit::new(corridor(), 30).unwrap();
-        let mut whole = settings
-            .begin(&lake, QTable::filled(16, 8, 0.3).unwrap())
-            .unwrap();
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(42);
+        let table = QTable::filled(16, 8, 0.3).unwrap();
+        let (mut whole, mut rng) = (settings.begin(&lake, table).unwrap(), rng(42));
         let mut bytes = encode("run", &(&whole, &lake, &rng)).unwrap();
-        let go_on =
-            |run: &mut Training<QLearning, Boltzmann>, lake: &mut World, rng: &mut _, until| {
-                run.run_in_blocks(lake, Until::Actions(until), 3, rng, |_, _| {
-                    ControlFlow::Continue(())
-                })
-                .unwrap();
-            };
+        let go_on = |run: &mut Training<_, _>, lake: &mut World, rng: &mut _, until| {
+            run.run_in_blocks(lake, Until::Actions(until), 3, rng, |_, _| {
+                ControlFlow::Continue(())
+            })
+            .unwrap();
+        };
         go_on(&mut whole, &mut lake, &mut rng, 1_000);
 
         let mut in_episode = 0;
@@ -134,9 +124,8 @@ fn a_run_in_blocks_goes_on_as_if_it_had_not_stopped() {
         }
         assert!(in_episode > 3);
         let back: Run = decode("run", &bytes).unwrap();
-        assert_eq!(whole.actions(), 1_026);
+        assert_eq!((whole.actions(), whole.curve().len()), (1_026, 12));
         assert_eq!(back, (whole, lake, rng));
-        assert_eq!(back.0.curve().len(), 12);
     }
 }
 
@@ -146,24 +135,12 @@ fn a_sweep_with_an_enormous_change_ahead_can_be_saved() {
     let mut table = QTable::filled(2, 1, -1.7e308).unwrap();
     let learner = PrioritizedSweeping::new(&table, 1.0).unwrap();
     let mut learner = learner.with_backups(1).unwrap();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    for (state, reward, status) in [
-        (1, 0.0, Status::Continuing),
-        (0, 1.7e308, Status::Terminated),
+    for experience in [
+        experience(1, 0, step(0, 0.0, Status::Continuing)),
+        experience(0, 0, step(0, 1.7e308, Status::Terminated)),
     ] {
-        let step = Step {
-            observation: State(0),
-            reward,
-            status,
-        };
-        let experience = Experience {
-            state: State(state),
-            action: Action(0),
-            step,
-            next_action: None,
-        };
         learner
-            .learn(&mut table, &experience, &Greedy, &mut rng)
+            .learn(&mut table, &experience, &Greedy, &mut rng(1))
             .unwrap();
     }
     assert!(table.max(State(0)) > 1e308 && table.max(State(1)) < -1e308);
@@ -191,17 +168,20 @@ fn damaged_parts_of_a_run_are_refused() {
     };
     assert!(intervals(vec![1.0], Some(1)));
     assert!(!intervals(vec![2.0, 1.0], None) && !intervals(vec![1.0], Some(2)));
-    let mask = |allowed: Vec<bool>| forged::<ActionMask>("ActionMask", (2u64, allowed)).is_ok();
-    assert!(mask(vec![true, false, false, true]));
-    assert!(!mask(vec![true; 3]));
+    let masked = |mask: Vec<bool>| {
+        let parts = (2u64, 0.0, vec![0.0; 4], vec![0u32; 4], Some(mask));
+        forged::<QTable>("QTable", parts).is_ok()
+    };
+    assert!(masked(vec![true, false, false, true]) && !masked(vec![true; 3]));
 }
 
 /// A run of SARSA on three cells with the given counters, in which state 0 is next and an action
 /// was chosen for it.
-fn forged_run(chosen: u64, count: u64) -> Training<Sarsa, EpsilonGreedy> {
-    let table = QTable::new(3, 2).unwrap();
+fn forged_run(chosen: u64, count: u64) -> Training<NStep, EpsilonGreedy> {
+    let table = zeros(3, 2);
     let (half, clock) = ((0u32, 0.5, false), (count, count));
-    let learner = (half, 0.9, clock);
+    // Target::Sarsa, n, average reward, pending pairs.
+    let learner = ((half, 0.9, clock), 2u32, 1u64, (0.0, 0.0), Vec::<u8>::new());
     let policy = (half, 0u32, clock);
     let running = Some((0u64, Some(chosen), count, 0.0));
     let tally = (count, 0.0, 0.0, count, count, count, count, 0.0);
@@ -213,39 +193,34 @@ fn forged_run(chosen: u64, count: u64) -> Training<Sarsa, EpsilonGreedy> {
         (counts, running, tally),
         Vec::<u8>::new(),
     );
-    forged("Training Sarsa EpsilonGreedy", parts).unwrap()
+    forged("Training NStep EpsilonGreedy", parts).unwrap()
 }
 
 #[test]
 fn a_stored_action_is_checked_before_the_environment_sees_it() {
-    let mut chain = toys::chain(3).unwrap();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    let mut run = |chosen| forged_run(chosen, 0).run(&mut chain, Until::Actions(5), &mut rng);
+    let mut chain = ModelEnvironment::chain(3).unwrap();
+    let mut run = |chosen| forged_run(chosen, 0).run(&mut chain, Until::Actions(5), &mut rng(1));
     assert_eq!(run(1), Ok(()));
     for chosen in [2, 9, u64::MAX] {
-        let refused = Err(Error::ActionOutOfRange {
-            action: Action(chosen as usize),
-            actions: 2,
-        });
-        assert_eq!(run(chosen), refused);
+        assert_refused!(
+            run(chosen),
+            Error::OutOfRange {
+                what: "action",
+                count: 2,
+                ..
+            }
+        );
     }
 }
 
 #[test]
 fn counters_stop_at_their_largest_number() {
-    let mut chain = toys::chain(3).unwrap();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut chain = ModelEnvironment::chain(3).unwrap();
     let mut training = forged_run(1, u64::MAX);
-    assert_eq!(
-        (training.actions(), training.episodes()),
-        (u64::MAX, u64::MAX - 1)
-    );
-    training
-        .run(&mut chain, Until::Episodes(u64::MAX), &mut rng)
-        .unwrap();
-    assert_eq!(
-        (training.actions(), training.episodes()),
-        (u64::MAX, u64::MAX)
-    );
+    let counters = |of: &Training<_, _>| (of.actions(), of.episodes());
+    assert_eq!(counters(&training), (u64::MAX, u64::MAX - 1));
+    let until = Until::Episodes(u64::MAX);
+    training.run(&mut chain, until, &mut rng(1)).unwrap();
+    assert_eq!(counters(&training), (u64::MAX, u64::MAX));
     assert_eq!(training.curve().last().unwrap().actions, u64::MAX);
 }

@@ -1,11 +1,27 @@
 //! An environment that answers as a test wants, and runs with settings of one's own.
 
-use qtable::{
-    Action, Boltzmann, Environment, Error, Model, ModelEnvironment, Outcome, QLearning, QTable,
-    Schedule, State, Status, Step, Training, Until,
-};
+use qtable::*;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
+
+/// Asserts that a result is an error of a kind.
+macro_rules! assert_refused {
+    ($result:expr, $($kind:tt)+) => {
+        match $result {
+            Err($($kind)+) => {}
+            other => panic!("{other:?} is not {}", stringify!($($kind)+)),
+        }
+    };
+}
+
+/// Asserts that two numbers differ by less than a bound.
+macro_rules! assert_near {
+    ($found:expr, $wanted:expr, $bound:expr $(, $label:expr)?) => {
+        let (found, wanted): (f64, f64) = ($found, $wanted);
+        let near = (found - wanted).abs() < $bound;
+        assert!(near, "{found} is not {wanted} {:?}", ($($label)?));
+    };
+}
 
 pub(crate) fn rng(seed: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed)
@@ -13,6 +29,57 @@ pub(crate) fn rng(seed: u64) -> Xoshiro256PlusPlus {
 
 pub(crate) fn constant(value: f64) -> Schedule {
     Schedule::constant(value).unwrap()
+}
+
+pub(crate) fn epsilon(value: f64) -> EpsilonGreedy {
+    EpsilonGreedy::new(constant(value)).unwrap()
+}
+
+pub(crate) fn q_learning(alpha: f64, gamma: f64) -> QLearning {
+    QLearning::new(constant(alpha), gamma).unwrap()
+}
+
+/// A table of zeros.
+pub(crate) fn zeros(states: usize, actions: usize) -> QTable {
+    QTable::new(states, actions).unwrap()
+}
+
+/// A table of zeros with the shape of an environment.
+pub(crate) fn zeros_of(environment: &dyn Environment) -> QTable {
+    zeros(environment.states(), environment.actions())
+}
+
+pub(crate) fn step(observation: usize, reward: f64, status: Status) -> Step {
+    Step {
+        observation: State(observation),
+        reward,
+        status,
+    }
+}
+
+/// The experience of an action without a next one.
+pub(crate) fn experience(state: usize, action: usize, step: Step) -> Experience {
+    Experience {
+        state: State(state),
+        action: Action(action),
+        step,
+        next_action: None,
+    }
+}
+
+/// A run after a number of actions.
+pub(crate) fn trained<L: Learner, P: Policy>(
+    environment: &mut dyn Environment,
+    table: QTable,
+    learner: L,
+    policy: P,
+    (limit, actions, seed): (u64, u64, u64),
+) -> Training<L, P> {
+    let training = Training::new(environment, table, learner, policy).unwrap();
+    let mut training = training.with_episode_limit(limit).unwrap();
+    let until = Until::Actions(actions);
+    training.run(environment, until, &mut rng(seed)).unwrap();
+    training
 }
 
 /// An environment of three states and two actions whose n-th answer is given.
@@ -42,14 +109,6 @@ impl<F: FnMut(u64) -> Step> Environment for Odd<F> {
 
 pub(crate) fn odd(answer: impl FnMut(u64) -> Step) -> Odd<impl FnMut(u64) -> Step> {
     Odd { steps: 0, answer }
-}
-
-pub(crate) fn step(observation: usize, reward: f64, status: Status) -> Step {
-    Step {
-        observation: State(observation),
-        reward,
-        status,
-    }
 }
 
 /// 16 cells in a row and 8 actions that go 3 cells back to 4 ahead, or now and then nowhere; the
@@ -109,8 +168,7 @@ impl Settings {
         &self,
         environment: &mut dyn Environment,
     ) -> Result<Training<QLearning, Boltzmann>, Error> {
-        let table = QTable::new(environment.states(), environment.actions())?;
-        let mut training = self.begin(environment, table)?;
+        let mut training = self.begin(environment, zeros_of(environment))?;
         training.run(environment, Until::Actions(self.actions), &mut rng(0))?;
         Ok(training)
     }
@@ -136,7 +194,7 @@ pub(crate) fn sealed(format: u32, kind: &str, types: &str, payload: &[u8]) -> Ve
 pub(crate) fn forged<T: serde::de::DeserializeOwned>(
     types: &str,
     parts: impl serde::Serialize,
-) -> Result<T, qtable::FileError> {
+) -> Result<T, FileError> {
     let payload = bincode::serde::encode_to_vec(parts, bincode::config::standard()).unwrap();
-    qtable::decode("forged", &sealed(2, "forged", types, &payload))
+    decode("forged", &sealed(3, "forged", types, &payload))
 }

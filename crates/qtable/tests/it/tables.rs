@@ -1,15 +1,12 @@
 //! Tables, policies, discretisation and text, by properties and by hand.
 
 use proptest::prelude::*;
-use qtable::{
-    Action, ActionMask, Boltzmann, EpsilonGreedy, Error, Greedy, Intervals, Policy, Product,
-    QTable, State, Ties, Ucb,
-};
+use qtable::*;
 
-use crate::support::{constant, rng};
+use crate::support::{constant, epsilon, rng, zeros};
 
 fn row(values: &[f64]) -> QTable {
-    let mut table = QTable::new(1, values.len()).unwrap();
+    let mut table = zeros(1, values.len());
     for (action, &value) in values.iter().enumerate() {
         table.set(State(0), Action(action), value).unwrap();
     }
@@ -18,49 +15,31 @@ fn row(values: &[f64]) -> QTable {
 
 #[test]
 fn impossible_tables_are_refused() {
-    assert!(matches!(QTable::new(0, 3), Err(Error::EmptyShape { .. })));
-    assert!(matches!(QTable::new(3, 0), Err(Error::EmptyShape { .. })));
-    assert!(matches!(
-        QTable::new(usize::MAX, 2),
-        Err(Error::TooLarge { .. })
-    ));
-    assert!(matches!(
-        QTable::new(1 << 40, 1 << 10),
-        Err(Error::TooLarge { .. })
-    ));
-    assert!(matches!(
-        QTable::filled(2, 2, f64::NAN),
-        Err(Error::ValueNotFinite { .. })
-    ));
-    assert!(matches!(
-        QTable::filled(2, 2, f64::INFINITY),
-        Err(Error::ValueNotFinite { .. })
-    ));
-    let mut table = QTable::new(2, 2).unwrap();
-    assert!(matches!(
-        table.set(State(2), Action(0), 0.0),
-        Err(Error::StateOutOfRange { .. })
-    ));
-    assert!(matches!(
-        table.set(State(0), Action(2), 0.0),
-        Err(Error::ActionOutOfRange { .. })
-    ));
-    assert!(matches!(
-        table.visit(State(2), Action(0)),
-        Err(Error::StateOutOfRange { .. })
-    ));
-    assert_eq!(
-        (
-            table.get(State(0), Action(5)),
-            table.get(State(1), Action(1))
-        ),
-        (None, Some(0.0))
+    for (states, actions) in [(0, 3), (3, 0), (usize::MAX, 2), (1 << 40, 1 << 10)] {
+        assert_refused!(QTable::new(states, actions), Error::Shape { .. });
+    }
+    for value in [f64::NAN, f64::INFINITY] {
+        assert_refused!(
+            QTable::filled(2, 2, value),
+            Error::NotFinite { what: "value", .. }
+        );
+    }
+    let mut table = zeros(2, 2);
+    let (state, action) = (State(2), Action(2));
+    assert_refused!(
+        table.set(state, Action(0), 0.0),
+        Error::OutOfRange { what: "state", .. }
     );
-    let mask = ActionMask::new(3, 2, |_, _| true).unwrap();
-    assert!(matches!(
-        table.set_mask(Some(mask)),
-        Err(Error::ShapeMismatch { .. })
-    ));
+    assert_refused!(
+        table.set(State(0), action, 0.0),
+        Error::OutOfRange { what: "action", .. }
+    );
+    assert_refused!(
+        table.visit(state, Action(0)),
+        Error::OutOfRange { what: "state", .. }
+    );
+    assert_eq!(table.get(State(0), Action(5)), None);
+    assert_eq!(table.get(State(1), Action(1)), Some(0.0));
 }
 
 proptest! {
@@ -69,10 +48,9 @@ proptest! {
         writes in prop::collection::vec((0usize..3, 0usize..5, -3i8..4), 1..200),
         forbidden in prop::collection::vec(any::<bool>(), 15),
     ) {
-        let mask = ActionMask::new(3, 5, |s, a| a.0 == s.0 || !forbidden[s.0 * 5 + a.0]).unwrap();
-        for mask in [None, Some(mask)] {
-            let mut table = QTable::new(3, 5).unwrap();
-            table.set_mask(mask).unwrap();
+        for masked in [false, true] {
+            let mut table = zeros(3, 5);
+            table.restrict(|s, a| !masked || a.0 == s.0 || !forbidden[s.0 * 5 + a.0]);
             for &(state, action, value) in &writes {
                 let (state, action) = (State(state), Action(action));
                 let allowed = table.allows(state, action);
@@ -148,143 +126,117 @@ proptest! {
 
 #[test]
 fn impossible_discretisations_are_refused() {
-    let not_ascending = Intervals::new(&[1.0, 1.0]);
-    assert!(matches!(
-        not_ascending,
-        Err(Error::NotAscending {
+    let intervals = Intervals::new;
+    assert_refused!(
+        intervals(&[1.0, 1.0]),
+        Error::NotAscending {
             what: "edge",
             index: 1,
             ..
-        })
-    ));
+        }
+    );
     for edge in [f64::NAN, f64::INFINITY] {
-        let refused = Intervals::new(&[1.0, edge]);
-        assert!(matches!(
-            refused,
-            Err(Error::Setting {
+        assert_refused!(
+            intervals(&[1.0, edge]),
+            Error::Setting {
                 name: "an edge",
                 ..
-            })
-        ));
+            }
+        );
     }
-    let two = Intervals::new(&[1.0]).unwrap();
-    let no_bin = Err(Error::BinOutOfRange { bin: 2, bins: 2 });
-    assert_eq!(two.clone().with_goal(2), no_bin);
+    let two = intervals(&[1.0]).unwrap();
+    assert_refused!(
+        two.clone().with_goal(2),
+        Error::OutOfRange {
+            what: "bin",
+            index: 2,
+            count: 2
+        }
+    );
     let product = Product::new(vec![two.clone(), two.clone()]).unwrap();
-    let one_short = product.index(&[0.0]);
-    assert!(matches!(
-        one_short,
-        Err(Error::WrongLength {
+    assert_refused!(
+        product.index(&[0.0]),
+        Error::WrongLength {
             needed: 2,
             found: 1,
             ..
-        })
-    ));
-    let nan = Err(Error::NotANumber { quantity: 1 });
-    assert_eq!(product.index(&[0.0, f64::NAN]), nan);
-    let outside = Error::BinOutOfRange { bin: 2, bins: 2 };
-    assert_eq!(product.state(&[0, 2]), Err(outside));
-    let too_large = Product::new(vec![two; 64]);
-    assert!(matches!(too_large, Err(Error::TooLarge { .. })));
-}
-
-/// Shares of each action in many choices.
-fn shares(policy: &mut dyn Policy, table: &QTable, choices: u32) -> Vec<f64> {
-    let mut counts = vec![0u32; table.actions()];
-    let mut rng = rng(17);
-    for _ in 0..choices {
-        counts[policy.choose(table, State(0), &mut rng).0] += 1;
-    }
-    counts
-        .iter()
-        .map(|&count| f64::from(count) / f64::from(choices))
-        .collect()
+        }
+    );
+    assert_refused!(
+        product.index(&[0.0, f64::NAN]),
+        Error::NotANumber { quantity: 1 }
+    );
+    assert_refused!(
+        product.state(&[0, 2]),
+        Error::OutOfRange {
+            what: "bin",
+            index: 2,
+            count: 2
+        }
+    );
+    assert_refused!(Product::new(vec![two; 64]), Error::Shape { .. });
 }
 
 #[test]
 fn every_policy_chooses_as_often_as_it_says() {
+    const CHOICES: u32 = 100_000;
     let mut table = row(&[1.0, 3.0, -2.0, 3.0, 9.0, 2.5]);
-    table
-        .set_mask(Some(
-            ActionMask::new(1, 6, |_, action| action != Action(4)).unwrap(),
-        ))
-        .unwrap();
-    for _ in 0..10 {
-        for action in [0, 1, 2, 3, 5] {
-            table.visit(State(0), Action(action)).unwrap();
-        }
+    table.restrict(|_, action| action != Action(4));
+    for action in [0, 1, 2, 3, 5].repeat(10) {
+        table.visit(State(0), Action(action)).unwrap();
     }
+    let ucb = |ties| Ucb::new(1.0).unwrap().with_ties(ties);
     let policies: Vec<Box<dyn Policy>> = vec![
         Box::new(Greedy),
-        Box::new(
-            EpsilonGreedy::new(constant(0.4))
-                .unwrap()
-                .with_ties(Ties::Lowest),
-        ),
-        Box::new(
-            EpsilonGreedy::new(constant(0.4))
-                .unwrap()
-                .with_ties(Ties::Random),
-        ),
+        Box::new(epsilon(0.4).with_ties(Ties::Lowest)),
+        Box::new(epsilon(0.4).with_ties(Ties::Random)),
         Box::new(Boltzmann::new(constant(1.5)).unwrap()),
-        Box::new(Ucb::new(1.0).unwrap().with_ties(Ties::Lowest)),
-        Box::new(Ucb::new(1.0).unwrap().with_ties(Ties::Random)),
+        Box::new(ucb(Ties::Lowest)),
+        Box::new(ucb(Ties::Random)),
     ];
     for (index, mut policy) in policies.into_iter().enumerate() {
-        let mut p = vec![f64::NAN; 6];
-        assert!(policy.probabilities(&table, State(0), &mut p));
-        assert!(
-            (p.iter().sum::<f64>() - 1.0).abs() < 1e-12,
-            "policy {index}: {p:?}"
-        );
-        for (action, share) in shares(&mut *policy, &table, 100_000)
-            .into_iter()
-            .enumerate()
-        {
+        let (mut told, mut counts, mut rng) = ([f64::NAN; 6], [0u32; 6], rng(17));
+        assert!(policy.probabilities(&table, State(0), &mut told));
+        assert_near!(told.iter().sum(), 1.0, 1e-12, index);
+        for _ in 0..CHOICES {
+            counts[policy.choose(&table, State(0), &mut rng).0] += 1;
+        }
+        for (p, count) in told.into_iter().zip(counts) {
             // Five standard deviations.
-            let off = 5.0 * (p[action] * (1.0 - p[action]) / 100_000.0).sqrt() + 1e-12;
-            assert!(
-                (share - p[action]).abs() < off,
-                "policy {index}, action {action}: {share}, not {}",
-                p[action]
-            );
+            let off = 5.0 * (p * (1.0 - p) / f64::from(CHOICES)).sqrt() + 1e-12;
+            assert_near!(f64::from(count) / f64::from(CHOICES), p, off, index);
         }
         assert!(
-            p[4].abs() < 1e-300,
+            told[4].abs() < 1e-300,
             "policy {index} would take what is forbidden"
         );
     }
 }
 
 #[test]
-fn boltzmann_has_the_probabilities_of_equation_4() {
-    let table = row(&[1.0, 2.0, 4.0]);
-    let mut p = [0.0; 3];
-    Boltzmann::new(constant(2.0))
-        .unwrap()
-        .probabilities(&table, State(0), &mut p);
+fn boltzmann_has_the_probabilities_of_its_formula() {
+    let told = |values: &[f64], temperature| {
+        let mut p = [0.0; 3];
+        let policy = Boltzmann::new(constant(temperature)).unwrap();
+        policy.probabilities(&row(values), State(0), &mut p);
+        p
+    };
     let e = [0.5f64, 1.0, 2.0].map(f64::exp);
-    for (found, weight) in p.iter().zip(e) {
-        assert!((found - weight / e.iter().sum::<f64>()).abs() < 1e-15);
+    for (found, weight) in told(&[1.0, 2.0, 4.0], 2.0).into_iter().zip(e) {
+        assert_near!(found, weight / e.iter().sum::<f64>(), 1e-15);
     }
     // The extremes: a hair's breadth decides when cold, nothing does when hot.
-    let near = row(&[0.0, 1e-4, f64::MIN]);
-    Boltzmann::new(constant(1e-6))
-        .unwrap()
-        .probabilities(&near, State(0), &mut p);
+    let p = told(&[0.0, 1e-4, f64::MIN], 1e-6);
     assert!(
         p[1] > 1.0 - 1e-15 && p[0] < 1e-40 && p[2].abs() < 1e-300,
         "{p:?}"
     );
-    Boltzmann::new(constant(1e6))
-        .unwrap()
-        .probabilities(&row(&[0.0, 1.0, -1.0]), State(0), &mut p);
-    assert!(p.iter().all(|p| (p - 1.0 / 3.0).abs() < 1e-6));
-    let huge = row(&[f64::MAX, f64::MIN, f64::MAX]);
-    Boltzmann::new(constant(1e6))
-        .unwrap()
-        .probabilities(&huge, State(0), &mut p);
-    assert!((p[0] - 0.5).abs() < 1e-15 && (p[2] - 0.5).abs() < 1e-15);
+    for p in told(&[0.0, 1.0, -1.0], 1e6) {
+        assert_near!(p, 1.0 / 3.0, 1e-6);
+    }
+    let p = told(&[f64::MAX, f64::MIN, f64::MAX], 1e6);
+    assert_near!(p[0], 0.5, 1e-15);
+    assert_near!(p[2], 0.5, 1e-15);
 }
 
 #[test]
