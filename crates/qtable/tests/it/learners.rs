@@ -67,7 +67,7 @@ fn every_learner_walks_along_the_cliff_in_13_steps() {
         assert_near!(found.success, 1.0, 1e-12, name);
         // Those that learn the policy that acts, exploration included, have learned to keep away
         // from the edge.
-        let on_policy = ["SARSA", "uncut", "tree"]
+        let on_policy = ["SARSA", "uncut", "tree", "TB"]
             .iter()
             .any(|word| name.contains(word));
         let longest = if on_policy { 19.0 } else { 13.0 };
