@@ -20,7 +20,7 @@ pub struct Request {
     pub grip: bool,
 }
 
-/// Answer of a controller.
+/// Answer of a controller to a [`Request`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Decision {
     /// Move the arm by this, which may be nothing.
@@ -33,7 +33,7 @@ pub enum Decision {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Feedback {
-    /// A run begins. What is known of the ball of the run before is void.
+    /// A run begins. Knowledge of the place of the previous run's ball is void.
     Begin,
     /// The arm reports these joint angles: at the beginning of a run, and after each move, whoever
     /// ordered it.

@@ -22,7 +22,7 @@ pub struct BehaviourSpec {
     pub space: Product,
     /// Joints that it moves, and their steps.
     pub moves: Vec<JointSteps>,
-    /// Intervals that hold together at the goal.
+    /// Goal intervals; at the goal all of them hold at once.
     pub goal: Vec<GoalInterval>,
     /// Reward that teaches it.
     pub reward: Reward,

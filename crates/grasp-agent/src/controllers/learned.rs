@@ -14,11 +14,14 @@ use crate::error::BehaviourError;
 use crate::percept::{Percept, Sighting};
 use crate::record::policy_json::PolicyJson;
 
-/// The paper's controller (section 3): centering and approaching, each of which chooses for its own
-/// joints in every cycle.
+/// The paper's controller (section 3): two learned behaviours, centering and approaching. In every
+/// cycle each of them chooses a move for its own joints.
 ///
-/// It is frozen unless [`Learned::learning`] is called. Learning at work is one-step Q-learning by
-/// the rewards of the specifications; moves out of the working limits are never tried.
+/// Its tables stay as they are unless [`Learned::learning`] is called. It then goes on learning
+/// during the runs: one-step Q-learning by the rewards of the two [`BehaviourSpec`]s. Moves that
+/// would leave the working limits are never tried.
+///
+/// [`BehaviourSpec`]: crate::BehaviourSpec
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(into = "PolicyJson", try_from = "PolicyJson")]
 pub struct Learned {
@@ -60,8 +63,8 @@ impl Learning {
 /// Settings of learning at work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OnlineLearning {
-    /// Discount factor, 0 or above and below 1: at 1 a goal that is kept would be worth infinitely
-    /// much.
+    /// Discount factor, at least 0 and below 1. At 1 the value of an absorbing goal
+    /// ([`Reward::absorbing`](crate::Reward::absorbing)) would be infinite.
     pub gamma: f64,
     /// Learning rate, from 0 to 1.
     pub alpha: f64,
@@ -130,8 +133,9 @@ impl Learned {
         Percept::new(ball.features, joints)
     }
 
-    /// Sets the repetition penalties: the value subtracted from the Q of an action that was chosen
-    /// once before in the same state of this run, 3, 7 and 15 times as much after more choices.
+    /// Sets the repetition penalties, units of Q. The penalty is subtracted from the Q of an action
+    /// that was chosen before in the same state of this run: once after one choice, 3 times after
+    /// two, 7 times after three, 15 times after four, and so on.
     ///
     /// A greedy policy on coarse states may otherwise go round in circles for ever. 0 is the plain
     /// greedy policy; a penalty that is negative or not finite counts as 0.
@@ -151,7 +155,7 @@ impl Learned {
         (self.centering.kappa, self.approaching.kappa)
     }
 
-    /// Makes the controller learn at work.
+    /// Makes the controller go on learning during the runs.
     ///
     /// # Errors
     /// [`BehaviourError::Settings`] for a setting out of its range.

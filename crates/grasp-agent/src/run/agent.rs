@@ -17,9 +17,8 @@ use crate::sight::frozen::FrozenCheck;
 /// The modules of section 2.2 of the paper, and the state machine that links them.
 ///
 /// Rotation and reaching are done by a [`Controller`]: the paper's two learned behaviours
-/// ([`Learned`]) or any other. Search, recovery and supervision
-/// follow the settings, or are replaced by others: [`Agent::searching_by`],
-/// [`Agent::recovering_by`], [`Agent::supervised_by`].
+/// ([`Learned`]) or any other. Search, recovery and supervision follow [`AgentConfig`];
+/// [`Agent::searching_by`], [`Agent::recovering_by`] and [`Agent::supervised_by`] replace them.
 #[derive(Clone, Debug)]
 pub struct Agent<C = Learned> {
     config: AgentConfig,
@@ -29,7 +28,7 @@ pub struct Agent<C = Learned> {
 }
 
 impl<C: Controller> Agent<C> {
-    /// Creates an agent that reaches by `controller`.
+    /// Creates an agent whose arm reaches for the ball by the moves of `controller`.
     ///
     /// # Errors
     /// [`AgentError::Config`] for settings that cannot work.
@@ -51,21 +50,21 @@ impl<C: Controller> Agent<C> {
         })
     }
 
-    /// Replaces the search by [`AgentConfig::search_poses`].
+    /// Uses `search` instead of the search from [`AgentConfig::search_poses`].
     #[must_use]
     pub fn searching_by(mut self, search: impl Search + 'static) -> Self {
         self.modules.search = Box::new(search);
         self
     }
 
-    /// Replaces the recovery by [`AgentConfig::recovery`].
+    /// Uses `recovery` instead of the moves of [`AgentConfig::recovery`].
     #[must_use]
     pub fn recovering_by(mut self, recovery: impl Search + 'static) -> Self {
         self.modules.recovery = Box::new(recovery);
         self
     }
 
-    /// Replaces the supervision by the bounds of the settings.
+    /// Uses `supervision` instead of the bounds in [`AgentConfig`].
     #[must_use]
     pub fn supervised_by(mut self, supervision: impl Supervision + 'static) -> Self {
         self.modules.supervision = Box::new(supervision);
@@ -109,7 +108,7 @@ impl<C: Controller> Agent<C> {
         self
     }
 
-    /// Searches the ball, reaches it and closes the gripper on it. The controller keeps what it
+    /// Searches for the ball, reaches it and closes the gripper on it. The controller keeps what it
     /// learns on the way.
     ///
     /// Every event goes to `observe` as it happens. The gripper is opened first.

@@ -15,24 +15,24 @@ pub struct AgentConfig {
     /// tried first.
     pub search_poses: Vec<Joints>,
     /// Displacements with which the search poses are tried again, one after the other, if the ball
-    /// is in view from none of them (default `J1` +12.5 with `J2` +6 degrees, then `J1` +12.5 with
-    /// `J2` -6 degrees). A ball at the border of one view is in the middle of another.
+    /// is in view from none of them (default `JT1` +12.5 with `JT2` +6 degrees, then `JT1` +12.5
+    /// with `JT2` -6 degrees). A ball at the border of one view is in the middle of another.
     pub search_again: Vec<JointDelta>,
-    /// Intervals that must hold together before the gripper moves (default x 99..108, y 74..82, r
+    /// Intervals that must all hold at once before the gripper moves (default x 99..108, y 74..82, r
     /// 32..34).
     pub goal: Vec<GoalInterval>,
-    /// Move from the goal pose to the grip (default `J5` by -18.01 degrees): the paper's "the
+    /// Move from the goal pose to the grip (default `JT5` by -18.01 degrees): the paper's "the
     /// fifth joint is activated". If it leads out of the limits and the controller has no aim
     /// of its own, the run ends with [`GaveUp::NoMoveLeft`](crate::GaveUp::NoMoveLeft).
     pub grip: JointDelta,
-    /// `true`: turns `JT6` for the grip so that the jaws close across the longer axis of what is
-    /// seen ([`Sighting::long_axis`](crate::Sighting::long_axis)), by the shorter turn (default
-    /// `false`). With `JT6` at 0 the jaws open along the rows of the image, and a turn of `JT6`
-    /// turns them from x toward y.
+    /// `true`: turns `JT6` before the grip, the shorter way, until the jaws close at right angles
+    /// to the object's longer axis ([`Sighting::long_axis`](crate::Sighting::long_axis)). `false`
+    /// (default): leaves `JT6` alone. At `JT6` = 0 the jaws open along the rows of the image; a
+    /// positive turn moves them from x toward y.
     pub grip_across: bool,
     /// Moves from the pose of the last sighting to look for a lost ball, after that pose itself
-    /// (default four: `J2` by -20 degrees, which draws the hand back and shows more, the same with
-    /// `J1` by +15 and by -15, and `J2` by +12).
+    /// (default four, in degrees: `JT2` -20, which draws the hand back and shows more; `JT2` -20
+    /// with `JT1` +15; `JT2` -20 with `JT1` -15; `JT2` +12).
     pub recovery: Vec<JointDelta>,
     /// Range that each joint is kept in, finite (default [`JointLimits::paper`]).
     pub limits: JointLimits,
@@ -44,18 +44,20 @@ pub struct AgentConfig {
     /// search of the paper's poses has 18; a user-supplied search might never end. Together with
     /// `max_cycles` this bounds the run.
     pub max_views: usize,
-    /// Frames to look at from one pose before the ball counts as not in view (default 2).
+    /// Frames to look at from one pose before the ball counts as not in view, at least 1
+    /// (default 2).
     /// Detection by sampling can miss a circle once.
     pub looks: usize,
     /// Radius up to which any approach is slow enough, feature units (default 62).
     ///
-    /// The radius of a ball of known size is inversely proportional to its distance. A move after
-    /// which it is beyond this, and has grown by more than `approach_growth`, is taken back
-    /// (section 2.2 of the paper: "a rapid approach that could damage the camera").
+    /// The radius of a ball of known size is inversely proportional to its distance. A move is
+    /// taken back if the radius after it exceeds this and is more than `approach_growth` times the
+    /// radius before (section 2.2 of the paper: "a rapid approach that could damage the camera").
     pub approach_radius: f64,
-    /// Largest growth of the radius in one move beyond `approach_radius`, finite (default 1.5).
+    /// Largest ratio of the radius after a move to the radius before it, above 0 and finite
+    /// (default 1.5). It applies to radii above `approach_radius`.
     pub approach_growth: f64,
-    /// Lift that verifies the grip (default `J2` by -15 degrees). `None`: closing the jaws at the
+    /// Lift that verifies the grip (default `JT2` by -15 degrees). `None`: closing the jaws at the
     /// goal is success, whatever is between them.
     ///
     /// After the jaws have closed, the hand goes back to the pose from which the ball was last

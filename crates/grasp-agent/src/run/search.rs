@@ -7,10 +7,11 @@ use crate::percept::Sighting;
 /// A module that names poses to look from, until the ball is in view: the paper's target search and
 /// its recovery of a lost target (section 2.2).
 ///
-/// It moves nothing itself. [`Agent::searching_by`](crate::Agent::searching_by) replaces the search
-/// by [`AgentConfig::search_poses`](crate::AgentConfig::search_poses), and
-/// [`Agent::recovering_by`](crate::Agent::recovering_by) the recovery by
+/// It moves nothing itself. By default an agent searches from
+/// [`AgentConfig::search_poses`](crate::AgentConfig::search_poses) and recovers by the moves of
 /// [`AgentConfig::recovery`](crate::AgentConfig::recovery).
+/// [`Agent::searching_by`](crate::Agent::searching_by) and
+/// [`Agent::recovering_by`](crate::Agent::recovering_by) install other modules.
 ///
 /// ```
 /// use grasp_agent::puma_val2::Joints;

@@ -15,22 +15,22 @@ use crate::sight::camera_model::CameraModel;
 /// Expected errors of an uncalibrated cell, as standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
-    /// Logarithm of the focal length \[0.3\].
+    /// Logarithm of the focal length (by eye: 0.3).
     pub focal: f64,
-    /// Principal point, feature units \[5\].
+    /// Principal point, feature units (by eye: 5).
     pub centre: f64,
-    /// Roll, pitch and yaw of the camera, radians \[0.17\].
+    /// Roll, pitch and yaw of the camera, radians (by eye: 0.17).
     pub turn: f64,
-    /// Camera position along each of its axes, metres \[0.015\].
+    /// Camera position along each of its axes, metres (by eye: 0.015).
     pub shift: f64,
-    /// Logarithm of the ball's radius \[0.15\].
+    /// Logarithm of the ball's radius (by eye: 0.15).
     pub radius: f64,
-    /// Backlash of each of the first three joints, whole width, radians \[0.015\].
+    /// Backlash of each of the first three joints, whole width, radians (by eye: 0.015).
     pub play: f64,
 }
 
 impl Prior {
-    /// Returns the errors of a cell set up by eye: the values in the brackets of the fields.
+    /// Returns the errors of a cell that was set up by eye: the values that the fields state.
     pub fn by_eye() -> Self {
         Self {
             focal: 0.3,

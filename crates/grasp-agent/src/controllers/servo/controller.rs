@@ -51,7 +51,7 @@ pub struct Servo {
     law: ServoLaw,
     settings: ServoSettings,
     state: State,
-    /// Share of each computed move that is made.
+    /// Fraction of each computed move that is made, 0..=1.
     boldness: f64,
 }
 
