@@ -50,8 +50,8 @@
 //!
 //! Within a phase the events are the orders that were carried out ([`EventKind::AtSearchPose`],
 //! [`EventKind::Moved`], ...), the results of looking at a frame ([`EventKind::Seen`],
-//! [`EventKind::NotSeen`], [`EventKind::SameFrame`]) and the interventions of supervision ([`EventKind::TooNear`],
-//! [`EventKind::TooFast`], [`EventKind::TakenBack`]).
+//! [`EventKind::NotSeen`], [`EventKind::SameFrame`]) and the interventions of supervision
+//! ([`EventKind::TooNear`], [`EventKind::TooFast`], [`EventKind::TakenBack`]).
 //!
 //! The crate contains no simulator, renderer, detector, arm or camera: they come in through the
 //! traits of `hough-heuristic` and `puma-val2`, and through closures.

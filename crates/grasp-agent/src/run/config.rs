@@ -18,8 +18,8 @@ pub struct AgentConfig {
     /// is in view from none of them (default `JT1` +12.5 with `JT2` +6 degrees, then `JT1` +12.5
     /// with `JT2` -6 degrees). A ball at the border of one view is in the middle of another.
     pub search_again: Vec<JointDelta>,
-    /// Intervals that must all hold at once before the gripper moves (default x 99..108, y 74..82, r
-    /// 32..34).
+    /// Intervals that must all hold at once before the gripper moves (default x 99..108, y 74..82,
+    /// r 32..34).
     pub goal: Vec<GoalInterval>,
     /// Move from the goal pose to the grip (default `JT5` by -18.01 degrees): the paper's "the
     /// fifth joint is activated". If it leads out of the limits and the controller has no aim
