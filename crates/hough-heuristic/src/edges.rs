@@ -15,7 +15,8 @@ mod tests;
 use image::GrayImage;
 
 pub use canny::{Canny, CannyConfig};
-pub use dispatch::{Vectorized, widest};
+pub use dispatch::Vectorized;
+pub(crate) use dispatch::widest;
 pub(crate) use gradient::{EdgeGradient, Geometry};
 #[cfg(feature = "imageproc")]
 pub use imageproc_canny::ImageprocCanny;

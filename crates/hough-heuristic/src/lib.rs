@@ -28,9 +28,9 @@
 //!
 //! # Detectors
 //!
-//! * [`AContrario`]: for photographs. It finds an unknown number of circles, each with its number
-//!   of false alarms and standard errors, in a bounded number of draws. It goes beyond the paper.
-//!   [`detect_circles`] calls it for a single frame.
+//! * [`AContrario`]: for photographs. It finds any number of circles, each with its number of false
+//!   alarms and standard errors, in bounded work. It goes beyond the paper. [`detect_circles`] calls
+//!   it for a single frame.
 //! * [`Heuristic`]: the detector of the paper that this project follows (section 2.1), a random
 //!   search whose only memory is the edges.
 //! * [`RandomizedHough`] and [`StandardHough`]: the two transforms that the paper compares it with.
@@ -63,11 +63,12 @@
 //!
 //! # Limitations
 //!
-//! [`AContrario`] finds everything round: lamps, wheels and letters too. The other detectors go by
-//! the belonging β, the share of the circle's pixels that are edges, whatever the direction of
-//! those edges. Where edges cover more than a tenth of the picture, as in grass or gravel, chance
-//! lifts β above any useful θ. A sphere far off the optical axis projects to an ellipse, which a
-//! larger `tolerance` accepts up to a point.
+//! [`AContrario`] finds everything round, wheels and letters too. It does not find circles of a
+//! radius below 4 px, of which less than about a third shows, or drawn in dashes or dots. The other
+//! detectors go by the belonging β, the share of the circle's pixels that are edges, whatever the
+//! direction of those edges. Where edges cover more than a tenth of the picture, as in grass or
+//! gravel, chance lifts β above any useful θ. A sphere far off the optical axis projects to an
+//! ellipse, which a larger `tolerance` accepts up to a point.
 
 mod a_contrario;
 mod acceptance;
@@ -94,8 +95,7 @@ pub use curve::{Curve, Ellipse, Line};
 pub use detect::{CircleDetector, Detection, FrameRefused};
 #[cfg(feature = "imageproc")]
 pub use edges::ImageprocCanny;
-pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeMap, EdgePixel};
-pub use edges::{Vectorized, widest};
+pub use edges::{Canny, CannyConfig, EdgeDetector, EdgeMap, EdgePixel, Vectorized};
 pub use error::ConfigError;
 #[cfg(feature = "files")]
 pub use frame::{Channel, ImageFiles};

@@ -4,21 +4,10 @@
 //! where the processor has AVX2, which the call below checks and the compiler cannot.
 #![allow(unsafe_code)]
 
-/// Work that is compiled for several widths of vectors: [`run`](Vectorized::run) and the functions
-/// inlined into it (`#[inline(always)]` on both). [`widest`] runs it.
-pub trait Vectorized {
-    /// The result.
-    type Output;
-
-    /// Does the work. Mark it `#[inline(always)]`.
-    fn run(self) -> Self::Output;
-}
-
-/// Runs `work` by the fastest code for this machine: with AVX2 if the processor has it. The result
-/// does not depend on the machine, since there are no fused multiplications.
+/// Work that is compiled for several widths of vectors.
 ///
 /// ```
-/// use hough_heuristic::{Vectorized, widest};
+/// use hough_heuristic::Vectorized;
 ///
 /// struct Halve<'a>(&'a mut [f32]);
 ///
@@ -32,10 +21,25 @@ pub trait Vectorized {
 /// }
 ///
 /// let mut values = [3.0; 100];
-/// widest(Halve(&mut values));
+/// Halve(&mut values).widest();
 /// assert_eq!(values, [1.5; 100]);
 /// ```
-pub fn widest<W: Vectorized>(work: W) -> W::Output {
+pub trait Vectorized: Sized {
+    /// The result.
+    type Output;
+
+    /// Does the work. Mark it and the functions that it calls `#[inline(always)]`.
+    fn run(self) -> Self::Output;
+
+    /// Does the work by the fastest code for this machine: with AVX2 if the processor has it. The
+    /// result does not depend on the machine, since there are no fused multiplications.
+    fn widest(self) -> Self::Output {
+        widest(self)
+    }
+}
+
+/// Does the work by the fastest code for this machine.
+pub(crate) fn widest<W: Vectorized>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the function needs nothing but AVX2, which has just been detected.

@@ -1,6 +1,6 @@
 //! Blur of lens and sensor.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 
 use crate::render::canvas::Canvas;
 
@@ -54,7 +54,7 @@ fn convolve(values: &mut [f32], width: usize, kernel: &[f32], spare: &mut Vec<f3
         let row = |y: usize| &values[y * w..][..w];
         let pairs = kernel.iter().enumerate();
         let pairs = pairs.map(|(i, k)| (*k, row(y.saturating_sub(i)), row((y + i).min(h - 1))));
-        widest(Weighing {
+        Vectorized::widest(Weighing {
             pairs,
             out: &mut mixed[y * w..][..w],
         });
@@ -65,7 +65,7 @@ fn convolve(values: &mut [f32], width: usize, kernel: &[f32], spare: &mut Vec<f3
         padded[reach + w..].fill(row[w - 1]);
         let pairs = kernel.iter().enumerate();
         let pairs = pairs.map(|(i, k)| (*k, &padded[reach - i..][..w], &padded[reach + i..][..w]));
-        widest(Weighing { pairs, out });
+        Vectorized::widest(Weighing { pairs, out });
     }
 }
 

@@ -1,6 +1,6 @@
 //! The shaded bodies: cylinders, boxes, and what lies flat; balls are drawn in `sphere`.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::render::canvas::Canvas;
@@ -69,7 +69,7 @@ impl Studio<'_> {
         row: &mut [f32],
     ) {
         let texture = self.texture;
-        widest(PlaneRow {
+        Vectorized::widest(PlaneRow {
             plane,
             texture,
             strength,

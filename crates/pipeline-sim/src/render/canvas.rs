@@ -1,6 +1,6 @@
 //! The frame in linear light, and the filling of convex shapes with smooth edges.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 use nalgebra::Point2;
 
 /// Light per pixel, 1 = just white.
@@ -60,7 +60,7 @@ impl Canvas {
         polygon: &[Point2<f64>],
         shade: impl FnMut(usize, usize, &mut [f32]),
     ) {
-        widest(Filling {
+        Vectorized::widest(Filling {
             canvas: self,
             polygon,
             shade,

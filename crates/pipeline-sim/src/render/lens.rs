@@ -1,6 +1,6 @@
 //! Distortion of the lens.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 use nalgebra::{Point2, Vector2};
 
 use crate::cell::camera::Camera;
@@ -78,7 +78,7 @@ impl Warp {
                 let p = a * weights[0] + b * weights[1] + c * weights[2] + d * weights[3] - low;
                 *place = [p.x, p.y];
             }
-            widest(Sources {
+            Vectorized::widest(Sources {
                 row: &row,
                 shares: &shares,
                 sources,
@@ -100,7 +100,7 @@ impl Warp {
 
     /// Takes every pixel of `out` from `ideal`.
     pub(super) fn apply(&self, ideal: &Canvas, out: &mut Canvas) {
-        widest(Applying {
+        Vectorized::widest(Applying {
             warp: self,
             ideal,
             out,

@@ -1,6 +1,6 @@
 //! Slowly varying light on the table, computed at few pixels and interpolated between them.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::render::view::View;
@@ -73,7 +73,7 @@ impl LightGrid {
     /// Computes the light at the nodes whose rays meet the plane; the others are dark. Every second
     /// node along both axes is interpolated where its neighbours are alike.
     pub(super) fn lay(&mut self, view: &View, plane: &Matrix3<f64>, lighting: &impl Lighting) {
-        widest(Laying {
+        Vectorized::widest(Laying {
             grid: self,
             size: (view.width, view.height),
             plane,
@@ -83,7 +83,7 @@ impl LightGrid {
 
     /// Multiplies the pixels x0.. of row y by the light on them.
     pub(super) fn shine(&self, y: usize, x0: usize, row: &mut [f32]) {
-        widest(Shining {
+        Vectorized::widest(Shining {
             light: self,
             start: (y, x0),
             row,

@@ -1,6 +1,6 @@
 //! From light to gray levels: blur, vignetting, noise, gamma, eight bits.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -70,7 +70,7 @@ impl Exposure {
         frame: u64,
         out: &mut [u8],
     ) {
-        widest(Exposing {
+        Vectorized::widest(Exposing {
             exposure: self,
             canvas,
             camera,

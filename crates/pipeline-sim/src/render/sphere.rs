@@ -1,6 +1,6 @@
 //! Shaded balls.
 
-use hough_heuristic::{Vectorized, widest};
+use hough_heuristic::Vectorized;
 use nalgebra::{Point3, Vector3};
 
 use crate::render::bodies::Studio;
@@ -48,7 +48,7 @@ impl Studio<'_> {
             let yn = ((y as f64 - self.view.principal.y) / self.view.focal) as f32;
             let first = ((origin as f64 - self.view.principal.x) / self.view.focal) as f32;
             let place = y * canvas.width + origin;
-            widest(SphereRow {
+            Vectorized::widest(SphereRow {
                 centre: [cx, cy, cz],
                 k,
                 yn,
