@@ -253,6 +253,7 @@ impl AContrario {
         let smallest = pyramid.depth();
         let finest = usize::from(radii.0 >= 8.0 && smallest > 0);
         let contrast = self.config.contrast as f32;
+        let deadline = self.budget.deadline;
         let edges_of = |depth: usize, edges: &mut Edges| {
             let Edges {
                 maxima,
@@ -262,12 +263,14 @@ impl AContrario {
             let gray = pyramid.gray(depth);
             let noise = noise / (1 << depth) as f32 + ROUNDING;
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
-            let points = maxima.find(gray.pixels, gray.width, threshold);
+            let points = maxima.find(gray.pixels, gray.width, threshold, deadline);
             let points = thinning.strongest(points, (gray.width, gray.height));
             level.fill(gray.width, gray.height, points);
         };
         let mut search = |depth: usize, level: &mut Level| {
             let scale = (1 << depth) as f32;
+            // The deadline may have left out the edges.
+            self.budget.is_late();
             self.budget.begin_size(depth == finest);
             for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
                 let ring = proof.in_frame().shrunk(scale);
@@ -302,16 +305,17 @@ impl AContrario {
             });
         };
         let [coarse, fine] = &mut self.edges;
-        // The edges of the finest size take about as long as all that is done at the others.
+        // The edges of the finest size take about as long as all that is done at the others, and
+        // come last so that a deadline leaves the circles of these.
         both(
             frame.len() >= LARGE_FRAME,
-            || edges_of(finest, fine),
             || {
                 for depth in (finest + 1..=smallest).rev() {
                     edges_of(depth, coarse);
                     search(depth, &mut coarse.level);
                 }
             },
+            || edges_of(finest, fine),
         );
         search(finest, &mut fine.level);
         let candidates = &mut self.collected.candidates;

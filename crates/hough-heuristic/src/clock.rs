@@ -15,3 +15,8 @@ pub(crate) fn between(start: Option<Instant>, end: Option<Instant>) -> Duration 
         _ => Duration::ZERO,
     }
 }
+
+/// Returns `true` if there is a deadline and it has passed.
+pub(crate) fn is_past(deadline: Option<Instant>) -> bool {
+    deadline.is_some_and(|deadline| now() >= Some(deadline))
+}

@@ -40,7 +40,7 @@ pub(super) struct Budget {
     most_looks: [u64; 3],
     /// Looks of the search that may be spent by the end of this size.
     most_of_size: u64,
-    deadline: Option<Instant>,
+    pub(super) deadline: Option<Instant>,
     /// Set once the deadline has passed.
     late: bool,
     /// Circles proven beyond doubt.
@@ -96,9 +96,7 @@ impl Budget {
 
     /// Reads the clock if there is a deadline, and returns `true` if it has passed.
     pub(super) fn is_late(&mut self) -> bool {
-        self.late |= self
-            .deadline
-            .is_some_and(|deadline| clock::now() >= Some(deadline));
+        self.late |= clock::is_past(self.deadline);
         self.spent |= self.late;
         self.late
     }

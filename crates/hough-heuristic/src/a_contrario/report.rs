@@ -43,7 +43,8 @@ impl AContrario {
                 continue;
             }
             // What is proven is reported, measured or not.
-            let measured = if self.budget.is_over(Stage::Measurements) {
+            let over = self.budget.is_late() || self.budget.is_over(Stage::Measurements);
+            let measured = if over {
                 None
             } else {
                 self.budget.looks += MEASURING;

@@ -288,13 +288,10 @@ impl Search<'_> {
             let mut line = (self.seed % lines.max(1) as u64) as usize;
             for _ in 0..lines {
                 line = (line + stride) % lines;
-                if budget.is_late() {
-                    return;
-                }
                 let points = level.line(transposed, line);
                 let line_end = points.end;
                 for at in points {
-                    if budget.is_over(Stage::Search) {
+                    if budget.is_late() || budget.is_over(Stage::Search) {
                         return;
                     }
                     self.draw_from(level, transposed, (at, line_end), found, prover, budget);

@@ -41,7 +41,7 @@ proptest! {
         let of = |wide: bool, maxima: &mut Maxima| {
             let (mut polar, mut proofs) = (Polar::default(), Vec::new());
             let (mut level, mut collected) = (Level::default(), Collected::default());
-            let points = maxima.find(frame.as_raw(), 160, 40.0);
+            let points = maxima.find(frame.as_raw(), 160, 40.0, None);
             level.fill(160, 120, points);
             collected.clear(CANDIDATES);
             let mut budget = Budget::new(&AContrarioConfig::default(), frame.len());

@@ -1,8 +1,12 @@
 //! The maxima of the gradient across edges, without hysteresis.
 
+use std::time::Instant;
+
 use super::rows::{Candidate, Finding, Passes, Rows, UNITS};
 use super::smoothing::{noise_gain, smoothing_weights};
 use super::widest;
+#[cfg(feature = "parallel")]
+use crate::clock;
 
 /// Finds the pixels whose gradient is a maximum across the edge.
 #[derive(Clone, Debug)]
@@ -39,18 +43,24 @@ impl Maxima {
     }
 
     /// The maxima above `threshold`, in gray levels of Sobel's gradient, row by row; none in a
-    /// frame below 3x3.
-    pub(crate) fn find(&mut self, gray: &[u8], width: usize, threshold: f32) -> &[Candidate] {
+    /// frame below 3x3, or if the deadline passes before they are all found.
+    pub(crate) fn find(
+        &mut self,
+        gray: &[u8],
+        width: usize,
+        threshold: f32,
+        deadline: Option<Instant>,
+    ) -> &[Candidate] {
         self.passes.low = squared(threshold);
         if width < 3 || gray.len() < 3 * width {
             self.candidates.clear();
             return &self.candidates;
         }
         #[cfg(feature = "parallel")]
-        if self.find_in_strips(gray, width) {
+        if self.find_in_strips(gray, width, deadline) {
             return &self.candidates;
         }
-        self.find_at_once(gray, width, &mut [])
+        self.find_at_once(gray, width, &mut [], deadline)
     }
 
     /// The maxima above the low threshold of a frame of at least 3x3 pixels, marked in `marks` as
@@ -63,10 +73,16 @@ impl Maxima {
         marks: &mut [u8],
     ) -> &[Candidate] {
         (self.passes.low, self.passes.high) = (squared(low), squared(high));
-        self.find_at_once(gray, width, marks)
+        self.find_at_once(gray, width, marks, None)
     }
 
-    fn find_at_once(&mut self, gray: &[u8], width: usize, marks: &mut [u8]) -> &[Candidate] {
+    fn find_at_once(
+        &mut self,
+        gray: &[u8],
+        width: usize,
+        marks: &mut [u8],
+        deadline: Option<Instant>,
+    ) -> &[Candidate] {
         self.candidates.clear();
         widest(Finding {
             passes: &self.passes,
@@ -75,6 +91,7 @@ impl Maxima {
             rows: &mut self.rows,
             marks,
             found: &mut self.candidates,
+            deadline,
         });
         &self.candidates
     }
@@ -106,7 +123,7 @@ const LEAST_ROWS: usize = 4;
 impl Maxima {
     /// Finds the candidates of large frames, a strip of rows on each thread; false if the frame is
     /// too small for that.
-    fn find_in_strips(&mut self, gray: &[u8], width: usize) -> bool {
+    fn find_in_strips(&mut self, gray: &[u8], width: usize, deadline: Option<Instant>) -> bool {
         use rayon::prelude::*;
 
         let height = gray.len() / width;
@@ -135,6 +152,7 @@ impl Maxima {
                 rows,
                 marks: &mut [],
                 found: candidates,
+                deadline,
             });
             candidates.retain_mut(|candidate| {
                 candidate.pixel.y += first as u32;
@@ -142,8 +160,11 @@ impl Maxima {
             });
         });
         self.candidates.clear();
-        for strip in &self.strips[..count] {
-            self.candidates.extend_from_slice(&strip.candidates);
+        if !clock::is_past(deadline) {
+            let found = self.strips[..count]
+                .iter()
+                .flat_map(|strip| &strip.candidates);
+            self.candidates.extend(found);
         }
         true
     }
@@ -169,10 +190,10 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let (mut strips, mut whole) = (Maxima::new(sigma), Maxima::new(sigma));
             (strips.passes.low, whole.passes.low) = (squared(20.0), squared(20.0));
-            let split = pool.install(|| strips.find_in_strips(&gray, width));
+            let split = pool.install(|| strips.find_in_strips(&gray, width, None));
             prop_assert_eq!(split, gray.len() >= 2 * LEAST_STRIP && height >= 2 * LEAST_ROWS);
             if split {
-                whole.find_at_once(&gray, width, &mut []);
+                whole.find_at_once(&gray, width, &mut [], None);
                 prop_assert_eq!(&strips.candidates, &whole.candidates);
             }
         }

@@ -5,7 +5,10 @@
 //! compiled for the baseline of the target and, by [`widest`](super::widest), for wider vectors; the
 //! results are the same by construction, and a test compares both with a plain version.
 
+use std::time::Instant;
+
 use super::{EdgeGradient, EdgePixel, Vectorized};
+use crate::clock;
 
 /// Gray levels are carried in sixteenths from the smoothing on.
 pub(super) const UNITS: f32 = 16.0;
@@ -70,6 +73,8 @@ pub(super) struct Finding<'a> {
     /// The edge image to mark them in, or empty.
     pub(super) marks: &'a mut [u8],
     pub(super) found: &'a mut Vec<Candidate>,
+    /// The time after which none are listed.
+    pub(super) deadline: Option<Instant>,
 }
 
 impl Vectorized for Finding<'_> {
@@ -84,10 +89,15 @@ impl Vectorized for Finding<'_> {
             rows,
             marks,
             found,
+            deadline,
         } = self;
         let last = gray.len() / width - 1;
         rows.resize(width, passes.weights.len() - 1);
         for y in 0..=last + 1 {
+            if y % BLOCK == 0 && clock::is_past(deadline) {
+                found.clear();
+                return;
+            }
             // Row y is smoothed, then row y - 1 differentiated, then the maxima of row y - 2 found.
             if y <= last {
                 rows.smooth_row(passes, gray, width, y);

@@ -1,6 +1,8 @@
 //! The fused passes beside Canny's passes as plainly as they can be written, and the whole operator
 //! on frames whose edges are known.
 
+use std::time::Duration;
+
 use image::GrayImage;
 use proptest::prelude::*;
 
@@ -8,6 +10,7 @@ use super::canny::EDGE;
 use super::maxima::squared;
 use super::rows::{Finding, Passes, STRONG, WEAK};
 use super::*;
+use crate::clock;
 
 /// A candidate of the plain version.
 #[derive(Clone, Copy, Debug)]
@@ -204,7 +207,7 @@ proptest! {
             let mut find = |marks: &mut [u8]| {
                 let mut found = Vec::new();
                 let found_in = &mut found;
-                path(Finding { passes, gray, width, rows, marks, found: found_in });
+                path(Finding { passes, gray, width, rows, marks, found: found_in, deadline: None });
                 found
             };
             let mut marks = vec![77; gray.len()];
@@ -263,6 +266,17 @@ fn a_slanted_border_is_located_to_a_twentieth_of_a_pixel() {
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         assert!(mean < 0.05, "{degrees}: {mean}");
     }
+}
+
+#[test]
+fn a_deadline_leaves_all_maxima_or_none() {
+    let frame = GrayImage::from_fn(90, 70, |x, y| image::Luma([(x / 9 * 20 + y % 3) as u8]));
+    let mut maxima = Maxima::new(0.8);
+    let mut find = |deadline| maxima.find(frame.as_raw(), 90, 20.0, deadline).len();
+    let now = clock::now().unwrap();
+    assert!(find(None) > 0);
+    assert_eq!(find(Some(now + Duration::from_secs(60))), find(None));
+    assert_eq!(find(Some(now)), 0);
 }
 
 #[test]

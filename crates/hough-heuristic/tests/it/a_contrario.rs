@@ -307,9 +307,13 @@ fn an_empty_budget_is_refused_and_a_spent_one_is_reported() {
     let mut late = with(|config| config.milliseconds_per_megapixel = Some(1e-6));
     assert_eq!(late.detect(&frame).unwrap(), []);
     assert!(late.effort().ended_by_budget);
-    let mut calm = plain();
-    calm.detect(&frame).unwrap();
-    assert!(!calm.effort().ended_by_budget);
+    let (mut calm, mut ample) = (
+        plain(),
+        with(|config| config.milliseconds_per_megapixel = Some(1e6)),
+    );
+    let found = calm.detect(&frame).unwrap();
+    assert_eq!(ample.detect(&frame).unwrap(), found);
+    assert!(!calm.effort().ended_by_budget && !ample.effort().ended_by_budget);
 }
 
 #[test]
