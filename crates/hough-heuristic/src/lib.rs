@@ -1,11 +1,10 @@
 //! Circle detectors for gray images: an a contrario detector for photographs, and Hough transforms
 //! without and with an accumulator.
 //!
-//! A frame passes two stages, each behind a trait with one principal method. An [`EdgeDetector`]
-//! turns the [`GrayImage`](image::GrayImage) into an [`EdgeMap`]: the edge image, the list of its
-//! edge pixels that the literature calls the structure `D`, and, if known, their gradients. A
-//! [`CircleDetector`] turns the frame into [`Detection`]s, best first, each a [`Circle`] with a
-//! score between 0 and 1.
+//! A [`CircleDetector`] turns a frame, a [`GrayImage`](image::GrayImage), into [`Detection`]s, best
+//! first: each is a [`Circle`] with a score between 0 and 1. The three transforms take any
+//! [`EdgeDetector`], which turns the frame into an [`EdgeMap`]: the edge image, the list of its
+//! edge pixels that the paper calls the structure `D`, and, if known, their gradients.
 //!
 //! ```
 //! use hough_heuristic::image::{GrayImage, Luma};
@@ -29,8 +28,8 @@
 //! # Detectors
 //!
 //! * [`AContrario`]: for photographs. It finds any number of circles, each with its number of false
-//!   alarms and standard errors, in bounded work. It goes beyond the paper. [`detect_circles`] calls
-//!   it for a single frame.
+//!   alarms and standard errors, in bounded work. It goes beyond the paper.
+//!   [`detect_circles`] calls it for a single frame.
 //! * [`Heuristic`]: the detector of the paper that this project follows (section 2.1), a random
 //!   search whose only memory is the edges.
 //! * [`RandomizedHough`] and [`StandardHough`]: the two transforms that the paper compares it with.
@@ -41,8 +40,8 @@
 //! # Edges
 //!
 //! [`Canny`] is the crate's own operator: fused integer passes, sub-pixel positions, thresholds
-//! that rise with the frame's noise. `ImageprocCanny` (feature `imageproc`) wraps that of the crate
-//! `imageproc`. [`EdgeMap::from_image`] takes the edges of any other.
+//! that rise with the frame's noise. `ImageprocCanny` (feature `imageproc`) wraps the operator of
+//! the crate `imageproc`. [`EdgeMap::from_image`] accepts the edge image of any other operator.
 //!
 //! # Frames
 //!
@@ -67,8 +66,8 @@
 //! radius below 4 px, of which less than about a third shows, or drawn in dashes or dots. The other
 //! detectors go by the belonging β, the share of the circle's pixels that are edges, whatever the
 //! direction of those edges. Where edges cover more than a tenth of the picture, as in grass or
-//! gravel, chance lifts β above any useful θ. A sphere far off the optical axis projects to an
-//! ellipse, which a larger `tolerance` accepts up to a point.
+//! gravel, chance lifts β above any useful threshold θ ([`Acceptance::theta`]). A sphere far off
+//! the optical axis projects to an ellipse, which a larger `tolerance` accepts up to a point.
 
 mod a_contrario;
 mod acceptance;

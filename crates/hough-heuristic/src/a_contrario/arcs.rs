@@ -8,18 +8,19 @@ use super::polar::Ring;
 use super::prover::Prover;
 use super::search::{Search, Start};
 
-/// Steps of [`STEP`] pixels that an arc is followed to either side.
+/// Largest number of steps along an arc from its first point, to either side.
 const STEPS: usize = 6;
+/// Length of a step, pixels.
 const STEP: f32 = 2.0;
-/// Every how many points one begins an arc.
+/// Interval between the points that begin an arc, in the list of points.
 const EVERY: usize = 8;
-/// The points within so many steps do not begin another arc.
+/// Number of steps within which a point does not begin another arc.
 const OWN: usize = 2;
 /// The fewest points of an arc.
 const LEAST_POINTS: usize = 9;
-/// The cosine of the most that the direction may change in a step.
+/// Cosine of the largest change of direction in a step.
 const LEAST_STRAIGHT: f32 = 0.8;
-/// Largest quadratic mean of the distances of an arc's points from its circle, pixels.
+/// Largest root mean square distance of an arc's points from its circle, pixels.
 const SCATTER: f32 = 0.35;
 /// Less of the outline is required than for a pair, of which two sides are visible. The circle is
 /// fitted to nearer points only: those farther off belong to what hides it.
@@ -104,8 +105,8 @@ impl Arc {
         }
     }
 
-    /// The circle that the powers of the points with respect to have the least squares (Kåsa's);
-    /// None if they lie off it or determine none.
+    /// The circle fitted to the points by Kåsa's method, which minimizes the sum of the squared
+    /// powers of the points; `None` if the points determine no circle or scatter about it.
     #[inline(always)]
     fn ring(&self) -> Option<Ring> {
         if self.count < LEAST_POINTS {

@@ -65,7 +65,8 @@ impl Candidate {
     }
 }
 
-/// Divergence of the outline's edges from those of chance, summed over the outline.
+/// Kullback-Leibler divergence of the outline's share of edges from that of chance, summed over
+/// independent samples of the outline, decimal digits.
 fn weight(r: f32, support: Support) -> f32 {
     let independent = (2.0 * r).min(32.0) * support.visible as f32 / 32.0;
     let (share, chance) = (support.share().min(0.999), 0.2);
@@ -120,8 +121,8 @@ impl Collected {
         })
     }
 
-    /// Keeps the better of those that are nearly one; tells whether this one is worth a proof at
-    /// once, as it is if it was kept or if others were in its way, and its place if it has one.
+    /// Keeps the better of this candidate and one near it. Returns `None` if the candidate is not
+    /// worth a proof at once, otherwise its place in the list, if it has one.
     pub(super) fn add(
         &mut self,
         candidate: Candidate,

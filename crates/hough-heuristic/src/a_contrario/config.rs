@@ -19,10 +19,11 @@ pub struct AContrarioConfig {
     /// Smallest radius, pixels (default 8; 4..=max_radius). Below 8 the full size of the frame is
     /// searched too, which takes several times as long.
     pub min_radius: f64,
-    /// Largest radius, pixels (min_radius..=100000). The default, None, is 0.52 of the frame's
-    /// shorter side; with a `region` it is at most 0.52 of the region's shorter side or 280 px,
-    /// whichever is more. If it equals `min_radius`, the radius is known: circles whose measured
-    /// radius is within 1 px plus 5 % of it are reported with that radius.
+    /// Largest radius, pixels (min_radius..=100000). The default, None, is 0.52 of the shorter side
+    /// of the frame. With a `region` it is 0.52 of the region's shorter side, but not below 280 px
+    /// and not above the default without a region. If `max_radius` equals `min_radius`, the radius
+    /// is known: circles whose measured radius differs from it by at most 1 px plus 5 % are
+    /// reported with the known radius.
     pub max_radius: Option<f64>,
     /// Largest number of circles reported, best first (default: all; at least 1).
     pub max_circles: usize,
@@ -35,13 +36,14 @@ pub struct AContrarioConfig {
     /// frames; 0..=1). Larger values drop things that are hardly round. Smaller values add mostly
     /// circles of chance.
     pub min_score: f64,
-    /// Smallest contrast of an edge that is drawn, gray levels (default 8; above 0..=128). Smaller
-    /// values find fainter circles and take longer. Noise raises it.
+    /// Smallest contrast of an edge that the search draws, gray levels (default 8; above 0, at most
+    /// 128). Smaller values find fainter circles and take longer. Noise raises the contrast used.
     pub contrast: f64,
     /// Largest number of pairs drawn per million pixels of the frame (default 50000; at least 1).
-    /// A frame below 250,000 pixels counts as that many. Each draw brings a budget of 16 looks,
-    /// which bounds all work that depends on the frame's content; each circle found adds 50 draws
-    /// and 8,000 looks. Smaller values miss circles amid dense texture.
+    /// A smaller frame than 250,000 pixels counts as that many. Each draw adds 16 looks to the
+    /// sample budget, which bounds all work that depends on the frame's content
+    /// ([`Effort::looks`](crate::Effort::looks)). Each circle found adds 50 draws and 8,000 looks.
+    /// Smaller values miss circles amid dense texture.
     pub draws_per_megapixel: u32,
     /// Time limit of the search, milliseconds per million pixels (default None; above 0). With a
     /// time limit the result depends on the speed of the machine. It has no effect on targets

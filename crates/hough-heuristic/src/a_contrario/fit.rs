@@ -2,8 +2,8 @@
 
 use super::polar::{LANES, Ring};
 
-/// Moments of `residual = dr + ux dx + uy dy` over unit vectors `u`, in eight sums each that are
-/// added up at the end.
+/// Sums for the least-squares fit of `residual = dr + ux dx + uy dy` over unit vectors `u`. Each
+/// moment is kept as eight partial sums, one for each vector lane; [`step`](Self::step) adds them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Moments([[f32; LANES]; 9]);
 

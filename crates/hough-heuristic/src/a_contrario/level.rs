@@ -169,7 +169,7 @@ impl Level {
         self.free[self.nearest[pixel] as usize] = false;
     }
 
-    /// The points of a row, or of a column.
+    /// Index range of the points of one row, or of one column if `transposed`.
     #[inline(always)]
     pub(super) fn line(&self, transposed: bool, line: usize) -> Range<usize> {
         let starts = if transposed {

@@ -29,8 +29,8 @@ impl Measured {
         }
     }
 
-    /// Moves the circle by what shading and blur had displaced it, and adds what is uncertain of
-    /// that to the errors.
+    /// Undoes the displacement `limb` that shading and blur caused, and adds its uncertainty to the
+    /// standard errors.
     fn shift_by(&mut self, limb: &Ring) {
         self.ring.x += limb.x;
         self.ring.y += limb.y;
@@ -47,7 +47,7 @@ impl Measured {
         );
     }
 
-    /// Converts to a frame whose pixels are `factor` times as small.
+    /// Returns the measurement in a frame that is `factor` times as wide and high.
     pub(super) fn grown(&self, factor: f32) -> Self {
         Self {
             ring: self.ring.grown(factor),
@@ -68,14 +68,14 @@ impl Measured {
 /// Factor on the standard errors, found on rendered frames: neighbouring rays have correlated
 /// errors.
 const SCATTER: f32 = 2.0;
-/// Errors that no number of rays takes away, pixels: of pixels as squares, and for each pixel that
-/// shading had displaced the outline.
+/// Standard errors that more rays do not reduce. `MODEL_*`: pixels, from the square shape of
+/// pixels. `LIMB_*`: per pixel by which shading displaced the outline.
 const MODEL_CENTRE: f32 = 0.01;
 const MODEL_RADIUS: f32 = 0.03;
 const LIMB_CENTRE: f32 = 0.5;
 const LIMB_RADIUS: f32 = 1.1;
 
-/// The most directions.
+/// Largest number of directions.
 const MOST: usize = 256;
 /// Reach of the search for edges on either side of the outline, pixels.
 const REACH: usize = 4;
@@ -260,8 +260,8 @@ fn shift_of(profile: &[f32], least: f32) -> Option<f32> {
     Some(width * excess.clamp(0.0, 0.5))
 }
 
-/// The weight of a slope: its square where that is below what is doubtful, itself where it is far
-/// above.
+/// The weight of a slope: proportional to its square far below `doubtful`, close to the slope
+/// itself far above.
 #[inline(always)]
 fn weight_of(slope: f32, doubtful: f32) -> f32 {
     if doubtful.is_finite() {

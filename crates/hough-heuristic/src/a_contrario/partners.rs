@@ -3,7 +3,7 @@
 use super::level::Lines;
 use super::polar::{LANES, Ring};
 
-/// Smallest part of a normal along the line that the pair lies on.
+/// Smallest component of a point's unit normal along the line that the pair lies on.
 pub(super) const LEAST_ALONG: f32 = 0.58;
 /// Largest number of mirrored partners tried per point.
 pub(super) const PARTNERS: usize = 6;

@@ -20,8 +20,8 @@ const SPACING: f32 = 2.5;
 /// levels were lost.
 const OVERLAP: f32 = 0.85;
 
-/// From here on slopes are averaged along the outline, and the edges of a circle may lie farther
-/// off it, gray levels.
+/// Noise from which slopes are averaged along the outline and edges may lie farther off the circle,
+/// gray levels.
 pub(super) const NOISE: f32 = 3.0;
 /// Share of a circle in the frame below which its number of false alarms is multiplied.
 const WHOLE: f32 = 0.9;
@@ -31,15 +31,15 @@ const CUT: f32 = 3.0;
 /// since balls darken towards one side.
 const NO_EDGE: f32 = 0.25;
 
-/// From this width on an edge is soft, pixels: of a sharp one it is some two.
+/// Width from which an edge counts as soft, pixels. A sharp edge is about 2 px wide.
 const SOFT: f32 = 3.0;
-/// Certainty that more tolerances cost a soft outline.
+/// Certainty subtracted from a soft outline, for which more tolerances are tested.
 const SOFT_TESTS: f32 = 0.3;
-/// Fewer rays than these do not make a circle.
+/// Least number of rays whose edge lies on a circle.
 const LEAST_NEAR: usize = 20;
 
-/// Nor does a smaller share of those in the frame, at first and once the outline has been moved to
-/// the edges: of balls of which two fifths are hidden some show little more.
+/// Least share of the rays in the frame whose edge lies on the circle: before the outline is moved
+/// to the edges, and after. A ball that is hidden to two fifths may show little more.
 const LEAST_SHARE: [f32; 2] = [0.3, 0.4];
 
 /// Result of the proof of a candidate.
@@ -138,10 +138,10 @@ impl Proof {
 
 /// The certainty that gives a score of one half.
 const HALF_SURE: f32 = 1.0;
-/// From this certainty on a circle explains the edges on it.
+/// Certainty from which a circle is beyond doubt and explains the edges on it.
 const BEYOND_DOUBT: f32 = 4.0;
-/// So does one of a score of one half and more of which this share is covered, as small ones never
-/// become surer.
+/// Covered share from which a circle of score 0.5 or more is beyond doubt too. Small circles never
+/// reach a higher certainty.
 const ALL_BUT_COVERED: f32 = 0.85;
 /// Additional distance at which an edge still belongs to another circle, pixels of the level.
 const MORE_SLACK: f32 = 0.5;
@@ -248,8 +248,8 @@ pub(super) fn prove(
     Some(weigh(polar, &edges, ring, setting, window))
 }
 
-/// Moves the outline to the edges, in steps that look at those within the foci, pixels; also tells
-/// how many there were.
+/// Moves the outline to the edges, in one step for each of `foci`, the largest distance at which
+/// edges count, pixels. Returns the outline and the number of edges that counted last.
 #[inline(always)]
 fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option<(Ring, usize)> {
     let mut ring = start;

@@ -11,37 +11,38 @@ use super::refute;
 use super::strongest::RAYS;
 use crate::edges::{Vectorized, widest};
 
-/// From this radius on a circle is proven at half the size, pixels.
+/// Radius from which a circle is proven in the frame halved once more, pixels there.
 const LARGE: f32 = 24.0;
-/// In noise, from this radius on.
+/// The same radius in a noisy frame, pixels.
 const SMALL: f32 = 9.0;
 /// Noise from which on a frame counts as noisy, gray levels.
 const NOISY: f32 = 8.0;
 
-/// The least radius at which a circle is looked at a second time at half the size, pixels there.
+/// Least radius of a circle that is examined a second time at half the size, pixels there.
 const LEAST_SECOND: f32 = 8.0;
-/// From this certainty on no larger size is asked, but in noise.
+/// Certainty from which no larger size is examined, except in noise.
 const SURE: f32 = 12.0;
-/// Reach of the search for edges in doubt, and where another outline was found, radii.
+/// Reach of the search for edges in the narrow window: for a doubtful circle, and next to another
+/// outline, radii.
 const NARROW: f32 = 0.15;
 const NARROWEST: f32 = 0.1;
-/// Candidates of less certainty are not looked at in a narrow window.
+/// Least certainty for an examination in the narrow window.
 const LEAST_NARROW: f32 = -3.0;
-/// But for those whose outline runs along edges so far.
+/// Weight from which a candidate is examined there at any certainty.
 const LEAST_WEIGHT: f32 = 10.0;
-/// Evidence against circles of less certainty is not looked for.
+/// Least certainty of a circle for which evidence against it is sought.
 const LEAST_REFUTED: f32 = 0.5;
-/// Certainty that a second look costs.
+/// Certainty subtracted from a second proof of one candidate: it is one more test.
 const SECOND_LOOK: f32 = 1.0;
 
-/// The frame and its halves.
+/// The frame and its repeated halvings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pyramid<'a> {
     pub(super) frame: &'a GrayImage,
     pub(super) sizes: &'a [Size],
 }
 
-/// A frame of a power of two below the full size.
+/// One halving of the frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Size {
     pub(super) gray: Vec<u8>,
@@ -55,7 +56,7 @@ impl<'a> Pyramid<'a> {
         self.sizes.len()
     }
 
-    /// The frame, or the one that is as many times half of it.
+    /// The frame halved `depth` times.
     pub(super) fn gray(&self, depth: usize) -> Gray<'a> {
         match depth.checked_sub(1).and_then(|index| self.sizes.get(index)) {
             None => Gray {

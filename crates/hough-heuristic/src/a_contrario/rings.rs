@@ -3,7 +3,7 @@
 use super::AContrario;
 use crate::circle::Circle;
 
-/// Circles reported of those about one centre.
+/// Choice of the circles that are reported among those about one centre.
 ///
 /// Two circles are about one centre if one lies in the other and their centres are apart by at most
 /// a tenth of the larger radius and 1 px.
@@ -15,9 +15,9 @@ pub enum Rings {
     /// All of them: both edges of a washer, every ring of a target.
     #[default]
     All,
-    /// The largest alone.
+    /// Only the largest circle.
     Outer,
-    /// The smallest alone.
+    /// Only the smallest circle.
     Inner,
 }
 

@@ -9,12 +9,13 @@ use crate::detect::{CircleDetector, FrameRefused};
 use crate::region::Region;
 
 impl AContrario {
-    /// Searches for the circle `last`, whose centre and radius may have changed by `reach` pixels,
-    /// and searches the whole frame only if it is not there. Returns `true` if it was.
+    /// Searches for the circle `last`, whose centre and radius may have changed by `reach` pixels.
+    /// Only if it is not found is the whole frame searched. Returns `true` if it was found.
     ///
     /// [`measurements`](Self::measurements) then holds the one circle followed, or else all circles
     /// of the frame. The number of false alarms counts the circles in the part that was searched.
-    /// A `last` or a `reach` that is not finite, or has no radius, is never there.
+    /// A `last` that is not finite or has no radius is never found, nor is any with a `reach` that
+    /// is not finite.
     ///
     /// # Errors
     /// [`FrameRefused`] if the whole frame is to be searched and the configuration does not suit

@@ -1,9 +1,9 @@
 //! Estimates a frame's noise.
 
-/// Every how many rows a row is usually looked at.
+/// Usual distance between sampled rows.
 pub(crate) const ROW_STEP: usize = 12;
-/// Every how many columns a pixel is looked at; odd, so that no two-pixel pattern is met in one
-/// phase only.
+/// Distance between sampled columns. It is odd, so that a pattern with a period of two pixels is
+/// sampled in both phases.
 const COLUMN_STEP: usize = 3;
 /// Columns that are worked on together, a multiple of the step.
 const BLOCK: usize = 96;

@@ -2,8 +2,8 @@
 //!
 //! Everything is integer arithmetic on short rows that stay in the nearest cache, written as plain
 //! loops over slices of one length, which the compiler turns into vector code. The same source is
-//! compiled for the baseline of the target and, by [`widest`](super::widest), for wider vectors; the
-//! results are the same by construction, and a test compares both with a plain version.
+//! compiled for the baseline of the target and, by [`widest`](super::widest), for wider vectors.
+//! The results are the same by construction, and a test compares both with a plain version.
 
 use std::time::Instant;
 

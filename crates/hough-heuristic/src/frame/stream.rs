@@ -182,7 +182,7 @@ fn parse_header(line: &[u8]) -> Result<(u32, u32, u64), String> {
     Ok((width, height, chroma))
 }
 
-/// A line without its end; none at the end of the stream.
+/// Reads a line and drops its line end; `None` at the end of the stream.
 fn read_line(reader: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
     let mut line = Vec::new();
     let mut limited = Read::take(reader, MAX_LINE as u64 + 1);

@@ -57,9 +57,9 @@ impl Structure {
         self.order();
     }
 
-    /// Draws pixels, the paper's step 3a: the first from the whole of `D`, and the others from there
-    /// too or, with a `reach`, from those within about that distance of the first along each axis.
-    /// Returns `false` if there are not so many.
+    /// Draws pixels, the paper's step 3a: the first from the whole of `D`. The others come from
+    /// there too or, with a `reach`, from the pixels within about that distance of the first along
+    /// each axis. Returns `false` if there are too few pixels.
     pub(crate) fn draw(
         &self,
         reach: Option<f64>,

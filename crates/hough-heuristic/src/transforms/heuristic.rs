@@ -27,11 +27,11 @@ pub struct HeuristicConfig {
     /// Triples drawn at most per frame (default 60000; at least 1). Bounds the time; more finds
     /// fainter and smaller balls amid more clutter.
     pub iterations: u32,
-    /// Draws all pixels from the whole of `D`, as the paper does (default false). For a circle that
-    /// owns the share `p` of all edge pixels, one draw of three in `p^-3` then hits it. Otherwise
-    /// the second and third come from a window around the first that is as wide as a circle of some
-    /// radius in the range can reach, which in clutter hits a small ball hundreds of times as often.
-    /// The radius is drawn anew each time, its logarithm uniform.
+    /// Draws all three pixels from the whole of `D`, as the paper does (default false). A circle
+    /// that owns the share `p` of all edge pixels is then hit once in `p^-3` draws. With `false`
+    /// the second and third pixel come from a window around the first, as wide as a circle of a
+    /// radius that is drawn from the range each time (log-uniform). In clutter this hits a small
+    /// ball hundreds of times as often.
     pub anywhere: bool,
     /// Seed of the draws (default 1). They begin anew with every frame.
     pub seed: u64,

@@ -1,5 +1,5 @@
-//! The circles that the a contrario detector is asked for: of a region, about one centre, apart from
-//! one another, and of which size by default.
+//! The circles that the a contrario detector is asked for: of a region, about one centre, apart
+//! from one another, and of which size by default.
 
 use hough_heuristic::image::{GrayImage, Luma, imageops};
 use hough_heuristic::{AContrario, AContrarioConfig, Circle, CircleDetector, Region, Rings};
