@@ -120,8 +120,8 @@ pub fn save<T: Serialize>(path: impl AsRef<Path>, kind: &str, value: &T) -> Resu
 /// Reads a value that [`save`] wrote with the same kind.
 ///
 /// # Errors
-/// [`FileError::At`] with the path and the cause. A damaged or foreign file is refused within
-/// memory in proportion to its length.
+/// [`FileError::At`] with the path and the cause. Refusing a damaged or foreign file takes memory
+/// in proportion to its length at most.
 pub fn load<T: DeserializeOwned>(path: impl AsRef<Path>, kind: &str) -> Result<T, FileError> {
     let path = path.as_ref();
     let open = || Ok(File::open(path)?);

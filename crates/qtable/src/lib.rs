@@ -15,8 +15,8 @@
 //!
 //! * All randomness comes from the generator handed in. The same seed gives the same result, bit
 //!   for bit, on every platform: the crate has exponential and logarithm of its own.
-//! * Nothing is bootstrapped through a step that *terminated* an episode; through a *truncated* one
-//!   it is.
+//! * Learners bootstrap through a step that *truncated* an episode, never through one that
+//!   *terminated* it.
 //! * A table never holds a value that is not finite. A reward of NaN or a state out of range is
 //!   refused with an [`Error`] that says what and where. Methods that return no `Result` panic
 //!   outside a table, like an index into a slice.

@@ -71,7 +71,7 @@ impl DynaQ {
         })
     }
 
-    /// Sets the number of imagined steps after each real one; 0 is plain Q-learning.
+    /// Sets the number of imagined steps after each real one (default 5); 0 is plain Q-learning.
     #[must_use]
     pub fn with_planning_steps(self, planning_steps: u32) -> Self {
         Self {

@@ -42,8 +42,8 @@ impl Experience {
 /// ```
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 /// use qtable::{
-///     Environment, EpsilonGreedy, Experience, Learner, ModelEnvironment, Policy, QLearning, QTable,
-///     Schedule, State, Status,
+///     Environment, EpsilonGreedy, Experience, Learner, ModelEnvironment, Policy, QLearning,
+///     QTable, Schedule, State, Status,
 /// };
 ///
 /// fn main() -> Result<(), qtable::Error> {

@@ -64,7 +64,7 @@ impl PrioritizedSweeping {
         .restore()
     }
 
-    /// Sets the number of backups after each real step, at least 1.
+    /// Sets the number of backups after each real step, at least 1 (default 5).
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -72,7 +72,7 @@ impl PrioritizedSweeping {
         Self { backups, ..self }.restore()
     }
 
-    /// Sets the change up to which a pair is not queued, in units of the values.
+    /// Sets the change up to which a pair is not queued, in units of the values (default 0).
     ///
     /// # Errors
     /// [`Error::Setting`].

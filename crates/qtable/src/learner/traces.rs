@@ -35,7 +35,8 @@ validated! {
     /// ```
     /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
     /// use qtable::{
-    ///     EpsilonGreedy, ModelEnvironment, QTable, Schedule, State, Target, Traces, Training, Until,
+    ///     EpsilonGreedy, ModelEnvironment, QTable, Schedule, State, Target, Traces, Training,
+    ///     Until,
     /// };
     ///
     /// fn main() -> Result<(), qtable::Error> {

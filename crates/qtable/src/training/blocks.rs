@@ -23,12 +23,12 @@ impl Training<QLearning, Boltzmann> {
     /// stand still within each of `blocks` equal parts from one record to the next, and the actions
     /// are drawn from a [`CachedBoltzmann`].
     ///
-    /// Below 8 actions the plain policy is the faster one, and this is
-    /// [`run_with`](Training::run_with), as it is with a dynamic environment. With 256 to 1024 blocks in a run nothing of the course of
-    /// the schedules is lost. (An α by visits changes at every visit all the same.) Values are kept
-    /// as `f32` while it runs and written back before `on_record` is called and at the end, also
-    /// after an error. The result is another one than that of [`run`](Training::run) from the same
-    /// seed, drawn from the same distribution but for the steps of the schedules.
+    /// With fewer than 8 actions, where the plain policy is faster, and with a dynamic environment
+    /// it calls [`run_with`](Training::run_with). 256 to 1024 blocks in a run follow the schedules
+    /// closely enough. (An α by visits still changes at every visit.) Values are kept as `f32`
+    /// while it runs. They are written back before `on_record` is called and at the end, also after
+    /// an error. The result differs from that of [`run`](Training::run) with the same seed: it is
+    /// drawn from the same distribution, apart from the steps of the schedules.
     ///
     /// The run ends with the block in which a total is reached. The weights are not saved: a run
     /// that is resumed makes them anew from the table, which changes no bit at the end of a block.
