@@ -1,19 +1,31 @@
 //! The differences between a believed cell and the real one.
 
+use std::f64::consts::PI;
 use std::fmt;
 use std::str::FromStr;
 
+use hough_heuristic::Features;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
-use puma_val2::{ArmError, Joints};
+use puma_val2::Joints;
 use rand::{Rng, RngExt};
 
 use crate::cell::ball::Holder;
+use crate::cell::distortion::Distortion;
 use crate::cell::geometry::Cell;
-use crate::error::{QuantityError, finite, positive};
+use crate::error::{QuantityError, amount, at_most, finite, positive};
 
 /// Differences of a real cell from the nominal one.
+///
+/// [`Errors::apply`] puts those of camera, ball and links into a cell; arm and cameras on a
+/// [`SharedCell`](crate::SharedCell) make the others ([`SharedCell::set_errors`]).
+///
+/// [`SharedCell::set_errors`]: crate::SharedCell::set_errors
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default)
+)]
 pub struct Errors {
     /// True focal length over the nominal one.
     pub focal_factor: f64,
@@ -27,20 +39,73 @@ pub struct Errors {
     pub camera_shift: [f64; 3],
     /// Displacement of the principal point, feature units.
     pub centre_shift: [f64; 2],
+    /// Distortion of the lens.
+    pub distortion: Distortion,
     /// True radius of the ball over the nominal one.
     pub radius_factor: f64,
+    /// Lengthening of upper arm and forearm, metres.
+    pub link_shift: [f64; 2],
+    /// Offset of each link from the angle that its encoder reads, `JT1` first, radians.
+    pub joint_zero: [f64; 6],
+    /// Turn of each link over that of its encoder. Turns count from the middle of the working
+    /// range, where the arm was adjusted (`JT2` -85, `JT3` 167.5 degrees, the others 0).
+    pub gear: [f64; 6],
+    /// Fraction of the turn of `JT3` that `JT2` makes as well, and of that of `JT2` that `JT3`
+    /// makes.
+    pub drag: [f64; 2],
+    /// Droop of the upper arm when it is level, radians. It falls with the cosine of the elevation.
+    pub sag: f64,
     /// Play between motor and link in every joint, whole width, radians.
     pub backlash: f64,
     /// Angle of one encoder count, `JT1` first, radians; 0 for a joint that stands anywhere.
     pub encoder_step: [f64; 6],
+    /// Turn below which a joint sticks: it stays, and its encoder shows it, radians.
+    pub stiction: f64,
+    /// Turn below which a link stays although its encoder shows the turn, radians.
+    pub dead_zone: f64,
     /// Standard deviation of the noise on each image feature, units.
     pub feature_noise: f64,
+    /// A camera that shows left and right exchanged.
+    pub mirrored: bool,
+    /// Number of looks by which the camera's image is late, at most 1000.
+    pub lag: usize,
+    /// Fraction of looks that do not show the ball, 0..=1.
+    pub missed: f64,
+    /// Fraction of looks that show it somewhere else, 0..=1.
+    pub outliers: f64,
+    /// Turn about the image's x axis, radians, and displacement along it, metres, by which the
+    /// camera slips in its mount ([`Errors::slip_camera`]).
+    pub slip: [f64; 2],
 }
+
+/// Middle of the working range, from which gears and drag count, degrees.
+const ADJUSTED_DEGREES: [f64; 6] = [0.0, -85.0, 167.5, 0.0, 0.0, 0.0];
 
 impl Errors {
     /// Angle of one count of each of the PUMA 560's encoders, degrees.
     pub const PUMA_ENCODER_DEGREES: [f64; 6] =
         [0.00575, 0.00417, 0.00670, 0.00474, 0.00501, 0.00939];
+
+    /// Names of odd errors, each with its usual amount, for [`Errors::with_odd`].
+    pub const ODD: [(&str, f64); 17] = [
+        ("zeros", 3.0),
+        ("gears", 3.0),
+        ("sag", 4.0),
+        ("drag", 10.0),
+        ("back-drag", 10.0),
+        ("links", 20.0),
+        ("stiction", 0.5),
+        ("dead-zone", 0.5),
+        ("play", 3.0),
+        ("lag", 1.0),
+        ("slip", 8.0),
+        ("mirrored", 1.0),
+        ("roll", 45.0),
+        ("lens", -0.4),
+        ("noise", 3.0),
+        ("missed", 20.0),
+        ("outliers", 5.0),
+    ];
 
     /// Returns the errors of a cell that is as believed.
     pub fn none() -> Self {
@@ -51,21 +116,87 @@ impl Errors {
             yaw: 0.0,
             camera_shift: [0.0; 3],
             centre_shift: [0.0; 2],
+            distortion: Distortion::default(),
             radius_factor: 1.0,
+            link_shift: [0.0; 2],
+            joint_zero: [0.0; 6],
+            gear: [1.0; 6],
+            drag: [0.0; 2],
+            sag: 0.0,
             backlash: 0.0,
             encoder_step: [0.0; 6],
+            stiction: 0.0,
+            dead_zone: 0.0,
             feature_noise: 0.0,
+            mirrored: false,
+            lag: 0,
+            missed: 0.0,
+            outliers: 0.0,
+            slip: [0.0; 2],
         }
     }
 
-    /// Returns the true cell for the believed cell `nominal`. Backlash, encoder steps and noise
-    /// belong to the arm ([`SimulatedArm::with_errors`](crate::SimulatedArm::with_errors)) and the
-    /// observation ([`FeatureCamera`](crate::FeatureCamera)).
+    /// Adds an odd error, one that no level has: its name, with the usual amount, or `NAME=AMOUNT`.
+    ///
+    /// | name | amount |
+    /// |---|---|
+    /// | `zeros`, `gears` | degrees, per cent that `JT2` and `JT3` are off |
+    /// | `sag` | degrees that the level upper arm hangs down |
+    /// | `drag`, `back-drag` | per cent of its turn by which `JT3` drags `JT2`, `JT2` drags `JT3` |
+    /// | `links` | millimetres that upper arm and forearm are too long |
+    /// | `stiction`, `dead-zone`, `play` | degrees |
+    /// | `lag` | looks that the image is late |
+    /// | `slip` | degrees of the slip, with 10 mm |
+    /// | `mirrored` | 1, or 0 for an upright image |
+    /// | `roll` | degrees |
+    /// | `lens` | first radial term of the distortion |
+    /// | `noise` | feature units |
+    /// | `missed`, `outliers` | per cent of the looks |
     ///
     /// # Errors
-    /// [`QuantityError`] names the factor that is not above zero, or the angle or shift that is not
-    /// finite.
-    pub fn apply(&self, nominal: &Cell) -> Result<Cell, QuantityError> {
+    /// [`QuantityError::Name`] lists the names; [`QuantityError::Value`] for an amount that is not
+    /// a finite number.
+    pub fn with_odd(mut self, name: &str) -> Result<Self, QuantityError> {
+        let (kind, given) = name
+            .split_once('=')
+            .map_or((name, None), |(k, v)| (k, Some(v)));
+        let Some((_, usual)) = Self::ODD.iter().find(|(known, _)| *known == kind) else {
+            return Err(QuantityError::Name {
+                name: kind.to_owned(),
+                known: Self::ODD.map(|(known, _)| known).join(", "),
+            });
+        };
+        let amount = given.map_or(*usual, |text| text.trim().parse().unwrap_or(f64::NAN));
+        finite(format!("the amount of {kind}"), amount)?;
+        let (angle, share) = (amount.to_radians(), amount / 100.0);
+        match kind {
+            "zeros" => self.joint_zero = [0.0, angle, angle, 0.0, 0.0, 0.0],
+            "gears" => self.gear = [1.0, 1.0 + share, 1.0 + share, 1.0, 1.0, 1.0],
+            "sag" => self.sag = angle,
+            "drag" => self.drag[0] = share,
+            "back-drag" => self.drag[1] = share,
+            "links" => self.link_shift = [amount / 1000.0; 2],
+            "stiction" => self.stiction = angle,
+            "dead-zone" => self.dead_zone = angle,
+            "play" => self.backlash = angle,
+            "lag" => self.lag = amount.max(0.0) as usize,
+            "slip" => self.slip = [angle, 0.010],
+            "mirrored" => self.mirrored = amount > 0.0,
+            "roll" => self.roll += angle,
+            "lens" => self.distortion.k1 = amount,
+            "noise" => self.feature_noise = amount,
+            "missed" => self.missed = share,
+            _ => self.outliers = share,
+        }
+        self.check()?;
+        Ok(self)
+    }
+
+    /// Checks that a cell can be wrong in these ways.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the quantity that is out of range.
+    pub(crate) fn check(&self) -> Result<(), QuantityError> {
         let [x, y, z] = self.camera_shift;
         for (quantity, value) in [
             ("roll of the camera (rad)", self.roll),
@@ -74,19 +205,72 @@ impl Errors {
             ("shift of the camera along its x axis (m)", x),
             ("shift of the camera along its y axis (m)", y),
             ("shift of the camera along its z axis (m)", z),
+            ("lengthening of the upper arm (m)", self.link_shift[0]),
+            ("lengthening of the forearm (m)", self.link_shift[1]),
+            ("drag of JT2 by JT3", self.drag[0]),
+            ("drag of JT3 by JT2", self.drag[1]),
+            ("sag of the upper arm (rad)", self.sag),
+            ("turn of the camera's slip (rad)", self.slip[0]),
+            ("length of the camera's slip (m)", self.slip[1]),
         ] {
             finite(quantity, value)?;
         }
+        amount(
+            "standard deviation of the features' noise (units)",
+            self.feature_noise,
+        )?;
+        let steps = self.encoder_step.into_iter().zip(1..);
+        let steps = steps.map(|(step, joint)| (format!("encoder step of JT{joint} (rad)"), step));
+        let drive = [
+            ("backlash (rad)", self.backlash),
+            ("stiction (rad)", self.stiction),
+            ("dead zone (rad)", self.dead_zone),
+        ];
+        for (quantity, value) in drive
+            .map(|(name, v)| (name.to_owned(), v))
+            .into_iter()
+            .chain(steps)
+        {
+            amount(quantity.as_str(), value)?;
+            at_most(quantity, value, PI)?;
+        }
+        for (zero, joint) in self.joint_zero.iter().zip(1..) {
+            finite(format!("zero of JT{joint} (rad)"), *zero)?;
+        }
+        for (gear, joint) in self.gear.iter().zip(1..) {
+            positive(format!("gear of JT{joint}"), *gear)?;
+        }
+        at_most("lag (looks)", self.lag as f64, 1000.0)?;
+        amount("fraction of missed looks", self.missed)?;
+        amount("fraction of outliers", self.outliers)?;
+        at_most(
+            "fraction of missed looks and outliers",
+            self.missed + self.outliers,
+            1.0,
+        )
+    }
+
+    /// Returns the true cell for the believed cell `nominal`.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the quantity that is out of range.
+    pub fn apply(&self, nominal: &Cell) -> Result<Cell, QuantityError> {
+        self.check()?;
         let radius = nominal.ball.radius * self.radius_factor;
         positive("radius of the ball (m)", radius)?;
-        let unit = f64::from(nominal.camera.size().0) / hough_heuristic::Features::WIDTH;
-        let principal = nominal.camera.principal_point()
-            + Vector2::new(self.centre_shift[0] * unit, self.centre_shift[1] * unit);
+        let unit = f64::from(nominal.camera.size().0) / Features::WIDTH;
+        let [across, down] = self.centre_shift;
+        let principal = nominal.camera.principal_point() + Vector2::new(across, down) * unit;
         let mut cell = *nominal;
         cell.camera = nominal
             .camera
             .with_focal_factor(self.focal_factor)?
             .with_principal_point(principal)?;
+        if !self.distortion.is_none() {
+            cell.camera = cell.camera.with_distortion(self.distortion)?;
+        }
+        cell.params.a2 += self.link_shift[0];
+        cell.params.d4 += self.link_shift[1];
         // Shifted along the camera's own axes, then turned in place.
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), self.yaw)
             * Rotation3::from_axis_angle(&Vector3::x_axis(), self.pitch)
@@ -96,42 +280,66 @@ impl Errors {
             UnitQuaternion::from_rotation_matrix(&turn),
         );
         cell.ball.radius = radius;
-        if nominal
-            .holder
-            .is_some_and(|holder| holder.carries(&nominal.ball))
-        {
+        let carried = |holder: Holder| holder.carries(&nominal.ball);
+        if nominal.holder.is_some_and(carried) {
             cell.holder = Some(Holder::under(&cell.ball));
         }
         Ok(cell)
     }
+
+    /// Lets the camera of a cell slip in its mount.
+    pub fn slip_camera(&self, cell: &mut Cell) {
+        let [turn, shift] = self.slip;
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), turn);
+        cell.mount *= Isometry3::from_parts(Translation3::new(shift, 0.0, 0.0), turn);
+    }
+
+    /// Returns the angles of the links of an arm whose encoders, less the play, read `read`.
+    pub(crate) fn links(&self, read: &Joints) -> Joints {
+        let straight = Self::none();
+        let as_read = self.joint_zero == straight.joint_zero && self.gear == straight.gear;
+        if as_read && self.drag == straight.drag && self.sag == 0.0 {
+            return *read;
+        }
+        let from = Joints::from_degrees(ADJUSTED_DEGREES);
+        let turned = |i: usize| read.0[i] - from.0[i];
+        let geared = |i: usize| from.0[i] + self.gear[i] * turned(i) + self.joint_zero[i];
+        let mut links = Joints(std::array::from_fn(geared));
+        links.0[1] += self.drag[0] * turned(2);
+        links.0[2] += self.drag[1] * turned(1);
+        // At JT2 = 0 the upper arm is level; positive angles lower it.
+        links.0[1] += self.sag * links.0[1].cos();
+        links
+    }
+
+    /// Draws what goes wrong in a look at the ball.
+    pub(crate) fn glitch<R: Rng + ?Sized>(&self, rng: &mut R) -> Glitch {
+        if self.missed + self.outliers <= 0.0 {
+            return Glitch::None;
+        }
+        let lot: f64 = rng.random();
+        if lot < self.missed {
+            Glitch::Missed
+        } else if lot < self.missed + self.outliers {
+            Glitch::Outlier(Features {
+                x: rng.random_range(10.0..Features::WIDTH - 10.0),
+                y: rng.random_range(10.0..Features::HEIGHT - 10.0),
+                r: rng.random_range(8.0..45.0),
+            })
+        } else {
+            Glitch::None
+        }
+    }
 }
 
-impl Errors {
-    /// Checks that an arm can have this play and these encoders.
-    ///
-    /// # Errors
-    /// [`ArmError::Setting`] names the quantity that is not finite, or below zero.
-    pub(crate) fn check_drive(&self) -> Result<(), ArmError> {
-        const STEPS: [&str; 6] = [
-            "the encoder step of JT1",
-            "the encoder step of JT2",
-            "the encoder step of JT3",
-            "the encoder step of JT4",
-            "the encoder step of JT5",
-            "the encoder step of JT6",
-        ];
-        let steps = STEPS.into_iter().zip(self.encoder_step);
-        for (what, value) in steps.chain([("the backlash", self.backlash)]) {
-            if !(0.0..=std::f64::consts::PI).contains(&value) {
-                return Err(ArmError::Setting {
-                    what,
-                    value: format!("{value} rad"),
-                    allowed: "a finite angle of zero or above, at most half a turn",
-                });
-            }
-        }
-        Ok(())
-    }
+/// A fault of a single look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Glitch {
+    None,
+    /// The ball does not show.
+    Missed,
+    /// The ball shows here instead.
+    Outlier(Features),
 }
 
 impl Default for Errors {
@@ -150,7 +358,7 @@ impl Default for Errors {
 /// | extreme | 40 % | 15 deg | 1 deg | 1.5 units | 20 % | 20 mm each axis | 5 units |
 ///
 /// Each quantity is off by the full amount, with a random sign. All levels but `none` have the
-/// encoder steps of a PUMA 560.
+/// encoder steps of a PUMA 560. Other errors are added by [`Errors::with_odd`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ErrorLevel {
@@ -189,18 +397,17 @@ impl ErrorLevel {
             backlash: f64::to_radians(backlash),
             encoder_step: Errors::PUMA_ENCODER_DEGREES.map(f64::to_radians),
             feature_noise: noise,
+            ..Errors::none()
         }
     }
 }
 
+/// Names of the levels, in the order of [`ErrorLevel::ALL`].
+const LEVELS: [&str; 4] = ["none", "moderate", "heavy", "extreme"];
+
 impl fmt::Display for ErrorLevel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::None => "none",
-            Self::Moderate => "moderate",
-            Self::Heavy => "heavy",
-            Self::Extreme => "extreme",
-        })
+        f.pad(LEVELS[*self as usize])
     }
 }
 
@@ -208,62 +415,12 @@ impl FromStr for ErrorLevel {
     type Err = QuantityError;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|level| level.to_string() == name)
+        let found = LEVELS.iter().position(|level| *level == name);
+        found
+            .map(|k| Self::ALL[k])
             .ok_or_else(|| QuantityError::Name {
                 name: name.to_owned(),
-                known: "none, moderate, heavy, extreme".to_owned(),
+                known: LEVELS.join(", "),
             })
-    }
-}
-
-/// Motors and gears: the reported joint angles, and those of the links.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Drive {
-    backlash: f64,
-    encoder_step: [f64; 6],
-    reported: Joints,
-    links: Joints,
-}
-
-impl Drive {
-    /// `errors` must have passed [`Errors::check_drive`].
-    pub(crate) fn new(joints: Joints, errors: &Errors) -> Self {
-        let (backlash, encoder_step) = (errors.backlash, errors.encoder_step);
-        let mut drive = Self {
-            backlash,
-            encoder_step,
-            reported: joints,
-            links: joints,
-        };
-        drive.send(joints);
-        drive
-    }
-
-    /// Returns the angles that the encoders report.
-    pub(crate) fn reported(&self) -> Joints {
-        self.reported
-    }
-
-    /// Returns the angles of the links, within the play of the gears.
-    pub(crate) fn links(&self) -> Joints {
-        self.links
-    }
-
-    /// Turns the motors to the counts nearest to `target`; the links follow once the play is used
-    /// up.
-    pub(crate) fn send(&mut self, target: Joints) {
-        let half = 0.5 * self.backlash;
-        for i in 0..6 {
-            let step = self.encoder_step[i];
-            let motor = if step > 0.0 {
-                (target.0[i] / step).round() * step
-            } else {
-                target.0[i]
-            };
-            self.reported.0[i] = motor;
-            self.links.0[i] = self.links.0[i].clamp(motor - half, motor + half);
-        }
     }
 }

@@ -4,43 +4,41 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
 
-use crate::cell::errors::{Drive, Errors};
 use crate::devices::shared_cell::SharedCell;
 
 /// An arm without a controller that moves at once: a [`Manipulator`] and a [`ProximitySensor`].
 ///
 /// It pushes the ball when it runs into it, carries it when it holds it, and records both
-/// ([`SharedCell::contacts`]). With [`Errors`] its gears have play and its encoders count in steps:
-/// it reports the angles of the motors, and [`SimulatedArm::pose`] returns those of the links.
+/// ([`SharedCell::contacts`]). It makes the errors of its cell ([`SharedCell::set_errors`]) and
+/// reports what its encoders read; [`SimulatedArm::pose`] returns the angles of the links.
 #[derive(Clone, Debug)]
 pub struct SimulatedArm {
     cell: SharedCell,
     drive: Arc<Mutex<Drive>>,
 }
 
+/// Motors and gears.
+#[derive(Clone, Copy, Debug)]
+struct Drive {
+    /// Angles that the encoders read.
+    read: Joints,
+    /// The same behind the play of the gears.
+    driven: Joints,
+}
+
 impl SimulatedArm {
-    /// Creates a perfect arm in `cell`, standing at `joints`.
+    /// Creates an arm in `cell`, sent to `joints`.
     ///
     /// # Errors
     /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] if it cannot stand there.
     pub fn new(cell: SharedCell, joints: Joints) -> Result<Self, ArmError> {
-        Self::with_errors(cell, joints, &Errors::none())
-    }
-
-    /// Creates an arm with the backlash and the encoder steps of `errors`, sent to `joints`.
-    /// ([`Errors::apply`] puts the other errors into the cell.)
-    ///
-    /// # Errors
-    /// Those of [`SimulatedArm::new`]; [`ArmError::Setting`] for backlash or an encoder step that
-    /// is not finite, below zero or above half a turn.
-    pub fn with_errors(
-        cell: SharedCell,
-        joints: Joints,
-        errors: &Errors,
-    ) -> Result<Self, ArmError> {
-        errors.check_drive()?;
         cell.with(|cell| cell.params.check(&joints))?;
-        let drive = Arc::new(Mutex::new(Drive::new(joints, errors)));
+        let mut drive = Drive {
+            read: joints,
+            driven: joints,
+        };
+        drive.send(joints, &cell);
+        let drive = Arc::new(Mutex::new(drive));
         Ok(Self { cell, drive })
     }
 
@@ -48,38 +46,65 @@ impl SimulatedArm {
     /// [`CellCamera::new`](crate::CellCamera::new) and
     /// [`FeatureCamera::new`](crate::FeatureCamera::new).
     pub fn pose(&self) -> impl FnMut() -> Joints + Send + use<> {
-        let drive = Arc::clone(&self.drive);
-        move || locked(&drive).links()
+        let arm = self.clone();
+        move || arm.links()
+    }
+
+    fn links(&self) -> Joints {
+        let driven = self.drive().driven;
+        self.cell.links(&driven)
+    }
+
+    fn drive(&self) -> MutexGuard<'_, Drive> {
+        // Plain data stays valid when a thread panics.
+        self.drive.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Locks plain data, which stays valid when a thread panics.
-fn locked(drive: &Mutex<Drive>) -> MutexGuard<'_, Drive> {
-    drive.lock().unwrap_or_else(PoisonError::into_inner)
+impl Drive {
+    /// Turns the motors to the counts nearest to `target`; the links follow once the play is used
+    /// up.
+    fn send(&mut self, target: Joints, cell: &SharedCell) {
+        let errors = cell.errors();
+        let half = 0.5 * errors.backlash;
+        for i in 0..6 {
+            let (angle, step) = (target.0[i], errors.encoder_step[i]);
+            let motor = if step > 0.0 {
+                (angle / step).round() * step
+            } else {
+                angle
+            };
+            self.read.0[i] = motor;
+            self.driven.0[i] = self.driven.0[i].clamp(motor - half, motor + half);
+        }
+    }
 }
 
 impl Manipulator for SimulatedArm {
     fn joints(&mut self) -> Result<Joints, ArmError> {
-        Ok(locked(&self.drive).reported())
+        Ok(self.drive().read)
     }
 
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
-        let target = locked(&self.drive).reported() + delta;
+        let target = self.drive().read + delta;
         self.move_to(target)
     }
 
     fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
-        let mut drive = locked(&self.drive);
         self.cell.with(|cell| cell.params.check(&target))?;
-        let from = drive.links();
-        drive.send(target);
-        self.cell.sweep(&from, &drive.links());
-        Ok(drive.reported())
+        let from = self.links();
+        let read = {
+            let mut drive = self.drive();
+            let target = self.cell.overcome_friction(&drive.read, &target);
+            drive.send(target, &self.cell);
+            drive.read
+        };
+        self.cell.sweep(&from, &self.links());
+        Ok(read)
     }
 
     fn set_gripper(&mut self, gripper: Gripper) -> Result<(), ArmError> {
-        let joints = locked(&self.drive).links();
-        self.cell.set_gripper(gripper, &joints);
+        self.cell.set_gripper(gripper, &self.links());
         Ok(())
     }
 
@@ -90,7 +115,7 @@ impl Manipulator for SimulatedArm {
 
 impl ProximitySensor for SimulatedArm {
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        let joints = locked(&self.drive).links();
+        let joints = self.links();
         Ok(self.cell.with(|cell| cell.proximity(&joints)))
     }
 }

@@ -1,20 +1,23 @@
 //! The camera on the hand, with and without frames.
 
-use hough_heuristic::image::GrayImage;
+use std::collections::VecDeque;
+
+use hough_heuristic::image::{GrayImage, imageops};
 use hough_heuristic::{Features, FrameError, FrameSource};
 use puma_val2::Joints;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
+use crate::cell::errors::Glitch;
 use crate::cell::geometry::Cell;
-use crate::cell::noise::{NOISE, with_noise};
-use crate::devices::shared_cell::SharedCell;
-use crate::error::{QuantityError, amount};
+use crate::cell::noise::with_noise;
+use crate::devices::shared_cell::{SharedCell, remove_ball};
+use crate::error::QuantityError;
 use crate::render::renderer::Renderer;
 use crate::render::shot::Shot;
 
 /// The camera on the hand as a [`FrameSource`]: every grab renders the cell as it is, with the
-/// joints where they are.
+/// joints where they are, with the errors of the cell ([`SharedCell::set_errors`]).
 ///
 /// A closure supplies the joints, so that any arm will do: [`SimulatedArm::pose`] or the pose of an
 /// emulated controller. Frames are taken in an instant unless [`CellCamera::exposed`] sets an
@@ -26,6 +29,8 @@ pub struct CellCamera<P> {
     renderer: Renderer,
     pose: P,
     exposure: Option<(Shot, Box<Moved>)>,
+    rng: Xoshiro256PlusPlus,
+    late: VecDeque<GrayImage>,
 }
 
 /// Returns cell and joints some seconds later, or before.
@@ -34,11 +39,14 @@ type Moved = dyn FnMut(&Cell, &Joints, f64) -> (Cell, Joints) + Send;
 impl<P: FnMut() -> Joints> CellCamera<P> {
     /// Creates a camera in `cell` at the pose that `pose` returns.
     pub fn new(cell: SharedCell, renderer: Renderer, pose: P) -> Self {
+        let rng = Xoshiro256PlusPlus::seed_from_u64(renderer.seed());
         Self {
             cell,
             renderer,
             pose,
             exposure: None,
+            rng,
+            late: VecDeque::new(),
         }
     }
 
@@ -94,7 +102,17 @@ impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         let joints = (self.pose)();
         let mut wrong = joints.non_finite();
-        let cell = self.cell.get();
+        let (mut cell, errors) = (self.cell.get(), self.cell.errors());
+        match errors.glitch(&mut self.rng) {
+            Glitch::None => {}
+            Glitch::Missed => remove_ball(&mut cell),
+            Glitch::Outlier(features) => {
+                if let Some(elsewhere) = cell.ball_showing(&joints, &features) {
+                    remove_ball(&mut cell);
+                    cell.ball.centre = elsewhere;
+                }
+            }
+        }
         if wrong.is_none() {
             match &mut self.exposure {
                 None => drop(self.renderer.render(&cell, &joints)),
@@ -107,16 +125,23 @@ impl<P: FnMut() -> Joints> FrameSource for CellCamera<P> {
                 }
             }
         }
-        match wrong {
-            None => {
-                frame.clone_from(self.renderer.frame());
-                Ok(())
-            }
-            Some(joint) => Err(FrameError::Failed {
+        if let Some(joint) = wrong {
+            return Err(FrameError::Failed {
                 origin: "simulated camera".to_owned(),
                 reason: format!("the angle of {joint} is not a finite number"),
-            }),
+            });
         }
+        frame.clone_from(self.renderer.frame());
+        if errors.mirrored {
+            imageops::flip_horizontal_in_place(frame);
+        }
+        if errors.lag > 0 {
+            self.late.push_back(frame.clone());
+            if let Some(late) = delayed(&mut self.late, errors.lag) {
+                *frame = late;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -130,35 +155,54 @@ impl<P> std::fmt::Debug for CellCamera<P> {
     }
 }
 
-/// Camera and detector in one: the ball's features from the geometry, with noise, without a frame.
+/// Camera and detector in one: the ball's features from the geometry, with the errors of the cell
+/// ([`SharedCell::set_errors`]), without a frame.
 pub struct FeatureCamera<P> {
     cell: SharedCell,
     pose: P,
-    noise: f64,
     rng: Xoshiro256PlusPlus,
+    late: VecDeque<Option<Features>>,
 }
 
 impl<P: FnMut() -> Joints> FeatureCamera<P> {
-    /// Creates a camera in `cell` at the pose that `pose` returns. Its features carry normal noise
-    /// of standard deviation `noise` units, drawn from `seed`.
-    ///
-    /// # Errors
-    /// [`QuantityError::Value`] for noise that is not a finite number of zero or above.
-    pub fn new(cell: SharedCell, pose: P, noise: f64, seed: u64) -> Result<Self, QuantityError> {
-        amount(NOISE, noise)?;
-        Ok(Self {
+    /// Creates a camera in `cell` at the pose that `pose` returns; its errors are drawn from
+    /// `seed`.
+    pub fn new(cell: SharedCell, pose: P, seed: u64) -> Self {
+        Self {
             cell,
             pose,
-            noise,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
-        })
+            late: VecDeque::new(),
+        }
     }
 
     /// Returns the features that a detector would find; `None` if the ball counts as lost.
     pub fn look(&mut self) -> Option<Features> {
-        let joints = (self.pose)();
-        let features = self.cell.with(|cell| cell.features(&joints)).ok()?;
-        Some(with_noise(features, self.noise, &mut self.rng))
+        let (joints, errors) = ((self.pose)(), self.cell.errors());
+        let seen = match errors.glitch(&mut self.rng) {
+            Glitch::None => self.cell.with(|cell| cell.features(&joints)).ok(),
+            Glitch::Missed => None,
+            Glitch::Outlier(features) => Some(features),
+        };
+        let mut seen = seen.map(|f| with_noise(f, errors.feature_noise, &mut self.rng));
+        if let Some(features) = seen.as_mut().filter(|_| errors.mirrored) {
+            features.x = Features::WIDTH - features.x;
+        }
+        self.late.push_back(seen);
+        delayed(&mut self.late, errors.lag).flatten()
+    }
+}
+
+/// Takes the image that is `lag` looks old out of a queue whose last is new; the oldest there is in
+/// the beginning.
+fn delayed<T: Clone>(queue: &mut VecDeque<T>, lag: usize) -> Option<T> {
+    while queue.len() > lag + 1 {
+        queue.pop_front();
+    }
+    if queue.len() == lag + 1 {
+        queue.pop_front()
+    } else {
+        queue.front().cloned()
     }
 }
 
@@ -166,7 +210,6 @@ impl<P> std::fmt::Debug for FeatureCamera<P> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("FeatureCamera")
             .field("cell", &self.cell)
-            .field("noise", &self.noise)
             .finish_non_exhaustive()
     }
 }

@@ -7,8 +7,8 @@ use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySen
 use crate::devices::shared_cell::SharedCell;
 
 impl SharedCell {
-    /// Wraps an arm whose jaws act on the cell. `pose` returns the arm's joints; whoever moves them
-    /// calls [`SharedCell::move_hand`] on the way.
+    /// Wraps an arm whose jaws act on the cell. `pose` returns the angles of its links
+    /// ([`SharedCell::links`]); whoever moves them calls [`SharedCell::move_hand`] on the way.
     pub fn with_jaws_of<M, P>(&self, arm: M, pose: P) -> impl Manipulator + use<M, P>
     where
         M: Manipulator,
@@ -23,7 +23,7 @@ impl SharedCell {
     }
 
     /// Wraps an arm, now at `start`, that the cell follows by the joints which the arm reports at
-    /// the end of each move. Returns it with a closure that reads the last ones.
+    /// the end of each move. Returns it with a closure that reads the last angles of its links.
     pub fn follow<M: Manipulator>(
         &self,
         arm: M,
@@ -32,11 +32,11 @@ impl SharedCell {
         impl Manipulator + use<M>,
         impl Fn() -> Joints + Clone + Send + Sync + use<M>,
     ) {
-        self.move_hand(&start);
+        self.move_hand(&self.links(&start));
         let reported = Arc::new(Mutex::new(start));
         let read = {
-            let reported = Arc::clone(&reported);
-            move || *reported.lock().unwrap_or_else(PoisonError::into_inner)
+            let (cell, reported) = (self.clone(), Arc::clone(&reported));
+            move || cell.links(&reported.lock().unwrap_or_else(PoisonError::into_inner))
         };
         let arm = FollowedArm {
             arm,
@@ -80,6 +80,11 @@ struct FollowedArm<M, P> {
 }
 
 impl<M, P> FollowedArm<M, P> {
+    fn has_friction(&self) -> bool {
+        let errors = self.cell.errors();
+        errors.stiction > 0.0 || errors.dead_zone > 0.0
+    }
+
     fn note(&self, outcome: Result<Joints, ArmError>) -> Result<Joints, ArmError> {
         let stands = match &outcome {
             Ok(joints) | Err(ArmError::ProximityStop { joints, .. }) => Some(joints),
@@ -87,7 +92,7 @@ impl<M, P> FollowedArm<M, P> {
         };
         if let (Some(reported), Some(joints)) = (&self.reported, stands) {
             *reported.lock().unwrap_or_else(PoisonError::into_inner) = *joints;
-            self.cell.move_hand(joints);
+            self.cell.move_hand(&self.cell.links(joints));
         }
         outcome
     }
@@ -100,11 +105,19 @@ impl<M: Manipulator, P: FnMut() -> Joints + Send> Manipulator for FollowedArm<M,
     }
 
     fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        if self.has_friction() {
+            let target = self.arm.joints()? + delta;
+            return self.move_to(target);
+        }
         let joints = self.arm.move_by(delta);
         self.note(joints)
     }
 
-    fn move_to(&mut self, target: Joints) -> Result<Joints, ArmError> {
+    fn move_to(&mut self, mut target: Joints) -> Result<Joints, ArmError> {
+        if self.has_friction() {
+            let reported = self.arm.joints()?;
+            target = self.cell.overcome_friction(&reported, &target);
+        }
         let joints = self.arm.move_to(target);
         self.note(joints)
     }

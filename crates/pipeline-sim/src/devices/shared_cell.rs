@@ -5,8 +5,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use nalgebra::Point3;
 use puma_val2::{Gripper, Joints};
 
+use crate::cell::errors::Errors;
 use crate::cell::geometry::Cell;
 use crate::cell::grasp::Grasp;
+use crate::error::QuantityError;
 
 /// Contacts of the hand with the cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,6 +44,9 @@ struct State {
     /// Set while the hand overlaps something.
     touching: bool,
     contacts: Contacts,
+    errors: Errors,
+    /// Angles of joints that stay in their dead zone.
+    stuck: [Option<f64>; 6],
 }
 
 impl SharedCell {
@@ -52,7 +57,50 @@ impl SharedCell {
             stood: None,
             touching: false,
             contacts: Contacts::default(),
+            errors: Errors::none(),
+            stuck: [None; 6],
         })))
+    }
+
+    /// Lets arm and cameras in this cell make these errors, but for those that [`Errors::apply`]
+    /// puts into the cell. Play and encoder steps are those of a [`SimulatedArm`] alone.
+    ///
+    /// # Errors
+    /// [`QuantityError`] names the quantity that is out of range.
+    ///
+    /// [`SimulatedArm`]: crate::SimulatedArm
+    pub fn set_errors(&self, errors: &Errors) -> Result<(), QuantityError> {
+        errors.check()?;
+        self.lock().errors = *errors;
+        Ok(())
+    }
+
+    pub(super) fn errors(&self) -> Errors {
+        self.lock().errors
+    }
+
+    /// Returns the angles of the links of an arm that reports these, which cameras and sensors go
+    /// by.
+    pub fn links(&self, reported: &Joints) -> Joints {
+        let state = self.lock();
+        let driven = |i: usize| state.stuck[i].unwrap_or(reported.0[i]);
+        state.errors.links(&Joints(std::array::from_fn(driven)))
+    }
+
+    /// Returns the target of a move that joints with stiction really go to, and remembers the
+    /// joints that stay in their dead zone.
+    pub(super) fn overcome_friction(&self, reported: &Joints, target: &Joints) -> Joints {
+        let mut state = self.lock();
+        let (stiction, dead_zone) = (state.errors.stiction, state.errors.dead_zone);
+        let mut end = *target;
+        for i in 0..6 {
+            if (target.0[i] - reported.0[i]).abs() < stiction {
+                end.0[i] = reported.0[i];
+            }
+            let here = state.stuck[i].unwrap_or(reported.0[i]);
+            state.stuck[i] = ((end.0[i] - here).abs() < dead_zone).then_some(here);
+        }
+        end
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -133,7 +181,7 @@ impl SharedCell {
 }
 
 /// Puts the ball out of reach, without a holder.
-fn remove_ball(cell: &mut Cell) {
+pub(super) fn remove_ball(cell: &mut Cell) {
     cell.place_ball(Point3::new(-9.0, 0.0, -0.1));
     cell.holder = None;
 }

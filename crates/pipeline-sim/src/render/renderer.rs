@@ -88,6 +88,10 @@ impl Renderer {
         &self.scene
     }
 
+    pub(crate) fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// Returns the last frame.
     pub(crate) fn frame(&self) -> &GrayImage {
         &self.image
