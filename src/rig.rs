@@ -30,7 +30,7 @@ pub struct Rig {
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
 }
 
-/// Reader of the arm's current joint angles.
+/// Reader of the current angles of the arm's links.
 type Pose = Arc<dyn Fn() -> Joints + Send + Sync>;
 
 /// Baud rate of VAL II's terminal line (8 data bits, no parity, one stop bit).
@@ -55,7 +55,7 @@ impl Rig {
         let around = cell.clone();
         emulator
             .attach_sensor(client_config.proximity_signal, move |joints| {
-                around.move_hand(joints)
+                around.move_hand(&around.links(joints))
             })
             .map_err(|fault| RigError::Serve(io::Error::other(fault.to_string())))?;
         let config = ServeConfig {
@@ -76,7 +76,9 @@ impl Rig {
             (server, line)
         };
         let name = line.name().to_owned();
-        let pose: Pose = Arc::new(move || server.with_emulator(|emulator| emulator.joints()));
+        let linked = cell.clone();
+        let pose: Pose =
+            Arc::new(move || linked.links(&server.with_emulator(|emulator| emulator.joints())));
         let arm = {
             let pose = Arc::clone(&pose);
             cell.with_jaws_of(connect(line, client_config)?, move || pose())
@@ -222,7 +224,8 @@ impl Rig {
         }
     }
 
-    /// Returns a closure that reads the arm's current joint angles.
+    /// Returns a closure that reads the current angles of the arm's links, which are those that it
+    /// reports unless the cell has other errors ([`SharedCell::set_errors`]).
     pub fn pose(&self) -> impl Fn() -> Joints + Send + Sync + use<> {
         let pose = Arc::clone(&self.pose);
         move || pose()

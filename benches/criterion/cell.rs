@@ -9,7 +9,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pipeline_sim::{
-    Ball, Cell, FeatureCamera, Recipe, Renderer, Scene, SharedCell, SimulatedArm, Workspace,
+    Ball, Cell, Errors, FeatureCamera, Recipe, Renderer, Scene, SharedCell, SimulatedArm, Workspace,
 };
 use puma_val2::{JointDelta, Manipulator};
 use rand::SeedableRng;
@@ -71,8 +71,13 @@ fn steps(c: &mut Criterion) {
     });
     let (cell, joints) = starts[0];
     let shared = SharedCell::new(cell);
+    let noisy = Errors {
+        feature_noise: 0.5,
+        ..Errors::none()
+    };
+    shared.set_errors(&noisy).expect("sound noise");
     let mut arm = SimulatedArm::new(shared.clone(), joints).expect("within limits");
-    let mut camera = FeatureCamera::new(shared, arm.pose(), 0.5, 3).expect("sound noise");
+    let mut camera = FeatureCamera::new(shared, arm.pose(), 3);
     let mut sign = 1.0;
     group.bench_function("arm and feature camera", |b| {
         b.iter(|| {

@@ -16,7 +16,7 @@ use grasp_agent::{
     SavedRun, Servo, ServoLaw as Law, ServoSettings, TaughtGoal,
 };
 use hough_heuristic::CircleDetector;
-use pipeline_sim::{ErrorLevel, MoveForm, Workspace};
+use pipeline_sim::{ErrorLevel, Errors, MoveForm, Workspace};
 use puma_grasp::{BallDetector, Rig, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -72,6 +72,12 @@ struct Options {
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', default_values_t = ErrorLevel::ALL)]
     levels: Vec<ErrorLevel>,
 
+    /// Odd errors beside the level's, separated by commas: zeros, gears, sag, drag, back-drag,
+    /// links, stiction, dead-zone, play, lag, slip (at the fifth ball), mirrored, roll, lens, noise,
+    /// missed, outliers; NAME=AMOUNT for another than the usual amount
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    odd: Vec<String>,
+
     /// Compare only controllers whose name contains this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
@@ -98,6 +104,9 @@ struct Options {
     logs: bool,
 }
 
+/// Ball of each controller, from 0, before which a camera slips.
+const SLIP_AT: u64 = 4;
+
 fn main() -> ExitCode {
     ended(run(&Options::parse()))
 }
@@ -111,6 +120,9 @@ fn run(options: &Options) -> Outcome {
     }
     let mut file = Table::create(options.out.join("comparison.csv"), Row::CSV_HEADER)?;
     let mut rows = Vec::new();
+    if !options.odd.is_empty() {
+        say!("odd errors: {}", options.odd.join(", "));
+    }
     say!("{}", Row::HEADER);
     let bar = progress_bar(
         (options.levels.len() * options.draws) as u64,
@@ -204,6 +216,10 @@ impl<'a> DrawnCell<'a> {
     /// Lets a controller go for all balls. A run that a fault of arm or camera ends has failed.
     fn runs(&self, name: &str, rival: &Rival, world: &mut World) -> Outcome<Vec<Counted>> {
         let (options, draw) = (self.options, self.draw);
+        let slips = options.odd.iter().any(|odd| odd.starts_with("slip"));
+        if slips {
+            *world = self.world()?;
+        }
         let controller = match rival {
             Rival::Hybrid => Box::new(self.taught_hybrid(name, world)?),
             _ => rival.controller(self.goal.as_ref()),
@@ -211,6 +227,9 @@ impl<'a> DrawnCell<'a> {
         let mut agent = Agent::with_controller(self.config.clone(), controller)?;
         let mut runs = Vec::new();
         for start in 0..options.starts as u64 {
+            if slips && start == SLIP_AT {
+                world.slip();
+            }
             let mut saved = SavedRun::before(&agent);
             let seed = seed_of(options.seed, &[3, draw, start]);
             let run = world.run(&mut agent, seed, &mut |event| saved.note(event));
@@ -234,6 +253,9 @@ impl<'a> DrawnCell<'a> {
                 Err(error) => {
                     self.report(name, &format!("ball {start}"), &*error);
                     *world = self.world()?;
+                    if slips && start >= SLIP_AT {
+                        world.slip();
+                    }
                     Counted::default()
                 }
             };
@@ -297,23 +319,34 @@ enum World {
     /// Features straight from the geometry, an arm that moves at once.
     Shortcut(Box<TrialCell>),
     /// Rendered frames, circle detection, VAL II on a line.
-    Chain(Box<Rig>, Box<dyn CircleDetector + Send>),
+    Chain(Box<Rig>, Box<dyn CircleDetector + Send>, Errors),
 }
 
 impl World {
     fn draw(options: &Options, level: ErrorLevel, seed: u64) -> Outcome<Self> {
+        let drawn = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let odd = options.odd.iter();
+        let errors = odd.fold(Ok(drawn), |errors, odd| errors?.with_odd(odd))?;
         if options.full_chain {
-            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let rig = rig_with_errors(level, &bright_ball_scene(), seed, &mut rng)?;
-            return Ok(Self::Chain(Box::new(rig), options.detector.build(seed)?));
+            let rig = rig_with_errors(&errors, &bright_ball_scene(), seed)?;
+            let detector = options.detector.build(seed)?;
+            return Ok(Self::Chain(Box::new(rig), detector, errors));
         }
-        let cell = TrialCell::draw(level, seed)?;
+        let cell = TrialCell::with_errors(errors)?;
         let cell = if options.grip {
             cell
         } else {
             cell.without_bodies()
         };
         Ok(Self::Shortcut(Box::new(cell)))
+    }
+
+    /// Lets the camera slip in its mount.
+    fn slip(&mut self) {
+        match self {
+            Self::Shortcut(cell) => cell.slip(),
+            Self::Chain(rig, _, errors) => rig.cell().with(|cell| errors.slip_camera(cell)),
+        }
     }
 
     /// Lets `agent` go for the ball that `seed` places; `None` if no ball can be seen.
@@ -325,7 +358,7 @@ impl World {
     ) -> Outcome<Option<Trial>> {
         let (rig, detector) = match self {
             Self::Shortcut(cell) => return Ok(cell.run(agent, seed, &mut |_, _| (), observe)?),
-            Self::Chain(rig, detector) => (rig, detector),
+            Self::Chain(rig, detector, _) => (rig, detector),
         };
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let Ok(ball) = ball_in_view(rig.cell(), &mut rng) else {

@@ -153,7 +153,7 @@ impl Place {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut scene = bright_ball_scene();
         scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
-        let rig = rig_with_errors(options.level, &scene, seed, &mut rng)?;
+        let rig = rig_with_errors(&options.level.draw(&mut rng), &scene, seed)?;
         Ok(Self::Chain(Box::new(rig), rng))
     }
 }

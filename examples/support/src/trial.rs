@@ -140,20 +140,16 @@ fn reach<C: Controller>(
     })
 }
 
-/// Starts an emulated controller, around whose arm the cell has errors of `level`. Of these only
-/// those of camera and ball apply: the emulated arm has no play.
+/// Starts an emulated controller, around whose arm the cell has these errors. All apply but the
+/// play and the encoder steps of the arm, and the noise of features: frames have noise of their own.
 ///
 /// # Errors
-/// Those of [`Rig::emulated`].
-pub fn rig_with_errors(
-    level: ErrorLevel,
-    scene: &Scene,
-    seed: u64,
-    rng: &mut Xoshiro256PlusPlus,
-) -> Outcome<Rig> {
+/// Those of [`Rig::emulated`], and the quantity that is out of range.
+pub fn rig_with_errors(errors: &Errors, scene: &Scene, seed: u64) -> Outcome<Rig> {
     let rig = Rig::emulated(false, scene, seed)?;
-    let wrong = level.draw(rng).apply(&rig.cell().get())?;
+    let wrong = errors.apply(&rig.cell().get())?;
     rig.cell().with(|cell| *cell = wrong);
+    rig.cell().set_errors(errors)?;
     Ok(rig)
 }
 
@@ -182,7 +178,14 @@ impl TrialCell {
     /// # Errors
     /// A camera that cannot be; none of the levels makes one.
     pub fn draw(level: ErrorLevel, seed: u64) -> Result<Self, QuantityError> {
-        let errors = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        Self::with_errors(level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed)))
+    }
+
+    /// Applies errors to the paper's cell.
+    ///
+    /// # Errors
+    /// The quantity that is out of range.
+    pub fn with_errors(errors: Errors) -> Result<Self, QuantityError> {
         Ok(Self {
             cell: errors.apply(&paper_cell())?,
             errors,
@@ -211,10 +214,22 @@ impl TrialCell {
         self
     }
 
+    /// Lets the camera slip in its mount by the slip of the errors.
+    pub fn slip(&mut self) {
+        self.errors.slip_camera(&mut self.cell);
+    }
+
+    /// Shares a cell that is wrong as this one is.
+    fn shared(&self, cell: Cell) -> SharedCell {
+        let shared = SharedCell::new(cell);
+        let set = shared.set_errors(&self.errors);
+        debug_assert!(set.is_ok(), "checked when they were applied");
+        shared
+    }
+
     /// Draws a ball that is in view from one of the search poses as the arm really takes them.
     fn sample_seen_ball(&self, rng: &mut Xoshiro256PlusPlus) -> Result<Option<Ball>, ArmError> {
-        let shared = SharedCell::new(self.cell);
-        let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
+        let mut arm = SimulatedArm::new(self.shared(self.cell), home())?;
         let mut pose = arm.pose();
         let mut stands = Vec::new();
         for search_pose in self.workspace.search_poses() {
@@ -285,16 +300,16 @@ impl TrialCell {
     ) -> Result<Option<Features>, ArmError> {
         const LOOKS: usize = 20;
         // The ball is shown between real jaws even where the hand has no bodies otherwise.
-        let shared = SharedCell::new(Cell {
+        let shared = self.shared(Cell {
             hand: HandShape::paper(),
             ..self.cell
         });
-        let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
+        let mut arm = SimulatedArm::new(shared.clone(), home())?;
         arm.move_to(from + *grip)?;
         let gripping = arm.pose()();
         shared.with(|cell| cell.place_ball(cell.tool_point(&gripping)));
         arm.move_to(from)?;
-        let mut camera = self.camera(shared, arm.pose(), seed)?;
+        let mut camera = FeatureCamera::new(shared, arm.pose(), seed);
         let looks = (0..LOOKS).map(|_| camera.look());
         let Some(seen) = looks.collect::<Option<Vec<Features>>>() else {
             return Ok(None);
@@ -302,21 +317,6 @@ impl TrialCell {
         let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / LOOKS as f64;
         let [x, y, r] = [mean(|f| f.x), mean(|f| f.y), mean(|f| f.r)];
         Ok(Some(Features { x, y, r }).filter(well_inside))
-    }
-
-    /// Returns a camera with the noise of the drawn errors.
-    fn camera<P: FnMut() -> Joints>(
-        &self,
-        cell: SharedCell,
-        pose: P,
-        seed: u64,
-    ) -> Result<FeatureCamera<P>, ArmError> {
-        let noise = self.errors.feature_noise;
-        FeatureCamera::new(cell, pose, noise, seed).map_err(|_| ArmError::Setting {
-            what: "the noise of the image features",
-            value: noise.to_string(),
-            allowed: "a finite number of zero or above",
-        })
     }
 
     /// Lets `agent` go for the ball that `seed` places among those in view from the search poses;
@@ -338,9 +338,9 @@ impl TrialCell {
         };
         let mut cell = self.cell;
         cell.place_ball(ball.centre);
-        let shared = SharedCell::new(cell);
-        let mut arm = SimulatedArm::with_errors(shared.clone(), home(), &self.errors)?;
-        let mut camera = self.camera(shared.clone(), arm.pose(), rng.random())?;
+        let shared = self.shared(cell);
+        let mut arm = SimulatedArm::new(shared.clone(), home())?;
+        let mut camera = FeatureCamera::new(shared.clone(), arm.pose(), rng.random());
         let mut pose = arm.pose();
         let mut eye = FeatureEye(|| {
             let joints = pose();

@@ -296,17 +296,17 @@ impl Errors {
 
     /// Returns the angles of the links of an arm whose encoders, less the play, read `read`.
     pub(crate) fn links(&self, read: &Joints) -> Joints {
-        let straight = Self::none();
-        let as_read = self.joint_zero == straight.joint_zero && self.gear == straight.gear;
-        if as_read && self.drag == straight.drag && self.sag == 0.0 {
+        let (zero, gear, drag) = (&self.joint_zero, &self.gear, &self.drag);
+        let off = zero.iter().chain(drag).copied().chain([self.sag]);
+        if off.chain(gear.map(|gear| gear - 1.0)).all(|off| off == 0.0) {
             return *read;
         }
         let from = Joints::from_degrees(ADJUSTED_DEGREES);
         let turned = |i: usize| read.0[i] - from.0[i];
-        let geared = |i: usize| from.0[i] + self.gear[i] * turned(i) + self.joint_zero[i];
+        let geared = |i: usize| from.0[i] + gear[i] * turned(i) + zero[i];
         let mut links = Joints(std::array::from_fn(geared));
-        links.0[1] += self.drag[0] * turned(2);
-        links.0[2] += self.drag[1] * turned(1);
+        links.0[1] += drag[0] * turned(2);
+        links.0[2] += drag[1] * turned(1);
         // At JT2 = 0 the upper arm is level; positive angles lower it.
         links.0[1] += self.sag * links.0[1].cos();
         links

@@ -4,12 +4,8 @@ use hough_heuristic::Features;
 use nalgebra::Vector3;
 use pipeline_sim::{Ball, Cell, Grasp, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
 
-fn rng(seed: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(seed)
-}
+use crate::rng;
 
 /// Cells with a ball that a search pose sees and the arm reaches, each with its goal pose.
 fn goals(count: usize) -> Vec<(Cell, Joints)> {

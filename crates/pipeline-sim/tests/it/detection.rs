@@ -3,8 +3,9 @@
 
 use hough_heuristic::{Acceptance, CircleDetector, Features, Heuristic, HeuristicConfig};
 use pipeline_sim::{Recipe, Renderer, Scene, Snapshot};
-use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::rng;
 
 /// Draws a snapshot of a recipe's, without its scene.
 fn drawn(name: &str, rng: &mut Xoshiro256PlusPlus) -> Snapshot {
@@ -17,7 +18,7 @@ fn drawn(name: &str, rng: &mut Xoshiro256PlusPlus) -> Snapshot {
 
 #[test]
 fn features_agree_with_rendering_and_detection() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut rng = rng(1);
     let mut renderer = Renderer::new(&Scene::laboratory(), 1);
     // The laboratory has other round things, and outlines off the axis are ellipses: several
     // circles, some tolerance.

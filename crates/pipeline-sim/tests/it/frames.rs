@@ -7,8 +7,8 @@ use pipeline_sim::{
     Shape, Shot, Thing, Workspace,
 };
 use puma_val2::{JointDelta, Joints};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::{at_goal, rng};
 
 /// A gray ball in perfectly even light over a white table, no noise, no blur: its edge is where the
 /// geometry says, or nowhere.
@@ -35,12 +35,6 @@ fn silhouette() -> Scene {
         },
         ..Scene::plain()
     }
-}
-
-fn cell_at_goal() -> (Cell, Joints) {
-    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-    let goal = cell.goal_pose(45.0).expect("within reach");
-    (cell, goal)
 }
 
 /// A minimal detector for such a ball: the half-level crossing along rays from a place inside, then
@@ -99,7 +93,7 @@ fn detect(frame: &GrayImage, inside: Point2<f64>, reach: f64) -> Option<(f64, f6
 /// The largest error of centre and of radius over many poses, the mean error of the radius, and how
 /// many were measured.
 fn errors(camera: Camera, seed: u64) -> (f64, f64, f64, usize) {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut rng = rng(seed);
     let mut renderer = Renderer::new(&silhouette(), 1);
     let (mut centre, mut radius, mut bias, mut count) = (0.0_f64, 0.0_f64, 0.0, 0);
     for _ in 0..30 {
@@ -173,7 +167,7 @@ fn roughness(frame: &GrayImage) -> (f64, f64) {
 
 #[test]
 fn defocus_motion_and_fields_leave_their_marks() {
-    let (cell, _) = cell_at_goal();
+    let (cell, _) = at_goal();
     let goal = Workspace::paper().search_poses()[3];
     let quiet = Sensor {
         read_noise: 0.0,
@@ -233,7 +227,7 @@ fn defocus_motion_and_fields_leave_their_marks() {
 
 #[test]
 fn noise_has_the_strength_asked_for() {
-    let (cell, goal) = cell_at_goal();
+    let (cell, goal) = at_goal();
     let even = Scene {
         lights: Vec::new(),
         ambient: 0.5,
@@ -271,7 +265,7 @@ fn noise_has_the_strength_asked_for() {
 
 #[test]
 fn impossible_scenes_and_poses_do_not_fail() {
-    let (mut cell, goal) = cell_at_goal();
+    let (mut cell, goal) = at_goal();
     let mut scene = Scene::laboratory();
     scene.lights.push(Light {
         toward: nalgebra::Vector3::zeros(),

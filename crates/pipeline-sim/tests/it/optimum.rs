@@ -3,8 +3,8 @@
 use hough_heuristic::Features;
 use pipeline_sim::{Ball, Cell, Workspace};
 use puma_val2::{JointDelta, Joints};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::rng;
 
 /// Returns the paper's moves of `JT2` and `JT3` together.
 fn moves() -> Vec<JointDelta> {
@@ -22,7 +22,7 @@ fn reached(f: &Features, _: &Joints) -> bool {
 
 #[test]
 fn goal_is_four_to_five_moves_from_the_search_poses() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut rng = rng(1);
     let (workspace, moves) = (Workspace::paper(), moves());
     let nominal = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (mut total, mut starts) = (0, 0);

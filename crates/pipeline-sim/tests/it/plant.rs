@@ -1,18 +1,10 @@
-//! The cell as a plant: errors, play, grasps, pushes and moving balls.
+//! The cell as a plant: grasps and pushes.
 
 use nalgebra::{Point3, Vector3};
-use pipeline_sim::{
-    Ball, Cell, ErrorLevel, Errors, FeatureCamera, Grasp, SharedCell, SimulatedArm, Workspace,
-};
-use puma_val2::{Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+use pipeline_sim::{Ball, Cell, Grasp, SharedCell, SimulatedArm, Workspace};
+use puma_val2::{Gripper, JointDelta, Manipulator, ProximitySensor};
 
-fn at_goal() -> (Cell, Joints) {
-    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-    let goal = cell.goal_pose(45.0).expect("within reach");
-    (cell, goal)
-}
+use crate::{at_goal, rng};
 
 fn swing() -> JointDelta {
     JointDelta::from_degrees([0.0, 0.0, 0.0, 0.0, -18.01, 0.0])
@@ -176,32 +168,6 @@ fn ball_off_its_holder_is_pushed_without_it() {
         assert!(aside.sweep(&there, &there) > 0.005);
         assert_eq!(aside.holder, Some(holder), "the holder stays where it is");
     }
-    // With another ball than one believes the holder still carries it.
-    let bigger = Errors {
-        radius_factor: 1.2,
-        ..Errors::none()
-    };
-    let wrong = bigger.apply(&at_goal().0).expect("sound errors");
-    assert!(wrong.holder.expect("on a holder").carries(&wrong.ball));
-}
-
-#[test]
-fn impossible_play_and_encoders_are_refused_by_name() {
-    let start = Workspace::paper().search_poses()[2];
-    let arm =
-        |errors: Errors| SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors);
-    for bad in [f64::INFINITY, f64::NAN, -0.001, 4.0] {
-        let mut errors = Errors::none();
-        errors.encoder_step[3] = bad;
-        let refused = arm(errors).expect_err("no such encoder").to_string();
-        assert!(refused.contains("the encoder step of JT4"), "{refused}");
-        let errors = Errors {
-            backlash: bad,
-            ..Errors::none()
-        };
-        let refused = arm(errors).expect_err("no such gear").to_string();
-        assert!(refused.contains("the backlash"), "{refused}");
-    }
 }
 
 #[test]
@@ -281,129 +247,6 @@ fn arm_pushes_the_ball_out_of_its_way() {
 }
 
 #[test]
-fn reported_and_real_joints_differ_by_play_and_counts() {
-    let errors = Errors {
-        backlash: 0.2_f64.to_radians(),
-        ..ErrorLevel::Moderate.draw(&mut rng(1))
-    };
-    let start = Workspace::paper().search_poses()[2];
-    let mut arm = SimulatedArm::with_errors(SharedCell::new(at_goal().0), start, &errors)
-        .expect("within limits");
-    let mut pose = arm.pose();
-    let step = |arm: &mut SimulatedArm, degrees: f64| {
-        let delta = JointDelta::from_degrees([0.0, degrees, 0.0, 0.0, 0.0, 0.0]);
-        arm.move_by(delta).expect("within limits").degrees()[1]
-    };
-    let up = step(&mut arm, 2.0);
-    let behind = up - pose().degrees()[1];
-    assert!(
-        (behind - 0.1).abs() < 0.005,
-        "the links hang back by half the play: {behind}"
-    );
-    let back = step(&mut arm, -0.15);
-    assert!(
-        (pose().degrees()[1] - (up - behind)).abs() < 1e-9,
-        "inside the play nothing moves"
-    );
-    let counts = back / Errors::PUMA_ENCODER_DEGREES[1];
-    assert!(
-        (counts - counts.round()).abs() < 1e-6,
-        "whole counts: {counts}"
-    );
-}
-
-fn rng(seed: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(seed)
-}
-
-#[test]
-fn error_levels_are_drawn_from_a_seed_and_make_the_cell_wrong() {
-    let (cell, goal) = at_goal();
-    for level in ErrorLevel::ALL {
-        assert_eq!(level.draw(&mut rng(3)), level.draw(&mut rng(3)));
-        assert_eq!(level.to_string().parse::<ErrorLevel>(), Ok(level));
-        let mut worst: f64 = 0.0;
-        for seed in 0..20 {
-            let wrong = level
-                .draw(&mut rng(seed))
-                .apply(&cell)
-                .expect("sound errors");
-            if let Ok(f) = wrong.features(&goal) {
-                worst = worst
-                    .max((f.x - 103.5).hypot(f.y - 78.0))
-                    .max((f.r - 33.0).abs());
-            }
-        }
-        match level {
-            ErrorLevel::None => assert!(worst < 0.2),
-            _ => assert!(worst > 5.0, "{level}: {worst}"),
-        }
-    }
-    assert!("severe".parse::<ErrorLevel>().is_err());
-    assert!(
-        Errors {
-            focal_factor: 0.0,
-            ..Errors::none()
-        }
-        .apply(&cell)
-        .is_err()
-    );
-    assert!(
-        Errors {
-            radius_factor: -1.0,
-            ..Errors::none()
-        }
-        .apply(&cell)
-        .is_err()
-    );
-    assert!(
-        Errors {
-            yaw: f64::NAN,
-            ..Errors::none()
-        }
-        .apply(&cell)
-        .is_err()
-    );
-}
-
-#[test]
-fn feature_camera_adds_noise_to_the_cells_features() {
-    let (cell, goal) = at_goal();
-    let shared = SharedCell::new(cell);
-    let arm = SimulatedArm::new(shared.clone(), goal).expect("within limits");
-    let mut exact = FeatureCamera::new(shared.clone(), arm.pose(), 0.0, 1).expect("no noise");
-    assert_eq!(exact.look(), cell.features(&goal).ok());
-    let mut noisy = FeatureCamera::new(shared, arm.pose(), 0.5, 1).expect("noise");
-    let spread = (0..2000)
-        .map(|_| (noisy.look().expect("in sight").r - 33.0).powi(2))
-        .sum::<f64>()
-        / 2000.0;
-    assert!((spread.sqrt() - 0.5).abs() < 0.05, "{spread}");
-}
-
-#[test]
-fn errors_of_the_mount_are_named() {
-    type Spoil = fn(&mut Errors);
-    let (cell, _) = at_goal();
-    let spoil: [(&str, Spoil); 6] = [
-        ("roll", |e| e.roll = f64::NAN),
-        ("pitch", |e| e.pitch = f64::INFINITY),
-        ("yaw", |e| e.yaw = f64::NAN),
-        ("along its x axis", |e| e.camera_shift[0] = f64::NAN),
-        ("along its y axis", |e| e.camera_shift[1] = f64::NAN),
-        ("along its z axis", |e| {
-            e.camera_shift[2] = f64::NEG_INFINITY;
-        }),
-    ];
-    for (named, spoil) in spoil {
-        let mut errors = Errors::none();
-        spoil(&mut errors);
-        let refused = errors.apply(&cell).expect_err("not finite").to_string();
-        assert!(refused.contains(named), "{named}: {refused}");
-    }
-}
-
-#[test]
 fn long_hand_meets_the_ball_on_its_way() {
     // Fingers half a metre long: they reach the ball where the wrist stays far from it.
     let mut cell = Cell::paper(Ball::at(0.6, 0.1, -0.1));
@@ -419,24 +262,4 @@ fn long_hand_meets_the_ball_on_its_way() {
     let ball = cell.ball.centre;
     assert!(cell.sweep(&turned(-12.0), &turned(12.0)) > 0.0);
     assert!(cell.ball.centre != ball);
-}
-
-#[test]
-fn noise_that_is_not_a_finite_amount_is_refused_by_name() {
-    let (cell, goal) = at_goal();
-    let shared = SharedCell::new(cell);
-    for noise in [-1.0, f64::NAN, f64::INFINITY] {
-        let camera = FeatureCamera::new(shared.clone(), || goal, noise, 1).expect_err("no noise");
-        let samples = cell
-            .sample_moves(5, noise, &mut rng(1))
-            .expect_err("no noise");
-        assert_eq!(camera.to_string(), samples.to_string());
-        assert!(camera.to_string().contains("noise"), "{camera}");
-    }
-    let refused = cell
-        .sample_moves(usize::MAX, 0.1, &mut rng(1))
-        .expect_err("too many");
-    assert!(refused.to_string().contains("at most"), "{refused}");
-    let (centering, reaching) = cell.sample_moves(5, 0.5, &mut rng(1)).expect("sound");
-    assert_eq!((centering.len(), reaching.len()), (5, 5));
 }

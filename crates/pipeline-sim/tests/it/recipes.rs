@@ -3,11 +3,11 @@
 use pipeline_sim::{
     Camera, QuantityError, Recipe, Renderer, Round, RoundOutline, Sensor, Snapshot,
 };
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::rng;
 
 fn drawn(name: &str, size: (u32, u32), seed: u64) -> (Renderer, Snapshot) {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut rng = rng(seed);
     let recipe = Recipe::named(name).expect("a recipe");
     recipe.draw(size, &mut rng).expect("a usable size")
 }
@@ -166,7 +166,7 @@ fn motion_blur_is_four_to_twelve_pixels() {
 
 #[test]
 fn frame_without_pixels_is_refused() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut rng = rng(1);
     for size in [(0, 576), (768, 0)] {
         let refused = Recipe::cell()[0]
             .draw(size, &mut rng)

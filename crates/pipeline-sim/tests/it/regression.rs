@@ -4,11 +4,11 @@ use hough_heuristic::Features;
 use pipeline_sim::{
     Ball, Cell, ErrorLevel, Errors, MoveForm, MoveModel, MoveSample, QuantityError,
 };
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+
+use crate::rng;
 
 fn samples(seed: u64, count: usize, noise: f64) -> (Vec<MoveSample>, Vec<MoveSample>) {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut rng = rng(seed);
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     cell.sample_moves(count, noise, &mut rng)
         .expect("sound noise")
@@ -223,7 +223,7 @@ fn samples_without_a_prediction_count_as_errors() {
 fn refit_learns_a_wrong_arm_from_few_moves() {
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let (centering, reaching) = samples(9, 1500, 0.125);
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(10);
+    let mut rng = rng(10);
     let heavy = ErrorLevel::Heavy.draw(&mut rng);
     let larger = Errors {
         radius_factor: 1.5,

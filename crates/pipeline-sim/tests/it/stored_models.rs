@@ -1,13 +1,13 @@
 //! Models stored through serde.
 
 use pipeline_sim::{Ball, Cell, MoveForm, MoveModel};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
 use serde_json::{Value, json};
+
+use crate::rng;
 
 /// Returns a model of each behaviour.
 fn models() -> [MoveModel; 2] {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut rng = rng(11);
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     let drawn = cell.sample_moves(300, 0.125, &mut rng);
     let (centering, reaching) = drawn.expect("sound noise");

@@ -5,19 +5,13 @@ use pipeline_sim::{
     Appearance, Ball, Cell, Distortion, Occluder, ProjectedEllipse, Recipe, Renderer, Round, Scene,
     Shape, Thing, Workspace,
 };
-use puma_val2::{JointDelta, Joints};
-use rand::SeedableRng;
-use rand::rngs::Xoshiro256PlusPlus;
+use puma_val2::JointDelta;
 
-fn cell_at_goal() -> (Cell, Joints) {
-    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-    let goal = cell.goal_pose(45.0).expect("within reach");
-    (cell, goal)
-}
+use crate::{at_goal, rng};
 
 #[test]
 fn truth_knows_what_hides_the_ball() {
-    let (cell, goal) = cell_at_goal();
+    let (cell, goal) = at_goal();
     let target = |scene: &Scene| {
         let truth = Renderer::new(scene, 1).truth(&cell, &goal);
         assert_eq!(truth[0].what, Round::Target);
@@ -64,7 +58,7 @@ fn truth_knows_what_hides_the_ball() {
 #[test]
 fn nearer_things_hide_farther_ones() {
     // A tall cylinder between the camera and a low ball on the table.
-    let (cell, _) = cell_at_goal();
+    let (cell, _) = at_goal();
     let pose = Workspace::paper().search_poses()[3];
     let appearance = Appearance {
         albedo: 0.5,
@@ -139,7 +133,7 @@ fn with_thing(shape: Shape, x: f64, y: f64) -> Scene {
 
 #[test]
 fn ball_over_a_box_hides_it_and_behind_it_is_hidden() {
-    let (mut cell, goal) = cell_at_goal();
+    let (mut cell, goal) = at_goal();
     cell.holder = None;
     let shape = Shape::Box {
         length: 0.10,
@@ -226,7 +220,7 @@ fn visible_share_is_the_counted_one_at_bent_borders() {
     let paper = pipeline_sim::Camera::paper();
     let bent = paper.with_distortion(lens).expect("does not fold");
     let small = paper.resized(192, 144).expect("a usable size");
-    let (cell, goal) = cell_at_goal();
+    let (cell, goal) = at_goal();
     let renderer = Renderer::new(&Scene::plain(), 1);
     for camera in [paper, small, bent] {
         let mut cell = cell;
@@ -279,7 +273,7 @@ fn visible_share_is_the_counted_one_at_bent_borders() {
 
 #[test]
 fn truth_of_distorted_frames_agrees_with_their_rays() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut rng = rng(3);
     let recipe = Recipe::named("distorted").expect("a recipe");
     let mut rows = 0;
     for _ in 0..2 {
