@@ -15,8 +15,8 @@
 //!   [`Manipulator`] and [`ProximitySensor`], the two narrow traits for programs that control an
 //!   arm.
 //!
-//! Angles are radians and lengths metres, but for names that end in `degrees` or `val`: VAL
-//! speaks degrees and millimetres. Joint angles are VAL's own, those that `WHERE` prints.
+//! Angles are radians and lengths metres. Names that end in `degrees` or `val` are the exception:
+//! they hold VAL's degrees and millimetres. Joint angles are VAL's own, those that `WHERE` prints.
 //!
 //! ```
 //! use puma_val2::{
@@ -45,34 +45,36 @@
 //!
 //! Checks come before the motion. A typed line is compared with its echo before it is ended, the
 //! values of a point with the controller's display of them, a program with its listing, and the two
-//! halves of `WHERE` with each other. Angles of the resident program are believed if they are those
-//! of the goal or are shown twice.
+//! halves of `WHERE` with each other. Angles from the resident program ([`Resident`]) are accepted
+//! if they are those of the goal or are shown twice.
 //!
 //! A call ends with the arm at its goal or with a typed [`ArmError`]. After an error the arm is
 //! stopped as far as the line allows it, and [`Val2Client::last_known`] is `None` where the last
 //! angles may be wrong. Every wait and every buffer is bounded.
 //!
-//! A line whose end does not come back is spoilt: an empty line would complete whatever its damaged
-//! end has made of it. Commands end with a blank, so that a doubled last character is harmless. A
-//! point must show the values of before when it is opened again, which proves its name.
+//! If the end of a line is not echoed, the client deletes the line or makes it invalid before it
+//! sends anything else: an empty line could carry out the damaged one. Commands end with a blank,
+//! so that a doubled last character is harmless. A point that is opened again must show its earlier
+//! values, which proves that its name arrived undamaged. A program that asks for values is
+//! cancelled, since it might take an empty line for zeros.
 //!
-//! A controller that echoes nothing leaves a bare line unchecked: [`MoveWay::Automatic`] and
-//! [`Val2Client::move_hand`] then move by `POINT`, whose display is compared, and a stored program,
-//! and motions by `DRIVE` or `#PPOINT` are refused.
+//! Without an echo a single line cannot be checked. [`MoveWay::Automatic`] and
+//! [`Val2Client::move_hand`] then move by `POINT`, whose display is compared, and a stored program.
+//! Motions by `DRIVE` or `#PPOINT` are refused.
 //!
-//! [`Val2Client::arm_proximity`] lets the controller itself stop the arm on a signal. While it is
-//! armed every motion is guarded or refused, and a short pulse is not overlooked: the program that
-//! it calls keeps it in a variable.
+//! [`Val2Client::arm_proximity`] lets the controller itself stop the arm on a signal. While this
+//! guard is armed, every motion is guarded or refused. A short pulse counts too: the program that
+//! the signal calls records it in a variable.
 //!
-//! `cargo test --test it faults -- --nocapture` damages, loses and doubles each character of each
-//! kind of call, cuts and closes the line there, and counts the faults recovered from and reported.
-//! A program that asks for values is cancelled before it is answered with an empty line, which it
-//! might take for zeros.
+//! `cargo test -p puma-val2 --test it faults -- --nocapture` damages, loses and doubles each
+//! character of each kind of call, cuts and closes the line there, and counts the faults recovered
+//! from and reported.
 //!
 //! # Cost of a move
 //!
 //! At 9600 baud a character takes a millisecond. Measured on the emulator with a paced line and an
-//! arm that takes no time (`cargo test --test it budget -- --nocapture`), each move confirmed:
+//! arm that takes no time (`cargo test -p puma-val2 --test it budget -- --nocapture`), each move
+//! confirmed; *quiet* is [`ClientConfig::quiet`]:
 //!
 //! | a move of | characters sent | received | moves per second, 30 ms quiet | 5 ms quiet |
 //! |---|---|---|---|---|
@@ -85,10 +87,10 @@
 //! | three joints, resident program | 23 | 72 | 9.3 | 12.2 |
 //!
 //! `WHERE` alone is 230 of the characters received. [`MoveWay::Automatic`] takes `DRIVE` for one
-//! joint, `#PPOINT` for several, and `POINT` where the controller does not know `#PPOINT`; `DRIVE`
-//! for several joints adds up their times. [`Val2Client::resident`] puts a small program into the
-//! controller that answers each move with the joint angles reached; it can neither be guarded nor
-//! checked without an echo.
+//! joint, `#PPOINT` for several, and `POINT` where the controller does not know `#PPOINT`. `DRIVE`
+//! moves several joints one after the other. [`Val2Client::resident`] puts a small program into the
+//! controller that answers each move with the joint angles reached. It needs an echo, and no
+//! proximity guard can watch it.
 //!
 //! # Limitations
 //!
@@ -98,8 +100,9 @@
 //! * The emulated servos follow exactly: no dynamics in the motion, no collision, no servoed hand.
 //! * Successive motions of an emulated program stop at every via point.
 //! * The supervisory port (DDCMP) and `ALTER` are missing.
-//! * A client waits until its call is done; [`Manipulator::stop`] cannot be called meanwhile: an
-//!   emergency stop is a button, not a program.
+//! * A client waits until its call is done, and [`Manipulator::stop`] cannot be called meanwhile.
+//!   [`Val2Client::stop_on`] stops the arm over any line, from a fresh process too. Neither
+//!   replaces the emergency stop, which is a button.
 
 mod client;
 mod emulator;

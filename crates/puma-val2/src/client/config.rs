@@ -22,8 +22,8 @@ pub struct ClientConfig {
     /// Longest time for finding a prompt in [`Val2Client::connect`](super::Val2Client::connect)
     /// (default: 10 s); loading from a floppy takes longer.
     pub connect_timeout: Duration,
-    /// Monitor speed set by `connect`, percent, above 0 to 327 (default: none, `connect` leaves it
-    /// as it is).
+    /// Monitor speed set by `connect`, percent, above 0, at most 327.67 (default: none, `connect`
+    /// leaves it as it is).
     pub speed_percent: Option<f64>,
     /// Greatest distance of a joint from its goal that counts as reached, radians (default: 0.05
     /// degrees). A PUMA 560 stands at encoder counts up to 0.009 degrees apart; less than 0.01
@@ -42,11 +42,11 @@ pub struct ClientConfig {
     /// Answer to a start-up question that speaks of initializing, which erases programs and
     /// locations (default: no).
     pub initialize: bool,
-    /// Makes `connect` abort a program that runs, or asks for values (default: no). A running
-    /// program leaves the position to be read; moves are refused.
+    /// Makes `connect` abort a program that runs or asks for values (default: no). While a program
+    /// runs, the position can be read and moves are refused.
     pub abort_running_program: bool,
-    /// The controller understands Ctrl-C, Ctrl-Q and Ctrl-U (default: yes). Otherwise they are not
-    /// sent.
+    /// `true` if the controller understands Ctrl-C, Ctrl-Q and Ctrl-U (default: yes). Otherwise
+    /// they are not sent.
     pub control_characters: bool,
     /// Number of further tries of `calibrate` while arm power is off (default: 0).
     pub power_retries: usize,

@@ -4,8 +4,8 @@
 /// out. Ctrl-Q comes first: a flipped bit can make a Ctrl-S, which holds all output.
 pub(super) const SPOIL: &[u8] = b"\x11\x15!!\r";
 
-/// Stops the arm and a program, without a prompt. The first `PANIC` may end a half-typed line, which
-/// it spoils.
+/// Stops the arm and a program, without a prompt. The first `PANIC` may be appended to a half-typed
+/// line, which it makes invalid.
 pub(super) const STOP: &[u8] = b"\x11PANIC\rPANIC\r\x03";
 
 /// Asks for the prompt.

@@ -45,7 +45,7 @@ impl Means {
 #[derive(Debug)]
 pub(super) struct Doubt {
     pub(super) error: ArmError,
-    /// The motion had all its time and was stopped.
+    /// The time of the motion ran out and it was stopped.
     pub(super) overdue: bool,
 }
 
@@ -186,7 +186,7 @@ impl<T: Transport> Val2Client<T> {
         is_doubt(error) || !self.wire.checks_echo() && names_no_place(error)
     }
 
-    /// Refuses a motion by one line that nothing can be compared with.
+    /// Refuses a motion by a single line, `DRIVE` or `#PPOINT`, whose echo is not checked.
     fn check_means(&self, means: Means) -> Result<(), ArmError> {
         let one_line = matches!(means, Means::Drive(_) | Means::Ppoint);
         if !one_line || self.wire.checks_echo() {
@@ -212,8 +212,8 @@ impl<T: Transport> Val2Client<T> {
         Ok(true)
     }
 
-    /// Returns the doubt that a motion was commanded in, if any. Afterwards the monitor has its
-    /// prompt again, or the arm has been told to stop.
+    /// Returns the doubt that the command of a motion has left, if any. Afterwards the monitor
+    /// shows its prompt again, or the arm has been told to stop.
     pub(super) fn doubt(
         &mut self,
         outcome: Result<(), Failed>,

@@ -106,8 +106,8 @@ impl<T: Transport> Val2Client<T> {
         self.put_in_place(name, NEW)
     }
 
-    /// Gives the program `new` the name `name`. At every moment the one of before or the new one
-    /// is there.
+    /// Renames the program `new` to `name`, replacing the old program of that name. At every moment
+    /// the old program or the new one exists.
     pub(super) fn put_in_place(&mut self, name: &str, new: &str) -> Result<(), ArmError> {
         let known = self.programs()?;
         let is_there = |wanted: &str| known.iter().any(|name| name.eq_ignore_ascii_case(wanted));

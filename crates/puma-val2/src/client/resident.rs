@@ -56,9 +56,9 @@ const QUESTION: &str = "the program's question";
 /// reached. Angles are absolute, so that a move can be commanded again after doubt. The program
 /// ends with [`Resident::end`] or when this is dropped.
 ///
-/// One line shows the angles once, and nothing else with it that would betray a changed digit. They
-/// are believed when they are those that the arm was sent to; otherwise the program is asked until
-/// it shows the same twice in a row.
+/// An answer shows the angles only once, so that a changed digit would not be noticed. The angles
+/// are accepted if they are those that the arm was sent to; otherwise the program is asked until it
+/// shows the same ones twice in a row.
 ///
 /// A motion that the controller refuses ends the program, and so does a restart or a line that is
 /// lost in mid-move. Every further call is then an [`ArmError::Setting`];
@@ -150,8 +150,8 @@ impl<T: Transport> Resident<'_, T> {
         })
     }
 
-    /// Gives the program a line until it has answered with its question again, and returns what it
-    /// said before. Nothing in a line is relative.
+    /// Sends a line to the program until it asks its question again, and returns its output before
+    /// the question. Repeating a line is safe, since all angles in it are absolute.
     fn give(&mut self, answer: &str) -> Result<Reply, ArmError> {
         self.check_alive()?;
         let mut tries = 0;
@@ -186,7 +186,7 @@ impl<T: Transport> Resident<'_, T> {
         }
     }
 
-    /// Waits until the program asks again, or is no more.
+    /// Waits until the program asks its question again or has ended.
     fn regain(&mut self) -> Result<Ending, ArmError> {
         let limit = self.client.longest_motion();
         let wire = &mut self.client.wire;
@@ -212,8 +212,8 @@ impl<T: Transport> Resident<'_, T> {
         Err(self.client.wire.garbled(answer, "six joint angles", &heard))
     }
 
-    /// Returns the angles that the program shows twice in a row. The arm moves only while a line
-    /// that says so is answered.
+    /// Returns the angles that the program shows twice in a row. The arm moves only between a line
+    /// with a move and its answer.
     fn stands(&mut self, mut before: Option<Joints>) -> Result<Joints, ArmError> {
         for _ in 0..self.client.wire.config.retries.saturating_add(3) {
             let joints = self.ask(WHERE)?;

@@ -132,7 +132,7 @@ impl<T: Transport> Val2Client<T> {
         }
     }
 
-    /// Sets the monitor's speed in percent, above 0 to 327.67.
+    /// Sets the monitor's speed in percent, above 0, at most 327.67.
     ///
     /// # Errors
     /// [`ArmError::Setting`] before anything is sent; otherwise errors of the line or the

@@ -219,7 +219,7 @@ impl<T: Transport> Wire<T> {
         Ok(false)
     }
 
-    /// Reads away unasked output and keeps its messages.
+    /// Discards output that no command asked for, and keeps the messages in it as notices.
     fn take_unasked(&mut self) -> Result<(), ArmError> {
         let mut reader = self.reader();
         // A line that never falls silent is left to the echo check.

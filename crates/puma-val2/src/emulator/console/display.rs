@@ -87,7 +87,7 @@ pub(crate) fn place_heading(profile: &Profile) -> String {
         .concat()
 }
 
-/// Returns the six values of a location below that heading.
+/// Returns the six values of a location, to be printed below [`place_heading`].
 pub(crate) fn place_values(place: &Place, profile: &Profile) -> String {
     let values = place.val();
     let lengths = matches!(place, Place::Transformation(_));
