@@ -26,7 +26,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Returns the workspace used throughout: 500..800 mm from the waist axis, azimuth -70..70
+    /// Returns the workspace of the paper's cell: 500..800 mm from the waist axis, azimuth -70..70
     /// degrees, 200 mm below to 50 mm above the shoulder; search poses (p, -110, 210, 0, 45, 0)
     /// with p from -75 to 50 in steps of 25 degrees.
     pub fn paper() -> Self {

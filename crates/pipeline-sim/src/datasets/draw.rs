@@ -22,7 +22,7 @@ pub(super) struct CellRecipe {
     pub(super) things: usize,
     /// Taller cylinders.
     pub(super) tall: bool,
-    /// Change of the scene.
+    /// Function that changes the drawn scene.
     pub(super) change: fn(&mut Scene, &mut dyn Rng),
     /// A lens with barrel distortion.
     pub(super) barrel: bool,

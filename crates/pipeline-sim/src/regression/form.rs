@@ -2,8 +2,8 @@
 
 use hough_heuristic::Features;
 
-/// The quantities that a [`MoveModel`](crate::MoveModel) predicts, and the terms it predicts them
-/// from.
+/// The quantities that a [`MoveModel`](crate::MoveModel) predicts, and the terms that each of them
+/// is a linear combination of.
 ///
 /// With d1, d2, d3 the moves of `JT1`, `JT2`, `JT3` in degrees, a = d2 / 20, b = d3 / 16, Z =
 /// 33 / r, V = (y - 72) / r, E = (`JT3` - 140) / 40 before the move. In the arm's plane (Z, V) is,
@@ -14,24 +14,26 @@ use hough_heuristic::Features;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum MoveForm {
-    /// Centering: change of x on 1, d1, r d1. A near ball moves farther in the image.
+    /// Centering: change of x from the terms 1, d1 and r d1. A near ball moves farther in the
+    /// image.
     Centering,
-    /// Change of x on 1, d1: the paper's linear regression. It leaves a fifth of the variance
-    /// unexplained.
+    /// Centering: change of x from the terms 1 and d1, the paper's linear regression. It leaves a
+    /// fifth of the variance unexplained.
     CenteringLinear,
-    /// Approaching: changes of y and r on 1, d2, d3: the paper's linear regression, per elbow
-    /// interval.
+    /// Approaching: changes of y and r from the terms 1, d2 and d3, the paper's linear regression,
+    /// per elbow interval.
     Linear,
-    /// Changes of Z and V on 1, a, b, Za, Zb, Va, Vb, Ea.
+    /// Approaching: changes of Z and V from the terms 1, a, b, Za, Zb, Va, Vb, Ea.
     Rigid8,
-    /// Changes of Z and V on 1, and a, b, a², ab, b² each times 1, Z, V, E, and E²a.
+    /// Approaching: changes of Z and V from 22 terms: 1; each of a, b, a², ab, b² times each of 1,
+    /// Z, V, E; E²a.
     #[default]
     Rigid22,
-    /// Changes of Z and V on the twelve products that a rigid motion of a two-joint arm consists
-    /// of. With c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e = `JT3`, they
-    /// are (c23 minus 1) and s23 times Z and V; (c3 minus c23) and (s3 minus s23) times 1, cos e,
-    /// sin e; 1 minus c3; s3. No further terms exist: the residual is the outline's slight
-    /// ellipticity.
+    /// Approaching: changes of Z and V from the twelve terms that a rigid motion of a two-joint arm
+    /// consists of. With c, s cosine and sine of d3 (index 3) and d2 + d3 (index 23), and e =
+    /// `JT3`, they are (c23 minus 1) and s23 times Z and V; (c3 minus c23) and (s3 minus s23) times
+    /// 1, cos e, sin e; 1 minus c3; s3. No further terms exist: the residual is the outline's
+    /// slight ellipticity.
     RigidBody,
 }
 

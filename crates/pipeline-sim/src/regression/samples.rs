@@ -95,13 +95,14 @@ impl Cell {
         })
     }
 
-    /// Draws `count` samples of moves of `JT1`, and as many of moves of `JT2` and `JT3`, each from a
-    /// [`Cell::exploring_start`] of its own and with a random move of the paper's lists; kept if
-    /// the arm stays within its working limits and the ball in sight.
+    /// Draws `count` samples of moves of `JT1` (centering), and as many of moves of `JT2` and `JT3`
+    /// (approaching); returns them in this order. Each sample has its own
+    /// [`Cell::exploring_start`] and a random move of the paper's lists. It is kept if the arm
+    /// stays within its working limits and the ball in sight.
     ///
-    /// Features carry normal noise of standard deviation `noise` units. In a cell in which nothing
-    /// can be seen or reached the lists are short. 100 000 samples of each kind take about a second
-    /// and 13 MB.
+    /// Features carry normal noise of standard deviation `noise` feature units. The lists are
+    /// shorter in a cell in which nothing can be seen or reached. 100 000 samples of each kind take
+    /// about a second and 13 MB.
     ///
     /// # Errors
     /// [`QuantityError::Value`] for noise that is not a finite number of zero or above, and for

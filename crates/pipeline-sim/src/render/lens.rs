@@ -6,19 +6,20 @@ use nalgebra::{Point2, Vector2};
 use crate::cell::camera::Camera;
 use crate::render::canvas::Canvas;
 
-/// Pixels, at most, from one place to the next at which a distortion is undone exactly; and parts
-/// of the focal length.
+/// Largest distance of the places at which a distortion is undone exactly: pixels, and parts of the
+/// focal length.
 const STEP: (f64, f64) = (16.0, 1.0 / 60.0);
-/// Greatest distance of places between which pixels of a row are interpolated linearly.
+/// Largest distance of the places in a row between which pixels are interpolated linearly: pixels,
+/// and parts of the focal length.
 const RUN: (f64, f64) = (WHOLE_RUN as f64, 1.0 / 250.0);
 const WHOLE_RUN: usize = 4;
 
 /// The map from a distorted frame to the ideal one it is taken from.
 ///
-/// A distortion is undone exactly on a coarse grid. Between, cubic polynomials tell where every
-/// fourth pixel of every row comes from (every one in small frames), and those that follow lie on a
-/// straight line to the next: in all within .005 pixels of the exact place for lenses whose corners
-/// move by up to a tenth of the frame's width.
+/// A distortion is undone exactly on a coarse grid. Cubic polynomials between its places give the
+/// source of every fourth pixel of every row (of every pixel in small frames). The sources of the
+/// other pixels are interpolated linearly. The result is within 0.005 pixels of the exact place for
+/// lenses that move the corners by up to a tenth of the frame's width.
 #[derive(Clone, Debug)]
 pub(super) struct Warp {
     camera: Camera,
@@ -33,8 +34,9 @@ pub(super) struct Warp {
 }
 
 impl Warp {
-    /// Returns `None` for a camera without distortion. Otherwise the ideal frame is larger, by less
-    /// than a factor of three for a radial distortion that does not fold.
+    /// Creates the map for a camera; `None` for a camera without distortion. The ideal
+    /// (undistorted) frame is larger than the distorted one: less than three times as wide for a
+    /// radial distortion that does not fold.
     pub(super) fn new(camera: &Camera) -> Option<Self> {
         if camera.distortion().is_none() {
             return None;

@@ -135,9 +135,9 @@ pub struct Occluder {
     pub from: Point2<f64>,
     /// The other end.
     pub to: Point2<f64>,
-    /// Width.
+    /// Width, feature units.
     pub width: f64,
-    /// Width of its blurred edges.
+    /// Width of its blurred edges, feature units.
     pub softness: f64,
     /// Reflectance.
     pub albedo: f64,
@@ -226,8 +226,8 @@ impl Scene {
         }
     }
 
-    /// Returns the scene used throughout: a wooden table under two lamps, with boxes, cylinders,
-    /// discs, another ball, print and tape.
+    /// Returns the scene of the examples and benchmarks: a wooden table under two lamps, with
+    /// boxes, cylinders, discs, another ball, print and tape.
     pub fn laboratory() -> Self {
         /// Shape, x and y (m), turn (degrees), reflectance, texture.
         type Row = (Shape, f64, f64, f64, f64, f64);

@@ -41,9 +41,9 @@ struct Cast {
 /// The light on the table without ball and holder: stains, and the shadows of things.
 #[derive(Clone, Debug)]
 pub(super) struct ThingShadows {
-    /// Map without the things.
+    /// Values of the map without the things.
     bare: Vec<f32>,
-    /// Map with them.
+    /// Map with the shadows of the things.
     map: CoarseMap,
     /// Shadow of each thing; `None` for flat things and those off the map.
     casts: Vec<Option<Cast>>,
@@ -52,8 +52,8 @@ pub(super) struct ThingShadows {
 }
 
 impl ThingShadows {
-    /// Darkens `stains` where things keep the lamps' light off the table, and a little around their
-    /// feet.
+    /// Creates the map from `stains`, darkened in the shadows of the things and a little around
+    /// their feet.
     pub(super) fn new(stains: CoarseMap, scene: &Scene) -> Self {
         let things = scene.things.iter();
         let mut shadows = Self {
@@ -117,7 +117,7 @@ impl ThingShadows {
     }
 }
 
-/// Returns what two ranges have in common.
+/// Returns the intersection of two ranges.
 fn shared(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     a.start.max(b.start)..a.end.min(b.end)
 }

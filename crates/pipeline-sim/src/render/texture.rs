@@ -24,7 +24,7 @@ struct Level {
     values: Vec<u8>,
 }
 
-/// Texels of a strip's row, and its length in memory.
+/// Columns of a strip, and the length of its row in memory, texels.
 const STRIP: u32 = 64;
 const PITCH: u32 = STRIP + 8;
 /// Flags of a place that is half a texel further along u, along v.
@@ -306,7 +306,7 @@ impl CoarseMap {
         }
     }
 
-    /// Returns the place of entry (i, j), metres.
+    /// Returns the position on the table of the entry in column `i` and row `j`, metres.
     pub(super) fn place(&self, i: usize, j: usize) -> (f64, f64) {
         let (step, (x, y)) = (self.size / (self.side - 1) as f64, self.corner);
         (x + i as f64 * step, y + j as f64 * step)
