@@ -291,6 +291,7 @@ pub(super) fn check_line(what: &'static str, text: &str) -> Result<(), ArmError>
 
 /// Returns a line of a listing without the number of its step.
 fn without_number(line: &str) -> &str {
+    let line = line.trim();
     let rest = line.trim_start_matches(|c: char| c.is_ascii_digit());
     match rest.strip_prefix('.') {
         Some(step) if rest.len() < line.len() => step.trim(),

@@ -99,11 +99,12 @@ pub(super) fn messages(reply: &str) -> Vec<String> {
 
 /// Returns the lines that a reply says, without blank ones, the echo of `line` and the prompt.
 pub(super) fn lines_said(reply: &str, line: &str) -> Vec<String> {
-    let mut lines: Vec<&str> = reply.split(['\r', '\n']).map(str::trim).collect();
+    let mut lines: Vec<&str> = reply.split(['\r', '\n']).map(str::trim_end).collect();
     // The prompt or the question.
     lines.pop();
     let is_echo = |l: &&str| {
-        l.trim_start_matches(['.', '*'])
+        l.trim()
+            .trim_start_matches(['.', '*'])
             .eq_ignore_ascii_case(line.trim())
     };
     let echo = lines.iter().position(is_echo);

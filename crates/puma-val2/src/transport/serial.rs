@@ -57,7 +57,8 @@ fn open(path: &str, baud: u32) -> io::Result<SerialPort> {
     use rustix::termios::{ioctl_tiocexcl, isatty};
 
     let in_use = |_| {
-        let why = "another program holds the port: end that program first";
+        let who = holder(path).unwrap_or_else(|| "another program".to_owned());
+        let why = format!("{who} holds the port: end that program first");
         io::Error::new(io::ErrorKind::ResourceBusy, why)
     };
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -76,6 +77,21 @@ fn open(path: &str, baud: u32) -> io::Result<SerialPort> {
     configure(&mut settings, baud)?;
     port.set_configuration(&settings)?;
     Ok(port)
+}
+
+/// Returns the name and number of the process that has locked a file, where Linux tells.
+#[cfg(unix)]
+fn holder(path: &str) -> Option<String> {
+    use std::os::unix::fs::MetadataExt;
+
+    let file = format!(":{}", std::fs::metadata(path).ok()?.ino());
+    let locks = std::fs::read_to_string("/proc/locks").ok()?;
+    // `1: FLOCK ADVISORY WRITE 1234 00:18:5 0 EOF`
+    let of_file = |words: &Vec<&str>| words.get(1) == Some(&"FLOCK") && words[5].ends_with(&file);
+    let lines = locks.lines().map(|line| line.split_whitespace().collect());
+    let process = lines.filter(|w: &Vec<&str>| w.len() > 5).find(of_file)?[4];
+    let name = std::fs::read_to_string(format!("/proc/{process}/comm")).ok()?;
+    Some(format!("`{}` (process {process})", name.trim()))
 }
 
 #[cfg(not(unix))]

@@ -29,6 +29,8 @@ mod emulator_robustness;
 mod faults;
 mod interpreter;
 mod oracles;
+#[cfg(all(unix, feature = "cli"))]
+mod owner;
 mod profiles;
 #[cfg(feature = "cli")]
 mod program;

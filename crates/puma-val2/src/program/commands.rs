@@ -1,0 +1,398 @@
+//! Subcommands that need the monitor.
+
+use std::fs;
+use std::io::{self, IsTerminal, Read, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::client::{ClientConfig, Location, Val2Client};
+use crate::error::ArmError;
+use crate::joints::{Joint, Joints};
+use crate::kinematics::xyzoat::Xyzoat;
+use crate::manipulator::{Gripper, Manipulator};
+use crate::program::failure::Failure;
+use crate::program::files::write_whole;
+use crate::program::keys;
+use crate::program::link::Link;
+use crate::program::{Command, Globals};
+
+pub(super) type Client<'a> = Val2Client<&'a mut Link>;
+
+impl Command {
+    /// Returns the speed of a command that moves the arm.
+    fn speed(&self) -> Option<f64> {
+        match self {
+            Self::Jog { speed, .. } | Self::Move { speed, .. } | Self::Run { speed, .. } => {
+                Some(speed.percent)
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns `true` if the arm may move.
+    pub(super) fn moves(&self) -> bool {
+        let by_line = |line: &[String]| {
+            let word = line.join(" ").trim().to_ascii_uppercase();
+            let word = word.split([' ', ',']).next().unwrap_or_default().to_owned();
+            let moving = ["DO", "CALIBRATE", "EXECUTE", "PROCEED", "RETRY", "NEXT"];
+            moving
+                .iter()
+                .any(|m| !word.is_empty() && m.starts_with(&word))
+        };
+        match self {
+            Self::Calibrate | Self::Hand { .. } => true,
+            Self::Send { line } => by_line(line),
+            _ => self.speed().is_some(),
+        }
+    }
+
+    /// Returns a description of the motion that is asked about.
+    fn motion(&self) -> String {
+        let at = self
+            .speed()
+            .map(|s| format!(" at {s} % speed"))
+            .unwrap_or_default();
+        match self {
+            Self::Calibrate => "Every joint will move a little.".to_owned(),
+            Self::Hand { state } => format!("The hand will {state}."),
+            Self::Jog {
+                joint: Some(joint),
+                degrees: Some(by),
+                ..
+            } => {
+                format!("JT{joint} will turn by {by} degrees{at}.")
+            }
+            Self::Jog { .. } => format!("The arm will move while a key is held{at}."),
+            Self::Move { to, .. } => format!("The arm will move to {}{at}.", to.join(" ")),
+            Self::Run { name, .. } => format!("Program {name} will run{at}."),
+            Self::Send { line } => format!("`{}` may move the arm.", line.join(" ")),
+            _ => String::new(),
+        }
+    }
+}
+
+/// Refuses a command that cannot be carried out, or is not confirmed, before the line is opened.
+pub(super) fn check(globals: &Globals, command: &Command) -> Result<(), Failure> {
+    if let Command::Move {
+        to, hand, straight, ..
+    } = command
+    {
+        let is_pose = to.len() == 6;
+        if to.len() != 1 && !is_pose {
+            return Err(Failure::usage("`move` takes six numbers or one name"));
+        }
+        if is_pose {
+            numbers(to)?;
+        }
+        if *hand && !is_pose || *straight && is_pose && !*hand {
+            return Err(Failure::usage(
+                "--hand takes six numbers, --straight a pose of the hand",
+            ));
+        }
+    }
+    if command.moves() {
+        confirm(globals, &command.motion())?;
+    }
+    Ok(())
+}
+
+fn confirm(globals: &Globals, what: &str) -> Result<(), Failure> {
+    if globals.yes {
+        return Ok(());
+    }
+    if !io::stdin().is_terminal() {
+        return Err(Failure::unconfirmed(format!(
+            "{what} Nobody can be asked: say --yes"
+        )));
+    }
+    eprint!("{what} Go on? [y/N] ");
+    io::stderr().flush()?;
+    let mut answer = String::new();
+    io::stdin().read_line(&mut answer)?;
+    match answer.trim().to_ascii_lowercase().as_str() {
+        "y" | "yes" => Ok(()),
+        _ => Err(Failure::unconfirmed("not confirmed: nothing was done")),
+    }
+}
+
+/// Prints that a command is done.
+pub(super) fn done(globals: &Globals, what: &str) {
+    if globals.json {
+        println!("{}", json!({"done": what}));
+    } else {
+        println!("{what}");
+    }
+}
+
+fn print(globals: &Globals, text: &str, value: &Value) {
+    if globals.json {
+        println!("{value}");
+    } else if !text.is_empty() {
+        println!("{}", text.trim_end());
+    }
+}
+
+pub(super) fn run(
+    globals: &Globals,
+    command: &Command,
+    link: &mut Link,
+    mut config: ClientConfig,
+) -> Result<(), Failure> {
+    config.speed_percent = command.speed();
+    let mut client = Val2Client::connect(link, config)?;
+    match command {
+        Command::Calibrate => {
+            client.calibrate()?;
+            show_where(globals, &client.where_()?);
+        }
+        Command::Where { watch } => {
+            show_where(globals, &client.where_()?);
+            while *watch && !client.line().take_interrupt() {
+                std::thread::sleep(Duration::from_millis(200));
+                match client.where_() {
+                    Ok(location) => show_where(globals, &location),
+                    Err(_) if client.line().take_interrupt() => return Ok(()),
+                    Err(error) => return Err(error.into()),
+                }
+            }
+        }
+        Command::Jog {
+            joint: Some(joint),
+            degrees: Some(by),
+            ..
+        } => {
+            client.drive(Joint::ALL[usize::from(*joint) - 1], by.to_radians(), 100.0)?;
+            show_where(globals, &client.where_()?);
+        }
+        Command::Jog { .. } => keys::jog(&mut client)?,
+        Command::Move {
+            to, hand, straight, ..
+        } => {
+            go(&mut client, to, *hand, *straight)?;
+            show_where(globals, &client.where_()?);
+        }
+        Command::Hand { state } => {
+            let (gripper, text) = match state.as_str() {
+                "open" => (Gripper::Open, "hand open"),
+                _ => (Gripper::Closed, "hand closed"),
+            };
+            client.set_gripper(gripper)?;
+            done(globals, text);
+        }
+        Command::Speed { percent } => {
+            client.set_speed(*percent)?;
+            done(globals, &format!("speed {percent} %"));
+        }
+        Command::Teach { name } => {
+            let values = client.here(name)?;
+            let text = values.map(|v| v.to_string()).join(", ");
+            print(
+                globals,
+                &format!("{name} = {text}"),
+                &json!({"name": name, "values": values}),
+            );
+        }
+        Command::Ls => list(globals, &mut client)?,
+        Command::Get { name } => {
+            let steps = client.program(name)?;
+            let body: String = steps.iter().map(|step| format!(" {step}\n")).collect();
+            let text = format!(".PROGRAM {}\n{body}.END", name.to_ascii_uppercase());
+            print(globals, &text, &json!({"program": name, "steps": steps}));
+        }
+        Command::Put { file }
+        | Command::Restore {
+            file,
+            dry_run: false,
+        } => {
+            restore(globals, &mut client, &read(file)?)?;
+        }
+        Command::Restore { file, .. } => {
+            show_plan(globals, &client.restore_plan(&read(file)?)?);
+        }
+        Command::Rm { name } => {
+            confirm(globals, &format!("{name} will be deleted."))?;
+            client.remove(name)?;
+            done(globals, &format!("{name} deleted"));
+        }
+        Command::Backup { file } => {
+            let text = client.backup()?;
+            if file.as_os_str() == "-" {
+                print!("{text}");
+            } else {
+                write_whole(file, text.as_bytes())?;
+                let lines = text.lines().count();
+                done(
+                    globals,
+                    &format!("{lines} lines written to {}", file.display()),
+                );
+            }
+        }
+        Command::Run {
+            name, wait: true, ..
+        } => {
+            let said = client.execute(name)?;
+            let lines: Vec<&str> = said.split(['\r', '\n']).filter(|l| !l.is_empty()).collect();
+            let output = &lines[1..lines.len().saturating_sub(1).max(1)];
+            print(
+                globals,
+                &output.join("\n"),
+                &json!({"program": name, "output": output}),
+            );
+        }
+        Command::Run { name, cycles, .. } => {
+            client.start(name, *cycles)?;
+            done(globals, &format!("{name} started"));
+        }
+        Command::Status => said(globals, &mut client, "STATUS")?,
+        Command::Io => said(globals, &mut client, "IO")?,
+        Command::Send { line } => said(globals, &mut client, &line.join(" "))?,
+        Command::Signal { number, state } => {
+            let signed = i32::from(*number);
+            match state.as_deref() {
+                Some("on") => client.set_signal(signed)?,
+                Some(_) => client.set_signal(-signed)?,
+                None => {}
+            }
+            let on = client.signal(*number)?;
+            let text = format!("{number} {}", if on { "on" } else { "off" });
+            print(globals, &text, &json!({"signal": number, "on": on}));
+        }
+        Command::Stop | Command::Term | Command::Emulate(_) => {}
+    }
+    Ok(())
+}
+
+fn numbers(words: &[String]) -> Result<[f64; 6], Failure> {
+    let number = |word: &String| word.parse::<f64>().ok().filter(|v| v.is_finite());
+    let values: Option<Vec<f64>> = words.iter().map(number).collect();
+    let six = values.and_then(|values| values.try_into().ok());
+    six.ok_or_else(|| Failure::usage(format!("`{}` are not six numbers", words.join(" "))))
+}
+
+fn go(client: &mut Client<'_>, to: &[String], hand: bool, straight: bool) -> Result<(), Failure> {
+    if to.len() == 6 {
+        let values = numbers(to)?;
+        if hand {
+            client.move_hand(&Xyzoat::from_val(values), straight)?;
+        } else {
+            client.move_to(Joints::from_degrees(values))?;
+        }
+        return Ok(());
+    }
+    let name = &to[0];
+    if name.eq_ignore_ascii_case("ready") {
+        client.ready()?;
+        return Ok(());
+    }
+    let listed = client.send_line(&format!("LISTL {name}"))?;
+    let values = listed.lines().find_map(|line| {
+        let values: Option<Vec<f64>> = line
+            .split_whitespace()
+            .skip(1)
+            .map(|w| w.parse().ok())
+            .collect();
+        <[f64; 6]>::try_from(values?).ok()
+    });
+    let Some(values) = values else {
+        let text = format!("the controller knows no location {name}: {listed}");
+        return Err(Failure { text, code: 3 });
+    };
+    if name.starts_with('#') {
+        client.move_to(Joints::from_degrees(values))?;
+    } else {
+        client.move_hand(&Xyzoat::from_val(values), straight)?;
+    }
+    Ok(())
+}
+
+fn show_where(globals: &Globals, location: &Location) {
+    let joints = location.joints.degrees();
+    let text = format!("joints {}\nhand   {}", location.joints, location.hand);
+    print(
+        globals,
+        &text,
+        &json!({"joints_deg": joints.map(rounded), "xyzoat": location.hand.val().map(rounded)}),
+    );
+}
+
+/// Rounds to the digits that a controller shows.
+fn rounded(value: f64) -> f64 {
+    (value * 1000.0).round() / 1000.0
+}
+
+/// Types a line and prints the answer; a message of the controller is a refusal.
+fn said(globals: &Globals, client: &mut Client<'_>, line: &str) -> Result<(), Failure> {
+    let text = client.send_line(line)?;
+    let lines: Vec<&str> = text.lines().collect();
+    print(globals, &text, &json!({"line": line, "answer": lines}));
+    match lines
+        .iter()
+        .find(|l| l.len() > 2 && l.starts_with('*') && l[1..].contains('*'))
+    {
+        None => Ok(()),
+        Some(message) => Err(Failure {
+            text: format!("`{line}` was refused: {message}"),
+            code: 3,
+        }),
+    }
+}
+
+fn list(globals: &Globals, client: &mut Client<'_>) -> Result<(), Failure> {
+    let programs = client.programs()?;
+    let mut names = |list: &str, words: usize| -> Result<Vec<String>, Failure> {
+        let text = client.send_line(list)?;
+        let rows = text.lines().map(|line| line.split_whitespace().collect());
+        let named = rows.filter(|row: &Vec<&str>| row.len() == words);
+        Ok(named.map(|row| row[0].to_owned()).collect())
+    };
+    let (locations, reals) = (names("LISTL", 7)?, names("LISTR", 2)?);
+    let all = [
+        ("programs ", &programs),
+        ("locations", &locations),
+        ("reals    ", &reals),
+    ];
+    let text =
+        all.map(|(kind, names)| format!("{kind}  {}", names.join(" ")).trim_end().to_owned());
+    let value = json!({"programs": programs, "locations": locations, "reals": reals});
+    print(globals, &text.join("\n"), &value);
+    Ok(())
+}
+
+fn read(file: &Path) -> Result<String, Failure> {
+    let text = if file.as_os_str() == "-" {
+        let mut text = String::new();
+        io::stdin().read_to_string(&mut text).map(|_| text)
+    } else {
+        fs::read_to_string(file)
+    };
+    text.map_err(|error| Failure {
+        text: format!("{}: {error}", file.display()),
+        code: 1,
+    })
+}
+
+fn restore(globals: &Globals, client: &mut Client<'_>, text: &str) -> Result<(), Failure> {
+    let plan = match client.restore(text, globals.yes) {
+        Err(ArmError::Conflict { names, port }) if io::stdin().is_terminal() => {
+            confirm(
+                globals,
+                &format!("{port} holds other contents of {names}, to be replaced."),
+            )?;
+            client.restore(text, true)?
+        }
+        Err(error @ ArmError::Conflict { .. }) => {
+            return Err(Failure::unconfirmed(format!(
+                "{error}: --yes replaces them"
+            )));
+        }
+        outcome => outcome?,
+    };
+    show_plan(globals, &plan);
+    Ok(())
+}
+
+fn show_plan(globals: &Globals, plan: &[String]) {
+    print(globals, &plan.join("\n"), &json!({ "plan": plan }));
+}

@@ -1,0 +1,101 @@
+//! Jogging by keys: the arm moves while a key is held.
+
+use crate::program::commands::Client;
+use crate::program::failure::Failure;
+
+/// Moves the arm as keys say until `q`.
+///
+/// A key that is held is repeated by the terminal. Each step is short, and keys that come during
+/// it are forgotten: the arm stands within one step of the key's release.
+#[cfg(unix)]
+pub(super) fn jog(client: &mut Client<'_>) -> Result<(), Failure> {
+    use crate::joints::Joint;
+    use std::io::{self, IsTerminal, Write};
+
+    if !io::stdin().is_terminal() {
+        return Err(Failure::usage(
+            "jogging by keys needs a terminal: `jog JOINT DEGREES` does not",
+        ));
+    }
+    let keyboard = Keyboard::raw()?;
+    let (mut joint, mut step) = (Joint::J1, 1.0_f64);
+    println!("1-6 joint, hold + or - to move, [ ] step, q ends\r");
+    let mut stands = client.where_()?.joints;
+    loop {
+        print!("{joint}  step {step} degrees  {stands}   \r");
+        io::stdout().flush()?;
+        let sign = match keyboard.key()? {
+            digit @ b'1'..=b'6' => {
+                joint = Joint::ALL[usize::from(digit - b'1')];
+                continue;
+            }
+            b'[' => {
+                step = (step / 2.0).max(0.125);
+                continue;
+            }
+            b']' => {
+                step = (step * 2.0).min(4.0);
+                continue;
+            }
+            b'+' | b'=' => 1.0,
+            b'-' | b'_' => -1.0,
+            b'q' | 0x03 | 0x04 => break,
+            _ => continue,
+        };
+        match client.drive(joint, (sign * step).to_radians(), 100.0) {
+            Ok(joints) => stands = joints,
+            Err(error) => println!("\r\n{error}\r"),
+        }
+        keyboard.forget()?;
+    }
+    println!("\r");
+    Ok(())
+}
+
+#[cfg(not(unix))]
+pub(super) fn jog(_: &mut Client<'_>) -> Result<(), Failure> {
+    let text = "jogging by keys is only there on Unix: use `jog JOINT DEGREES`";
+    Err(Failure::usage(text))
+}
+
+/// The keyboard without line editing, as it was again when this is dropped.
+#[cfg(unix)]
+struct Keyboard(rustix::termios::Termios);
+
+#[cfg(unix)]
+impl Keyboard {
+    fn raw() -> Result<Self, Failure> {
+        use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+        let stdin = std::io::stdin();
+        let before = tcgetattr(&stdin).map_err(std::io::Error::from)?;
+        let mut raw = before.clone();
+        raw.make_raw();
+        tcsetattr(&stdin, OptionalActions::Now, &raw).map_err(std::io::Error::from)?;
+        Ok(Self(before))
+    }
+
+    /// Forgets the keys that have come.
+    fn forget(&self) -> Result<(), Failure> {
+        use rustix::termios::{QueueSelector, tcflush};
+
+        let flushed = tcflush(std::io::stdin(), QueueSelector::IFlush);
+        Ok(flushed.map_err(std::io::Error::from)?)
+    }
+
+    /// Waits for a key. Of several only the last counts.
+    fn key(&self) -> Result<u8, Failure> {
+        let mut keys = [0; 256];
+        let count = rustix::io::read(std::io::stdin(), &mut keys).map_err(std::io::Error::from)?;
+        Ok(if count == 0 { b'q' } else { keys[count - 1] })
+    }
+}
+
+#[cfg(unix)]
+impl Drop for Keyboard {
+    fn drop(&mut self) {
+        use rustix::termios::{OptionalActions, tcsetattr};
+
+        let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, &self.0);
+    }
+}

@@ -1,0 +1,123 @@
+//! The line of the program to its controller.
+
+use std::fs::File;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use crate::client::{ClientConfig, MoveWay, Val2Client};
+use crate::emulator::profile::Profile;
+use crate::program::failure::Failure;
+use crate::program::{Command, Globals, commands, term};
+use crate::transport::{Recorded, SerialLine, TcpLine, Transport};
+
+/// A line that Ctrl-C interrupts.
+pub(super) struct Link {
+    line: Box<dyn Transport>,
+    pub(super) interrupted: Arc<AtomicBool>,
+}
+
+impl Link {
+    /// Returns `true` once for each Ctrl-C.
+    pub(super) fn take_interrupt(&self) -> bool {
+        self.interrupted.swap(false, Ordering::AcqRel)
+    }
+}
+
+impl Transport for Link {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.line.send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
+        let until = self.clock().saturating_add(timeout);
+        loop {
+            if self.interrupted.load(Ordering::Acquire) {
+                return Err(io::Error::other("interrupted by Ctrl-C"));
+            }
+            let left = until.saturating_sub(self.clock());
+            let slice = left.min(Duration::from_millis(50));
+            match self.line.receive(buffer, slice)? {
+                None if slice < left => {}
+                outcome => return Ok(outcome),
+            }
+        }
+    }
+
+    fn clock(&self) -> Duration {
+        self.line.clock()
+    }
+
+    fn name(&self) -> &str {
+        self.line.name()
+    }
+}
+
+/// Opens the line and carries out a command on it.
+pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Failure> {
+    commands::check(globals, command)?;
+    let config = config(globals)?;
+    let mut link = open(globals)?;
+    let outcome = match command {
+        Command::Stop => {
+            Val2Client::stop_on(&mut link, config.clone())?;
+            commands::done(globals, "stopped");
+            Ok(())
+        }
+        Command::Term => term::run(&mut link, &config),
+        _ => commands::run(globals, command, &mut link, config.clone()),
+    };
+    if outcome.is_ok() || !link.take_interrupt() {
+        return outcome;
+    }
+    let mut text = "interrupted by Ctrl-C".to_owned();
+    if command.moves() {
+        match Val2Client::stop_on(&mut link, config) {
+            Ok(()) => text.push_str("; the arm has been stopped"),
+            Err(error) => text = format!("{text}; {error}"),
+        }
+    }
+    Err(Failure { text, code: 130 })
+}
+
+fn config(globals: &Globals) -> Result<ClientConfig, Failure> {
+    let name = globals.profile.as_deref().unwrap_or("val2");
+    let profile = Profile::named(name).ok_or_else(|| {
+        let names = Profile::all().map(|p| p.name).join(", ");
+        Failure::usage(format!("no profile `{name}`: there are {names}"))
+    })?;
+    Ok(ClientConfig {
+        control_characters: profile.control_characters,
+        way: if profile.ppoint {
+            MoveWay::Automatic
+        } else {
+            MoveWay::Point
+        },
+        ..ClientConfig::for_baud(globals.baud.unwrap_or(9600))
+    })
+}
+
+fn open(globals: &Globals) -> Result<Link, Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&interrupted))?;
+    let variable = std::env::var("VAL2_PORT").ok();
+    let mut line: Box<dyn Transport> =
+        match (&globals.tcp, globals.port.as_ref().or(variable.as_ref())) {
+            (Some(address), _) => Box::new(TcpLine::connect(address, Duration::from_secs(5))?),
+            (None, Some(port)) => Box::new(SerialLine::open(port, globals.baud.unwrap_or(9600))?),
+            (None, None) => {
+                return Err(Failure::usage(
+                    "which controller? --port DEV names a serial port, --tcp HOST:PORT an address",
+                ));
+            }
+        };
+    if let Some(path) = &globals.transcript {
+        let file = File::create(path).map_err(|error| Failure {
+            text: format!("{}: {error}", path.display()),
+            code: 1,
+        })?;
+        line = Box::new(Recorded::new(line, file));
+    }
+    Ok(Link { line, interrupted })
+}

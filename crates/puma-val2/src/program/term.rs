@@ -1,0 +1,75 @@
+//! A terminal of the controller.
+
+use std::io::{self, BufRead, IsTerminal, Write};
+use std::sync::mpsc::{self, TryRecvError};
+use std::time::Duration;
+
+use crate::client::ClientConfig;
+use crate::client::reader::ReplyReader;
+use crate::program::failure::Failure;
+use crate::program::link::Link;
+use crate::transport::Transport;
+
+/// Passes lines to the controller and its text to the standard output, until the input ends.
+///
+/// A person's lines are sent at once, Ctrl-C as it is. Those of a file or a pipe wait for the
+/// prompt or question before: the controller's input buffer is small.
+pub(super) fn run(link: &mut Link, config: &ClientConfig) -> Result<(), Failure> {
+    let (sender, lines) = mpsc::channel();
+    std::thread::spawn(move || {
+        let stdin = io::stdin().lock().lines();
+        stdin
+            .map_while(Result::ok)
+            .try_for_each(|line| sender.send(line))
+    });
+    let by_person = io::stdin().is_terminal();
+    if by_person {
+        eprintln!("terminal of {}; Ctrl-D ends", link.name());
+    }
+    let reader = || ReplyReader::new(4096, config.idle_prompt, config.run_prompt);
+    let mut said = reader();
+    // Asks for the prompt, without ending a line that somebody has begun.
+    let ask: &[u8] = if config.control_characters {
+        b"\x11\x15\r"
+    } else {
+        b"\r"
+    };
+    link.send(ask)?;
+    let mut buffer = [0; 512];
+    let mut ended = false;
+    loop {
+        if link.take_interrupt() {
+            link.send(b"\x03")?;
+        }
+        let quiet = config.quiet.max(Duration::from_millis(50));
+        match link.receive(&mut buffer, quiet) {
+            Ok(Some(count)) => {
+                said.push(&buffer[..count]);
+                let text = String::from_utf8_lossy(&buffer[..count]).replace('\r', "");
+                print!("{text}");
+                io::stdout().flush()?;
+                continue;
+            }
+            Ok(None) => {}
+            // Ctrl-C is for the controller.
+            Err(_) if link.interrupted.load(std::sync::atomic::Ordering::Acquire) => continue,
+            Err(error) => return Err(error.into()),
+        }
+        let asks = said.ending().is_some();
+        if ended && asks {
+            println!();
+            return Ok(());
+        }
+        if !by_person && !asks {
+            continue;
+        }
+        match lines.try_recv() {
+            Ok(line) => {
+                said = reader();
+                link.send(format!("{line}\r").as_bytes())?;
+            }
+            Err(TryRecvError::Empty) => {}
+            Err(TryRecvError::Disconnected) => ended = true,
+        }
+    }
+}
