@@ -7,7 +7,7 @@
 //! | [`hough_heuristic`] | a gray frame into circles |
 //! | [`qtable`] | experience into a policy |
 //! | [`puma_val2`] | joint angles into VAL II text and back, for a real PUMA 560 or the emulated controller |
-//! | [`pipeline_sim`] | an arm pose into a camera frame, and samples of it into a regression simulator |
+//! | [`pipeline_sim`] | an arm pose into a camera frame or features, and samples of moves into a regression model |
 //! | [`grasp_agent`] | circles into joint moves: learned behaviours, search, recovery, grip |
 //!
 //! They are re-exported here under their own names. This package joins the simulated cell to the
@@ -24,8 +24,9 @@
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
 //!     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-//!     let (centering, reaching) = cell.sample_moves(500, 0.5, &mut rng)?;
-//!     let simulator = Simulator::fit(&centering, &reaching, MoveForm::Rigid22)?;
+//!     // 500 moves of each behaviour, features with noise of 0.5 units of 192x144.
+//!     let (centering, approaching) = cell.sample_moves(500, 0.5, &mut rng)?;
+//!     let simulator = Simulator::fit(&centering, &approaching, MoveForm::Rigid22)?;
 //!     let spec = BehaviourSpec::centering();
 //!     let lesson = simulator.learn(spec, &[], 20_000, &mut rng, &mut |_| {})?;
 //!     let last = lesson.curve.last();

@@ -166,7 +166,8 @@ impl Rig {
         Ok(())
     }
 
-    /// Puts the ball at its place unless it would stand in the hand. Returns whether it did.
+    /// Puts the ball at its place. Returns `false`, and changes nothing, if it would overlap the
+    /// hand.
     fn put(&self, ball: &Ball) -> bool {
         self.cell.place_ball(ball.centre, &(self.pose)())
     }
@@ -299,7 +300,7 @@ pub enum RigError {
     /// The emulator could not be served.
     #[error("the controller emulator cannot be served: {0}")]
     Serve(#[source] io::Error),
-    /// The line or the controller.
+    /// The line or the controller failed.
     #[error(transparent)]
     Arm(#[from] ArmError),
 }

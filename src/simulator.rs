@@ -79,8 +79,8 @@ impl Simulator {
 
     /// Learns `spec` in this simulator with the paper's settings ([`LearningSettings::paper`]).
     ///
-    /// With `trials`, percepts to start from, the best table of the second half of the run is kept
-    /// ([`BehaviourSpec::learn`]); without, the last one.
+    /// `trials` are percepts from which tables are tried. With them, the best table of the second
+    /// half of the run is kept ([`BehaviourSpec::learn`]); if `trials` is empty, the last table.
     ///
     /// # Errors
     /// No actions to learn from, or a reward that is not a number (the literal Eq. 5 and 6 divide

@@ -73,8 +73,8 @@ struct Options {
     levels: Vec<ErrorLevel>,
 
     /// Odd errors beside the level's, separated by commas: zeros, gears, sag, drag, back-drag,
-    /// links, stiction, dead-zone, play, lag, slip (at the fifth ball), mirrored, roll, lens, noise,
-    /// missed, outliers; NAME=AMOUNT for another than the usual amount
+    /// links, stiction, dead-zone, play, lag, slip (at the fifth ball), mirrored, roll, lens,
+    /// noise, missed, outliers; NAME=AMOUNT for another than the usual amount
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     odd: Vec<String>,
 

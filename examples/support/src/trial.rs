@@ -140,8 +140,8 @@ fn reach<C: Controller>(
     })
 }
 
-/// Starts an emulated controller, around whose arm the cell has these errors. All apply but the
-/// play and the encoder steps of the arm, and the noise of features: frames have noise of their own.
+/// Starts an emulated controller, around whose arm the cell has these errors. All apply except the
+/// backlash and the encoder steps of the arm, and the noise of features: frames have their own.
 ///
 /// # Errors
 /// Those of [`Rig::emulated`], and the quantity that is out of range.
