@@ -8,19 +8,19 @@ use super::strongest::{Edges, RAYS};
 const OVAL: f32 = 0.07;
 /// Rays that it must explain in addition, as a share of those in the frame.
 const GAIN: f32 = 0.1;
-/// Edges less steep than this part of the outline's do not count.
+/// Least slope of an edge that counts, as a fraction of the slope of the outline.
 const LEAST_SLOPE: f32 = 0.5;
 /// The least fourth or fifth harmonic of a polygon, in radii.
 const CORNERS: f32 = 0.055;
-/// Factor by which it exceeds the second and third.
+/// Least ratio of that harmonic to the second and third.
 const LEADS: f32 = 1.5;
 /// Largest distance of corners from the circle, in radii.
 const CORNER_REACH: f32 = 0.25;
 /// Share of the rays in the frame on which the outline of a polygon must be seen.
 const CLOSED: f32 = 0.75;
-/// The variance that the harmonics explain, over what is left, each by degree of freedom.
+/// Least ratio of the variance that the harmonics explain to the rest, each per degree of freedom.
 const LEAST_RATIO: f32 = 6.0;
-/// A circle covered more than this is no ellipse.
+/// Covered share from which a circle is not tested against an ellipse.
 const MOST_COVERED: f32 = 0.85;
 
 /// Returns `true` if another outline explains clearly more of the edges around the circle.

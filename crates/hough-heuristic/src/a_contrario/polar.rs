@@ -22,7 +22,7 @@ pub(super) struct Ring {
 }
 
 impl Ring {
-    /// The circle in a frame whose pixels are `factor` times as large.
+    /// The circle in the frame whose width and height are divided by `factor`.
     pub(super) fn shrunk(&self, factor: f32) -> Self {
         let corner = 0.5 * (factor - 1.0);
         Self {
@@ -32,7 +32,7 @@ impl Ring {
         }
     }
 
-    /// The circle in a frame whose pixels are `factor` times as small.
+    /// The circle in the frame whose width and height are multiplied by `factor`.
     pub(super) fn grown(&self, factor: f32) -> Self {
         let corner = 0.5 * (factor - 1.0);
         Self {
@@ -63,7 +63,7 @@ pub(super) struct Polar {
 
 /// Directions that are worked on together.
 pub(super) const LANES: usize = 8;
-/// The most directions in which slopes are averaged across the outline.
+/// Largest number of directions for which slopes are averaged across the outline.
 const MOST_SOFT: usize = 64;
 /// Largest number of directions averaged on either side.
 const MARGIN: usize = 8;

@@ -11,24 +11,24 @@ use super::polar::{Gray, Polar, Ring};
 use super::proof::{NOISE, Proof, window_for};
 use super::strongest::{Edges, RAYS};
 
-/// Share of the certainty that a share of refuted rays costs, per unit.
+/// Fraction of the certainty that is lost per unit of the share of refuted rays.
 const PRICE: f32 = 3.0;
-/// At this share nothing is left, however sure the rest is; from a little less on it costs more.
+/// Share of refuted rays at which no certainty is left, and the loss per unit shortly below it.
 const MOST_REFUTED: f32 = 0.3;
 const LAST_PRICE: f32 = 5.5;
-/// More rays without any edge than this share, and the circle is out.
+/// Share of rays without any edge above which a circle is dropped.
 const MOST_BARE: f32 = 0.3;
-/// They count where the outline is this many deviations of the noise steep.
+/// Least slope of the outline for such rays to count, in deviations of the noise.
 const STEEP: f32 = 5.0;
-/// Of a circle cut by the frame at least this share of the outline is to be seen.
+/// Least share of the outline that must be seen if the frame cuts the circle.
 const LEAST_SEEN: f32 = 0.45;
-/// The circle is cut by the frame if less than this share lies in it.
+/// Share of the outline in the frame below which the frame cuts the circle.
 const WHOLE: f32 = 0.9;
 /// Distance from the outline at which levels are taken, pixels.
 const BESIDE: f32 = 2.5;
-/// Fewer hits than these say nothing of levels.
+/// Number of rays on the outline below which no evidence against the circle is sought.
 const LEAST_HITS: usize = 8;
-/// A part of the outline of fewer rays is not followed.
+/// Least number of rays in a part of the outline that is followed.
 const LEAST_PART: usize = 3;
 /// Rays at the end of a part that its levels are taken from.
 const END: usize = 4;
@@ -36,9 +36,9 @@ const END: usize = 4;
 const FAINT: f32 = 0.025;
 /// The least step at a junction, in units of the ground's unevenness.
 const ROUGH: f32 = 2.5;
-/// Rays behind its border on which the thing in front is looked at.
+/// Number of rays behind its border on which a thing in front is examined.
 const FAR: i32 = 9;
-/// Weight of a gap that one thing in front begins or ends at.
+/// Weight of a gap with a thing in front at one of its two ends.
 const HALF_EXCUSED: f32 = 0.75;
 
 /// The picture around an outline, ray by ray.

@@ -15,16 +15,16 @@ use crate::edges::{Vectorized, widest};
 
 /// Noise above which the larger circles are measured at half the size of the frame, gray levels.
 const NOISY: f32 = 15.0;
-/// Outlines that differ by less are one, pixels and radii: their errors, and the width of a line.
+/// Difference below which two outlines count as one, pixels and radii: it allows for their errors
+/// and for the width of a drawn line.
 const SAME_PIXELS: f32 = 3.0;
 const SAME_SHARE: f32 = 0.04;
 
 impl AContrario {
     /// Measures the proven circles, the surest first.
     ///
-    /// A circle must be as sure as the least score demands by the edges that are not on a circle
-    /// reported before it: so that a ring across the outlines of others is not reported, but one
-    /// inside of another is.
+    /// A circle must reach the least score by the edges that do not lie on a circle reported before
+    /// it. A ring across the outlines of others is then not reported, but one inside of another is.
     pub(super) fn report(&mut self, frame: &GrayImage, radii: (f64, f64), noise: f32) {
         let pyramid = Pyramid {
             frame,

@@ -63,7 +63,8 @@ impl Outline {
         }
     }
 
-    /// Looks at the outline until it is plain that there is no circle; None then.
+    /// Counts the edges along the outline; `None` as soon as their share falls clearly below
+    /// `least`.
     #[inline(always)]
     pub(super) fn support(
         &self,

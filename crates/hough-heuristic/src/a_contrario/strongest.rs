@@ -182,8 +182,8 @@ impl Edges {
             >= RAYS / 8
     }
 
-    /// Forgets the edges of what is as bright as can be if the light falls off around it: a lamp
-    /// and its glow, whose outline is where the exposure ends and not that of a thing.
+    /// Drops the edges of overexposed parts if the light falls off around them: of a lamp and its
+    /// glow, whose outline is the border of the overexposure and not of a thing.
     pub(super) fn leave_out_glow(
         &mut self,
         ring: &Ring,

@@ -5,11 +5,11 @@ use crate::edges::Candidate;
 
 /// The side of a tile, pixels.
 const TILE: usize = 64;
-/// One point of this many pixels may be an edge; of more the strongest are taken.
+/// Pixels of the frame per edge point that is kept; of more points the strongest are kept.
 const PIXELS_PER_POINT: usize = 12;
-/// Small sizes may have twice as many, up to this number.
+/// Number of points up to which a small frame may keep twice as many.
 const FEW: usize = 600;
-/// Of each tile this part of what it may hold is kept, however weak.
+/// One in so many of the points that the area of a tile allows is kept there, however weak.
 const TILE_SHARE: usize = 4;
 
 /// The strongest points of a frame and of each of its tiles.
