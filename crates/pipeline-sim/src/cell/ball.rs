@@ -13,7 +13,7 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Radius of the ball used throughout, metres: 20 mm.
+    /// Radius of the ball of the paper's cell, metres: 20 mm.
     pub const RADIUS: f64 = 0.020;
 
     /// Returns a ball of [`Ball::RADIUS`] with its centre at (x, y, z) metres.

@@ -59,19 +59,20 @@ pub struct Errors {
     pub backlash: f64,
     /// Angle of one encoder count, `JT1` first, radians; 0 for a joint that stands anywhere.
     pub encoder_step: [f64; 6],
-    /// Turn below which a joint sticks: it stays, and its encoder shows it, radians.
+    /// Turn below which a joint sticks, radians: the link does not move, and the encoder shows that
+    /// it did not.
     pub stiction: f64,
-    /// Turn below which a link stays although its encoder shows the turn, radians.
+    /// Turn below which a link does not move, radians, although its encoder shows the turn.
     pub dead_zone: f64,
     /// Standard deviation of the noise on each image feature, units.
     pub feature_noise: f64,
     /// A camera that shows left and right exchanged.
     pub mirrored: bool,
-    /// Number of looks by which the camera's image is late, at most 1000.
+    /// Number of frames by which the camera's image is late, at most 1000.
     pub lag: usize,
-    /// Fraction of looks that do not show the ball, 0..=1.
+    /// Fraction of frames that do not show the ball, 0..=1.
     pub missed: f64,
-    /// Fraction of looks that show it somewhere else, 0..=1.
+    /// Fraction of frames that show it somewhere else, 0..=1.
     pub outliers: f64,
     /// Turn about the image's x axis, radians, and displacement along it, metres, by which the
     /// camera slips in its mount ([`Errors::slip_camera`]).
@@ -107,7 +108,7 @@ impl Errors {
         ("outliers", 5.0),
     ];
 
-    /// Returns the errors of a cell that is as believed.
+    /// Returns the errors of a cell that equals the nominal one.
     pub fn none() -> Self {
         Self {
             focal_factor: 1.0,
@@ -136,7 +137,8 @@ impl Errors {
         }
     }
 
-    /// Adds an odd error, one that no level has: its name, with the usual amount, or `NAME=AMOUNT`.
+    /// Adds an odd error, one that no level has. `name` is `NAME`, which takes the usual amount of
+    /// [`Errors::ODD`], or `NAME=AMOUNT`.
     ///
     /// | name | amount |
     /// |---|---|
@@ -145,13 +147,13 @@ impl Errors {
     /// | `drag`, `back-drag` | per cent of its turn by which `JT3` drags `JT2`, `JT2` drags `JT3` |
     /// | `links` | millimetres that upper arm and forearm are too long |
     /// | `stiction`, `dead-zone`, `play` | degrees |
-    /// | `lag` | looks that the image is late |
-    /// | `slip` | degrees of the slip, with 10 mm |
+    /// | `lag` | frames by which the image is late |
+    /// | `slip` | degrees; the slip also shifts the camera by 10 mm |
     /// | `mirrored` | 1, or 0 for an upright image |
     /// | `roll` | degrees |
     /// | `lens` | first radial term of the distortion |
     /// | `noise` | feature units |
-    /// | `missed`, `outliers` | per cent of the looks |
+    /// | `missed`, `outliers` | per cent of the frames |
     ///
     /// # Errors
     /// [`QuantityError::Name`] lists the names; [`QuantityError::Value`] for an amount that is not

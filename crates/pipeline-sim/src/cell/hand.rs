@@ -108,7 +108,8 @@ pub struct HandShape {
 }
 
 impl HandShape {
-    /// Returns the gripper used throughout: tool point 126 mm beyond the flange (`TOOL` z = 126).
+    /// Returns the gripper of the paper's cell: tool point 126 mm beyond the flange (`TOOL` z =
+    /// 126).
     pub fn paper() -> Self {
         Self {
             tool: 0.126,

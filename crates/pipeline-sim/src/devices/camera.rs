@@ -50,9 +50,9 @@ impl<P: FnMut() -> Joints> CellCamera<P> {
         }
     }
 
-    /// Gives the frames an exposure time, of one field or two: `moved` receives cell and joints in
-    /// the middle of the exposure and a time in seconds after (or, below zero, before) it, and
-    /// returns both at that time.
+    /// Gives the frames an exposure time, of one field or two. `moved` receives the cell and the
+    /// joints in the middle of the exposure and a time t, and returns both t seconds later (earlier
+    /// for t below zero).
     ///
     /// The truth of the frame, and [`Cell::features`], hold for the middle of the exposure.
     ///
@@ -193,8 +193,8 @@ impl<P: FnMut() -> Joints> FeatureCamera<P> {
     }
 }
 
-/// Takes the image that is `lag` looks old out of a queue whose last is new; the oldest there is in
-/// the beginning.
+/// Takes the image that is `lag` frames older than the newest, which is the last of the queue.
+/// While the queue is shorter, takes the oldest one.
 fn delayed<T: Clone>(queue: &mut VecDeque<T>, lag: usize) -> Option<T> {
     while queue.len() > lag + 1 {
         queue.pop_front();

@@ -62,8 +62,9 @@ impl SharedCell {
         })))
     }
 
-    /// Lets arm and cameras in this cell make these errors, but for those that [`Errors::apply`]
-    /// puts into the cell. Play and encoder steps are those of a [`SimulatedArm`] alone.
+    /// Sets the errors that arm and cameras in this cell make. The errors of camera, ball and links
+    /// are not among them: [`Errors::apply`] puts those into the cell itself. Backlash and encoder
+    /// steps concern a [`SimulatedArm`] only.
     ///
     /// # Errors
     /// [`QuantityError`] names the quantity that is out of range.
