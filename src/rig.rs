@@ -1,7 +1,8 @@
 //! The rig: an arm behind a VAL II controller, with the simulated cell around it.
 
 use std::io;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use grasp_agent::{Agent, AgentError, CameraEye, Controller, RunEvent, RunOutcome};
@@ -28,7 +29,11 @@ pub struct Rig {
     pose: Pose,
     cell: SharedCell,
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
+    stop: StopFlag,
 }
+
+/// Flag of the rig's user, once there is one.
+type StopFlag = Arc<OnceLock<Arc<AtomicBool>>>;
 
 /// Reader of the current angles of the arm's links.
 type Pose = Arc<dyn Fn() -> Joints + Send + Sync>;
@@ -51,6 +56,7 @@ impl Rig {
     /// The system has no free line, or the emulator does not answer on it.
     pub fn emulated(realtime: bool, scene: &Scene, seed: u64) -> Result<Self, RigError> {
         let (cell, client_config) = (paper_cell(), ClientConfig::for_emulator());
+        let stop = StopFlag::default();
         let mut emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
         let around = cell.clone();
         emulator
@@ -81,10 +87,10 @@ impl Rig {
             Arc::new(move || linked.links(&server.with_emulator(|emulator| emulator.joints())));
         let arm = {
             let pose = Arc::clone(&pose);
-            cell.with_jaws_of(connect(line, client_config)?, move || pose())
+            cell.with_jaws_of(connect(line, client_config, &stop)?, move || pose())
         };
         let arm = Box::new(arm);
-        Ok(Self::assemble(name, arm, pose, cell, (scene, seed)))
+        Ok(Self::assemble(name, (arm, stop), pose, cell, (scene, seed)))
     }
 
     /// Connects to the controller on the serial device `path`.
@@ -110,16 +116,17 @@ impl Rig {
         seed: u64,
     ) -> Result<Self, RigError> {
         let name = line.name().to_owned();
-        let mut arm = connect(line, ClientConfig::default())?;
+        let stop = StopFlag::default();
+        let mut arm = connect(line, ClientConfig::default(), &stop)?;
         let (cell, start) = (paper_cell(), arm.joints()?);
         let (arm, pose) = cell.follow(arm, start);
         let (arm, pose): (_, Pose) = (Box::new(arm), Arc::new(pose));
-        Ok(Self::assemble(name, arm, pose, cell, (scene, seed)))
+        Ok(Self::assemble(name, (arm, stop), pose, cell, (scene, seed)))
     }
 
     fn assemble(
         name: String,
-        arm: Box<dyn Manipulator>,
+        (arm, stop): (Box<dyn Manipulator>, StopFlag),
         pose: Pose,
         cell: SharedCell,
         (scene, seed): (&Scene, u64),
@@ -135,7 +142,14 @@ impl Rig {
             pose,
             cell,
             camera,
+            stop,
         }
+    }
+
+    /// Stops the arm by the controller's own stop once `flag` is set: the order under way, or the
+    /// next one, ends with an error. Only the first flag that is given counts.
+    pub fn stopped_by(&self, flag: Arc<AtomicBool>) {
+        let _ = self.stop.set(flag);
     }
 
     /// Returns the name of the line to the controller: a device path or an address.
@@ -263,12 +277,63 @@ fn paper_cell() -> SharedCell {
     SharedCell::new(Cell::paper(Ball::at(0.6, 0.0, -0.1)))
 }
 
+/// A line that fails once when a flag is set, upon which the client stops the arm.
+#[derive(Debug)]
+struct StoppableLine<T> {
+    inner: T,
+    stop: StopFlag,
+    /// Set when the line has failed for the flag.
+    told: bool,
+}
+
+/// Longest wait between two looks at the flag.
+const LOOK: Duration = Duration::from_millis(20);
+
+impl<T: Transport> Transport for StoppableLine<T> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.inner.send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
+        let until = self.inner.clock().saturating_add(timeout);
+        loop {
+            let flag = self.stop.get();
+            let stop = flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+            if stop && !std::mem::replace(&mut self.told, true) {
+                return Err(io::Error::other("stopped on request"));
+            }
+            let left = until.saturating_sub(self.inner.clock());
+            let count = self.inner.receive(buffer, left.min(LOOK))?;
+            if count.is_some() || left <= LOOK {
+                return Ok(count);
+            }
+        }
+    }
+
+    fn clock(&self) -> Duration {
+        self.inner.clock()
+    }
+
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+}
+
 /// Connects to the monitor, calibrates, and arms the proximity guard.
-fn connect<T: Transport>(line: T, config: ClientConfig) -> Result<GuardedArm<T>, ArmError> {
+fn connect<T: Transport>(
+    line: T,
+    config: ClientConfig,
+    stop: &StopFlag,
+) -> Result<GuardedArm<StoppableLine<T>>, ArmError> {
     let config = ClientConfig {
         speed_percent: Some(100.0),
         power_retries: 15,
         ..config
+    };
+    let line = StoppableLine {
+        inner: line,
+        stop: Arc::clone(stop),
+        told: false,
     };
     let mut client = Val2Client::connect(line, config)?;
     client.calibrate()?;

@@ -12,9 +12,9 @@ mod overview;
 use std::path::PathBuf;
 
 use clap::Parser;
-use example_support::files::{animated, writable_folder, write_png, write_whole};
+use example_support::files::{animated, lock_folder, write_png, write_whole};
 use example_support::learning::paper_cell;
-use example_support::program::{ExitCode, Outcome, ended};
+use example_support::program::{ExitCode, Outcome, start};
 use example_support::say;
 use hough_heuristic::Y4mWriter;
 use image::GrayImage;
@@ -39,11 +39,11 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    ended(draw(&Options::parse()))
+    start(draw)
 }
 
 fn draw(options: &Options) -> Outcome {
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     let out = |name: &str| options.out.join(name);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let workspace = Workspace::paper();

@@ -22,13 +22,13 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::comparison::{self, Row};
-use example_support::files::{Table, writable_folder, write_whole};
+use example_support::files::{Table, lock_folder, writable_folder, write_whole};
 use example_support::learning::{
     ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
 };
 use example_support::plane::{ExactPlane, search_percepts};
 use example_support::program::{
-    ExitCode, Outcome, at_least_one, ended, on_all_cores, progress_bar,
+    ExitCode, Outcome, at_least_one, go_on, on_all_cores, progress_bar, start,
 };
 use example_support::say;
 use example_support::stages::Stages;
@@ -108,11 +108,11 @@ struct Options {
 const SLIP_AT: u64 = 4;
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     let mut rivals = rivals(options)?;
     rivals.retain(|(name, _)| name.contains(&options.only));
     if rivals.is_empty() {
@@ -130,7 +130,8 @@ fn run(options: &Options) -> Outcome {
         false,
     );
     for level in &options.levels {
-        let cells = on_all_cores(options.draws, |draw| {
+        let mut cells = Vec::new();
+        let done = on_all_cores(options.draws, &mut cells, |draw| {
             let cell = DrawnCell::new(options, *level, draw as u64)?;
             let mut world = cell.world()?;
             let runs = rivals
@@ -139,7 +140,7 @@ fn run(options: &Options) -> Outcome {
             let runs = runs.collect::<Outcome<Vec<_>>>()?;
             bar.inc(1);
             Ok((runs, options.taught_goal && cell.goal.is_none()))
-        })?;
+        });
         for (rival, (name, _)) in rivals.iter().enumerate() {
             let cells = cells.iter().map(|(runs, _)| runs[rival].clone()).collect();
             let row = Row::new(*level, name, &Tally { cells });
@@ -157,6 +158,8 @@ fn run(options: &Options) -> Outcome {
                 );
             });
         }
+        // The rows of a level that was broken off are of the cells until then.
+        done?;
     }
     bar.finish_and_clear();
     let success = if options.grip {
@@ -227,6 +230,7 @@ impl<'a> DrawnCell<'a> {
         let mut agent = Agent::with_controller(self.config.clone(), controller)?;
         let mut runs = Vec::new();
         for start in 0..options.starts as u64 {
+            go_on()?;
             if slips && start == SLIP_AT {
                 world.slip();
             }
@@ -277,6 +281,7 @@ impl<'a> DrawnCell<'a> {
         let (mut made, mut run) = (0, 0);
         // One more run could take the longest; a ball that is not found takes no move.
         while made + longest <= moves && run <= moves as u64 {
+            go_on()?;
             let mut saved = SavedRun::before(&agent);
             let seed = seed_of(seed, &[run]);
             match world.run(&mut agent, seed, &mut |event| saved.note(event)) {

@@ -28,10 +28,10 @@ use rand::{RngExt, SeedableRng};
 
 use detour::Detour;
 use egg::{Egg, EggCamera};
-use example_support::files::{keep_run, writable_folder, write_png};
+use example_support::files::{keep_run, lock_folder, write_png};
 use example_support::learning::{learn_both, simulators};
 use example_support::overlay::Overlay;
-use example_support::program::{ExitCode, Outcome, at_least_one, ended, progress_bar};
+use example_support::program::{ExitCode, Outcome, STOP, at_least_one, go_on, progress_bar, start};
 use example_support::say;
 use example_support::trial::ball_in_view;
 
@@ -77,14 +77,15 @@ fn length(text: &str) -> Result<f64, String> {
 const ACROSS_TOLERANCE: f64 = 20.0;
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
     let scene = bright_ball_scene();
     let mut rig = Rig::emulated(false, &scene, options.seed)?;
+    rig.stopped_by(STOP.clone());
     let mut features = Watched {
         features: egg_features(options.seed)?,
         outline: Rc::default(),
@@ -103,6 +104,7 @@ fn run(options: &Options) -> Outcome {
     say!(" run  moves  lost  final x, y, shorter half-axis   miss (mm)  off across (deg)  result");
     let bar = progress_bar(options.runs as u64, "eggs", false);
     for run in 1..=options.runs {
+        go_on()?;
         let place = ball_in_view(rig.cell(), &mut rng)?;
         let egg = Egg {
             half_length: 0.5e-3 * options.length,

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Parser;
 use grasp_agent::{
     Agent, AgentConfig, Behaviour, BehaviourPair, BehaviourSpec, JointLimits, Learned, Lesson,
     OnlineLearning, Percept, RunEvent, SavedRun,
@@ -18,11 +17,11 @@ use puma_grasp::{Rig, RigError, Simulator, bright_ball_scene};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-use example_support::files::{Table, writable_folder, write_png, write_whole};
+use example_support::files::{Table, lock_folder, writable_folder, write_png, write_whole};
 use example_support::learning::{ACTIONS, ACTIONS_FINE, SAMPLES, TRIALS, anywhere, simulators};
 use example_support::overlay::Overlay;
 use example_support::plane::search_percepts;
-use example_support::program::{ExitCode, Outcome, ended, progress_bar};
+use example_support::program::{ExitCode, Outcome, STOP, go_on, progress_bar, start};
 use example_support::say;
 use example_support::stages::Stages;
 use example_support::trial::{ball_in_view, run_on_rig};
@@ -36,13 +35,13 @@ mod record;
 mod results;
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {
     // Checks all input before the long work.
     options.check()?;
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     if let Some(folder) = options.export.as_deref().and_then(Path::parent) {
         writable_folder(&Path::new(".").join(folder))?;
     }
@@ -51,6 +50,7 @@ fn run(options: &Options) -> Outcome {
     let policy = options.policy.as_deref();
     let loaded = policy.map(|path| Taught::load(path, &pair)).transpose()?;
     let mut rig = open_rig(options)?;
+    rig.stopped_by(STOP.clone());
     options.say(format_args!(
         "connected to the VAL II controller on {}",
         rig.name()
@@ -97,7 +97,7 @@ fn run(options: &Options) -> Outcome {
     let mut broken_off = None;
     let bar = progress_bar(options.runs as u64, "balls", options.quiet);
     for run in 1..=options.runs {
-        let ball = match ball_in_view(rig.cell(), &mut rng) {
+        let ball = match go_on().and_then(|()| ball_in_view(rig.cell(), &mut rng)) {
             Ok(ball) => ball,
             Err(error) => {
                 broken_off = Some(error.to_string());
@@ -115,6 +115,8 @@ fn run(options: &Options) -> Outcome {
         let cell = rig.cell().clone();
         // A file that cannot be written ends the writing of files, not the run.
         let mut written: Outcome = Ok(());
+        // Frames to be written if the run fails.
+        let mut pictures = Vec::new();
         let mut observe = |event: &RunEvent<'_>| {
             let (row, picture) = record.note(event, &cell.get());
             if written.is_ok() {
@@ -124,23 +126,32 @@ fn run(options: &Options) -> Outcome {
                 && written.is_ok()
             {
                 sheet.add(&picture);
-                written = write_frame(&frames, picture);
+                if run <= options.frames_of {
+                    written = write_frame(&frames, picture);
+                } else {
+                    pictures.push(picture);
+                }
             }
         };
         let reached = rig.place(&ball).map_err(Into::into).and_then(|()| {
             let detector = &mut *detector;
             run_on_rig(&mut rig, detector, &mut agent, &stages, &mut observe).map_err(Into::into)
         });
-        let done: Outcome = reached.and_then(|trial| {
+        let mut done: Outcome = reached.and_then(|trial| {
             record.ended(&trial);
             written
         });
+        if !record.summary.grasped {
+            let mut pictures = pictures.into_iter();
+            done = done.and(pictures.try_for_each(|picture| write_frame(&frames, picture)));
+        }
         match done {
             Ok(()) => {
                 bar.suspend(|| options.say(one_line(&record)));
                 bar.inc(1);
             }
             Err(error) => {
+                let error = go_on().err().unwrap_or(error);
                 broken_off = Some(format!("run {run} was broken off: {error}"));
                 record.summary.reason.get_or_insert(error.to_string());
             }

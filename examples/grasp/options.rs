@@ -51,6 +51,11 @@ pub(crate) struct Options {
     #[arg(long)]
     pub(crate) save_runs: bool,
 
+    /// Write the frames of the first N runs and of runs that fail; a frame takes about 130 kB, a
+    /// run 20 to 30 of them
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub(crate) frames_of: usize,
+
     /// Go on learning during the runs, and save the policies to the output folder
     #[arg(long)]
     pub(crate) keep_learning: bool,

@@ -20,7 +20,7 @@ use rand::{RngExt, SeedableRng};
 
 use example_support::files::{writable_folder, write_png};
 use example_support::overlay::Overlay;
-use example_support::program::{ExitCode, Outcome, ended};
+use example_support::program::{ExitCode, Outcome, start};
 use example_support::say;
 
 /// Draws original, edges, structure D and the detected circle of a rendered scene.
@@ -39,7 +39,7 @@ struct Options {
 const RADII: Range<f64> = 20.0..250.0;
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {

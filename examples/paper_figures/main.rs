@@ -19,13 +19,13 @@ use puma_val2::Joints;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::files::{Table, writable_folder, write_png};
+use example_support::files::{Table, lock_folder, write_png};
 use example_support::learning::{
     ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
 };
 use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
 use example_support::plot::{CURVES, Panel, write_svg};
-use example_support::program::{ExitCode, Outcome, at_least_one, ended};
+use example_support::program::{ExitCode, Outcome, at_least_one, go_on, start};
 use example_support::say;
 use example_support::stages::cpu_time;
 use example_support::trial::{FEATURES, TrialCell, at_goal};
@@ -68,11 +68,11 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     let taught = figure_6(options)?;
     if !options.learning_only {
         figures_7_and_8(options, &taught)?;
@@ -106,12 +106,10 @@ fn figure_6(options: &Options) -> Outcome<Learned> {
     let mut taught = None;
     for seed in (options.first_seed..).take(options.seeds) {
         let (centering, approaching) = learned_with(options, seed, &starts)?;
-        curves[0].1.push(centering.curve);
-        curves[1].1.push(approaching.curve);
-        taught.get_or_insert(Learned::new(centering.behaviour, approaching.behaviour));
-    }
-    for (name, seeds) in &curves {
-        for (seed, curve) in (options.first_seed..).zip(seeds) {
+        for (name, curve) in [
+            ("centering", &centering.curve),
+            ("approaching", &approaching.curve),
+        ] {
             for record in curve {
                 let cell = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.5}"));
                 let (share, error) = (cell(record.success_share), cell(record.mean_td_error));
@@ -121,6 +119,9 @@ fn figure_6(options: &Options) -> Outcome<Learned> {
                 ))?;
             }
         }
+        curves[0].1.push(centering.curve);
+        curves[1].1.push(approaching.curve);
+        taught.get_or_insert(Learned::new(centering.behaviour, approaching.behaviour));
     }
     let panels = curves
         .iter()
@@ -183,6 +184,7 @@ fn learned_with(options: &Options, seed: u64, starts: &[PlaneStart]) -> Outcome<
         ("rigid regression, mended", Some(&rigid), &mended, found),
         ("linear regression, mended", Some(&linear), &mended, found),
     ] {
+        go_on()?;
         let _ = learn(name, simulator, spec, trials);
     }
     Ok((centering, approaching))

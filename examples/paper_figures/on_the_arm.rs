@@ -10,7 +10,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use example_support::files::Table;
 use example_support::learning::{learn_both, paper_cell, simulators};
 use example_support::plot::{Panel, write_svg};
-use example_support::program::{Outcome, on_all_cores};
+use example_support::program::{Outcome, go_on, on_all_cores};
 use example_support::say;
 use example_support::tally::wilson;
 use example_support::trial::TrialCell;
@@ -49,7 +49,8 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
         let mut lines = Vec::new();
         for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
             // Of each arm: centering at once, then the whole task after each number of moves.
-            let scores = on_all_cores(arms, |seed| one_arm(form, level, seed as u64))?;
+            let mut scores = Vec::new();
+            on_all_cores(arms, &mut scores, |seed| one_arm(form, level, seed as u64))?;
             let mut line = Vec::new();
             let measured = std::iter::once(("x", 0)).chain(MOVES.map(|made| ("all", made)));
             for (column, (goal, made)) in measured.enumerate() {
@@ -108,6 +109,7 @@ fn one_arm(form: MoveForm, level: ErrorLevel, seed: u64) -> Outcome<Vec<Score>> 
     let (mut made, mut ball, mut idle) = (0, 0, 0);
     for moves in MOVES {
         while made < moves {
+            go_on()?;
             let result = cell.run(&mut agent, 1_000_000 + ball, &mut |_, _| (), &mut |_| ())?;
             let cycles = result.map_or(0, |result| result.outcome.cycles);
             made += cycles;

@@ -13,7 +13,7 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::overlay::{CAPTION, Overlay, Rgb888};
-use example_support::program::Outcome;
+use example_support::program::{Outcome, STOP};
 use example_support::trial::ball_in_view;
 
 /// Size of each picture, below its caption.
@@ -34,6 +34,7 @@ struct Moment {
 /// the frame with the circle, its edges.
 pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Outcome<RgbImage> {
     let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
+    rig.stopped_by(STOP.clone());
     let mut detector = BallDetector::default().build(seed)?;
     let config = AgentConfig::paper(Workspace::paper().search_poses());
     let mut agent = Agent::with_controller(config, learned.clone())?;

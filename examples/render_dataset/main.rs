@@ -23,8 +23,8 @@ use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
-use example_support::files::{Table, writable_folder, write_png};
-use example_support::program::{ExitCode, Outcome, ended, progress_bar};
+use example_support::files::{Table, lock_folder, write_png};
+use example_support::program::{ExitCode, Outcome, go_on, progress_bar, start};
 use example_support::say;
 use example_support::stages::cpu_time;
 use kinds::{Kind, Kinds, repeated, share, size};
@@ -58,7 +58,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    ended(render(&Options::parse()))
+    start(render)
 }
 
 fn render(options: &Options) -> Outcome {
@@ -71,7 +71,7 @@ fn render(options: &Options) -> Outcome {
             .error(ErrorKind::ValueValidation, message)
             .exit();
     }
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     let mut truth = Table::create(options.out.join("truth.csv"), "file,cx,cy,r,what,visible")?;
     let mut frames = Table::create(options.out.join("frames.csv"), "file,scene")?;
     let bar = progress_bar(kinds.len() as u64 * options.frames, "frames", false);
@@ -81,6 +81,7 @@ fn render(options: &Options) -> Outcome {
         let mut shared: Option<Renderer> = None;
         let mut milliseconds = Vec::new();
         for i in 0..options.frames {
+            go_on()?;
             let again = shared.take().filter(|_| i % options.per_scene.max(1) != 0);
             let mut drawn = None;
             if let Some(renderer) = again {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use grasp_agent::{AgentError, RunEvent, SavedRun};
 
-use example_support::program::{ExitCode, Outcome, ended};
+use example_support::program::{ExitCode, Outcome, start};
 use example_support::say;
 
 /// Replays runs that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers`
@@ -31,7 +31,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {

@@ -8,8 +8,8 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use example_support::files::{Table, animated, keep_run, writable_folder, write_whole};
-use example_support::program::{ExitCode, Outcome, at_least_one, ended, progress_bar};
+use example_support::files::{Table, animated, keep_run, lock_folder, write_whole};
+use example_support::program::{ExitCode, Outcome, at_least_one, go_on, progress_bar, start};
 use example_support::say;
 use example_support::stages::{Stages, Timed};
 use example_support::tally::{Counted, Tally};
@@ -99,12 +99,12 @@ impl Options {
 }
 
 fn main() -> ExitCode {
-    ended(run(&Options::parse()))
+    start(run)
 }
 
 fn run(options: &Options) -> Outcome {
     let belief = options.belief.as_deref().map(Belief::load).transpose()?;
-    writable_folder(&options.out)?;
+    let _lock = lock_folder(&options.out)?;
     let path = options.out.join("track.csv");
     let csv = (!options.shortcut).then(|| Table::create(path, "run,move,x,y,r,event"));
     let balls = options.runs + options.cells * options.teach;
@@ -188,6 +188,7 @@ impl Runs<'_> {
         let stages = self.stages.clone();
         let mut agent = Agent::with_controller(config, stages.around(hybrid))?;
         for ball in 0..options.teach + options.runs_in(number) {
+            go_on()?;
             let teaching = ball < options.teach;
             if ball == options.teach {
                 let learned = agent.controller().inner.clone().frozen();

@@ -1,7 +1,7 @@
 //! Result files: written whole or not at all.
 
 use std::fmt::Display;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
@@ -20,6 +20,33 @@ pub fn writable_folder(folder: &Path) -> Outcome {
         .and_then(|()| fs::write(&probe, b""))
         .and_then(|()| fs::remove_file(&probe))
         .map_err(|error| format!("{}: cannot be written to: {error}", folder.display()).into())
+}
+
+/// Makes a folder writable for this program alone, until the returned file is closed.
+///
+/// # Errors
+/// A folder that cannot be written to, or that another run of a program is writing to.
+pub fn lock_folder(folder: &Path) -> Outcome<File> {
+    writable_folder(folder)?;
+    let path = folder.join(".lock");
+    let failed = |error| format!("{}: cannot be locked: {error}", path.display());
+    let mut options = File::options();
+    let open = options.read(true).write(true).create(true).truncate(false);
+    let mut file = open.open(&path).map_err(failed)?;
+    match file.try_lock() {
+        Ok(()) => {
+            file.set_len(0).map_err(failed)?;
+            write!(file, "process {}", std::process::id()).map_err(failed)?;
+            Ok(file)
+        }
+        Err(TryLockError::WouldBlock) => {
+            let holder = fs::read_to_string(&path).unwrap_or_default();
+            let folder = folder.display();
+            let what = format!("{folder}: {holder} is writing its results here");
+            Err(format!("{what}; choose another folder with --out").into())
+        }
+        Err(TryLockError::Error(error)) => Err(failed(error).into()),
+    }
 }
 
 /// Writes a file beside its place and renames it into it. A device or a pipe is written to directly

@@ -2,24 +2,58 @@
 
 use std::error::Error;
 pub use std::process::ExitCode;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::thread;
 
+use clap::Parser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
 /// Result of a program or a part of it.
 pub type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
-/// Returns the exit code of a program, after printing the error if there is one.
+/// Exit code of a program that a signal has stopped.
+const STOPPED: u8 = 130;
+
+/// Flag that the first SIGINT (Ctrl-C) or SIGTERM sets.
+pub static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+
+/// Runs a program with the options of its command line, and returns its exit code after printing
+/// the error if there is one. A first SIGINT or SIGTERM sets [`STOP`], a second one ends the
+/// program at once.
 #[allow(clippy::print_stderr, reason = "the error of a program")]
-pub fn ended(done: Outcome) -> ExitCode {
-    match done {
+pub fn start<O: Parser>(run: impl FnOnce(&O) -> Outcome) -> ExitCode {
+    let options = O::parse();
+    for signal in [SIGINT, SIGTERM] {
+        // Without them a signal ends the program, as it does by default.
+        let _ = flag::register_conditional_shutdown(signal, STOPPED.into(), Arc::clone(&STOP));
+        let _ = flag::register(signal, Arc::clone(&STOP));
+    }
+    match run(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::FAILURE
+            ExitCode::from(if stopped() { STOPPED } else { 1 })
         }
     }
+}
+
+/// Returns whether the program is to stop.
+pub fn stopped() -> bool {
+    STOP.load(Ordering::Relaxed)
+}
+
+/// Fails if the program is to stop.
+///
+/// # Errors
+/// A signal.
+pub fn go_on() -> Outcome {
+    if stopped() {
+        return Err("stopped by a signal".into());
+    }
+    Ok(())
 }
 
 /// Prints a formatted line. A closed pipe does not end the program.
@@ -58,27 +92,31 @@ pub fn progress_bar(length: u64, unit: &str, quiet: bool) -> ProgressBar {
         .with_message(unit.to_owned())
 }
 
-/// Returns the results of `work` for each of `0..count`, in order, computed on all processor cores.
+/// Does `work` for each of `0..count` on all processor cores, and adds the results to `done` in
+/// order.
 ///
 /// # Errors
-/// The first error that occurred. Work begun by then is finished, no other is begun.
+/// The first error that occurred. Work that others have begun by then is finished and added.
 pub fn on_all_cores<T: Send>(
     count: usize,
+    done: &mut Vec<T>,
     work: impl Fn(usize) -> Outcome<T> + Sync,
-) -> Outcome<Vec<T>> {
-    let (todo, done) = (Mutex::new(0..count), Mutex::new((Vec::new(), None)));
+) -> Outcome {
+    let (todo, results) = (Mutex::new(0..count), Mutex::new((Vec::new(), None)));
     let next = || todo.lock().ok()?.next();
     let worker = || {
         while let Some(index) = next() {
-            let result = work(index).map_err(|error| error.to_string());
-            let Ok(mut done) = done.lock() else { return };
+            let result = go_on().and_then(|()| work(index));
+            let Ok(mut results) = results.lock() else {
+                return;
+            };
             match result {
-                Ok(result) => done.0.push((index, result)),
+                Ok(result) => results.0.push((index, result)),
                 Err(error) => {
-                    done.1.get_or_insert(error);
+                    results.1.get_or_insert(error.to_string());
                 }
             }
-            if done.1.is_some() {
+            if results.1.is_some() {
                 return;
             }
         }
@@ -89,10 +127,8 @@ pub fn on_all_cores<T: Send>(
             scope.spawn(worker);
         }
     });
-    let (mut results, error) = done.into_inner().map_err(|error| error.to_string())?;
-    if let Some(error) = error {
-        return Err(error.into());
-    }
+    let (mut results, error) = results.into_inner().map_err(|error| error.to_string())?;
     results.sort_by_key(|(index, _)| *index);
-    Ok(results.into_iter().map(|(_, result)| result).collect())
+    done.extend(results.into_iter().map(|(_, result)| result));
+    error.map_or(Ok(()), |error| Err(error.into()))
 }

@@ -15,7 +15,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
 use crate::learning::paper_cell;
-use crate::program::Outcome;
+use crate::program::{Outcome, STOP};
 use crate::stages::Stages;
 
 /// A feature of the ball in the image.
@@ -147,6 +147,7 @@ fn reach<C: Controller>(
 /// Those of [`Rig::emulated`], and the quantity that is out of range.
 pub fn rig_with_errors(errors: &Errors, scene: &Scene, seed: u64) -> Outcome<Rig> {
     let rig = Rig::emulated(false, scene, seed)?;
+    rig.stopped_by(STOP.clone());
     let wrong = errors.apply(&rig.cell().get())?;
     rig.cell().with(|cell| *cell = wrong);
     rig.cell().set_errors(errors)?;
