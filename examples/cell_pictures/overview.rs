@@ -4,7 +4,7 @@ use example_support::program::Outcome;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use pipeline_sim::{Cell, Workspace};
 use plotters::coord::Shift;
-use plotters::prelude::*;
+use plotters::prelude::{SeriesLabelPosition as Pos, *};
 use puma_val2::Joints;
 
 /// Size of each view, pixels; both show 1.8 m by 1.5 m.
@@ -55,22 +55,23 @@ pub(crate) fn overview(cell: &Cell, workspace: &Workspace, path: &[Joints]) -> O
             ),
         ];
         let both = arm_and_ball(cell, joints, path, eye);
-        let (title, lines) = ("from the side, in the plane of the arm", from_side.iter());
+        let lines = from_side.iter().chain(&both);
+        let title = "from the side, in the plane of the arm";
         view(
             &views[0],
-            title,
+            (title, Pos::UpperRight),
             (-0.6, -0.75),
             side,
-            lines.chain(&both),
+            lines,
             cell,
         )?;
-        let (title, lines) = ("from above", from_above.iter());
+        let lines = from_above.iter().chain(&both);
         view(
             &views[1],
-            title,
+            ("from above", Pos::LowerLeft),
             (-0.9, -0.4),
             above,
-            lines.chain(&both),
+            lines,
             cell,
         )?;
         root.present()?;
@@ -78,10 +79,10 @@ pub(crate) fn overview(cell: &Cell, workspace: &Workspace, path: &[Joints]) -> O
     Ok(svg)
 }
 
-/// Draws one view, whose lower left corner is `corner` in metres.
+/// Draws one view, whose lower left corner is `corner` in metres, with its legend in a free corner.
 fn view<'a>(
     area: &DrawingArea<SVGBackend<'_>, Shift>,
-    title: &str,
+    (title, legend): (&str, Pos),
     corner: (f64, f64),
     flat: impl Fn(&Point3<f64>) -> (f64, f64),
     lines: impl Iterator<Item = &'a Line>,
@@ -120,7 +121,7 @@ fn view<'a>(
         .legend(|(x, y)| Circle::new((x + 8, y), 5, BALL.filled()));
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
+        .position(legend)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(200, 200, 205))
         .draw()?;

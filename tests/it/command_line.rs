@@ -4,9 +4,9 @@
 //! and is skipped.
 
 use std::io::{Read, Write};
-use std::net::TcpListener;
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use grasp_agent::{
@@ -199,6 +199,74 @@ fn options_that_would_have_no_effect_are_refused() {
     }
 }
 
+/// Waits until the arm has looked around for a while.
+fn wait_for_frames(grasp: &mut Child, out: &Path) {
+    let frames = || std::fs::read_dir(out.join("frames")).map_or(0, Iterator::count);
+    while frames() < 4 && grasp.try_wait().expect("a process").is_none() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Passes bytes on between a program that connects to the returned address and `controller`.
+/// Returns all that the program sent once it has closed the line.
+fn recording_relay(controller: String) -> (String, std::thread::JoinHandle<Vec<u8>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a socket");
+    let address = listener.local_addr().expect("its address").to_string();
+    let relay = std::thread::spawn(move || {
+        let (mut program, _) = listener.accept().expect("the program connects");
+        let mut controller = TcpStream::connect(controller).expect("the controller listens");
+        let mut answers = controller.try_clone().expect("a second handle");
+        let mut back = program.try_clone().expect("a second handle");
+        std::thread::spawn(move || std::io::copy(&mut answers, &mut back));
+        let (mut heard, mut bytes) = (Vec::new(), [0; 256]);
+        while let Ok(count @ 1..) = program.read(&mut bytes) {
+            heard.extend(&bytes[..count]);
+            controller.write_all(&bytes[..count]).expect("it takes it");
+        }
+        heard
+    });
+    (address, relay)
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_stops_the_arm_and_keeps_the_results() {
+    use puma_val2::{Emulator, EmulatorServer, Profile, PumaParams, ServeConfig};
+    let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
+    let config = ServeConfig {
+        realtime: true,
+        ..ServeConfig::default()
+    };
+    let server = EmulatorServer::tcp("127.0.0.1:0", emulator, config).expect("a free port");
+    let (address, relay) = recording_relay(server.address().to_owned());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (policy, out) = (policy_file(folder.path()), folder.path().join("out"));
+    let mut grasp = or_skip!(example("grasp"));
+    grasp.args(["--tcp", &address, "--policy", &policy, "--out"]);
+    grasp.arg(&out).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut grasp = grasp.spawn().expect("grasp starts");
+    wait_for_frames(&mut grasp, &out);
+    let mut kill = Command::new("kill");
+    kill.args(["-INT", &grasp.id().to_string()]);
+    assert!(kill.status().expect("kill is there").success());
+    let output = grasp.wait_with_output().expect("grasp ends");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{errors}");
+    let said = "run 1 was broken off: stopped by a signal";
+    assert!(errors.contains(said), "{errors}");
+    let sent = relay.join().expect("the relay ends with the line");
+    let stop = sent.windows(5).position(|bytes| bytes == b"PANIC");
+    let stop = stop.expect("the controller was told to stop");
+    assert!(!sent[stop..].windows(4).any(|bytes| bytes == b"MOVE"));
+    let before = server.with_emulator(|emulator| emulator.joints());
+    std::thread::sleep(Duration::from_millis(200));
+    let after = server.with_emulator(|emulator| emulator.joints());
+    assert_eq!(before, after, "the arm still moves");
+    let file = std::fs::read_to_string(out.join("failures/run001.json")).expect("the run");
+    SavedRun::from_json(&file).expect("a saved run");
+    assert!(out.join("summary.json").exists() && out.join("features.csv").exists());
+}
+
 #[cfg(all(unix, feature = "serial"))]
 #[test]
 fn grasp_keeps_what_it_has_when_the_controller_dies() {
@@ -228,11 +296,7 @@ fn grasp_keeps_what_it_has_when_the_controller_dies() {
     ]);
     grasp.stdout(Stdio::null()).stderr(Stdio::piped());
     let mut grasp = grasp.spawn().expect("grasp starts");
-    // Killed when the arm has looked around for a while.
-    let frames = || std::fs::read_dir(out.join("frames")).map_or(0, Iterator::count);
-    while frames() < 4 && grasp.try_wait().expect("a process").is_none() {
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait_for_frames(&mut grasp, &out);
     let killed = emulator.kill().and_then(|()| emulator.wait());
     killed.expect("the emulator ends");
     let output = grasp.wait_with_output().expect("grasp ends");

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use example_support::files::write_whole;
+use example_support::files::{lock_folder, write_whole};
+use example_support::program::on_all_cores;
 
 #[test]
 fn a_file_is_replaced_as_a_whole_and_a_link_stays_a_link() {
@@ -37,4 +38,27 @@ fn what_is_no_regular_file_is_not_replaced() {
     assert!(refused.to_string().contains("socket"), "{refused}");
     let there = fs::metadata(&path).expect("still there");
     assert!(there.file_type().is_socket());
+}
+
+#[test]
+fn a_folder_is_written_to_by_one_program_at_a_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let held = lock_folder(folder.path()).expect("nobody holds it");
+    let refused = lock_folder(folder.path()).expect_err("held").to_string();
+    let holder = format!("process {} is writing", std::process::id());
+    assert!(refused.contains(&holder), "{refused}");
+    drop(held);
+    lock_folder(folder.path()).expect("free again");
+}
+
+#[test]
+fn work_on_all_cores_keeps_its_order_and_its_first_error() {
+    let mut squares = Vec::new();
+    on_all_cores(9, &mut squares, |i| Ok(i * i)).expect("no error");
+    assert_eq!(squares, [0, 1, 4, 9, 16, 25, 36, 49, 64]);
+    let failing = |i| if i == 3 { Err("three".into()) } else { Ok(i) };
+    let mut done = Vec::new();
+    let error = on_all_cores(1_000, &mut done, failing).expect_err("of the fourth");
+    assert_eq!(error.to_string(), "three");
+    assert!(done.starts_with(&[0, 1, 2]) && done.len() < 1_000);
 }

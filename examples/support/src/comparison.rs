@@ -124,7 +124,7 @@ fn number(value: f64, decimals: usize) -> String {
 /// Those of plotters.
 pub fn plot(rows: &[Row], success: &str) -> Outcome<String> {
     const NAMES: i32 = 210;
-    const COLUMN: i32 = 210;
+    const COLUMN: i32 = 240;
     const BAR: f64 = 100.0;
     const LINE: i32 = 22;
     const HEAD: i32 = 60;
@@ -150,7 +150,7 @@ pub fn plot(rows: &[Row], success: &str) -> Outcome<String> {
         let words = |text: String, at: (i32, i32), size: i32| {
             Text::new(text, at, ("sans-serif", size).into_font().color(&ink))
         };
-        let title = format!("Bars: moves of a run that succeeded, up to {most:.1}. % {success}.");
+        let title = format!("Bars and numbers: moves of a run that succeeded. Percent: {success}.");
         root.draw(&words(title, (10, 10), 13))?;
         for (level, left) in levels.iter().zip((NAMES..).step_by(COLUMN as usize)) {
             root.draw(&words(format!("errors: {level}"), (left, 34), 14))?;

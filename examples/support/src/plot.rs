@@ -54,7 +54,11 @@ pub const CURVES: [Curve; 2] = [
         |record| Some(100.0 * record.success_share?),
         Some(105.0),
     ),
-    ("mean error of Q", |record| record.mean_td_error, None),
+    (
+        "mean error of Q, grows with its values",
+        |record| record.mean_td_error,
+        None,
+    ),
 ];
 
 impl Panel {
@@ -146,7 +150,7 @@ impl Panel {
                     .label(name)
                     .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], style));
             }
-            if line.len() < 80 {
+            if (3..80).contains(&line.len()) {
                 chart.draw_series(line.iter().map(|at| Circle::new(*at, 2, colour.filled())))?;
             }
         }
