@@ -324,18 +324,18 @@ enum World {
     /// Features straight from the geometry, an arm that moves at once.
     Shortcut(Box<TrialCell>),
     /// Rendered frames, circle detection, VAL II on a line.
-    Chain(Box<Rig>, Box<dyn CircleDetector + Send>, Errors),
+    Chain(Box<Rig>, Box<dyn CircleDetector + Send>, Box<Errors>),
 }
 
 impl World {
     fn draw(options: &Options, level: ErrorLevel, seed: u64) -> Outcome<Self> {
         let drawn = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
-        let odd = options.odd.iter();
-        let errors = odd.fold(Ok(drawn), |errors, odd| errors?.with_odd(odd))?;
+        let mut odd = options.odd.iter();
+        let errors = odd.try_fold(drawn, |errors, odd| errors.with_odd(odd))?;
         if options.full_chain {
             let rig = rig_with_errors(&errors, &bright_ball_scene(), seed)?;
             let detector = options.detector.build(seed)?;
-            return Ok(Self::Chain(Box::new(rig), detector, errors));
+            return Ok(Self::Chain(Box::new(rig), detector, Box::new(errors)));
         }
         let cell = TrialCell::with_errors(errors)?;
         let cell = if options.grip {
