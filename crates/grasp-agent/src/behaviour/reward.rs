@@ -18,15 +18,16 @@ pub struct Reward {
     pub lost: f64,
     /// Terms that pay for coming closer.
     pub terms: Vec<RewardTerm>,
-    /// Least denominator of a term, in the units of its input (default 1; literally 0).
+    /// Least denominator of a term, in the units of its input (default 1; 0 in the paper's formulas
+    /// as printed).
     ///
     /// At 0 the reward grows without bound near a target, and is infinite on it.
     pub floor: f64,
-    /// `true` if the goal, once reached, is kept (default; literally `false`).
+    /// `true` if the goal is absorbing: once reached, it is kept (default; `false` in the paper's
+    /// formulas as printed).
     ///
-    /// A goal that only ends the episode is worth 100; near it, going away and coming back pays
-    /// more than that. A goal that is kept pays 100 at every step to come, 100 / (1 - gamma) in
-    /// all.
+    /// A goal that only ends the episode is worth 100, and near it, going away and coming back pays
+    /// more than that. An absorbing goal pays 100 at every step to come, 100 / (1 - gamma) in all.
     pub absorbing: bool,
 }
 

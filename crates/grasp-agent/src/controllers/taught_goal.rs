@@ -12,7 +12,7 @@ use crate::percept::{Input, Sighting};
 ///
 /// The paper's goal intervals (x 99..108, y 74..82, r 32..34) hold for its camera; another camera,
 /// or another mount, shows something else there. To teach the goal, put the ball between the open
-/// jaws, take the grip's turn back, and look. This needs no knowledge of the camera.
+/// jaws, turn the arm back by the grip, and take a sighting. This needs no knowledge of the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaughtGoal {
     untaught: Features,
@@ -68,7 +68,7 @@ impl TaughtGoal {
         self.from
     }
 
-    /// Returns the move from there that brings the jaws around the ball.
+    /// Returns the move from [`seen_from`](Self::seen_from) that brings the jaws around the ball.
     pub fn grip(&self) -> JointDelta {
         self.grip
     }

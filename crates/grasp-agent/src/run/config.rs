@@ -72,8 +72,9 @@ pub struct AgentConfig {
     /// out of both views, or that the detector misses in two looks at each, counts as grasped.
     /// Only a sensor in the jaws could tell.
     pub lift: Option<JointDelta>,
-    /// Least radius of a ball that was left behind, seen from the lifted hand, feature units
-    /// (default 9). Smaller circles are something else, for example the end of the ball's stand.
+    /// Least radius of a ball that was left behind, seen from the lifted hand, feature units (at
+    /// least 0, default 9). Smaller circles are something else, for example the end of the ball's
+    /// stand.
     pub left_behind: f64,
     /// Largest distance of a joint from where it was sent, radians, before the arm counts as stuck
     /// (default 1 degree).

@@ -66,8 +66,8 @@ pub enum EventKind {
     /// The ball has come into view, and the controller begins to reach for it.
     Reaching,
     /// The arm stands at the search pose with this number, or is on its way there if
-    /// [`EventKind::TooNear`] follows. Numbers go on when the poses are tried again with a
-    /// displacement.
+    /// [`EventKind::TooNear`] follows. The numbering continues when the poses are tried again with
+    /// a displacement.
     AtSearchPose(usize),
     /// The ball is in the frame.
     Seen(Sighting),
@@ -84,8 +84,8 @@ pub enum EventKind {
     /// The arm has gone back to the pose of the last sighting (0), or made the recovery move with
     /// this number, or a part of it if [`EventKind::TooNear`] follows.
     Recovering(usize),
-    /// Something is too near to the hand. The arm has been stopped on its way to the pose of the
-    /// event before, or there.
+    /// Something is too near to the hand. The arm has been stopped at the pose of the preceding
+    /// event, or on its way there.
     TooNear,
     /// The ball came nearer too fast.
     TooFast,
@@ -101,8 +101,8 @@ pub enum EventKind {
     Gripping(JointDelta),
     /// The gripper has closed.
     Gripped,
-    /// The closed hand has gone back by a move of the grip, the last time to the pose from which
-    /// the ball was last seen.
+    /// The closed hand has gone back by one of the moves of the grip. After the last of them it is
+    /// at the pose from which the ball was last seen.
     Withdrawn,
     /// The arm has lifted the closed hand.
     Lifted,
@@ -153,11 +153,13 @@ impl EventKind {
 /// Result of a run that was not broken off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunOutcome {
-    /// Reason why nothing was gripped. `None` if the gripper has closed at the goal and the grip
-    /// was verified, or [`AgentConfig::lift`](crate::AgentConfig::lift) is `None`.
+    /// Reason why nothing was gripped. `None` if the gripper has closed on the ball and the grip
+    /// was verified; a grip without [`AgentConfig::lift`](crate::AgentConfig::lift) is not verified
+    /// and counts too.
     pub gave_up: Option<GaveUp>,
-    /// Moves after the first sighting, those of a recovery included, that of the grip not; and one
-    /// for each grip that failed, or was not begun because two looks at the goal differed.
+    /// Number of moves after the first sighting, including those of a recovery and without those of
+    /// a grip. Each grip that failed, or was not begun because two looks at the goal differed, adds
+    /// one.
     pub cycles: usize,
     /// Number of times the ball was lost.
     pub losses: usize,

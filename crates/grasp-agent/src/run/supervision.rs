@@ -9,7 +9,7 @@ use crate::run::config::AgentConfig;
 /// The paper's constant control of the approach (section 2.2: collisions with unexpected objects,
 /// "or a rapid approach that could damage the camera").
 ///
-/// It moves nothing itself, and keeps its memory from run to run. The supervision of an agent is
+/// It moves nothing itself, and its state is kept from run to run. The supervision of an agent is
 /// its [`AgentConfig`] unless [`Agent::supervised_by`](crate::Agent::supervised_by) replaces it.
 /// The agent itself watches the camera: see [`AgentConfig::same_frames`].
 ///

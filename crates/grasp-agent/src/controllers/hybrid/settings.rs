@@ -13,12 +13,12 @@ use crate::sight::camera_model::CameraModel;
 /// Settings of a [`Hybrid`](crate::Hybrid).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HybridSettings {
-    /// Nominal camera and arm.
+    /// Nominal camera, arm and ball (default [`CameraModel::paper`]).
     pub nominal: CameraModel,
-    /// Expected errors of the nominal model.
+    /// Expected errors of the nominal model (default [`Prior::by_eye`]).
     pub prior: Prior,
-    /// Fraction of the prior uncertainty added back when a saved belief is loaded, 0..=1 (default
-    /// 0.2). Larger values re-learn a knocked camera sooner; see
+    /// Fraction of the prior uncertainty added back when a saved belief is loaded, at least 0
+    /// (default 0.2). Larger values re-learn a knocked camera sooner; see
     /// [`Hybrid::with_belief`](crate::Hybrid::with_belief).
     pub drift: f64,
     /// Features of the ball at the goal (default (103.5, 78, 33)).
@@ -26,8 +26,8 @@ pub struct HybridSettings {
     /// Largest turns of `JT1` to `JT3` in one move, radians (default
     /// [`JointLimits::PAPER_STEPS`]).
     pub steps: [f64; 3],
-    /// Margin to the frame's border, in standard deviations of the predicted image place (default
-    /// 2).
+    /// Margin to the frame's border, in standard deviations of the predicted image place, at least
+    /// 0 (default 2).
     pub caution: f64,
     /// Number of latest runs kept as evidence (default 400).
     pub memory: usize,
@@ -36,7 +36,9 @@ pub struct HybridSettings {
     /// Turn of `JT4` for the grip, radians (default 0).
     pub grip_aside: f64,
     /// Largest standard deviation of the ball's place, metres, at which the controller aims the
-    /// grip itself (default 0.008). Above it the agent's configured grip is used.
+    /// grip itself, at least 0 (default 0.008). Above it [`AgentConfig::grip`] is used.
+    ///
+    /// [`AgentConfig::grip`]: crate::AgentConfig::grip
     pub grip_certainty: f64,
 }
 

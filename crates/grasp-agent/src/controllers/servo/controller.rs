@@ -41,11 +41,12 @@ pub enum ServoLaw {
     LookAhead,
 }
 
-/// A controller that believes in a [`CameraModel`](crate::CameraModel) and does not learn.
+/// A controller that computes its moves from a [`CameraModel`](crate::CameraModel) and does not
+/// learn.
 ///
-/// It halves its moves after each one that lost the ball or was taken back, and makes them half as
-/// large again after each one that did not: otherwise it would, once recovery has found the ball,
-/// lose it by the same move again.
+/// A move that lost the ball or was taken back halves the following moves. Every other move
+/// lengthens them by half, up to their full length. Otherwise the same move would lose the ball
+/// again after each recovery.
 #[derive(Clone, Debug)]
 pub struct Servo {
     law: ServoLaw,

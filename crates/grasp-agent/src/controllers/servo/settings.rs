@@ -12,12 +12,13 @@ use crate::sight::camera_model::CameraModel;
 /// Settings common to all servo controllers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ServoSettings {
-    /// Camera and arm as they are believed to be.
+    /// Model of camera, arm and ball that the moves are computed from (default
+    /// [`CameraModel::paper`]).
     pub model: CameraModel,
     /// Features of the ball at the goal (default (103.5, 78, 33), the middle of the paper's goal
     /// intervals).
     pub goal: Features,
-    /// Share of the error to remove in one move, above 0 (default 1).
+    /// Fraction of the error that one move removes, above 0 and finite (default 1).
     pub gain: f64,
     /// Largest turns of `JT1` to `JT3` in one move, radians (default
     /// [`JointLimits::PAPER_STEPS`]).
