@@ -33,7 +33,7 @@ fn files_that_cannot_be_read_are_named_and_the_rest_detected() {
     fs::create_dir(&images).unwrap();
     fs::write(images.join("a_broken.png"), b"\x89PNG\r\n\x1a\nnothing").unwrap();
     fs::write(images.join("b_empty.pgm"), b"P5\n0 0\n255\n").unwrap();
-    ball(images.join("c_ball.png"));
+    ball(images.join("c_ball.tif"));
     let missing = folder.path().join("missing.png");
     let (code, errors) = detect_circles(&["--csv", csv.to_str().unwrap()], &[&missing, &images]);
     assert_eq!(code, Some(1), "{errors}");
@@ -45,7 +45,7 @@ fn files_that_cannot_be_read_are_named_and_the_rest_detected() {
     let columns = "file,cx,cy,r,score,covered,visible,axis_ratio,centre_error,radius_error";
     assert_eq!(rows.next(), Some(columns));
     let found: Vec<&str> = rows.next().unwrap().split(',').collect();
-    assert!(found[0].ends_with("c_ball.png"));
+    assert!(found[0].ends_with("c_ball.tif"));
     let expected = [90.0, 80.0, 40.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
     for (field, value) in found[1..].iter().zip(expected) {
         let off = field.parse::<f64>().unwrap() - value;
