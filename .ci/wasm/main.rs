@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let distance = (f64::from(x) - 90.0).hypot(f64::from(y) - 70.0);
         Luma([if distance < 33.0 { 40 } else { 200 }])
     });
-    let found = detect_circles(&frame, 20.0, 60.0)?;
+    let (found, _) = detect_circles(&frame, 20.0, 60.0)?;
     assert!((found[0].circle.radius - 33.0).abs() < 1.0);
     let mut heuristic = Heuristic::with_canny(HeuristicConfig::default())?;
     assert!((heuristic.detect(&frame)?[0].circle.radius - 33.0).abs() < 1.0);

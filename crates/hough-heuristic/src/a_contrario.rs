@@ -343,7 +343,8 @@ impl CircleDetector for AContrario {
 }
 
 /// Returns the circles of a single frame with radii of `min_radius..=max_radius` pixels, best
-/// first.
+/// first, and the work that they took: there may be more circles if
+/// [`ended_by_budget`](Effort::ended_by_budget) is set.
 ///
 /// Runs [`AContrario`] with its default settings. For a stream of frames build a detector once.
 ///
@@ -354,7 +355,7 @@ pub fn detect_circles(
     frame: &GrayImage,
     min_radius: f64,
     max_radius: f64,
-) -> Result<Vec<Detection>, ConfigError> {
+) -> Result<(Vec<Detection>, Effort), ConfigError> {
     let config = AContrarioConfig {
         min_radius,
         max_radius: Some(max_radius),
@@ -362,7 +363,8 @@ pub fn detect_circles(
     };
     let mut detector = AContrario::new(config)?;
     // Without a region of interest no frame is refused.
-    Ok(detector.detect(frame).unwrap_or_default().to_vec())
+    let found = detector.detect(frame).unwrap_or_default().to_vec();
+    Ok((found, detector.effort()))
 }
 
 /// Frames with a shorter side hold nothing, pixels.

@@ -35,7 +35,8 @@ pub(crate) fn plain() -> AContrario {
 fn one_call_finds_all_circles_and_nothing_else() {
     for seed in 0..8 {
         let (frame, balls) = Scene { seed, ..SCENE }.render();
-        let found = detect_circles(&frame, 8.0, 60.0).unwrap();
+        let (found, effort) = detect_circles(&frame, 8.0, 60.0).unwrap();
+        assert!(!effort.ended_by_budget && !effort.ended_by_count);
         assert_eq!(found.len(), balls.len(), "seed {seed}: {found:?}");
         for ball in &balls {
             assert!(
