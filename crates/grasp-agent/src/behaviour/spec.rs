@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta};
-use qtable::{Action, Error, Intervals, Product, State};
+use qtable::{Action, Error, Intervals, Product, State, Status, Step};
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::reward::Reward;
@@ -295,6 +295,28 @@ impl BehaviourSpec {
             rest /= steps.degrees.len();
         }
         JointDelta::from_degrees(degrees)
+    }
+
+    /// Returns the step to the percept `after`; without one, or if it is no number, the ball is lost.
+    pub(crate) fn outcome(
+        &self,
+        (before, state): (&Percept, State),
+        after: Option<&Percept>,
+        gamma: f64,
+    ) -> Step {
+        let seen = after.and_then(|after| Some((after, self.state(after).ok()?)));
+        let (observation, reward, status) = match seen {
+            None => (state, self.reward.lost, Status::Terminated),
+            Some((after, next)) if self.at_goal(after) => {
+                (next, self.reward.arrival(gamma), Status::Terminated)
+            }
+            Some((after, next)) => (next, self.reward.step(before, after), Status::Continuing),
+        };
+        Step {
+            observation,
+            reward,
+            status,
+        }
     }
 
     /// Checks that a program could run it.

@@ -76,31 +76,14 @@ where
     }
 
     fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, qtable::Error> {
-        let reward = &self.spec.reward;
         let known = self.deltas.get(action.0).copied();
         let delta = known.unwrap_or_else(|| self.spec.delta(action));
         let after = (self.simulate)(&self.now, &delta);
-        // A percept that is not a number counts as lost.
-        let seen = after.and_then(|percept| Some((percept, self.spec.state(&percept).ok()?)));
-        let Some((after, observation)) = seen else {
-            return Ok(Step {
-                observation: self.state,
-                reward: reward.lost,
-                status: Status::Terminated,
-            });
-        };
-        let before = std::mem::replace(&mut self.now, after);
-        self.state = observation;
-        let (reward, status) = if self.spec.at_goal(&after) {
-            (reward.arrival(self.gamma), Status::Terminated)
-        } else {
-            (reward.step(&before, &after), Status::Continuing)
-        };
-        Ok(Step {
-            observation,
-            reward,
-            status,
-        })
+        let (spec, before) = (self.spec, (&self.now, self.state));
+        let step = spec.outcome(before, after.as_ref(), self.gamma);
+        self.state = step.observation;
+        self.now = after.unwrap_or(self.now);
+        Ok(step)
     }
 
     /// A success is the goal: a lost ball pays nothing positive.

@@ -3,7 +3,7 @@
 use puma_val2::{JointDelta, Joints};
 use qtable::rand::rngs::Xoshiro256PlusPlus;
 use qtable::rand::{RngExt, SeedableRng};
-use qtable::{Action, Boltzmann, QLearning, Schedule, State, Status, Step};
+use qtable::{Action, Boltzmann, QLearning, Schedule, State};
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::policy::{Behaviour, Episode, KAPPA};
@@ -316,24 +316,8 @@ impl Half {
         let (Some((before, state, action)), Some(learning)) = (self.last, learning) else {
             return;
         };
-        let (spec, gamma) = (self.behaviour.spec(), learning.settings.gamma);
-        let (observation, reward, status) = match now {
-            None => (state, spec.reward.lost, Status::Terminated),
-            Some(now) => {
-                let Ok(next) = spec.state(now) else { return };
-                if spec.at_goal(now) {
-                    (next, spec.reward.arrival(gamma), Status::Terminated)
-                } else {
-                    let paid = spec.reward.step(&before, now);
-                    (next, paid, Status::Continuing)
-                }
-            }
-        };
-        let step = Step {
-            observation,
-            reward,
-            status,
-        };
+        let gamma = learning.settings.gamma;
+        let step = self.behaviour.spec().outcome((&before, state), now, gamma);
         let learner = &mut learning.learner;
         self.behaviour.learn(learner, state, action, &step);
     }
