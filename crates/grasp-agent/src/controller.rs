@@ -50,6 +50,8 @@ pub enum Feedback {
     /// Supervision has taken the move decided on last back: something was too near, or the approach
     /// too fast.
     TakenBack,
+    /// The jaws closed at this pose, and the check of the grip has found the ball in them.
+    Held(Joints),
     /// The gripper was stopped on its way to the ball, or missed it. The ball may have moved.
     Missed,
     /// The run is over.

@@ -39,15 +39,10 @@ impl SavedController {
                 Ok(Box::new(Servo::new(law, settings)))
             }
             "hybrid" => {
-                let (settings, belief): (HybridSettings, Belief) = self.data()?;
+                let (settings, belief, shown): (HybridSettings, Belief, bool) = self.data()?;
                 settings.check()?;
                 belief.check()?;
-                // The belief is held as firmly as it was.
-                let settings = HybridSettings {
-                    drift: 0.0,
-                    ..settings
-                };
-                Ok(Box::new(Hybrid::with_belief(settings, belief).frozen()))
+                Ok(Box::new(Hybrid::restored(settings, belief, shown)))
             }
             kind => Err(BehaviourError::Text {
                 what: format!("{kind:?} is not a kind of controller of this crate"),

@@ -187,7 +187,7 @@ fn a_hybrid_that_cannot_work_is_refused() {
     let agent = agent_of(hybrid);
     let text = SavedRun::before(&agent).to_json();
     let cases = [
-        ("\"mean\":[0.0,", "\"mean\":[", "invalid length 12"),
+        ("\"mean\":[0.0,", "\"mean\":[", "invalid length 17"),
         ("\"noise\":1.0", "\"noise\":0.0", "noise of the belief is 0"),
         ("\"turn\":0.17", "\"turn\":0.0", "prior"),
         ("\"play\":0.015", "\"play\":null", "null"),

@@ -1,14 +1,9 @@
-//! The belief about camera, ball and gears: thirteen parameters with their covariance.
+//! The belief about camera, ball and arm: eighteen parameters with their covariance.
 
-use hough_heuristic::Features;
-use nalgebra::{Matrix3, Point3};
-use puma_val2::Joints;
 use serde::{Deserialize, Serialize};
 
 use crate::checked::above_zero;
-use crate::controllers::hybrid::parameters::{
-    Information, LEARNED, Numbers, corrected, sensitivity, vector,
-};
+use crate::controllers::hybrid::parameters::{Information, LEARNED, Numbers, at, corrected};
 use crate::error::BehaviourError;
 use crate::sight::camera_model::CameraModel;
 
@@ -27,6 +22,15 @@ pub struct Prior {
     pub radius: f64,
     /// Backlash of each of the first three joints, whole width, radians (by eye: 0.015).
     pub play: f64,
+    /// Zero of `JT3`, radians \[0.03\]. Those of `JT1` and `JT2` turn arm and ball alike and change
+    /// nothing. 0 switches a parameter of the arm off, here and below.
+    pub zero: f64,
+    /// Gears of `JT2` and `JT3`, true turn over the reported one less 1 \[0.02\].
+    pub gear: f64,
+    /// Sag of the level upper arm, radians \[0.03\].
+    pub sag: f64,
+    /// Turn of `JT2` per turn of `JT3` \[0.04\].
+    pub coupling: f64,
 }
 
 impl Prior {
@@ -39,38 +43,49 @@ impl Prior {
             shift: 0.015,
             radius: 0.15,
             play: 0.015,
+            zero: 0.03,
+            gear: 0.02,
+            sag: 0.03,
+            coupling: 0.04,
         }
     }
 
-    /// Validates that each standard deviation is above zero.
+    /// Checks that each standard deviation is above zero; those of the arm may be zero.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let deviations = self.deviations();
-        deviations
-            .iter()
-            .try_for_each(|s| above_zero("a standard deviation of the prior", *s))
+        for (i, deviation) in self.deviations().iter().enumerate() {
+            if i < at::ARM || *deviation != 0.0 {
+                above_zero("a standard deviation of the prior", *deviation)?;
+            }
+        }
+        Ok(())
     }
 
     fn deviations(&self) -> Numbers {
         let Self {
-            focal,
-            centre,
-            turn,
-            shift,
-            radius,
-            play,
+            focal: f,
+            centre: c,
+            turn: t,
+            shift: s,
+            radius: r,
+            play: p,
+            zero,
+            gear: g,
+            sag,
+            coupling,
         } = *self;
         Numbers::from_column_slice(&[
-            focal, centre, centre, turn, turn, turn, shift, shift, shift, radius, play, play, play,
+            f, c, c, t, t, t, s, s, s, r, p, p, p, zero, g, g, sag, coupling,
         ])
     }
 }
 
 /// Normal distribution of the errors of the nominal model.
 ///
-/// The thirteen parameters: logarithm of the focal length over the nominal one; shift of the
+/// The eighteen parameters: logarithm of the focal length over the nominal one; shift of the
 /// principal point (feature units); rotation of the camera about its x, y and z axes (radians) and
 /// translation along them (metres); logarithm of the ball's radius over the nominal one; backlash
-/// of `JT1`, `JT2` and `JT3` (whole width, radians).
+/// of `JT1`, `JT2` and `JT3` (whole width, radians); zero of `JT3` (radians), gears of `JT2` and
+/// `JT3`, sag of the upper arm (radians), and turn of `JT2` per turn of `JT3`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
     mean: Numbers,
@@ -83,15 +98,34 @@ pub struct Belief {
 /// Image noise assumed at first, feature units.
 const FIRST_NOISE: f64 = 1.0;
 
+/// Returns the precision of a standard deviation; that of 0 leaves hardly any room.
+fn precision(deviation: f64) -> f64 {
+    1.0 / (deviation * deviation).max(1e-18)
+}
+
 impl Belief {
-    /// Creates the belief of an uncalibrated cell.
+    /// Creates the belief of an uncalibrated cell with the arm as it is given.
     pub fn new(prior: &Prior) -> Self {
-        let precisions = prior.deviations().map(|s| 1.0 / (s * s).max(1e-18));
+        let mut precisions = prior.deviations().map(precision);
+        precisions
+            .rows_mut(at::ARM, LEARNED - at::ARM)
+            .fill(precision(0.0));
         Self::of(
             Numbers::zeros(),
             Information::from_diagonal(&precisions),
             FIRST_NOISE,
         )
+    }
+
+    /// Returns the belief with an arm as uncertain as in `prior`.
+    pub(crate) fn with_arm(&self, prior: &Prior) -> Self {
+        let (mut belief, deviations) = (self.clone(), prior.deviations());
+        for i in at::ARM..LEARNED {
+            belief.information.row_mut(i).fill(0.0);
+            belief.information.column_mut(i).fill(0.0);
+            belief.information[(i, i)] = precision(deviations[i]);
+        }
+        belief
     }
 
     pub(crate) fn of(mean: Numbers, information: Information, noise: f64) -> Self {
@@ -102,12 +136,12 @@ impl Belief {
         }
     }
 
-    /// Returns the means of the thirteen parameters.
+    /// Returns the means of the eighteen parameters.
     pub fn mean(&self) -> &[f64] {
         self.mean.as_slice()
     }
 
-    /// Returns the standard deviations of the thirteen parameters.
+    /// Returns the standard deviations of the eighteen parameters.
     pub fn deviations(&self) -> Vec<f64> {
         let covariance = self.information.try_inverse();
         (0..LEARNED)
@@ -127,7 +161,10 @@ impl Belief {
             // Avoids the rounding of two inversions.
             return self;
         }
-        let change = (prior.deviations() * share).map(|s| s * s);
+        let mut change = (prior.deviations() * share).map(|s| s * s);
+        if self.information[(at::ARM, at::ARM)] >= precision(0.0) {
+            change.rows_mut(at::ARM, LEARNED - at::ARM).fill(0.0);
+        }
         let information = self.information.try_inverse();
         let information =
             information.and_then(|c| (c + Information::from_diagonal(&change)).try_inverse());
@@ -139,50 +176,6 @@ impl Belief {
             0.5 * (information + information.transpose()),
             self.noise,
         )
-    }
-
-    /// Updates the belief by one sighting, from `joints`, of a ball at a place known to `unsure`
-    /// metres along each axis. Returns it unchanged if the sighting is impossible.
-    pub(crate) fn having_seen(
-        self,
-        nominal: &CameraModel,
-        joints: &Joints,
-        (ball, unsure): (&Point3<f64>, f64),
-        features: &Features,
-    ) -> Self {
-        const ITERATIONS: usize = 10;
-        let (before, prior) = (self.mean, self.information);
-        let view =
-            |numbers: &Numbers, ball: &Point3<f64>| corrected(nominal, numbers).view(joints, ball);
-        let (mut numbers, mut information) = (before, prior);
-        for _ in 0..ITERATIONS {
-            let Some((expected, by_all)) = sensitivity(&numbers, ball, view) else {
-                return self;
-            };
-            let by_numbers = by_all.fixed_columns::<LEARNED>(0);
-            let by_place = by_all.fixed_columns::<3>(LEARNED);
-            let spread = Matrix3::identity() * self.noise.powi(2)
-                + by_place * by_place.transpose() * unsure.powi(2);
-            let Some(weight) = spread.try_inverse() else {
-                return self;
-            };
-            let off = vector(features) - vector(&expected);
-            information = prior + by_numbers.transpose() * weight * by_numbers;
-            let gradient = by_numbers.transpose() * weight * off - prior * (numbers - before);
-            let Some(step) = information.cholesky().map(|c| c.solve(&gradient)) else {
-                return self;
-            };
-            numbers += step;
-        }
-        let finite = numbers
-            .iter()
-            .chain(information.iter())
-            .all(|v| v.is_finite());
-        if finite {
-            Self::of(numbers, information, self.noise)
-        } else {
-            self
-        }
     }
 
     pub(crate) fn with_noise(self, noise: f64) -> Self {
@@ -213,7 +206,7 @@ impl Belief {
 }
 
 impl Belief {
-    const FILE_KIND: &str = "grasp-agent belief/2";
+    const FILE_KIND: &str = "grasp-agent belief/3";
 
     /// Writes the belief to `path`, atomically.
     ///

@@ -1,7 +1,7 @@
 //! The hybrid controller: estimate, plan, move, learn.
 
 use hough_heuristic::Features;
-use nalgebra::{Point3, SMatrix, Vector3};
+use nalgebra::Point3;
 use puma_val2::{Joint, JointDelta, Joints};
 
 use crate::controller::SavedController;
@@ -10,7 +10,7 @@ use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
 use crate::controllers::hybrid::parameters::{
-    Numbers, WITH_BALL, corrected, deviations, sensitivity,
+    Numbers, WithBall, corrected, deviations, sensitivity, vector,
 };
 use crate::controllers::hybrid::settings::HybridSettings;
 use crate::controllers::taught_goal::TaughtGoal;
@@ -20,7 +20,7 @@ use crate::sight::camera_model::CameraModel;
 
 /// Visual servoing with a camera model that is calibrated from the sightings.
 ///
-/// Each cycle estimates the ball's place and the thirteen parameters of a [`Belief`] from all
+/// Each cycle estimates the ball's place and the eighteen parameters of a [`Belief`] from all
 /// sightings of the run (robust least squares, with the belief as prior). The arm then moves
 /// towards the goal pose, as far as the ball stays in view under the remaining uncertainty. A
 /// learning hybrid uses every run as evidence for the next.
@@ -34,6 +34,8 @@ pub struct Hybrid {
     /// Set while a remembered run is not yet part of the belief.
     news: bool,
     learning: bool,
+    /// `true` if a goal was taught, whose grip is right.
+    shown: bool,
     run: Run,
 }
 
@@ -52,6 +54,9 @@ struct Run {
     moving: usize,
     /// Grips so far; none has held the ball.
     grips: i32,
+    /// `true` if the last grip was aimed here, and if that one has missed.
+    aimed: bool,
+    missed: bool,
 }
 
 impl Default for Run {
@@ -64,6 +69,8 @@ impl Default for Run {
             doubt: false,
             moving: 0,
             grips: 0,
+            aimed: false,
+            missed: false,
         }
     }
 }
@@ -74,7 +81,7 @@ struct Estimate {
     numbers: Numbers,
     model: CameraModel,
     ball: Point3<f64>,
-    covariance: SMatrix<f64, WITH_BALL, WITH_BALL>,
+    covariance: WithBall,
 }
 
 /// Distance from the expected place at which the ball has moved: standard deviations, and a least
@@ -84,14 +91,18 @@ const MOVED: (f64, f64) = (5.0, 3.0);
 const FAR_OFF: f64 = 40.0;
 /// Number of sightings after a movement in which another one needs no confirmation.
 const STILL_MOVING: usize = 3;
-/// Standard deviation of a ball held between the jaws from their middle, metres.
+/// Standard deviation of a ball that was put between the jaws from their middle, metres.
 const SHOWN: f64 = 0.002;
+/// Standard deviation of a ball that the jaws have closed around.
+const HELD: f64 = 0.004;
 /// Margin to the border of the frame, feature units.
 const MARGIN: f64 = 4.0;
 /// Radius at which the ball is still detected reliably, feature units.
 const FAR_ENOUGH: f64 = 5.5;
-/// Largest radius that a move may lead to, feature units.
+/// Largest radius that a move may lead to, feature units, and over that of the goal if that is
+/// more.
 const LARGEST: f64 = 55.0;
+const NEARER: f64 = 1.25;
 /// Fractions of the way that are tried, in order.
 const SHARES: [f64; 9] = [1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05];
 /// Smallest fraction of the way, after any number of losses.
@@ -117,19 +128,34 @@ impl Hybrid {
             remembered: Vec::new(),
             news: false,
             learning: true,
+            shown: false,
             run: Run::default(),
         }
     }
 
+    /// Creates a controller that decides by a belief as it is, and learns nothing.
+    pub(crate) fn restored(settings: HybridSettings, belief: Belief, shown: bool) -> Self {
+        Self {
+            learning: false,
+            shown,
+            ..Self::beginning(settings, belief)
+        }
+    }
+
     /// Sets a goal that was taught on the arm. The taught grip also calibrates the camera, since
-    /// the ball was between the jaws, whose place the arm reports.
+    /// the ball was between the jaws. From then on the errors of the arm are learned too: without a
+    /// grip, sightings hardly tell them from errors of the camera.
     #[must_use]
     pub fn shown(mut self, goal: &TaughtGoal) -> Self {
         let (nominal, from) = (&self.settings.nominal, goal.seen_from());
-        let ball = nominal.tool_point(&(from + goal.grip()));
-        let seen =
-            |belief: Belief| belief.having_seen(nominal, &from, (&ball, SHOWN), &goal.features());
-        (self.before, self.belief) = (seen(self.before), seen(self.belief));
+        let shown = Evidence::shown(goal.features(), [from, from + goal.grip()], SHOWN);
+        self.shown = true;
+        for belief in [&mut self.before, &mut self.belief] {
+            *belief = belief.with_arm(&self.settings.prior);
+            if let Some(fit) = Fit::of(belief, &belief.numbers(), nominal, &[&shown]) {
+                *belief = fit.belief(belief.noise());
+            }
+        }
         self.settings.goal = goal.features();
         self.settings.grip_turn = goal.grip()[Joint::J5];
         self.settings.grip_aside = goal.grip()[Joint::J4];
@@ -156,7 +182,7 @@ impl Hybrid {
     /// Keeps the sightings of one ball in one place as evidence for later runs.
     fn remember(&mut self) {
         // A single sighting determines the ball's place and nothing of the camera.
-        if self.learning && self.run.evidence.len() >= 2 {
+        if self.learning && self.run.evidence.tells() {
             self.remembered.push(self.run.evidence.clone());
             self.news = true;
             let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
@@ -194,17 +220,14 @@ impl Hybrid {
         }
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
             let links = self.run.evidence.links(numbers);
-            corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
+            let seen = corrected(&self.settings.nominal, numbers).view(&links.stand(), ball);
+            seen.as_ref().map(vector)
         };
         let Some((expected, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
             return Some(f64::INFINITY);
         };
         let unsure = deviations(&by_all, &estimate.covariance);
-        let off = Vector3::new(
-            seen.x - expected.x,
-            seen.y - expected.y,
-            seen.r - expected.r,
-        );
+        let off = vector(seen) - expected;
         let moved = (0..3)
             .any(|i| off[i].abs() > MOVED.1.max(MOVED.0 * unsure[i].hypot(self.belief.noise())));
         moved.then(|| off.norm())
@@ -218,7 +241,8 @@ impl Hybrid {
     ) -> Option<JointDelta> {
         let model = &estimate.model;
         let links = self.run.evidence.links(&estimate.numbers);
-        let camera = model.arm.wrist(links.stand()) * model.mount;
+        let stand = links.stand();
+        let camera = model.arm.wrist(&stand) * model.mount;
         let here = camera.inverse_transform_point(&estimate.ball);
         let goal = model.in_camera(&self.settings.goal)?;
         // The goal's image place at the present distance, for a ball that cannot be approached yet.
@@ -231,8 +255,8 @@ impl Hybrid {
         let mut last = None;
         for (target, share) in ways.into_iter().flatten() {
             let wanted = here + (target - here) * (share * self.run.boldness);
-            let (stand, _) = model.pose_placing(&estimate.ball, &wanted, links.stand());
-            let motors = links.motors_for(&stand, joints);
+            let (placing, _) = model.pose_placing(&estimate.ball, &wanted, &stand);
+            let motors = links.motors_for(&placing, joints);
             let delta = self.cut(&motors, joints, limits);
             last = Some(delta);
             if self.stays_in_view(estimate, &(*joints + delta), least) {
@@ -264,18 +288,19 @@ impl Hybrid {
         let view = |numbers: &Numbers, ball: &Point3<f64>| {
             let mut links: Links = self.run.evidence.links(numbers);
             links.follow(motors);
-            corrected(&self.settings.nominal, numbers).view(links.stand(), ball)
+            let seen = corrected(&self.settings.nominal, numbers).view(&links.stand(), ball);
+            seen.as_ref().map(vector)
         };
-        let Some((f, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
+        let Some((seen, by_all)) = sensitivity(&estimate.numbers, &estimate.ball, view) else {
             return false;
         };
         let margin = deviations(&by_all, &estimate.covariance) * self.settings.caution;
         let inside =
             |v: f64, margin: f64, low: f64, high: f64| v - margin >= low && v + margin <= high;
-        inside(f.x, margin[0], MARGIN, Features::WIDTH - MARGIN)
-            && inside(f.y, margin[1], MARGIN, Features::HEIGHT - MARGIN)
-            && f.r >= least
-            && f.r + margin[2] <= LARGEST
+        inside(seen.x, margin.x, MARGIN, Features::WIDTH - MARGIN)
+            && inside(seen.y, margin.y, MARGIN, Features::HEIGHT - MARGIN)
+            && seen.z >= least
+            && seen.z + margin.z <= LARGEST.max(NEARER * self.settings.goal.r)
     }
 }
 
@@ -318,23 +343,28 @@ impl Hybrid {
         self.run.evidence.saw(ball.features);
         self.run.estimate = self.estimate();
         let estimate = self.run.estimate.as_ref()?;
-        let uncertainty: f64 = (WITH_BALL - 3..WITH_BALL)
-            .map(|i| estimate.covariance[(i, i)])
-            .sum();
-        // The configured grip has missed; accept a less certain aim each time.
-        let enough = self.settings.grip_certainty * 4_f64.powi(self.run.grips);
-        self.run.grips = (self.run.grips + 1).min(10);
-        if uncertainty.sqrt() > enough {
+        // An aim that has missed is followed by the taught grip.
+        if std::mem::take(&mut self.run.missed) && self.shown {
             return None;
         }
         let links = self.run.evidence.links(&estimate.numbers);
-        let mut from = *links.stand();
+        let mut from = links.stand();
         from.0[Joint::J5.index()] += self.settings.grip_turn;
         from.0[Joint::J4.index()] += self.settings.grip_aside;
         let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
         let motors = links.motors_for(&stand, &request.joints);
-        let within = request.limits.admit(&motors);
-        within.then(|| motors - request.joints)
+        let miss = |numbers: &Numbers, ball: &Point3<f64>| {
+            let mut links = self.run.evidence.links(numbers);
+            links.follow(&motors);
+            Some(estimate.model.tool_point(&links.stand()) - ball)
+        };
+        let (_, by_all) = sensitivity(&estimate.numbers, &estimate.ball, miss)?;
+        let uncertainty = deviations(&by_all, &estimate.covariance).norm();
+        // The configured grip has missed; accept a less certain aim each time.
+        let enough = self.settings.grip_certainty * 4_f64.powi(self.run.grips);
+        self.run.grips = (self.run.grips + 1).min(10);
+        self.run.aimed = uncertainty <= enough && request.limits.admit(&motors);
+        self.run.aimed.then(|| motors - request.joints)
     }
 
     /// Learns from the run that is over.
@@ -380,7 +410,11 @@ impl Controller for Hybrid {
                 self.run.boldness = (0.5 * self.run.boldness).max(LEAST_BOLDNESS);
                 self.run.losses += usize::from(*feedback == Feedback::Lost);
             }
+            // An aim that holds only confirms the belief that it was made by.
+            Feedback::Held(joints) if !self.run.aimed => self.run.evidence.held_at(joints, HELD),
+            Feedback::Held(_) => {}
             Feedback::Missed => {
+                self.run.missed = std::mem::take(&mut self.run.aimed);
                 // The miss may have moved the ball.
                 self.remember();
                 self.run.evidence.forget_sightings();
@@ -395,7 +429,7 @@ impl Controller for Hybrid {
     }
 
     fn save(&self) -> Option<SavedController> {
-        SavedController::new("hybrid", (self.settings, &self.belief))
+        SavedController::new("hybrid", (self.settings, &self.belief, self.shown))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Sightings, the poses they were made from, and the links' positions behind the backlash.
+//! Sightings, the poses they were made from, and the true joint angles behind play and arm errors.
 
 use hough_heuristic::Features;
 use puma_val2::Joints;
@@ -11,9 +11,28 @@ pub(crate) struct Evidence {
     /// Reported joint angles, radians, in order.
     path: Vec<Joints>,
     sightings: Vec<(usize, Features)>,
+    /// Pose of the path at which the jaws closed around the ball, and the standard deviation of the
+    /// ball from their middle, metres.
+    held: Option<(usize, f64)>,
+}
+
+/// True joint angles at each sighting, with its features, and where the jaws closed.
+pub(crate) struct Stands {
+    pub(crate) views: Vec<(Joints, Features)>,
+    pub(crate) held: Option<(Joints, f64)>,
 }
 
 impl Evidence {
+    /// Creates the evidence of a ball that shows as `seen` from a pose and is between the jaws, up
+    /// to `unsure` metres, after the move to another.
+    pub(crate) fn shown(seen: Features, [from, gripping]: [Joints; 2], unsure: f64) -> Self {
+        Self {
+            path: vec![from, gripping],
+            sightings: vec![(0, seen)],
+            held: Some((1, unsure)),
+        }
+    }
+
     pub(crate) fn arm_at(&mut self, joints: &Joints) {
         self.path.push(*joints);
     }
@@ -25,27 +44,45 @@ impl Evidence {
         }
     }
 
+    /// Records that the jaws closed around the ball at `joints`, up to `unsure` metres.
+    pub(crate) fn held_at(&mut self, joints: &Joints, unsure: f64) {
+        let index = self.path.iter().rposition(|pose| pose == joints);
+        self.held = index.map(|index| (index, unsure));
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.sightings.len()
+    }
+
+    /// Returns `true` if it says more than where the ball was: two sightings, or one and a grip.
+    pub(crate) fn tells(&self) -> bool {
+        self.len() + usize::from(self.held.is_some()) >= 2
     }
 
     /// Drops the sightings and keeps the path, which determines the backlash.
     pub(crate) fn forget_sightings(&mut self) {
         self.sightings.clear();
+        self.held = None;
     }
 
-    /// Returns the links' angles at each sighting, with its features.
-    pub(crate) fn views(&self, numbers: &Numbers) -> Vec<(Joints, Features)> {
+    /// Returns the true joint angles at each sighting and at the grip.
+    pub(crate) fn stands(&self, numbers: &Numbers) -> Stands {
         let mut links = Links::new(numbers);
-        let mut views = Vec::with_capacity(self.sightings.len());
+        let mut stands = Stands {
+            views: Vec::with_capacity(self.sightings.len()),
+            held: None,
+        };
         let mut next = self.sightings.iter().peekable();
         for (index, motors) in self.path.iter().enumerate() {
             links.follow(motors);
             while let Some((_, features)) = next.next_if(|(seen_at, _)| *seen_at == index) {
-                views.push((links.stand, *features));
+                stands.views.push((links.stand(), *features));
+            }
+            if let Some((_, unsure)) = self.held.filter(|(at, _)| *at == index) {
+                stands.held = Some((links.stand(), unsure));
             }
         }
-        views
+        stands
     }
 
     /// Returns the links at the end of the path.
@@ -58,19 +95,28 @@ impl Evidence {
     }
 }
 
-/// Links of the first three joints. A link follows its motor once the backlash is taken up.
+/// Links of the arm. Those of the first three joints follow their motors once the backlash is taken
+/// up, and stand beside them by the errors of the arm.
 #[derive(Clone, Debug)]
 pub(crate) struct Links {
     half: [f64; 3],
-    stand: Joints,
+    /// Zero of `JT3`, gears of `JT2` and `JT3`, sag, coupling.
+    arm: [f64; 5],
+    /// Angles with the backlash, before the errors of the arm.
+    driven: Joints,
     begun: bool,
 }
+
+/// Angles of `JT2` and `JT3`, radians, at which gears and coupling displace nothing: the middle of
+/// the working range.
+const MIDDLE: [f64; 2] = [-1.4, 3.3];
 
 impl Links {
     fn new(numbers: &Numbers) -> Self {
         Self {
             half: std::array::from_fn(|i| 0.5 * numbers[at::PLAY + i].max(0.0)),
-            stand: Joints::default(),
+            arm: std::array::from_fn(|i| numbers[at::ARM + i]),
+            driven: Joints::default(),
             begun: false,
         }
     }
@@ -81,7 +127,7 @@ impl Links {
             let half = if i < 3 { self.half[i] } else { 0.0 };
             let motor = motors.0[i];
             // `max` and `min` would hide NaN.
-            self.stand.0[i] = match self.stand.0[i] {
+            self.driven.0[i] = match self.driven.0[i] {
                 _ if !self.begun || motor.is_nan() => motor,
                 at if at < motor - half => motor - half,
                 at if at > motor + half => motor + half,
@@ -91,21 +137,39 @@ impl Links {
         self.begun = true;
     }
 
-    /// Returns the links' angles.
-    pub(crate) fn stand(&self) -> &Joints {
-        &self.stand
+    /// Returns the true joint angles.
+    pub(crate) fn stand(&self) -> Joints {
+        self.bent(&self.driven)
     }
 
-    /// Returns the motor angles that bring the links to `target`.
+    fn bent(&self, driven: &Joints) -> Joints {
+        let [zero, gear2, gear3, sag, coupling] = self.arm;
+        let [j2, j3] = [driven.0[1] - MIDDLE[0], driven.0[2] - MIDDLE[1]];
+        let mut bent = *driven;
+        bent.0[1] += gear2 * j2 + sag * driven.0[1].cos() + coupling * j3;
+        bent.0[2] += zero + gear3 * j3;
+        bent
+    }
+
+    /// Returns the motor angles that bring the links to `target`, from where the motors are.
     pub(crate) fn motors_for(&self, target: &Joints, motors: &Joints) -> Joints {
+        /// The errors of the arm are small: each round divides the rest by ten and more.
+        const ROUNDS: usize = 8;
+        let mut driven = *target;
+        for _ in 0..ROUNDS {
+            let bent = self.bent(&driven);
+            for i in 1..3 {
+                driven.0[i] += target.0[i] - bent.0[i];
+            }
+        }
         Joints(std::array::from_fn(|i| {
-            let way = target.0[i] - self.stand.0[i];
+            let way = driven.0[i] - self.driven.0[i];
             if i >= 3 {
-                target.0[i]
+                driven.0[i]
             } else if way.abs() < 1e-9 {
                 motors.0[i]
             } else {
-                target.0[i] + self.half[i].copysign(way)
+                driven.0[i] + self.half[i].copysign(way)
             }
         }))
     }

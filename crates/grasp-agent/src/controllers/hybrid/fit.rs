@@ -1,13 +1,11 @@
 //! Robust least squares: model parameters and ball positions from evidence.
 
-use hough_heuristic::Features;
 use nalgebra::{Isometry3, Matrix3, Point3, SMatrix, Vector3};
-use puma_val2::Joints;
 
 use crate::controllers::hybrid::belief::Belief;
-use crate::controllers::hybrid::evidence::Evidence;
+use crate::controllers::hybrid::evidence::{Evidence, Stands};
 use crate::controllers::hybrid::parameters::{
-    Information, LEARNED, METRE_STEP, Numbers, STEPS, ThreeBy, WITH_BALL, at, corrected, vector,
+    Information, LEARNED, METRE_STEP, Numbers, STEPS, ThreeBy, WithBall, at, corrected, vector,
 };
 use crate::sight::camera_model::CameraModel;
 
@@ -20,7 +18,7 @@ pub(crate) struct Fit {
     /// Information matrix of the parameters, marginal over the ball positions.
     pub(crate) information: Information,
     /// Joint information matrix of the parameters and the last ball.
-    pub(crate) with_last_ball: SMatrix<f64, WITH_BALL, WITH_BALL>,
+    pub(crate) with_last_ball: WithBall,
     /// Weighted sum of squared residuals, feature units squared.
     squares: f64,
     /// Degrees of freedom: residuals minus fitted values.
@@ -46,7 +44,7 @@ impl Fit {
         let model = corrected(nominal, start);
         let mut numbers = *start;
         let first_guess = |evidence: &&Evidence| {
-            let (joints, features) = *evidence.views(start).last()?;
+            let (joints, features) = *evidence.stands(start).views.last()?;
             model.locate(&joints, &features)
         };
         let mut balls: Vec<_> = evidence.iter().map(first_guess).collect();
@@ -140,19 +138,18 @@ fn cost(
     noise: f64,
 ) -> f64 {
     let model = corrected(nominal, numbers);
-    let views = evidence.views(numbers);
-    let one = |(joints, features): &(Joints, Features)| match seen(
-        &model,
-        &model.arm.wrist(joints),
-        ball,
-    ) {
+    let Stands { views, held } = evidence.stands(numbers);
+    let of_view = |(joints, features)| match seen(&model, &model.arm.wrist(joints), ball) {
         Some(expected) => (expected - vector(features))
             .iter()
             .map(|r| huber(r / noise))
             .sum(),
         None => INEXPLICABLE,
     };
-    views.iter().map(one).sum()
+    let of_grip = held.map_or(0.0, |(joints, unsure)| {
+        ((model.tool_point(&joints) - ball) / unsure).norm_squared()
+    });
+    views.iter().map(|(j, f)| of_view((j, f))).sum::<f64>() + of_grip
 }
 
 /// Normal equations in blocks: the parameters, and three columns for each ball.
@@ -208,9 +205,8 @@ impl Normal {
             cross: SMatrix::zeros(),
             gradient: Vector3::zeros(),
         };
-        let views = evidence.views(&varied.numbers);
-        let played: [Vec<(Joints, Features)>; 3] =
-            std::array::from_fn(|i| evidence.views(&varied.with_play[i]));
+        let Stands { views, held } = evidence.stands(&varied.numbers);
+        let moved: Vec<Stands> = varied.arms.iter().map(|n| evidence.stands(n)).collect();
         self.spare -= 3.0;
         for (index, (joints, features)) in views.iter().enumerate() {
             let wrist = varied.model.arm.wrist(joints);
@@ -223,10 +219,10 @@ impl Normal {
                     by_numbers.set_column(i, &((v - expected) / STEPS[i]));
                 }
             }
-            for (i, views) in played.iter().enumerate() {
-                let wrist = varied.model.arm.wrist(&views[index].0);
+            for (i, stands) in (at::PLAY..).zip(&moved) {
+                let wrist = varied.model.arm.wrist(&stands.views[index].0);
                 if let Some(v) = seen(&varied.model, &wrist, ball) {
-                    by_numbers.set_column(at::PLAY + i, &((v - expected) / STEPS[at::PLAY + i]));
+                    by_numbers.set_column(i, &((v - expected) / STEPS[i]));
                 }
             }
             let mut by_place = Matrix3::zeros();
@@ -250,6 +246,22 @@ impl Normal {
             block.gradient += by_place.transpose() * weighed * residual;
             self.squares += residual.component_mul(&residual).dot(&weights) * noise * noise;
             self.spare += 3.0;
+        }
+        if let Some((joints, unsure)) = held {
+            let tool = varied.model.tool_point(&joints);
+            let mut by_numbers = ThreeBy::<LEARNED>::zeros();
+            for (i, stands) in (at::PLAY..).zip(&moved) {
+                if let Some((joints, _)) = &stands.held {
+                    by_numbers
+                        .set_column(i, &((tool - varied.model.tool_point(joints)) / STEPS[i]));
+                }
+            }
+            let (residual, weight) = (ball - tool, unsure.powi(-2));
+            self.numbers += by_numbers.transpose() * by_numbers * weight;
+            self.gradient += by_numbers.transpose() * residual * weight;
+            block.own += Matrix3::identity() * weight;
+            block.cross += by_numbers.transpose() * weight;
+            block.gradient += residual * weight;
         }
         block
     }
@@ -301,8 +313,8 @@ impl Normal {
     }
 
     /// Returns the joint information matrix of the parameters and the last ball.
-    fn with_last_ball(&self) -> SMatrix<f64, WITH_BALL, WITH_BALL> {
-        let mut joint = SMatrix::<f64, WITH_BALL, WITH_BALL>::identity();
+    fn with_last_ball(&self) -> WithBall {
+        let mut joint = WithBall::identity();
         joint
             .fixed_view_mut::<LEARNED, LEARNED>(0, 0)
             .copy_from(&self.numbers);
@@ -333,8 +345,10 @@ fn inverse_of(own: &Matrix3<f64>, damping: f64) -> Option<Matrix3<f64>> {
 struct Varied {
     numbers: Numbers,
     model: CameraModel,
+    /// Models with another parameter of camera or ball, in the order of the parameters.
     models: Vec<CameraModel>,
-    with_play: [Numbers; 3],
+    /// Numbers with another parameter of the arm, from [`at::PLAY`] on.
+    arms: Vec<Numbers>,
 }
 
 impl Varied {
@@ -350,7 +364,7 @@ impl Varied {
             models: (0..at::PLAY)
                 .map(|i| corrected(nominal, &other(i)))
                 .collect(),
-            with_play: std::array::from_fn(|i| other(at::PLAY + i)),
+            arms: (at::PLAY..LEARNED).map(other).collect(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The thirteen parameters: their order, the model they define, and its derivatives.
+//! The parameters of a belief: their table, the model they define, and its derivatives.
 
 use hough_heuristic::Features;
 use nalgebra::{
@@ -8,9 +8,10 @@ use nalgebra::{
 use crate::sight::camera_model::CameraModel;
 
 /// Number of parameters.
-pub(crate) const LEARNED: usize = 13;
+pub(crate) const LEARNED: usize = 18;
 
-/// Index of each parameter in the vector.
+/// Index of each parameter in the vector. Those before [`at::PLAY`] enter the camera model, the
+/// others the angles of the joints ([`Links`](crate::controllers::hybrid::evidence::Links)).
 pub(crate) mod at {
     pub(crate) const FOCAL: usize = 0;
     pub(crate) const CENTRE: usize = 1;
@@ -18,6 +19,7 @@ pub(crate) mod at {
     pub(crate) const SHIFT: usize = 6;
     pub(crate) const RADIUS: usize = 9;
     pub(crate) const PLAY: usize = 10;
+    pub(crate) const ARM: usize = 13;
 }
 
 pub(crate) type Numbers = SVector<f64, LEARNED>;
@@ -25,17 +27,19 @@ pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
 
 /// Number of parameters and coordinates of one ball together.
 pub(crate) const WITH_BALL: usize = LEARNED + 3;
+pub(crate) type WithBall = SMatrix<f64, WITH_BALL, WITH_BALL>;
 
 /// Steps of the numerical derivatives, for each parameter.
 pub(crate) const STEPS: [f64; LEARNED] = [
-    1e-5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5,
+    1e-5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5,
+    1e-5, 1e-5,
 ];
 /// Step of the derivatives by a coordinate, metres.
 pub(crate) const METRE_STEP: f64 = 1e-6;
 
 pub(crate) type ThreeBy<const N: usize> = SMatrix<f64, 3, N>;
 
-/// Applies the parameters to `nominal`. Backlash is not part of a camera model.
+/// Applies the parameters of the camera and the ball to `nominal`.
 pub(crate) fn corrected(nominal: &CameraModel, numbers: &Numbers) -> CameraModel {
     let three = |i: usize| Vector3::new(numbers[i], numbers[i + 1], numbers[i + 2]);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_scaled_axis(three(at::TURN)));
@@ -55,14 +59,13 @@ pub(crate) fn vector(f: &Features) -> Vector3<f64> {
     Vector3::new(f.x, f.y, f.r)
 }
 
-/// Returns the predicted features and their derivatives by parameters and ball place; `None` if the
-/// ball would be out of view.
+/// Returns a prediction and its derivatives by parameters and ball place; `None` if there is none.
 pub(crate) fn sensitivity(
     numbers: &Numbers,
     ball: &Point3<f64>,
-    mut view: impl FnMut(&Numbers, &Point3<f64>) -> Option<Features>,
-) -> Option<(Features, ThreeBy<WITH_BALL>)> {
-    let here = view(numbers, ball)?;
+    mut predict: impl FnMut(&Numbers, &Point3<f64>) -> Option<Vector3<f64>>,
+) -> Option<(Vector3<f64>, ThreeBy<WITH_BALL>)> {
+    let here = predict(numbers, ball)?;
     let mut by_all = ThreeBy::<WITH_BALL>::zeros();
     for i in 0..WITH_BALL {
         let (mut other, mut place) = (*numbers, *ball);
@@ -76,19 +79,13 @@ pub(crate) fn sensitivity(
                 METRE_STEP
             }
         };
-        by_all.set_column(
-            i,
-            &((vector(&view(&other, &place)?) - vector(&here)) / step),
-        );
+        by_all.set_column(i, &((predict(&other, &place)? - here) / step));
     }
     Some((here, by_all))
 }
 
-/// Returns the standard deviations of the predicted x, y and r.
-pub(crate) fn deviations(
-    by_all: &ThreeBy<WITH_BALL>,
-    covariance: &SMatrix<f64, WITH_BALL, WITH_BALL>,
-) -> SVector<f64, 3> {
+/// Returns the standard deviations of a prediction.
+pub(crate) fn deviations(by_all: &ThreeBy<WITH_BALL>, covariance: &WithBall) -> Vector3<f64> {
     (by_all * covariance * by_all.transpose())
         .diagonal()
         .map(|v| v.max(0.0).sqrt())

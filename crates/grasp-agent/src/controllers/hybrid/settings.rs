@@ -35,8 +35,9 @@ pub struct HybridSettings {
     pub grip_turn: f64,
     /// Turn of `JT4` for the grip, radians (default 0).
     pub grip_aside: f64,
-    /// Largest standard deviation of the ball's place, metres, at which the controller aims the
-    /// grip itself, at least 0 (default 0.008). Above it [`AgentConfig::grip`] is used.
+    /// Largest standard deviation of an aimed grip from the ball, metres, at least 0 (default
+    /// 0.008). Above it [`AgentConfig::grip`] is used, and after an aim that has missed if a goal
+    /// was taught.
     ///
     /// [`AgentConfig::grip`]: crate::AgentConfig::grip
     pub grip_certainty: f64,

@@ -61,7 +61,7 @@ impl LookAhead {
                 } else {
                     None
                 };
-                let Some(after) = after.filter(in_view) else {
+                let Some(after) = after.filter(|after| in_view(after, &settings.goal)) else {
                     continue;
                 };
                 let distance = distance(&after, &settings.goal);
@@ -94,9 +94,10 @@ fn distance(f: &Features, goal: &Features) -> f64 {
     x * x + y * y + r * r
 }
 
-/// Returns `true` for a ball well inside the frame.
-fn in_view(f: &Features) -> bool {
+/// Returns `true` for a ball well inside the frame, and no larger than near the goal.
+fn in_view(f: &Features, goal: &Features) -> bool {
     const MARGIN: f64 = 8.0;
+    let largest = (1.25 * goal.r).max(60.0);
     let inside = |v: f64, size: f64| (MARGIN..=size - MARGIN).contains(&v);
-    inside(f.x, Features::WIDTH) && inside(f.y, Features::HEIGHT) && (5.0..=60.0).contains(&f.r)
+    inside(f.x, Features::WIDTH) && inside(f.y, Features::HEIGHT) && (5.0..=largest).contains(&f.r)
 }

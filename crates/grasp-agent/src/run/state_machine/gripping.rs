@@ -66,10 +66,14 @@ impl Run<'_> {
             }
         }
         self.set_jaws(Gripper::Closed)?;
+        let closed_at = self.joints;
         let held = match self.config.lift {
             Some(lift) => self.verify(&ball, [from + aside, from], lift, wandered)?,
             None => Ok(true),
         };
+        if held == Ok(true) && self.config.lift.is_some() {
+            self.controller.notice(&Feedback::Held(closed_at));
+        }
         // Sightings in the meantime were not of the ball in its place.
         self.last_seen = Some(ball);
         Ok(match held {

@@ -1,0 +1,108 @@
+//! Cells that are wrong in ways beyond camera and play, with a goal that was taught on the arm.
+
+use grasp_agent::{Agent, EventLog, Hybrid};
+
+use crate::cell::{config, hybrid};
+use crate::plant::{EXTREME, Level, MODERATE, Odd, Plant};
+
+/// An agent with the goal taught in this cell; `None` where it cannot be.
+fn taught(plant: &Plant) -> Option<Agent<Hybrid>> {
+    let goal = plant.taught()?;
+    let config = config().with_taught_goal(&goal);
+    Agent::with_controller(config, hybrid().shown(&goal)).ok()
+}
+
+/// Balls held of so many, and grips beside the ball, after learning on others.
+fn held(level: Level, odd: Odd, seed: u64, balls: u64) -> (u64, usize) {
+    let plant = Plant::new(level, odd, seed);
+    let mut agent = taught(&plant).unwrap();
+    let mut held = |from: u64, balls: u64| {
+        let balls = from..from + balls;
+        let runs = balls.map(|ball| plant.run(&mut agent, ball, &mut EventLog::default()).1);
+        runs.map(u64::from).sum::<u64>()
+    };
+    held(1000, 20);
+    let before = plant.misses();
+    (held(5000, balls), plant.misses() - before)
+}
+
+#[test]
+fn arms_a_little_off_do_not_mislead_a_trained_hybrid() {
+    let off = 3_f64.to_radians();
+    let none = Odd::default();
+    for (name, odd) in [
+        (
+            "joint zeros",
+            Odd {
+                zeros: [0.0, off, -off],
+                ..none
+            },
+        ),
+        (
+            "gears",
+            Odd {
+                gears: 0.03,
+                ..none
+            },
+        ),
+        (
+            "sag",
+            Odd {
+                sag: 4_f64.to_radians(),
+                ..none
+            },
+        ),
+        (
+            "coupling",
+            Odd {
+                coupling: 0.1,
+                ..none
+            },
+        ),
+        (
+            "links",
+            Odd {
+                links: 0.020,
+                ..none
+            },
+        ),
+    ] {
+        let (held, misses) = held(MODERATE, odd, 7, 10);
+        assert!(
+            held == 10 && misses <= 1,
+            "{name}: {held} of 10 held, {misses} missed"
+        );
+    }
+}
+
+#[test]
+fn a_goal_larger_than_55_units_is_reached() {
+    let large = |seed: &u64| {
+        let goal = Plant::new(EXTREME, Odd::default(), *seed).taught();
+        goal.is_some_and(|goal| goal.features().r > 55.0)
+    };
+    let seed = (0..200).find(large).expect("a long lens and a large ball");
+    let (held, _) = held(EXTREME, Odd::default(), seed, 8);
+    assert!(held >= 7, "seed {seed}: {held} of 8 held");
+}
+
+#[test]
+fn without_a_taught_goal_the_arm_is_taken_as_given() {
+    let plant = Plant::new(MODERATE, Odd::default(), 3);
+    let mut agent = Agent::with_controller(config(), hybrid()).unwrap();
+    for ball in 0..10 {
+        plant
+            .run(&mut agent, ball, &mut EventLog::default())
+            .0
+            .unwrap();
+    }
+    let mean = agent.controller().belief().mean();
+    assert!(
+        mean[13..].iter().all(|number| number.abs() < 1e-6),
+        "{mean:?}"
+    );
+    assert!(
+        (mean[0] - (plant.truth().focal / 250.909).ln()).abs() < 0.03,
+        "{mean:?}"
+    );
+}
