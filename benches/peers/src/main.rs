@@ -11,8 +11,8 @@
 //! only the action needed, which is the fastest that its interface allows.
 
 use qtable::{
-    Action, Boltzmann, CachedBoltzmann, Environment, EpsilonGreedy, Error, Policy, QLearning,
-    QTable, Schedule, State, Status, Step, Training, Until,
+    Action, Boltzmann, CachedBoltzmann, Environment, EpsilonGreedy, Error, Learner, Policy,
+    QLearning, QTable, Schedule, State, Status, Step, Target, Traces, Training, Until,
 };
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, RngExt, SeedableRng};
@@ -220,6 +220,131 @@ fn cached<const LEARNERS: usize>(updates: u64, seed: u64) -> Result<f64> {
     measured
 }
 
+/// The loop that one would write by hand for this problem alone: the maximum of each row kept, ties
+/// by the lowest index, and no checks.
+fn by_hand(updates: u64) -> Result<f64> {
+    let mut table = vec![[0.0f64; ACTIONS]; STATES];
+    let mut best = [0usize; STATES];
+    let (mut rng, mut state) = (rng(1), 0);
+    let measured = rate(updates, || {
+        for _ in 0..updates {
+            let action = match rng.random::<f64>() < 0.1 {
+                true => rng.random_range(0..ACTIONS),
+                false => best[state],
+            };
+            let (next, reward) = transition(state, action);
+            let target = reward + GAMMA * table[next][best[next]];
+            let (row, old) = (&mut table[state], table[state][action]);
+            row[action] = old + ALPHA * (target - old);
+            if action == best[state] && row[action] < old {
+                for (other, value) in row.iter().enumerate() {
+                    if *value > row[best[state]] {
+                        best[state] = other;
+                    }
+                }
+            } else if row[action] > row[best[state]] {
+                best[state] = action;
+            }
+            state = next;
+        }
+        Ok(())
+    });
+    black_box(table[state][best[state]]);
+    measured
+}
+
+/// A softmax by hand with the exponential of the standard library, at 500 states and 4 actions.
+fn softmax_by_hand(updates: u64) -> Result<f64> {
+    let mut table = vec![[0.0f64; 4]; 500];
+    let (mut rng, mut state) = (rng(1), 0);
+    let measured = rate(updates, || {
+        for _ in 0..updates {
+            let highest = table[state].iter().copied().fold(f64::MIN, f64::max);
+            let weights = table[state].map(|value| ((value - highest) / TEMPERATURE).exp());
+            let mut rest = rng.random::<f64>() * weights.iter().sum::<f64>();
+            let action = weights.iter().position(|weight| {
+                rest -= weight;
+                rest < 0.0
+            });
+            let action = action.unwrap_or(3);
+            let step = small_step(State(state), Action(action));
+            let next = step.observation.0;
+            let highest = table[next].iter().copied().fold(f64::MIN, f64::max);
+            let old = table[state][action];
+            table[state][action] = old + ALPHA * (step.reward + GAMMA * highest - old);
+            state = next;
+        }
+        Ok(())
+    });
+    black_box(table[state][0]);
+    measured
+}
+
+/// The step of a problem of 500 states and 4 actions.
+#[inline(always)]
+fn small_step(state: State, action: Action) -> Step {
+    let mixed = (state.0 * 4 + action.0).wrapping_mul(2_654_435_761) >> 7;
+    let reward = if mixed & 63 == 0 { 1.0 } else { 0.0 };
+    Step::new(State(mixed % 500), reward, Status::Continuing)
+}
+
+/// The same problem as an environment.
+struct Small(State);
+
+impl Environment for Small {
+    fn states(&self) -> usize {
+        500
+    }
+    fn actions(&self) -> usize {
+        4
+    }
+    fn reset(&mut self, rng: &mut dyn Rng) -> std::result::Result<State, Error> {
+        self.0 = State(rng.random_range(0..500));
+        Ok(self.0)
+    }
+    fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> std::result::Result<Step, Error> {
+        let step = small_step(self.0, action);
+        self.0 = step.observation;
+        Ok(step)
+    }
+}
+
+/// A run at 500 states and 4 actions, in episodes of 60 steps.
+fn small_training<L: Learner, P: Policy>(updates: u64, learner: L, policy: P) -> Result<f64> {
+    let mut problem = Small(State(0));
+    let training = Training::new(&problem, QTable::new(500, 4)?, learner, policy)?;
+    let mut training = training.with_episode_limit(60)?;
+    let (mut rng, until) = (rng(3), Until::Actions(updates));
+    let measured = rate(updates, || {
+        Ok(training.run(&mut problem, until, &mut rng)?)
+    });
+    black_box(training.table().max(State(0)));
+    measured
+}
+
+fn small_q(updates: u64, alpha: Schedule, epsilon: Schedule) -> Result<f64> {
+    let learner = QLearning::new(alpha, GAMMA)?;
+    small_training(updates, learner, EpsilonGreedy::new(epsilon)?)
+}
+
+fn small_sarsa_lambda(updates: u64) -> Result<f64> {
+    let learner = Traces::new(Target::Sarsa, 0.8, Schedule::constant(ALPHA)?, GAMMA)?;
+    small_training(
+        updates,
+        learner,
+        EpsilonGreedy::new(Schedule::constant(0.1)?)?,
+    )
+}
+
+fn small_boltzmann(updates: u64) -> Result<f64> {
+    let policy = Boltzmann::new(Schedule::constant(TEMPERATURE)?)?;
+    small_training(
+        updates,
+        QLearning::new(Schedule::constant(ALPHA)?, GAMMA)?,
+        policy,
+    )
+}
+
 /// The sum of what two threads do, each by its own CPU time.
 fn cached_on_two_threads(updates: u64) -> Result<f64> {
     let one = |seed| cached::<1>(updates / 2, seed).map_err(|error| error.to_string());
@@ -284,10 +409,11 @@ fn main() -> Result<()> {
         .next()
         .map_or(Ok(4_000_000), |text| text.parse())?;
     type Entry = (&'static str, fn(u64) -> Result<f64>);
-    let entries: [Entry; 10] = [
+    let entries: [Entry; 17] = [
         ("rurel 0.6.0, random actions, f64", rurel),
         ("random actions, f64", |n| epsilon_greedy(n, 1.0)),
         ("epsilon-greedy 0.1, f64", |n| epsilon_greedy(n, 0.1)),
+        ("the same by hand, lowest ties", by_hand),
         ("Boltzmann, plain, f64", |n| plain_boltzmann(n / 8)),
         ("Boltzmann, cached, f32", |n| cached::<1>(n, 1)),
         ("Boltzmann, cached, 2 interleaved", |n| cached::<2>(n, 1)),
@@ -300,6 +426,28 @@ fn main() -> Result<()> {
         }),
         ("run_in_blocks, 500 000 actions", |_| {
             whole_training(500_000, true)
+        }),
+        ("500x4: run, constant eps", |n| {
+            small_q(n, Schedule::constant(ALPHA)?, Schedule::constant(0.1)?)
+        }),
+        ("500x4: run, linear eps", |n| {
+            small_q(
+                n,
+                Schedule::constant(ALPHA)?,
+                Schedule::linear(1.0, 0.1, n)?,
+            )
+        }),
+        ("500x4: run, both exponential", |n| {
+            small_q(
+                n,
+                Schedule::exponential(0.6, 0.02, n)?,
+                Schedule::exponential(1.0, 0.1, n)?,
+            )
+        }),
+        ("500x4: run, SARSA(0.8)", |n| small_sarsa_lambda(n / 4)),
+        ("500x4: run, Boltzmann", |n| small_boltzmann(n / 2)),
+        ("500x4: softmax by hand, std exp", |n| {
+            softmax_by_hand(n / 2)
         }),
     ];
     let mut rates = vec![Vec::new(); entries.len()];

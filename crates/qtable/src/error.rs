@@ -54,19 +54,11 @@ pub enum Error {
         count: usize,
     },
     /// An action that the state does not offer.
-    #[error("action {} is not allowed in state {}", action.0, state.0)]
-    ActionNotAllowed {
-        /// The state.
-        state: State,
-        /// The action.
-        action: Action,
-    },
+    #[error("action {} is not allowed in state {}", .1.0, .0.0)]
+    ActionNotAllowed(State, Action),
     /// A state without actions in which an episode goes on.
-    #[error("state {} offers no action, but the episode goes on there", state.0)]
-    NoActionAllowed {
-        /// The state.
-        state: State,
-    },
+    #[error("state {} offers no action, but the episode goes on there", .0.0)]
+    NoActionAllowed(State),
     /// A reward or a value that is NaN or infinite, or that a cached table cannot hold as `f32`.
     /// Typical causes: a division by a distance that became zero; rewards without bound at γ = 1.
     #[error(
@@ -106,46 +98,27 @@ pub enum Error {
         /// The element before it.
         before: f64,
     },
-    /// A quantity that is NaN and so lies in no interval.
-    #[error("quantity {quantity} is NaN, which lies in no interval")]
-    NotANumber {
-        /// Position among the quantities of a product, 0 for plain intervals.
-        quantity: usize,
-    },
-    /// A learner that needs the next action was not given one. The policy must choose it before the
-    /// update.
-    #[error("the learner needs the action chosen next in state {}, but none was given", state.0)]
-    NextActionMissing {
-        /// The observed state.
-        state: State,
-    },
+    /// A quantity that is NaN and so lies in no interval: its position among the quantities of a
+    /// product, 0 for plain intervals.
+    #[error("quantity {0} is NaN, which lies in no interval")]
+    NotANumber(usize),
+    /// A learner that needs the next action was not given that of the observed state. The policy
+    /// must choose it before the update.
+    #[error("the learner needs the action chosen next in state {}, but none was given", .0.0)]
+    NextActionMissing(State),
     /// A learner that needs the policy's probabilities met a policy that does not tell them.
     #[error("the learner needs the probabilities of the policy, which this policy does not tell")]
     NoProbabilities,
-    /// Probabilities of a model that are not a distribution.
+    /// Outcomes of a model that are not a distribution, and the sum of their probabilities.
     #[error(
         "the outcomes of action {} in state {} have probabilities that sum to {sum}: \
-         each must lie in 0..=1 and the sum be 1",
-        action.0,
-        state.0
+         each must lie in 0..=1 and the sum be 1", .1.0, .0.0, sum = .2
     )]
-    NotADistribution {
-        /// The state.
-        state: State,
-        /// The action.
-        action: Action,
-        /// Sum of the probabilities.
-        sum: f64,
-    },
-    /// A computation that did not settle. Typical cause: γ = 1 with a policy that never reaches an
-    /// end.
-    #[error("no convergence after {sweeps} sweeps: the last one still changed a value by {change}")]
-    NotConverged {
-        /// Sweeps done.
-        sweeps: u64,
-        /// Largest change of the last sweep.
-        change: f64,
-    },
+    NotADistribution(State, Action, f64),
+    /// A computation that did not settle: the sweeps done and the largest change of the last one.
+    /// Typical cause: γ = 1 with a policy that never reaches an end.
+    #[error("no convergence after {0} sweeps: the last one still changed a value by {1}")]
+    NotConverged(u64, f64),
     /// A letter in the map of a frozen lake that has no meaning.
     #[error("row {row}, column {column} of the map is {letter:?}: it must be S, F, H or G")]
     MapLetter {
@@ -168,53 +141,28 @@ pub enum Error {
     /// a table that was changed by hand.
     #[error(
         "the learner was made for another table (they differ at action {} of state {}): \
-         make a learner for each table",
-        action.0,
-        state.0
+         make a learner for each table", .1.0, .0.0
     )]
-    OtherTable {
-        /// The state.
-        state: State,
-        /// The action.
-        action: Action,
-    },
+    OtherTable(State, Action),
     /// A new key beyond the bound of its [`Keys`](crate::Keys).
-    #[error("there are more than the {most} keys allowed: raise the bound, or merge states")]
-    TooManyKeys {
-        /// The bound.
-        most: usize,
-    },
+    #[error("there are more than the {0} keys allowed: raise the bound, or merge states")]
+    TooManyKeys(usize),
     /// A failure inside an environment, for example a lost connection.
     #[error("the environment failed: {0}")]
     Environment(String),
-    /// An environment whose shape or mask is another one than at first, although it is not
+    /// An environment whose shape or mask changed after a number of steps, although it is not
     /// [dynamic](crate::Environment::is_dynamic).
-    #[error("after {steps} steps {what} of the environment is not what it was at first")]
-    EnvironmentChanged {
-        /// Steps taken before.
-        steps: u64,
-        /// The changed property.
-        what: &'static str,
-    },
-    /// An episode that differs when repeated with its seed and its actions. Typical causes: `reset`
-    /// keeps something of the episode before, or randomness that does not come from the generator
-    /// handed in.
-    #[error("step {step} of an episode differs when repeated: {first:?}, then {second:?}")]
-    NotReproducible {
-        /// Number of the step within the episode; 0 is the reset.
-        step: u64,
-        /// The first time.
-        first: Step,
-        /// The second time.
-        second: Step,
-    },
-    /// No episode ended, neither by termination nor by truncation. Training then needs an episode
-    /// limit; a task without an end is no fault.
-    #[error("no episode ended within {steps} steps: training needs an episode limit")]
-    Endless {
-        /// Steps taken.
-        steps: u64,
-    },
+    #[error("after {1} steps {0} of the environment is not what it was at first")]
+    EnvironmentChanged(&'static str, u64),
+    /// An episode that differs when repeated with its seed and its actions, from the numbered step
+    /// on (0 is the reset). Typical causes: `reset` keeps something of the episode before, or
+    /// randomness that does not come from the generator handed in.
+    #[error("step {0} of an episode differs when repeated: {1:?}, then {2:?}")]
+    NotReproducible(u64, Step, Step),
+    /// No episode ended within a number of steps, neither by termination nor by truncation.
+    /// Training then needs an episode limit; a task without an end is no fault.
+    #[error("no episode ended within {0} steps: training needs an episode limit")]
+    Endless(u64),
 }
 
 impl Error {

@@ -40,47 +40,21 @@ pub enum FileError {
     /// damaged in transfer as text.
     #[error("not a file of this format (it does not begin with its signature)")]
     Signature,
-    /// A file of a later version of this crate.
-    #[error("made by a later version (format {found}, read here: {known}): update this program")]
-    Newer {
-        /// Version in the file.
-        found: u32,
-        /// Version written here.
-        known: u32,
-    },
+    /// A file of a later version of this crate, with its format.
+    #[error("made by a later version (format {0}, read here: {FORMAT}): update this program")]
+    Newer(u32),
     /// A file of an earlier version of this crate, whose contents are laid out differently.
-    #[error("made by an earlier version (format {found}, read here: {known}): make it anew")]
-    Older {
-        /// Version in the file.
-        found: u32,
-        /// Version read here.
-        known: u32,
-    },
-    /// A file that is cut short or damaged.
-    #[error(
-        "the checksum is {found:08x} but the bytes give {computed:08x}: \
-         the file is cut short or damaged"
-    )]
-    Checksum {
-        /// Checksum in the file.
-        found: u32,
-        /// Checksum of the bytes.
-        computed: u32,
-    },
-    /// A sound file of another kind or of other types.
-    #[error("it holds {found:?}, not {wanted:?}")]
-    Kind {
-        /// Kind or types asked for.
-        wanted: String,
-        /// Kind or types in the file.
-        found: String,
-    },
-    /// A kind longer than 255 bytes.
-    #[error("a kind of {length} bytes is longer than 255")]
-    KindTooLong {
-        /// Its length in bytes.
-        length: usize,
-    },
+    #[error("made by an earlier version (format {0}, read here: {FORMAT}): make it anew")]
+    Older(u32),
+    /// A file that is cut short or damaged: the checksum in it, and that of its bytes.
+    #[error("the checksum is {0:08x} but the bytes give {1:08x}: the file is cut short or damaged")]
+    Checksum(u32, u32),
+    /// A sound file of another kind or of other types: those asked for, and those found.
+    #[error("it holds {1:?}, not {0:?}")]
+    Kind(String, String),
+    /// A kind longer than 255 bytes, with its length.
+    #[error("a kind of {0} bytes is longer than 255")]
+    KindTooLong(usize),
     /// A payload that is not a valid value of the type asked for, for example a table with a NaN in
     /// it.
     #[error("the contents are not valid: {0}")]
@@ -177,7 +151,7 @@ impl<W: Write> Write for Summing<W> {
 
 fn write<T: Serialize>(writer: impl Write, kind: &str, value: &T) -> Result<(), FileError> {
     if kind.len() > NAME_LIMIT {
-        return Err(FileError::KindTooLong { length: kind.len() });
+        return Err(FileError::KindTooLong(kind.len()));
     }
     let sum = crc32fast::Hasher::new();
     let mut file = Summing { writer, sum };
@@ -203,8 +177,7 @@ fn read<T: DeserializeOwned>(file: &mut (impl Read + Seek), kind: &str) -> Resul
     for wanted in [kind, &types::<T>()] {
         let found = read_name(file)?;
         if found != wanted {
-            let wanted = wanted.to_owned();
-            return Err(FileError::Kind { wanted, found });
+            return Err(FileError::Kind(wanted.to_owned(), found));
         }
     }
     let length = end.saturating_sub(file.stream_position()?);
@@ -236,16 +209,12 @@ fn check(file: &mut (impl Read + Seek)) -> Result<u64, FileError> {
         return Err(FileError::Signature);
     }
     let mut format = [0; 4];
-    let cut_short = |_| FileError::Checksum {
-        found: 0,
-        computed: 0,
-    };
+    let cut_short = |_| FileError::Checksum(0, 0);
     file.read_exact(&mut format).map_err(cut_short)?;
-    let known = FORMAT;
     match u32::from_le_bytes(format) {
         FORMAT => {}
-        found if found > known => return Err(FileError::Newer { found, known }),
-        found => return Err(FileError::Older { found, known }),
+        found if found > FORMAT => return Err(FileError::Newer(found)),
+        found => return Err(FileError::Older(found)),
     }
     let names = file.stream_position()?;
     let end = file.seek(SeekFrom::End(0))?.saturating_sub(CHECKSUM);
@@ -262,7 +231,7 @@ fn check(file: &mut (impl Read + Seek)) -> Result<u64, FileError> {
     file.read_exact(&mut found).map_err(cut_short)?;
     let (found, computed) = (u32::from_le_bytes(found), sum.finalize());
     if found != computed {
-        return Err(FileError::Checksum { found, computed });
+        return Err(FileError::Checksum(found, computed));
     }
     file.seek(SeekFrom::Start(names))?;
     Ok(end)

@@ -50,11 +50,8 @@
 //!     fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
 //!         self.0 = if action == Action(1) { self.0 + 1 } else { self.0.saturating_sub(1) };
 //!         let done = self.0 == 4;
-//!         Ok(Step {
-//!             observation: State(self.0),
-//!             reward: if done { 1.0 } else { 0.0 },
-//!             status: if done { Status::Terminated } else { Status::Continuing },
-//!         })
+//!         let status = if done { Status::Terminated } else { Status::Continuing };
+//!         Ok(Step::new(State(self.0), if done { 1.0 } else { 0.0 }, status))
 //!     }
 //! }
 //!

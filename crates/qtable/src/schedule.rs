@@ -3,9 +3,6 @@
 
 use std::sync::Arc;
 
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
-
 use crate::elementary::{exp, ln};
 use crate::error::{Error, check_setting};
 use crate::validated::validated;
@@ -22,6 +19,13 @@ validated! {
     /// fn main() -> Result<(), qtable::Error> {
     ///     let epsilon = Schedule::linear(1.0, 0.1, 100)?;
     ///     assert_eq!((epsilon.at(0), epsilon.at(50), epsilon.at(999)), (1.0, 0.55, 0.1));
+    ///     let cooling = Schedule::exponential(1000.0, 10.0, 100)?;
+    ///     assert!((cooling.at(50) - 100.0).abs() < 1e-9);
+    ///     let steps = Schedule::piecewise(&[(0, 1.0), (10, 0.2), (100, 0.0)])?;
+    ///     assert_eq!((steps.at(5), steps.at(55)), (0.6, 0.1));
+    ///     // By the visits of the pair: 1/n, and n^-0.7.
+    ///     let (mean, power) = (Schedule::inverse_visits(1.0, 1.0)?, Schedule::visits_power(1.0, 0.7)?);
+    ///     assert!(mean.at(9) == 0.1 && power.at(9) > 0.19);
     ///     let by_hand = Schedule::custom((0.0, 1.0), |step| 1.0 / (1.0 + step as f64));
     ///     assert_eq!(by_hand?.by_episode().at(3), 0.25);
     ///     Ok(())
@@ -40,29 +44,15 @@ validated! {
     }
 }
 
-/// The course of a schedule.
+/// The course of a schedule. Numbers are start, end and steps, or start and scale or exponent.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Shape {
     Constant(f64),
-    Linear {
-        start: f64,
-        end: f64,
-        steps: u64,
-    },
-    Exponential {
-        start: f64,
-        end: f64,
-        steps: u64,
-    },
-    InverseVisits {
-        start: f64,
-        scale: f64,
-    },
-    VisitsPower {
-        start: f64,
-        exponent: f64,
-    },
+    Linear(f64, f64, u64),
+    Exponential(f64, f64, u64),
+    InverseVisits(f64, f64),
+    VisitsPower(f64, f64),
     Piecewise(Vec<(u64, f64)>),
     #[cfg_attr(feature = "serde", serde(skip))]
     Custom(Custom),
@@ -102,7 +92,7 @@ impl Schedule {
     /// # Errors
     /// A value that is not finite, or `steps` of 0.
     pub fn linear(start: f64, end: f64, steps: u64) -> Result<Self, Error> {
-        Self::of(Shape::Linear { start, end, steps })
+        Self::of(Shape::Linear(start, end, steps))
     }
 
     /// Creates a schedule from `start` at step 0 to `end` at `steps` by equal ratios; it stays at
@@ -111,7 +101,7 @@ impl Schedule {
     /// # Errors
     /// A value that is not finite or not positive, or `steps` of 0.
     pub fn exponential(start: f64, end: f64, steps: u64) -> Result<Self, Error> {
-        Self::of(Shape::Exponential { start, end, steps })
+        Self::of(Shape::Exponential(start, end, steps))
     }
 
     /// Creates the schedule `start / (1 + visits / scale)` of the visits of each state-action pair.
@@ -123,7 +113,7 @@ impl Schedule {
     /// # Errors
     /// A value that is not finite, or a scale that is not positive.
     pub fn inverse_visits(start: f64, scale: f64) -> Result<Self, Error> {
-        Self::of(Shape::InverseVisits { start, scale })
+        Self::of(Shape::InverseVisits(start, scale))
     }
 
     /// Creates the schedule `start / n^exponent` at the n-th visit of each state-action pair, with
@@ -135,7 +125,7 @@ impl Schedule {
     /// # Errors
     /// A start that is not finite, or an exponent outside `0.5..=1`.
     pub fn visits_power(start: f64, exponent: f64) -> Result<Self, Error> {
-        Self::of(Shape::VisitsPower { start, exponent })
+        Self::of(Shape::VisitsPower(start, exponent))
     }
 
     /// Creates straight lines between `(step, value)` points; the schedule is constant before the
@@ -173,51 +163,48 @@ impl Schedule {
     pub fn at(&self, step: u64) -> f64 {
         match &self.shape {
             Shape::Constant(value) => *value,
-            Shape::Linear { start, end, steps } => between(*start, *end, step, *steps),
-            Shape::Exponential { start, end, steps } if step < *steps => {
+            Shape::Linear(start, end, steps) => between(*start, *end, step, *steps),
+            Shape::Exponential(start, end, steps) if step < *steps => {
                 let value = start * exp(self.log_ratio * (step as f64 / *steps as f64));
                 held_between(*start, *end, value)
             }
-            Shape::Exponential { end, .. } => *end,
-            Shape::InverseVisits { start, scale } => start / (1.0 + step as f64 / scale),
-            Shape::VisitsPower { start, exponent } => {
-                let count = step.saturating_add(1) as f64;
-                start * exp(-exponent * ln(count))
+            Shape::Exponential(_, end, _) => *end,
+            Shape::InverseVisits(start, scale) => start / (1.0 + step as f64 / scale),
+            Shape::VisitsPower(start, exponent) => {
+                start * exp(-exponent * ln(step.saturating_add(1) as f64))
             }
             Shape::Piecewise(points) => along(points, step),
-            Shape::Custom(Custom { range, value }) => {
-                let value = value(step);
-                if value.is_nan() {
-                    range.0
-                } else {
-                    held_between(range.0, range.1, value)
-                }
-            }
+            Shape::Custom(Custom { range, value }) => match value(step) {
+                value if value.is_nan() => range.0,
+                value => held_between(range.0, range.1, value),
+            },
+        }
+    }
+
+    /// Returns values of which one is the smallest and one the largest.
+    fn ends(&self) -> Vec<f64> {
+        match &self.shape {
+            Shape::Constant(value) => vec![*value],
+            Shape::Linear(start, end, _) | Shape::Exponential(start, end, _) => vec![*start, *end],
+            Shape::InverseVisits(start, _) | Shape::VisitsPower(start, _) => vec![0.0, *start],
+            Shape::Piecewise(points) => points.iter().map(|&(_, value)| value).collect(),
+            Shape::Custom(custom) => vec![custom.range.0, custom.range.1],
         }
     }
 
     /// Returns the smallest and the largest value.
     pub(crate) fn range(&self) -> (f64, f64) {
-        let (low, high) = match &self.shape {
-            Shape::Constant(value) => (*value, *value),
-            Shape::Linear { start, end, .. } | Shape::Exponential { start, end, .. } => {
-                (*start, *end)
-            }
-            Shape::InverseVisits { start, .. } | Shape::VisitsPower { start, .. } => (0.0, *start),
-            Shape::Piecewise(points) => points.iter().fold(
-                (f64::INFINITY, f64::NEG_INFINITY),
-                |(low, high), &(_, value)| (value.min(low), value.max(high)),
-            ),
-            Shape::Custom(custom) => custom.range,
-        };
-        (low.min(high), low.max(high))
+        let ends = self.ends().into_iter();
+        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), end| {
+            (end.min(low), end.max(high))
+        })
     }
 
     /// Returns `true` for a schedule that counts the visits of each pair.
     pub fn is_by_visits(&self) -> bool {
         matches!(
             self.shape,
-            Shape::InverseVisits { .. } | Shape::VisitsPower { .. }
+            Shape::InverseVisits(..) | Shape::VisitsPower(..)
         )
     }
 
@@ -267,37 +254,31 @@ impl Schedule {
     }
 
     fn restore(mut self) -> Result<Self, Error> {
-        let finite = |value: f64| {
-            let valid = value.is_finite();
-            check_setting("a value of a schedule", value, valid, "finite")
-        };
+        for value in self.ends() {
+            check_setting("a value of a schedule", value, value.is_finite(), "finite")?;
+        }
+        let enough = |what, any: bool| check_setting(what, 0.0, any, "at least 1");
+        let steps_given = |steps: u64| enough("the number of steps of a schedule", steps > 0);
         match &self.shape {
-            Shape::Constant(value) => finite(*value)?,
-            Shape::Linear { start, end, steps } | Shape::Exponential { start, end, steps } => {
-                finite(*start)?;
-                finite(*end)?;
-                check_setting(
-                    "the number of steps of a schedule",
-                    *steps as f64,
-                    *steps > 0,
-                    "at least 1",
-                )?;
+            Shape::Linear(_, _, steps) => steps_given(*steps)?,
+            Shape::Exponential(start, end, steps) => {
+                steps_given(*steps)?;
+                let (lower, what) = (start.min(*end), "the lower end of an exponential schedule");
+                check_setting(what, lower, lower >= f64::MIN_POSITIVE, "positive")?;
+                self.log_ratio = ln(*end) - ln(*start);
             }
-            Shape::InverseVisits { start, scale } => {
-                finite(*start)?;
+            Shape::InverseVisits(_, scale) => {
                 let valid = scale.is_finite() && *scale > 0.0;
                 check_setting("the scale of a schedule", *scale, valid, "positive")?;
             }
-            Shape::VisitsPower { start, exponent } => {
-                finite(*start)?;
+            Shape::VisitsPower(_, exponent) => {
                 let valid = (0.5..=1.0).contains(exponent);
                 check_setting("the exponent of a schedule", *exponent, valid, "in 0.5..=1")?;
             }
             Shape::Piecewise(points) => {
-                let valid = !points.is_empty();
-                check_setting("the number of points", 0.0, valid, "at least 1")?;
-                points.iter().try_for_each(|&(_, value)| finite(value))?;
-                if let Some(before) = points.windows(2).position(|pair| pair[0].0 >= pair[1].0) {
+                enough("the number of points", !points.is_empty())?;
+                let mut pairs = points.windows(2);
+                if let Some(before) = pairs.position(|pair| pair[0].0 >= pair[1].0) {
                     return Err(Error::NotAscending {
                         what: "the step of point",
                         index: before + 1,
@@ -306,16 +287,7 @@ impl Schedule {
                     });
                 }
             }
-            Shape::Custom(custom) => {
-                finite(custom.range.0)?;
-                finite(custom.range.1)?;
-            }
-        }
-        if let Shape::Exponential { start, end, .. } = self.shape {
-            let valid = start.min(end) >= f64::MIN_POSITIVE;
-            let what = "the lower end of an exponential schedule";
-            check_setting(what, start.min(end), valid, "positive")?;
-            self.log_ratio = ln(end) - ln(start);
+            Shape::Constant(_) | Shape::Custom(_) => {}
         }
         Ok(self)
     }
@@ -323,7 +295,7 @@ impl Schedule {
 
 /// Actions taken and episodes begun so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Clock {
     pub(crate) actions: u64,
     episodes: u64,

@@ -1,16 +1,13 @@
 //! States, actions, and the answer of an environment to an action.
 
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
-
 /// Index of a state, `0..states`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State(pub usize);
 
 /// Index of an action, `0..actions`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Action(pub usize);
 
 /// State of an episode after a step.
@@ -37,4 +34,15 @@ pub struct Step {
     pub reward: f64,
     /// State of the episode.
     pub status: Status,
+}
+
+impl Step {
+    /// Creates a step from its parts.
+    pub fn new(observation: State, reward: f64, status: Status) -> Self {
+        Self {
+            observation,
+            reward,
+            status,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Training: the loop, cached exploration, evaluation, and experiments over seeds.
 
+mod against;
 mod blocks;
 mod cached;
 mod check_env;

@@ -274,7 +274,7 @@ impl BehaviourSpec {
         for (quantity, (input, axis)) in self.inputs.iter().zip(axes).enumerate() {
             let bin = axis
                 .index(input.of(percept))
-                .map_err(|_| Error::NotANumber { quantity })?;
+                .map_err(|_| Error::NotANumber(quantity))?;
             state = state * axis.bins() + bin;
         }
         Ok(State(state))

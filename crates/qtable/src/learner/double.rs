@@ -78,7 +78,7 @@ impl DoubleQLearning {
         if table.value(state, action).to_bits() == self.mean(state, action).to_bits() {
             return Ok(());
         }
-        Err(Error::OtherTable { state, action })
+        Err(Error::OtherTable(state, action))
     }
 
     #[cfg(feature = "serde")]

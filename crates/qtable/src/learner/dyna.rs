@@ -119,11 +119,7 @@ impl DynaQ {
         let drawn = rng.random_range(0..offered.max(1));
         let action = table.offered(state).nth(drawn)?;
         let tried_last = self.last_tried[state.0 * table.actions() + action.0];
-        let untried = Step {
-            observation: state,
-            reward: 0.0,
-            status: Status::Continuing,
-        };
+        let untried = Step::new(state, 0.0, Status::Continuing);
         let known = self.model.draw_outcome(state, action, rng);
         let mut step = known.unwrap_or(untried);
         step.reward += self.bonus * ((self.steps - tried_last) as f64).sqrt();

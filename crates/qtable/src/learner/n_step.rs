@@ -3,8 +3,6 @@
 use std::collections::VecDeque;
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, check_not_negative, check_setting};
 use crate::learner::rule::{Experience, Learner, Rates, is_greedy};
@@ -69,7 +67,7 @@ validated! {
 
 /// A visit whose update is still to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Pending {
     state: State,
     action: Action,

@@ -1,8 +1,6 @@
 //! One-step Q-learning.
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, check_finite};
 use crate::learner::rule::{Experience, Learner, Rates};
@@ -31,7 +29,7 @@ use crate::table::QTable;
 /// }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QLearning {
     rates: Rates,
 }

@@ -1,8 +1,5 @@
 //! The values that a return may end in.
 
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
-
 use crate::error::Error;
 use crate::policy::Policy;
 use crate::scratch::Scratch;
@@ -14,7 +11,7 @@ use crate::table::QTable;
 /// `Sarsa` and `ExpectedSarsa` learn the value of the policy that acts, exploration included, and
 /// so keep away from cliffs; the others learn the optimal policy as long as everything is tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Target {
     /// The best action's value, as in Q-learning. A return is cut before an exploratory action
     /// (Watkins 1989): what comes after it is not what the greedy policy would have met.
@@ -47,7 +44,7 @@ impl Target {
         match self {
             Self::Q | Self::UncutQ => Ok(table.max(state)),
             Self::Sarsa => {
-                let action = next_action.ok_or(Error::NextActionMissing { state })?;
+                let action = next_action.ok_or(Error::NextActionMissing(state))?;
                 table.check(state, action)?;
                 Ok(table.value(state, action))
             }

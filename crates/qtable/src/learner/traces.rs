@@ -1,8 +1,6 @@
 //! Learning with eligibility traces.
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, check_finite, check_fraction};
 use crate::learner::rule::{Experience, Learner, Rates, is_greedy};
@@ -154,7 +152,7 @@ impl Learner for Traces {
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(
     feature = "serde",
-    derive(Serialize, Deserialize),
+    derive(serde::Serialize, serde::Deserialize),
     serde(from = "Vec<(State, Action, f64)>", into = "Vec<(State, Action, f64)>")
 )]
 struct Recent {

@@ -1,8 +1,5 @@
 //! Known dynamics: the outcomes of every action and their probabilities.
 
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
-
 use crate::error::{Error, check_finite, check_index, check_length, positive};
 use crate::step::{Action, State, Status, Step};
 use crate::table::checked_entries;
@@ -10,7 +7,7 @@ use crate::validated::validated;
 
 /// One possible outcome of an action.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Outcome {
     /// Probability, `0..=1`.
     pub probability: f64,
@@ -39,11 +36,7 @@ impl Outcome {
             true => Status::Terminated,
             false => Status::Continuing,
         };
-        Step {
-            observation: self.next,
-            reward: self.reward,
-            status,
-        }
+        Step::new(self.next, self.reward, status)
     }
 }
 
@@ -199,7 +192,7 @@ impl Model {
         if outcomes.is_empty() || (valid && (sum - 1.0).abs() <= 1e-6) {
             return Ok(());
         }
-        Err(Error::NotADistribution { state, action, sum })
+        Err(Error::NotADistribution(state, action, sum))
     }
 }
 

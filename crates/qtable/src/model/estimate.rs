@@ -228,7 +228,7 @@ impl ModelEstimate {
         if f64::from(table.visits(state, action)) >= self.trials(state, action) {
             return Ok(());
         }
-        Err(Error::OtherTable { state, action })
+        Err(Error::OtherTable(state, action))
     }
 
     #[cfg(feature = "serde")]
@@ -255,7 +255,7 @@ impl ModelEstimate {
                 let count = seen.probability;
                 if !(count >= 1.0 && count <= u64::MAX as f64 && count.fract() == 0.0) {
                     let sum = count;
-                    return Err(Error::NotADistribution { state, action, sum });
+                    return Err(Error::NotADistribution(state, action, sum));
                 }
                 if !seen.terminated {
                     note_source(&mut self.sources[seen.next.0], index);

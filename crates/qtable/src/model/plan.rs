@@ -41,7 +41,7 @@ impl Model {
         let (mut sweeps, mut change, mut before) = (0, f64::INFINITY, f64::INFINITY);
         while change > tolerance {
             if sweeps == self.most_sweeps {
-                return Err(Error::NotConverged { sweeps, change });
+                return Err(Error::NotConverged(sweeps, change));
             }
             change = self.sweep(&mut table, gamma)?;
             sweeps += 1;
@@ -51,7 +51,7 @@ impl Model {
             if let Some(values) = self.eliminate(&table.greedy(), gamma) {
                 self.fill(&mut table, &values, gamma)?;
             } else if gamma >= 1.0 && change >= before && sweeps > 2 * self.states as u64 {
-                return Err(Error::NotConverged { sweeps, change });
+                return Err(Error::NotConverged(sweeps, change));
             }
             before = change;
         }
@@ -104,7 +104,7 @@ impl Model {
                 });
             }
             if sweeps >= self.most_sweeps {
-                return Err(Error::NotConverged { sweeps, change });
+                return Err(Error::NotConverged(sweeps, change));
             }
         }
     }
@@ -172,7 +172,7 @@ impl Model {
                 return Ok((values, change, sweeps));
             }
             if !change.is_finite() || sweeps == self.most_sweeps {
-                return Err(Error::NotConverged { sweeps, change });
+                return Err(Error::NotConverged(sweeps, change));
             }
         }
     }
@@ -233,7 +233,7 @@ impl Model {
             let state = State(state);
             check_index("action", action.0, self.actions)?;
             if self.outcomes(state, action).is_empty() && !self.is_terminal(state) {
-                return Err(Error::ActionNotAllowed { state, action });
+                return Err(Error::ActionNotAllowed(state, action));
             }
         }
         Ok(())

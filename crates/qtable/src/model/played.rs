@@ -101,14 +101,8 @@ impl Environment for ModelEnvironment {
     fn step(&mut self, action: Action, rng: &mut dyn Rng) -> Result<Step, Error> {
         let outcomes = self.model.outcomes(self.state, action).iter();
         let drawn = draw(outcomes.map(|outcome| (outcome, outcome.probability)), rng);
-        let step = drawn.map_or(
-            Step {
-                observation: self.state,
-                reward: 0.0,
-                status: Status::Continuing,
-            },
-            Outcome::step,
-        );
+        let stay = Step::new(self.state, 0.0, Status::Continuing);
+        let step = drawn.map_or(stay, Outcome::step);
         self.state = step.observation;
         Ok(step)
     }

@@ -1,8 +1,6 @@
 //! The trait of a policy, the greedy policy, and the rule for ties.
 
 use rand::{Rng, RngExt};
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::step::{Action, State};
 use crate::table::QTable;
@@ -11,6 +9,31 @@ use crate::table::QTable;
 ///
 /// A policy whose exploration changes with time counts its own choices, so that the same object
 /// goes on where it stopped.
+///
+/// ```
+/// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+/// use qtable::{Action, Boltzmann, EpsilonGreedy, Greedy, Policy, QTable, Schedule, State, Ucb};
+///
+/// fn main() -> Result<(), qtable::Error> {
+///     let mut table = QTable::new(1, 2)?;
+///     table.set(State(0), Action(1), 1.0)?;
+///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+///     let falling = Schedule::linear(1.0, 0.1, 10_000)?;
+///     let policies: [(Box<dyn Policy>, f64); 4] = [
+///         (Box::new(Greedy), 1.0),
+///         (Box::new(EpsilonGreedy::new(falling)?), 0.5),
+///         (Box::new(Boltzmann::new(Schedule::constant(0.5)?)?), 0.8808),
+///         (Box::new(Ucb::new(2.0)?), 0.5),
+///     ];
+///     for (mut policy, wanted) in policies {
+///         let mut p = [0.0; 2];
+///         policy.probabilities(&table, State(0), &mut p);
+///         assert!((p[1] - wanted).abs() < 1e-4);
+///         policy.choose(&table, State(0), &mut rng);
+///     }
+///     Ok(())
+/// }
+/// ```
 pub trait Policy {
     /// Chooses an action for a state of the table.
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action;
@@ -44,7 +67,7 @@ impl<P: Policy + ?Sized> Policy for Box<P> {
 /// The policy that always takes the best action; of several, the one with the lowest index.
 /// ([`EpsilonGreedy`](crate::EpsilonGreedy) with ε = 0 and [`Ties::Random`] draws among them.)
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Greedy;
 
 impl Policy for Greedy {
@@ -61,7 +84,7 @@ impl Policy for Greedy {
 
 /// The choice among equally good actions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Ties {
     /// Each with the same probability.
     #[default]

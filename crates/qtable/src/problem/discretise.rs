@@ -59,7 +59,7 @@ impl Intervals {
     /// [`Error::NotANumber`] for NaN.
     pub fn index(&self, value: f64) -> Result<usize, Error> {
         if value.is_nan() {
-            return Err(Error::NotANumber { quantity: 0 });
+            return Err(Error::NotANumber(0));
         }
         let bin = self.edges.partition_point(|&edge| edge <= value);
         match self.goal {
@@ -163,7 +163,7 @@ impl Product {
         for (quantity, (intervals, &value)) in self.quantities.iter().zip(values).enumerate() {
             let bin = intervals
                 .index(value)
-                .map_err(|_| Error::NotANumber { quantity })?;
+                .map_err(|_| Error::NotANumber(quantity))?;
             state = state * intervals.bins() + bin;
         }
         Ok(State(state))

@@ -3,8 +3,6 @@
 use std::num::NonZeroU64;
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, positive};
 use crate::problem::environment::Environment;
@@ -13,7 +11,7 @@ use crate::step::{Action, State, Status, Step};
 /// An environment whose episodes are truncated after a number of steps. Training has a limit of its
 /// own ([`Training::with_episode_limit`](crate::Training::with_episode_limit)).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TimeLimit<E> {
     inner: E,
     limit: NonZeroU64,

@@ -66,7 +66,7 @@ impl<K: Clone + Eq + Hash> Keys<K> {
         }
         let (state, most) = (self.keys.len(), self.most);
         if state >= most {
-            return Err(Error::TooManyKeys { most });
+            return Err(Error::TooManyKeys(most));
         }
         self.keys.push(key.clone());
         self.states.insert(key.clone(), state);

@@ -59,6 +59,17 @@ struct Best {
     equals: u32,
 }
 
+impl Best {
+    #[inline(always)]
+    fn new(value: f64, action: u32, equals: u32) -> Self {
+        Self {
+            value,
+            action,
+            equals,
+        }
+    }
+}
+
 impl QTable {
     /// Creates a table of zeros.
     ///
@@ -107,12 +118,7 @@ impl QTable {
         let before = self.states();
         if states > before {
             self.resize(states)?;
-            let (value, action, equals) = (self.initial, 0, self.actions as u32);
-            let best = Best {
-                value,
-                action,
-                equals,
-            };
+            let best = Best::new(self.initial, 0, self.actions as u32);
             self.best.resize(states, best);
         }
         Ok(())
@@ -274,7 +280,7 @@ impl QTable {
         check_index("state", state.0, self.states())
             .and_then(|()| check_index("action", action.0, self.actions))
             .err()
-            .unwrap_or(Error::ActionNotAllowed { state, action })
+            .unwrap_or(Error::ActionNotAllowed(state, action))
     }
 
     /// Checks a choice: a pair in the table that is offered now.
@@ -282,7 +288,7 @@ impl QTable {
     pub(crate) fn check_choice(&self, state: State, action: Action) -> Result<(), Error> {
         self.check(state, action)?;
         if self.dynamic && !self.allows(state, action) {
-            return Err(Error::ActionNotAllowed { state, action });
+            return Err(Error::ActionNotAllowed(state, action));
         }
         Ok(())
     }
@@ -333,12 +339,7 @@ impl QTable {
     fn follow(&mut self, state: State, action: u32, old: f64, value: f64) {
         let best = &mut self.best[state.0];
         if value > best.value {
-            let equals = 1;
-            *best = Best {
-                value,
-                action,
-                equals,
-            };
+            *best = Best::new(value, action, 1);
             return;
         }
         let (was, is) = (old >= best.value, value >= best.value);
@@ -352,11 +353,7 @@ impl QTable {
     pub(super) fn find_best(&mut self, state: State) {
         let row = &self.values[state.0 * self.actions..][..self.actions];
         let higher = |a: f64, b: f64| if b > a { b } else { a };
-        let mut found = Best {
-            value: row[0],
-            action: 0,
-            equals: 0,
-        };
+        let mut found = Best::new(row[0], 0, 0);
         match self.mask_row(state) {
             None => {
                 // Lane by lane, so that it is done with vectors.
@@ -417,13 +414,7 @@ impl QTable {
         self.best.clear();
         let reserved = self.best.try_reserve_exact(states);
         reserved.map_err(|_| Error::too_large(states, actions))?;
-        let (value, action, equals) = (self.initial, 0, 0);
-        let best = Best {
-            value,
-            action,
-            equals,
-        };
-        self.best.resize(states, best);
+        self.best.resize(states, Best::new(self.initial, 0, 0));
         self.find_all_best();
         Ok(self)
     }

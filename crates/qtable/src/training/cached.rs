@@ -11,7 +11,7 @@ use crate::policy::Boltzmann;
 use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
 
-/// Actions of a group, and blocks of a row: the numbers of sums that are compared at once.
+/// Actions of a group, and blocks of a row: as many sums as are compared at once.
 const GROUP: usize = 16;
 const BLOCKS: usize = 8;
 /// A row's offset follows its maximum once they are this many temperatures apart. The largest
@@ -32,7 +32,7 @@ const DRIFT: f64 = 30.0;
 /// of a probability below 6e-8 may never be drawn. A change of the temperature rebuilds all
 /// weights, so it is made in blocks of many actions:
 /// [`Training::run_in_blocks`](crate::Training::run_in_blocks). Below 8 actions [`Boltzmann`]
-/// itself is faster.
+/// itself is faster. Methods that return no `Result` panic outside the table.
 ///
 /// ```
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -110,14 +110,11 @@ impl CachedBoltzmann {
     pub fn new(table: &QTable, temperature: f64) -> Result<Self, Error> {
         let (states, actions) = (table.states(), table.actions());
         let groups_per_row = actions.div_ceil(GROUP);
-        let block_shift = groups_per_row
-            .div_ceil(BLOCKS)
-            .next_power_of_two()
-            .trailing_zeros();
+        let per_block = groups_per_row.div_ceil(BLOCKS).next_power_of_two();
         let mut cached = Self {
             actions,
             groups_per_row,
-            block_shift,
+            block_shift: per_block.trailing_zeros(),
             temperature: 1.0,
             slope: 1.0,
             heads: vec![Head::default(); states],
@@ -230,24 +227,15 @@ impl CachedBoltzmann {
             return error;
         }
         if self.value(state, action) == f32::NEG_INFINITY {
-            return Error::ActionNotAllowed { state, action };
+            return Error::ActionNotAllowed(state, action);
         }
-        let what = if step.reward.is_finite() {
-            "value"
-        } else {
-            "reward"
-        };
-        let value = if step.reward.is_finite() {
-            value
-        } else {
-            step.reward
-        };
-        Error::NotFinite {
-            what,
+        let reward = check_finite("reward", state, action, step.reward);
+        reward.err().unwrap_or(Error::NotFinite {
+            what: "value",
             state,
             action,
             value,
-        }
+        })
     }
 
     /// Writes values and visits back into a table of the same shape and mask.
@@ -269,9 +257,6 @@ impl CachedBoltzmann {
     }
 
     /// Draws an action with its probability by Boltzmann.
-    ///
-    /// # Panics
-    /// If the state is out of range.
     #[inline(always)]
     pub fn choose<R: Rng + ?Sized>(&self, state: State, rng: &mut R) -> Action {
         // As many random bits as an f32 holds; all that is drawn is below the total.
@@ -310,9 +295,6 @@ impl CachedBoltzmann {
     }
 
     /// Writes the probability of each action into `probabilities`, one entry for each.
-    ///
-    /// # Panics
-    /// If the state is out of range.
     pub fn probabilities(&self, state: State, probabilities: &mut [f64]) {
         let weights = self.row(state).iter().flat_map(|group| group.weights);
         let weights = weights.map(f64::from);
@@ -323,9 +305,6 @@ impl CachedBoltzmann {
     }
 
     /// Returns the value of a pair, negative infinity for a forbidden one.
-    ///
-    /// # Panics
-    /// If the pair is out of range.
     pub fn value(&self, state: State, action: Action) -> f32 {
         let (index, actions) = (action.0, self.actions);
         assert!(index < actions, "action {index} is outside 0..{actions}");
@@ -339,18 +318,12 @@ impl CachedBoltzmann {
     }
 
     /// Returns the highest value of a state.
-    ///
-    /// # Panics
-    /// If the state is out of range.
     #[inline(always)]
     pub fn max(&self, state: State) -> f32 {
         self.heads[state.0].max
     }
 
     /// Returns the action of the highest value; of several, the one with the lowest index.
-    ///
-    /// # Panics
-    /// If the state is out of range.
     #[inline(always)]
     pub fn best(&self, state: State) -> Action {
         Action(self.heads[state.0].best as usize)

@@ -74,17 +74,17 @@ pub fn check_env<E: Environment + ?Sized>(
         let now = (environment.states(), environment.actions());
         if now != shape && !environment.is_dynamic() {
             let what = "the shape";
-            return Err(Error::EnvironmentChanged { steps, what });
+            return Err(Error::EnvironmentChanged(what, steps));
         }
         episode += 1;
     }
     let steps = report.steps;
     if !environment.is_dynamic() && !has_mask_of(&table, environment) {
         let what = "the mask";
-        return Err(Error::EnvironmentChanged { steps, what });
+        return Err(Error::EnvironmentChanged(what, steps));
     }
     if report.terminated + report.truncated == 0 {
-        return Err(Error::Endless { steps });
+        return Err(Error::Endless(steps));
     }
     report.states_met = met.into_iter().filter(|&met| met).count();
     Ok(report)
@@ -132,11 +132,7 @@ fn record<E: Environment + ?Sized>(
             episode.push((action, *step));
         },
     )?;
-    let reset = Step {
-        observation: begin.unwrap_or_default(),
-        reward: 0.0,
-        status: Status::Continuing,
-    };
+    let reset = Step::new(begin.unwrap_or_default(), 0.0, Status::Continuing);
     episode.insert(0, (Action(0), reset));
     Ok(episode)
 }
@@ -144,11 +140,7 @@ fn record<E: Environment + ?Sized>(
 fn compare(first: &[(Action, Step)], second: &[(Action, Step)]) -> Result<(), Error> {
     for (step, (&(_, first), &(_, second))) in (0..).zip(first.iter().zip(second)) {
         if first != second {
-            return Err(Error::NotReproducible {
-                step,
-                first,
-                second,
-            });
+            return Err(Error::NotReproducible(step, first, second));
         }
     }
     Ok(())

@@ -3,8 +3,6 @@
 use std::num::NonZeroU64;
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::problem::Environment;
@@ -14,7 +12,7 @@ use crate::training::curve::{Record, Tally};
 /// Counters of a run, which stop at their largest number, the episode that is going on, and what
 /// has not yet been recorded.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Course {
     pub(super) episode_limit: NonZeroU64,
     pub(super) record_every: NonZeroU64,
@@ -26,7 +24,7 @@ pub(super) struct Course {
 
 /// An episode that is going on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Running {
     pub(super) state: State,
     /// The action that was chosen already, for a learner that needs it.

@@ -1,12 +1,9 @@
 //! The learning curve.
 
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
-
 /// One point of a learning curve. Counts are totals since the start; fractions and means are over
 /// the actions and the ended episodes since the record before, and `None` where there were none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Record {
     /// Actions taken so far.
     pub actions: u64,
@@ -27,7 +24,7 @@ pub struct Record {
 
 /// Sums between two records.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Tally {
     pub(super) actions: u64,
     reward: f64,

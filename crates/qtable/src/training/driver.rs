@@ -4,8 +4,6 @@ use std::num::NonZeroU64;
 use std::ops::ControlFlow;
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, positive};
 use crate::learner::{Experience, Learner};
@@ -13,7 +11,7 @@ use crate::policy::Policy;
 use crate::problem::Environment;
 use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
-use crate::training::course::{Actor, Course, Running};
+use crate::training::course::{Actor, Course};
 use crate::training::curve::{Record, Tally};
 use crate::training::episode::{check_choice, check_fit};
 
@@ -36,24 +34,22 @@ pub enum Until {
 #[cfg_attr(feature = "files", doc = "```")]
 #[cfg_attr(not(feature = "files"), doc = "```ignore")]
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
-/// use qtable::{EpsilonGreedy, QLambda, QTable, Schedule, Training, Until, decode, encode, toys};
+/// use qtable::{
+///     EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Training, Until, decode, encode,
+/// };
 ///
 /// fn main() -> Result<(), Box<dyn std::error::Error>> {
 ///     let mut lake = ModelEnvironment::frozen_lake("4x4", false)?;
-///     let learner = Traces::new(Target::Q, 0.8, Schedule::constant(0.1)?, 0.95)?;
+///     let learner = QLearning::new(Schedule::constant(0.1)?, 0.95)?;
 ///     let policy = EpsilonGreedy::new(Schedule::linear(1.0, 0.0, 10_000)?)?;
-///     let mut training =
-///         Training::new(&lake, QTable::new(16, 4)?, learner, policy)?.with_episode_limit(100)?;
+///     let mut training = Training::new(&lake, QTable::new(16, 4)?, learner, policy)?;
 ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
 ///     training.run(&mut lake, Until::Actions(7_001), &mut rng)?;
 ///
 ///     let saved = encode("lake-training/1", &(&training, &lake, &rng))?;
-///     type Run = (
-///         Training<QLambda, EpsilonGreedy>,
-///         qtable::ModelEnvironment,
-///         Xoshiro256PlusPlus,
-///     );
-///     let (mut resumed, mut same_lake, mut same_rng): Run = decode("lake-training/1", &saved)?;
+///     type Run = Training<QLearning, EpsilonGreedy>;
+///     let (mut resumed, mut same_lake, mut same_rng): (Run, ModelEnvironment, Xoshiro256PlusPlus) =
+///         decode("lake-training/1", &saved)?;
 ///
 ///     training.run(&mut lake, Until::Actions(20_000), &mut rng)?;
 ///     resumed.run(&mut same_lake, Until::Actions(20_000), &mut same_rng)?;
@@ -65,7 +61,7 @@ pub enum Until {
 /// An environment that cannot be saved is left between episodes: run to [`Until::Episodes`] and
 /// save then ([`is_in_episode`](Training::is_in_episode)).
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Training<L, P> {
     pub(super) table: QTable,
     pub(super) learner: L,
@@ -149,22 +145,24 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// use std::ops::ControlFlow;
     ///
     /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
-    /// use qtable::{EpsilonGreedy, QLearning, QTable, Schedule, Training, Until, toys};
+    /// use qtable::{EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Training, Until};
     ///
     /// fn main() -> Result<(), qtable::Error> {
     ///     let mut chain = ModelEnvironment::chain(5)?;
     ///     let learner = QLearning::new(Schedule::constant(0.5)?, 0.9)?;
     ///     let policy = EpsilonGreedy::new(Schedule::constant(0.5)?)?;
+    ///     let careful = EpsilonGreedy::new(Schedule::constant(0.1)?)?;
     ///     let mut training = Training::new(&chain, QTable::new(5, 2)?, learner, policy)?;
     ///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    ///     let until = Until::Actions(1_000_000);
-    ///     let stopped = training.run_with(&mut chain, until, &mut rng, |record, _| {
-    ///         match record.mean_td_error {
-    ///             Some(error) if error < 1e-9 => ControlFlow::Break(()),
-    ///             _ => ControlFlow::Continue(()),
+    ///     let until = Until::Actions(100_000);
+    ///     let stopped = training.run_with(&mut chain, until, &mut rng, |record, training| {
+    ///         *training.policy_mut() = careful.clone();
+    ///         match record.mean_steps < Some(5.0) {
+    ///             true => ControlFlow::Break(()),
+    ///             false => ControlFlow::Continue(()),
     ///         }
     ///     })?;
-    ///     assert!(stopped);
+    ///     assert!(stopped && training.actions() < 100_000);
     ///     Ok(())
     /// }
     /// ```
@@ -187,120 +185,8 @@ impl<L: Learner, P: Policy> Training<L, P> {
         Ok(false)
     }
 
-    /// Plays episodes of a game for two against another run, and both learn: with the same
-    /// environment for both, self play.
-    ///
-    /// [`Environment::player`] says whose turn it is: 0 is this run, 1 the other one. The reward of
-    /// a step is that of the player who acted; the other one gets its negative. For each player a
-    /// step is all that happens from one turn of theirs to the next. Both see the last step of an
-    /// episode, and [`Environment::succeeded`] is asked with the reward of each.
-    ///
-    /// # Errors
-    /// [`run`](Training::run) lists them. The episode is given up.
-    pub fn run_against<L2: Learner, P2: Policy, E: Environment + ?Sized, R: Rng + ?Sized>(
-        &mut self,
-        other: &mut Training<L2, P2>,
-        environment: &mut E,
-        episodes: u64,
-        mut rng: &mut R,
-    ) -> Result<(), Error> {
-        let rng: &mut dyn Rng = &mut rng;
-        check_fit(environment, &self.table)?;
-        check_fit(environment, &other.table)?;
-        for _ in 0..episodes {
-            (self.course.running, other.course.running) = (None, None);
-            let played = self.play_against(other, environment, rng);
-            (self.course.running, other.course.running) = (None, None);
-            played?;
-        }
-        Ok(())
-    }
-
-    /// Plays one episode against another run.
-    fn play_against<L2: Learner, P2: Policy, E: Environment + ?Sized>(
-        &mut self,
-        other: &mut Training<L2, P2>,
-        environment: &mut E,
-        rng: &mut dyn Rng,
-    ) -> Result<(), Error> {
-        let mut open = [None, None];
-        self.parts().1.begin_episode();
-        other.parts().1.begin_episode();
-        let mut state = environment.reset(rng)?;
-        loop {
-            let player = environment.player().min(1);
-            let action = match player {
-                0 => self.take_turn(environment, &mut open[0], state, rng)?,
-                _ => other.take_turn(environment, &mut open[1], state, rng)?,
-            };
-            let step = environment.step(action, rng)?;
-            for (place, turn) in open.iter_mut().enumerate() {
-                if let Some(turn) = turn {
-                    turn.reward += if place == player {
-                        step.reward
-                    } else {
-                        -step.reward
-                    };
-                }
-            }
-            state = step.observation;
-            if step.status != Status::Continuing {
-                self.answer(environment, open[0].take(), state, step.status, rng)?;
-                return other.answer(environment, open[1].take(), state, step.status, rng);
-            }
-        }
-    }
-
-    /// Learns from a player's last turn, and chooses the next action.
-    fn take_turn<E: Environment + ?Sized>(
-        &mut self,
-        environment: &E,
-        open: &mut Option<Turn>,
-        state: State,
-        rng: &mut dyn Rng,
-    ) -> Result<Action, Error> {
-        self.answer(environment, open.take(), state, Status::Continuing, rng)?;
-        let (course, mut pair) = self.parts();
-        if environment.is_dynamic() {
-            pair.meet(environment, state)?;
-        }
-        let running = course.running.take().unwrap_or(Running::at(state));
-        let action = pair.choose(state, running.action, rng)?;
-        let reward = 0.0;
-        *open = Some(Turn {
-            running,
-            action,
-            reward,
-        });
-        Ok(action)
-    }
-
-    /// Learns from a turn that led to a state.
-    fn answer<E: Environment + ?Sized>(
-        &mut self,
-        environment: &E,
-        turn: Option<Turn>,
-        observation: State,
-        status: Status,
-        rng: &mut dyn Rng,
-    ) -> Result<(), Error> {
-        let Some(turn) = turn else {
-            return Ok(());
-        };
-        let step = Step {
-            observation,
-            reward: turn.reward,
-            status,
-        };
-        let (course, mut pair) = self.parts();
-        let taken = (turn.running, turn.action);
-        let record = course.learn(environment, &mut pair, taken, step, rng)?;
-        self.curve.extend(record);
-        Ok(())
-    }
-
     /// Returns the counters beside the policy and the learner on their table.
-    fn parts(&mut self) -> (&mut Course, Pair<'_, L, P>) {
+    pub(super) fn parts(&mut self) -> (&mut Course, Pair<'_, L, P>) {
         let pair = Pair {
             table: &mut self.table,
             learner: &mut self.learner,
@@ -392,15 +278,8 @@ impl<L: Learner, P: Policy> Training<L, P> {
     }
 }
 
-/// A turn of a player, whose reward grows until the player's next turn.
-struct Turn {
-    running: Running,
-    action: Action,
-    reward: f64,
-}
-
 /// A policy that acts on a table, and a learner that improves it.
-struct Pair<'a, L, P> {
+pub(super) struct Pair<'a, L, P> {
     table: &'a mut QTable,
     learner: &'a mut L,
     policy: &'a mut P,

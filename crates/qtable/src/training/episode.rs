@@ -26,7 +26,7 @@ pub(super) fn check_choice(table: &QTable, state: State) -> Result<(), Error> {
     if table.equals(state) > 0 {
         return Ok(());
     }
-    Err(Error::NoActionAllowed { state })
+    Err(Error::NoActionAllowed(state))
 }
 
 /// Plays one episode of at most `limit` steps, from its first state to the last step.
@@ -38,12 +38,7 @@ pub(super) fn play<E: Environment + ?Sized>(
     mut choose: impl FnMut(&QTable, State, &mut dyn Rng) -> Action,
     mut on_step: impl FnMut(&E, Action, &Step),
 ) -> Result<(), Error> {
-    let observation = environment.reset(rng)?;
-    let mut step = Step {
-        observation,
-        reward: 0.0,
-        status: Status::Continuing,
-    };
+    let mut step = Step::new(environment.reset(rng)?, 0.0, Status::Continuing);
     for taken in 0..=limit {
         let state = step.observation;
         if environment.is_dynamic() {

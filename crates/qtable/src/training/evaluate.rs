@@ -1,8 +1,6 @@
 //! The quality of a policy, measured by trying it.
 
 use rand::Rng;
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, positive};
 use crate::policy::Policy;
@@ -13,7 +11,7 @@ use crate::training::episode::{check_fit, play};
 
 /// The results of a policy in a number of episodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evaluation {
     /// Episodes played.
     pub episodes: u64,

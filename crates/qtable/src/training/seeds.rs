@@ -1,8 +1,5 @@
 //! Experiments over many seeds, and means with their intervals.
 
-#[cfg(feature = "serde")]
-use serde::{Deserialize, Serialize};
-
 use crate::training::curve::Record;
 
 /// Runs an experiment once for every seed and returns the results in the order of the seeds.
@@ -13,8 +10,8 @@ use crate::training::curve::Record;
 /// ```
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 /// use qtable::{
-///     EpsilonGreedy, Estimate, QLearning, QTable, Schedule, State, Training, Until, over_seeds,
-///     toys,
+///     EpsilonGreedy, Estimate, ModelEnvironment, QLearning, QTable, Schedule, State, Training, Until,
+///     over_seeds,
 /// };
 ///
 /// fn main() -> Result<(), qtable::Error> {
@@ -51,7 +48,7 @@ pub fn over_seeds<T: Send, E: Send>(
 
 /// A mean of several runs with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimate {
     /// The mean; NaN of no values.
     pub mean: f64,
@@ -67,21 +64,16 @@ impl Estimate {
     pub fn of(values: &[f64]) -> Self {
         let count = values.len();
         let mean = values.iter().sum::<f64>() / count as f64;
-        if count < 2 {
-            return Self {
-                mean,
-                half_width: f64::INFINITY,
-                count,
-            };
-        }
-        let squares: f64 = values
-            .iter()
-            .map(|value| (value - mean) * (value - mean))
-            .sum();
-        let deviation = (squares / (count - 1) as f64).sqrt();
+        let half_width = if count < 2 {
+            f64::INFINITY
+        } else {
+            let squares = values.iter().map(|value| (value - mean) * (value - mean));
+            let deviation = (squares.sum::<f64>() / (count - 1) as f64).sqrt();
+            student_t(count - 1) * deviation / (count as f64).sqrt()
+        };
         Self {
             mean,
-            half_width: student_t(count - 1) * deviation / (count as f64).sqrt(),
+            half_width,
             count,
         }
     }
@@ -90,17 +82,16 @@ impl Estimate {
     /// the shortest. Runs in which it is `None` are left out at that point.
     pub fn of_curves(
         curves: &[Vec<Record>],
-        quantity: impl Fn(&Record) -> Option<f64>,
+        quantity: impl Fn(&Record) -> Option<f64> + Copy,
     ) -> Vec<Self> {
         let points = curves.iter().map(Vec::len).min().unwrap_or(0);
+        let at = |point: usize| {
+            curves
+                .iter()
+                .filter_map(move |curve| quantity(&curve[point]))
+        };
         (0..points)
-            .map(|point| {
-                let values: Vec<f64> = curves
-                    .iter()
-                    .filter_map(|curve| quantity(&curve[point]))
-                    .collect();
-                Self::of(&values)
-            })
+            .map(|point| Self::of(&at(point).collect::<Vec<_>>()))
             .collect()
     }
 }
@@ -109,11 +100,8 @@ impl std::fmt::Display for Estimate {
     /// Writes `mean ± half width`, with three decimals unless a precision is given.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let precision = f.precision().unwrap_or(3);
-        write!(
-            f,
-            "{:.precision$} ± {:.precision$}",
-            self.mean, self.half_width
-        )
+        let (mean, half_width) = (self.mean, self.half_width);
+        write!(f, "{mean:.precision$} ± {half_width:.precision$}")
     }
 }
 

@@ -178,7 +178,7 @@ fn faults_are_refused_and_change_nothing() {
         update(0, 3, 0, 0.0, 1.0),
         Error::OutOfRange { what: "action", .. }
     );
-    assert_refused!(update(0, 1, 0, 0.0, 1.0), Error::ActionNotAllowed { .. });
+    assert_refused!(update(0, 1, 0, 0.0, 1.0), Error::ActionNotAllowed(..));
     assert_refused!(
         update(0, 0, 0, f64::NAN, 1.0),
         Error::NotFinite { what: "reward", .. }
@@ -188,7 +188,7 @@ fn faults_are_refused_and_change_nothing() {
         Error::NotFinite { what: "value", .. }
     );
     // Not even where the learning rate lets nothing in.
-    assert_refused!(update(0, 1, 0, 0.0, 0.0), Error::ActionNotAllowed { .. });
+    assert_refused!(update(0, 1, 0, 0.0, 0.0), Error::ActionNotAllowed(..));
     assert_refused!(
         update(0, 0, 0, f64::INFINITY, 0.0),
         Error::NotFinite { what: "reward", .. }

@@ -93,7 +93,7 @@ fn a_key_beyond_the_bound_is_refused_and_the_run_goes_on() {
         Training::new(&words, zeros(1, 3), q_learning(0.5, 1.0), epsilon(1.0)).unwrap();
     let until = Until::Actions(5_000);
     let refused = training.run(&mut words, until, &mut rng(1));
-    assert_eq!(refused, Err(Error::TooManyKeys { most: 60 }));
+    assert_eq!(refused, Err(Error::TooManyKeys(60)));
     assert_eq!(training.table().states(), 60);
     let text = refused.unwrap_err().to_string();
     assert!(text.contains("the 60 keys allowed"), "{text}");

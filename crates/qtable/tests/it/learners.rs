@@ -291,7 +291,7 @@ fn what_a_learner_misses_is_named() {
     for (name, mut learner) in learners(&zeros(2, 1), &constant(0.5), 0.9) {
         let learned = learner.learn(&mut zeros(2, 1), &experience, &Mute, &mut rng(0));
         let wanted = match name {
-            _ if learner.needs_next_action() => Err(Error::NextActionMissing { state: State(1) }),
+            _ if learner.needs_next_action() => Err(Error::NextActionMissing(State(1))),
             _ if ["expected", "tree", "TB"].iter().any(|w| name.contains(w)) => {
                 Err(Error::NoProbabilities)
             }

@@ -95,7 +95,7 @@ proptest! {
         let goal = goal.index(edges.len() + 1);
         let intervals = Intervals::new(&edges).unwrap().with_goal(goal).unwrap();
         if value.is_nan() {
-            prop_assert_eq!(intervals.index(value), Err(Error::NotANumber { quantity: 0 }));
+            prop_assert_eq!(intervals.index(value), Err(Error::NotANumber(0)));
         } else {
             let bin = intervals.index(value).unwrap();
             let (low, high) = intervals.bounds(bin).unwrap();
@@ -162,10 +162,7 @@ fn impossible_discretisations_are_refused() {
             ..
         }
     );
-    assert_refused!(
-        product.index(&[0.0, f64::NAN]),
-        Error::NotANumber { quantity: 1 }
-    );
+    assert_refused!(product.index(&[0.0, f64::NAN]), Error::NotANumber(1));
     assert_refused!(
         product.state(&[0, 2]),
         Error::OutOfRange {
