@@ -94,10 +94,8 @@ fn moved(cell: usize, action: usize, (rows, columns): (usize, usize)) -> (usize,
 /// Section 2.3: ten arms with normal rewards about normal means.
 pub(crate) fn bandit(rng: &mut dyn Rng) -> World {
     let means = [(); 10].map(|()| normal(rng));
-    let mut best = 0;
-    (0..10).for_each(|arm| best = if means[arm] > means[best] { arm } else { best });
     World::new((1, 10), 0, move |_, arm, _, rng| {
-        (best, means[arm] + normal(rng), true)
+        (0, means[arm] + normal(rng), true)
     })
 }
 
