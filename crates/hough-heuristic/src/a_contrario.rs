@@ -318,14 +318,17 @@ impl AContrario {
             || edges_of(finest, fine),
         );
         search(finest, &mut fine.level);
-        let candidates = &mut self.collected.candidates;
-        candidates.sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight));
-        for candidate in candidates.iter().filter(|candidate| !candidate.tried) {
+        let found = &mut self.collected;
+        found
+            .candidates
+            .sort_unstable_by(|a, b| b.weight.total_cmp(&a.weight));
+        for index in 0..found.candidates.len() {
             if self.budget.is_late() || self.budget.is_over(Stage::Proofs) {
                 break;
             }
-            if prover.prove(candidate, &mut self.budget.looks).is_some() {
-                self.budget.grant();
+            let candidate = found.candidates[index];
+            if !candidate.tried && !found.is_proven(&candidate, &mut self.budget) {
+                found.settle(None, &candidate, &mut prover, &mut self.budget);
             }
         }
     }

@@ -11,8 +11,10 @@ const LOOKS_PER_DRAW: u64 = 16;
 /// each.
 const LEAST_MEGAPIXELS: f64 = 0.25;
 
+/// Cost of a look at all edges around a circle, in looks.
+pub(super) const ROUND: u64 = 200;
 /// Cost of a proof at one size, in looks.
-pub(super) const PROOF: u64 = 1500;
+const PROOF: u64 = 1500;
 /// Cost of a measurement, in looks.
 pub(super) const MEASURING: u64 = 1500;
 
@@ -38,8 +40,9 @@ pub(super) struct Budget {
     most_draws: u64,
     /// By [`Stage`].
     most_looks: [u64; 3],
-    /// Looks of the search that may be spent by the end of this size.
+    /// Looks and draws of the search that may be spent by the end of this size.
     most_of_size: u64,
+    most_draws_of_size: u64,
     pub(super) deadline: Option<Instant>,
     /// Set once the deadline has passed.
     late: bool,
@@ -76,19 +79,24 @@ impl Budget {
             *most += CIRCLE;
         }
         self.most_of_size += CIRCLE;
+        self.most_draws_of_size += DRAWS_PER_CIRCLE;
     }
 
-    /// Begins the search of a size, which leaves half of the looks to those after it.
+    /// Begins the search of a size, which leaves half of the work to those after it.
     pub(super) fn begin_size(&mut self, is_last: bool) {
-        let left = self.most_looks[Stage::Search as usize].saturating_sub(self.looks);
-        self.most_of_size = self.looks + if is_last { left } else { left / 2 };
+        let share = |most: u64, spent: u64| {
+            let left = most.saturating_sub(spent);
+            spent + if is_last { left } else { left / 2 }
+        };
+        self.most_of_size = share(self.most_looks[Stage::Search as usize], self.looks);
+        self.most_draws_of_size = share(self.most_draws, self.draws);
     }
 
     /// Returns `true` if this part of the work is to end.
     #[inline(always)]
     pub(super) fn is_over(&mut self, stage: Stage) -> bool {
         let drawn = matches!(stage, Stage::Search)
-            && (self.draws >= self.most_draws || self.looks >= self.most_of_size);
+            && (self.draws >= self.most_draws_of_size || self.looks >= self.most_of_size);
         let over = drawn || self.late || self.looks >= self.most_looks[stage as usize];
         self.spent |= over;
         over

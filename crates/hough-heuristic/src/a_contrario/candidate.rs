@@ -3,6 +3,7 @@
 use super::budget::Budget;
 use super::polar::Ring;
 use super::proof::log10;
+use super::prover::Prover;
 use super::search::Support;
 
 /// Number of meetings with a circle after which it is skipped.
@@ -45,6 +46,11 @@ impl Candidate {
             y: self.y,
             r: self.r,
         }
+    }
+
+    /// Makes it this circle, in pixels of the frame.
+    fn move_to(&mut self, ring: &Ring) {
+        (self.x, self.y, self.r) = (ring.x, ring.y, ring.r);
     }
 
     /// Returns `true` if both have one outline, as far as their sizes tell.
@@ -108,8 +114,14 @@ impl Collected {
 
     /// Returns `true` if the outline of this circle is that of a proven one.
     pub(super) fn is_proven(&self, circle: &Candidate, budget: &mut Budget) -> bool {
+        self.known(circle, budget).is_some()
+    }
+
+    /// The proven circle whose outline this one has.
+    fn known(&self, circle: &Candidate, budget: &mut Budget) -> Option<Ring> {
         budget.looks += self.proven.len() as u64 / 16;
-        self.proven.iter().any(|proven| proven.coincides(circle))
+        let known = self.proven.iter().find(|proven| proven.coincides(circle));
+        known.map(Candidate::ring)
     }
 
     /// Counts a meeting with a proven circle; returns `true` after enough of them.
@@ -155,28 +167,31 @@ impl Collected {
         }
     }
 
-    /// Moves the candidate at this place, if it has one, to the proven ones, as the circle it
-    /// proved to be; false if that was proven before.
-    pub(super) fn prove(
+    /// Proves a candidate, and moves it from its place, if it has one, to the proven ones; the
+    /// circle if it is beyond doubt.
+    pub(super) fn settle(
         &mut self,
         place: Option<usize>,
         candidate: &Candidate,
-        ring: &Ring,
+        prover: &mut Prover<'_>,
         budget: &mut Budget,
-    ) -> bool {
-        let proven = Candidate {
-            x: ring.x,
-            y: ring.y,
-            r: ring.r,
-            ..*candidate
-        };
-        let is_new = !self.is_proven(&proven, budget);
-        if is_new {
-            if let Some(place) = place {
-                self.candidates.swap_remove(place);
+    ) -> Option<Ring> {
+        let mut proven = *candidate;
+        let ring = prover.prove(candidate, &mut budget.looks)?;
+        proven.move_to(&ring);
+        // Drawn to the stronger edges of another outline: this one may still be there.
+        if let Some(known) = self.known(&proven, budget) {
+            let ring = prover.prove_narrowly(candidate, &known, &mut budget.looks)?;
+            proven.move_to(&ring);
+            if self.is_proven(&proven, budget) {
+                return Some(ring);
             }
-            self.proven.push(proven);
         }
-        is_new
+        if let Some(place) = place {
+            self.candidates.swap_remove(place);
+        }
+        self.proven.push(proven);
+        budget.grant();
+        Some(proven.ring())
     }
 }

@@ -22,6 +22,12 @@ pub(super) struct Ring {
 }
 
 impl Ring {
+    /// Distance of the centres and difference of the radii.
+    pub(super) fn apart(&self, other: &Self) -> f32 {
+        let (dx, dy) = (self.x - other.x, self.y - other.y);
+        (dx * dx + dy * dy).sqrt() + (self.r - other.r).abs()
+    }
+
     /// The circle in the frame whose width and height are divided by `factor`.
     pub(super) fn shrunk(&self, factor: f32) -> Self {
         let corner = 0.5 * (factor - 1.0);

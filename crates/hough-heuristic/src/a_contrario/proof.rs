@@ -1,6 +1,7 @@
 //! The number of false alarms of a candidate, computed at the size of the frame where its radius is
 //! one or two dozen pixels.
 
+use super::budget::ROUND;
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
 use super::polar::{Gray, LANES, Polar, Ring};
@@ -35,6 +36,14 @@ const NO_EDGE: f32 = 0.25;
 const SOFT: f32 = 3.0;
 /// Certainty subtracted from a soft outline, for which more tolerances are tested.
 const SOFT_TESTS: f32 = 0.3;
+/// Tolerances of the distance of an edge from the outline, pixels.
+const SLACKS: [f32; 4] = [0.25, 0.5, 0.8, 1.2];
+/// Certainty subtracted for the last two from an outline that is neither soft nor noisy.
+const UNEVEN_TESTS: f32 = 1.3;
+/// Least share of such an outline that the last two must cover.
+const LEAST_UNEVEN: f32 = 0.5;
+/// Width of an edge below which it belongs to a line or to grain, which displaces it, pixels.
+const CRISP: f32 = 1.35;
 /// Least number of rays whose edge lies on a circle.
 const LEAST_NEAR: usize = 20;
 
@@ -84,7 +93,7 @@ impl Proof {
     /// Takes evidence against the circle into account.
     pub(super) fn leave(&mut self, left: f32) {
         self.left = left;
-        self.certainty *= left;
+        self.certainty = left * self.certainty_of(self.hits);
     }
 
     /// The certainty without the rays whose edges lie on these circles of the frame.
@@ -115,8 +124,13 @@ impl Proof {
         if hits == self.hits {
             return self.certainty;
         }
+        self.left * self.certainty_of(hits)
+    }
+
+    /// The certainty that so many of the rays give, without the evidence against the circle.
+    fn certainty_of(&self, hits: u64) -> f32 {
         let share = hits.count_ones() as f32 / self.rays.max(1.0);
-        self.left * (self.samples * divergence(share, self.chance) - self.tests)
+        self.samples * divergence(share, self.chance) - self.tests
     }
 
     /// Largest distance from another outline of edges that belong to it, pixels of the frame.
@@ -153,8 +167,36 @@ pub(super) struct Setting {
     pub(super) noise: f32,
     /// Decimal logarithm of the number of circles that might have been tested.
     pub(super) tests: f32,
-    /// Reach of the search where only edges close to the outline count, radii.
-    pub(super) narrow: Option<f32>,
+    /// The edges that count, if not all of the window do.
+    pub(super) narrow: Option<Narrow>,
+}
+
+/// A part of the window around an outline.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Narrow {
+    /// So many pixels on either side.
+    Within(f32),
+    /// What is closer to the outline than to this one.
+    Beside(Ring),
+}
+
+impl Narrow {
+    /// The part in a frame whose pixels are `factor` times as large.
+    pub(super) fn shrunk(&self, factor: f32) -> Self {
+        match self {
+            Self::Within(pixels) => Self::Within(pixels / factor),
+            Self::Beside(other) => Self::Beside(other.shrunk(factor)),
+        }
+    }
+
+    /// Its reach on either side of a ring, pixels.
+    fn reach(&self, ring: &Ring) -> usize {
+        let pixels = match self {
+            Self::Within(pixels) => *pixels,
+            Self::Beside(other) => 0.5 * ring.apart(other),
+        };
+        ((pixels + 0.5) as usize).max(2)
+    }
 }
 
 /// Rays on either side over which slopes are averaged, for a ring of this radius.
@@ -190,6 +232,7 @@ pub(super) fn prove(
     polar: &mut Polar,
     start: Ring,
     setting: &Setting,
+    looks: &mut u64,
 ) -> Option<Proof> {
     let rays = circle.rays(RAYS);
     let mut window = window_for(&start, setting.noise);
@@ -197,12 +240,15 @@ pub(super) fn prove(
         reach: FIRST_REACH.min((start.r - 1.5) as usize).max(2),
         ..window
     };
-    if let Some(narrow) = setting.narrow {
-        window.reach = ((narrow * start.r + 0.5) as usize).clamp(2, window.reach);
-        wide.reach = window.reach;
-    }
     let mut ring = start;
+    let mut is_crisp = false;
+    let widest = window.reach;
     for round in 0..4 {
+        *looks += ROUND;
+        if let Some(narrow) = setting.narrow {
+            window.reach = narrow.reach(&ring).min(widest);
+            wide.reach = window.reach;
+        }
         let edges = Edges::around(
             &ring,
             gray,
@@ -210,9 +256,11 @@ pub(super) fn prove(
             polar,
             if round == 0 { wide } else { window },
         );
-        if round == 0 && !window.soft && edges.width(polar) > SOFT {
-            window.soft = true;
-            wide.soft = true;
+        if round == 0 {
+            let width = edges.width(polar);
+            window.soft = width > SOFT;
+            wide.soft = window.soft;
+            is_crisp = width < CRISP;
         }
         let foci = if setting.narrow.is_some() {
             [2.0, 1.5, 1.2]
@@ -224,28 +272,25 @@ pub(super) fn prove(
             [3.0, 2.0, 1.5]
         };
         let (better, near) = improve(rays, &edges, ring, foci)?;
-        let apart = |other: &Ring| {
-            let (dx, dy) = (better.x - other.x, better.y - other.y);
-            (dx * dx + dy * dy).sqrt() + (better.r - other.r).abs()
-        };
         let visible: f32 = polar.visible.iter().sum();
         if (near as f32) < LEAST_SHARE[round.min(1)] * visible {
             return None;
         }
-        if near < LEAST_NEAR || !(apart(&start) <= 6.0 && better.r >= 3.0) {
+        if near < LEAST_NEAR || !(better.apart(&start) <= 6.0 && better.r >= 3.0) {
             return None;
         }
-        let moved = apart(&ring);
+        let moved = better.apart(&ring);
         ring = better;
         if moved < 0.7 {
             break;
         }
     }
+    *looks += ROUND;
     let mut edges = Edges::around(&ring, gray, rays, polar, window);
     if edges.are_clipped(polar) {
         edges.leave_out_glow(&ring, gray, rays, polar, window);
     }
-    Some(weigh(polar, &edges, ring, setting, window))
+    Some(weigh(polar, &edges, ring, setting, window, is_crisp))
 }
 
 /// Moves the outline to the edges, in one step for each of `foci`, the largest distance at which
@@ -289,7 +334,14 @@ fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option
 }
 
 /// Weighs how many of the strongest edges lie on the outline.
-fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Window) -> Proof {
+fn weigh(
+    polar: &Polar,
+    edges: &Edges,
+    ring: Ring,
+    setting: &Setting,
+    window: Window,
+    is_crisp: bool,
+) -> Proof {
     let visible: f32 = polar.visible.iter().sum();
     let arc = ring.r * std::f32::consts::TAU / RAYS as f32;
     let averaged = if window.half > 0 {
@@ -310,10 +362,12 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
         left: 1.0,
         ..Proof::default()
     };
-    let slacks: &[f32] = if setting.noise > NOISE || window.soft {
-        &[0.25, 0.5, 0.8, 1.2]
+    // An outline that is neither averaged nor cut by the frame may be uneven, at a price.
+    let even = setting.noise > NOISE || window.soft;
+    let slacks = if even || (is_crisp && visible >= WHOLE * RAYS as f32) {
+        &SLACKS[..]
     } else {
-        &[0.25, 0.5]
+        &SLACKS[..2]
     };
     let tests = setting.tests
         + if window.soft { SOFT_TESTS } else { 0.0 }
@@ -322,7 +376,6 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
         } else {
             0.0
         };
-    best.tests = tests;
     for &slack in slacks {
         let on = |(distance, slope): (&f32, &f32)| *slope > 0.0 && distance.abs() <= slack;
         let mut hits = 0u64;
@@ -331,9 +384,15 @@ fn weigh(polar: &Polar, edges: &Edges, ring: Ring, setting: &Setting, window: Wi
         }
         let share = hits.count_ones() as f32;
         let p = (2.0 * slack + 0.2) / (2 * window.reach + 1) as f32;
-        let certainty = independent * divergence(share / rays.max(1.0), p) - tests;
+        let wide = slack > SLACKS[1] && !even;
+        if wide && share < LEAST_UNEVEN * visible {
+            continue;
+        }
+        let price = if wide { UNEVEN_TESTS } else { 0.0 };
+        let certainty = independent * divergence(share / rays.max(1.0), p) - tests - price;
         if certainty > best.certainty {
             best.certainty = certainty;
+            best.tests = tests + price;
             best.covered = share / visible.max(1.0);
             (best.hits, best.slack, best.chance) = (hits, slack, p);
         }

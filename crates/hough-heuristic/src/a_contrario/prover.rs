@@ -2,11 +2,11 @@
 
 use image::GrayImage;
 
-use super::budget::PROOF;
+use super::budget::ROUND;
 use super::candidate::Candidate;
 use super::directions::UnitCircle;
 use super::polar::{Gray, Polar, Ring};
-use super::proof::{self, Proof, Setting};
+use super::proof::{self, Narrow, Proof, Setting};
 use super::refute;
 use super::strongest::RAYS;
 use crate::edges::{Vectorized, widest};
@@ -22,10 +22,10 @@ const NOISY: f32 = 8.0;
 const LEAST_SECOND: f32 = 8.0;
 /// Certainty from which no larger size is examined, except in noise.
 const SURE: f32 = 12.0;
-/// Reach of the search for edges in the narrow window: for a doubtful circle, and next to another
-/// outline, radii.
+/// Reach of the search for edges in the narrow window, for a doubtful circle, radii.
 const NARROW: f32 = 0.15;
-const NARROWEST: f32 = 0.1;
+/// Least reach of the narrow window next to another outline, pixels.
+const LEAST_NARROW_REACH: f32 = 2.0;
 /// Least certainty for an examination in the narrow window.
 const LEAST_NARROW: f32 = -3.0;
 /// Weight from which a candidate is examined there at any certainty.
@@ -118,27 +118,34 @@ impl Prover<'_> {
         if best.is_none_or(|proof| !proof.is_beyond_doubt())
             && (certainty >= LEAST_NARROW || candidate.weight >= LEAST_WEIGHT)
         {
-            let narrow = self.prove_at(finest, &candidate.ring(), Some(NARROW), looks);
+            let narrow = Some(Narrow::Within(NARROW * candidate.r));
+            let narrow = self.prove_at(finest, &candidate.ring(), narrow, looks);
             best = better(best, narrow);
         }
         self.conclude(best?, looks)
     }
 
-    /// Proves a candidate by the edges close to its outline only.
+    /// Proves a candidate by the edges that are closer to its outline than to this other one.
     pub(super) fn prove_narrowly(
         &mut self,
         candidate: &Candidate,
+        other: &Ring,
         looks: &mut u64,
     ) -> Option<Ring> {
-        let finest = self.depth_for(candidate.r).saturating_sub(1);
-        let proof = self.prove_at(finest, &candidate.ring(), Some(NARROWEST), looks);
+        let reach = 0.5 * candidate.ring().apart(other);
+        let mut depth = self.depth_for(candidate.r).saturating_sub(1);
+        while depth > 0 && reach < LEAST_NARROW_REACH * (1 << depth) as f32 {
+            depth -= 1;
+        }
+        let narrow = Narrow::Beside(*other);
+        let proof = self.prove_at(depth, &candidate.ring(), Some(narrow), looks);
         self.conclude(better(None, proof)?, looks)
     }
 
     /// Weighs the evidence against a circle, and keeps the proof.
     fn conclude(&mut self, mut proof: Proof, looks: &mut u64) -> Option<Ring> {
         if proof.certainty >= LEAST_REFUTED {
-            proof.leave(self.refute(&proof, looks));
+            proof.leave(self.refute(&proof, &[], looks));
         }
         self.proofs.push(proof);
         proof.is_beyond_doubt().then(|| proof.in_frame())
@@ -149,10 +156,9 @@ impl Prover<'_> {
         &mut self,
         depth: usize,
         ring: &Ring,
-        narrow: Option<f32>,
+        narrow: Option<Narrow>,
         looks: &mut u64,
     ) -> Option<Proof> {
-        *looks += PROOF;
         let scale = (1 << depth) as f32;
         let proof = widest(Proving {
             gray: self.pyramid.gray(depth),
@@ -163,15 +169,17 @@ impl Prover<'_> {
                 noise: self.noise / scale + 0.3,
                 // Each size has a quarter of the places that the next larger one has.
                 tests: self.tests - 0.602 * depth as f32,
-                narrow,
+                narrow: narrow.map(|narrow| narrow.shrunk(scale)),
             },
+            looks,
         })?;
         Some(Proof { depth, ..proof })
     }
 
-    /// The part of a proof's certainty that the evidence against the circle leaves.
-    fn refute(&mut self, proof: &Proof, looks: &mut u64) -> f32 {
-        *looks += PROOF / 4;
+    /// The part of a proof's certainty that the evidence against the circle leaves, if these other
+    /// circles are there.
+    pub(super) fn refute(&mut self, proof: &Proof, others: &[Ring], looks: &mut u64) -> f32 {
+        *looks += ROUND;
         let ring = proof.in_frame();
         let depth = self.depth_for(ring.r);
         let scale = (1 << depth) as f32;
@@ -182,6 +190,8 @@ impl Prover<'_> {
             ring: ring.shrunk(scale),
             noise: self.noise / scale + 0.3,
             proof,
+            others,
+            scale,
         })
     }
 
@@ -218,6 +228,7 @@ struct Proving<'a> {
     polar: &'a mut Polar,
     start: Ring,
     setting: Setting,
+    looks: &'a mut u64,
 }
 
 impl Vectorized for Proving<'_> {
@@ -231,6 +242,7 @@ impl Vectorized for Proving<'_> {
             self.polar,
             self.start,
             &self.setting,
+            self.looks,
         )
     }
 }
@@ -243,6 +255,9 @@ struct Refuting<'a> {
     ring: Ring,
     noise: f32,
     proof: &'a Proof,
+    /// In pixels of the frame, which are so many times smaller.
+    others: &'a [Ring],
+    scale: f32,
 }
 
 impl Vectorized for Refuting<'_> {
@@ -251,8 +266,9 @@ impl Vectorized for Refuting<'_> {
     #[inline(always)]
     fn run(self) -> f32 {
         let rays = self.circle.rays(RAYS);
+        let others = self.others.iter().map(|other| other.shrunk(self.scale));
         refute::left(
-            self.gray, rays, self.polar, &self.ring, self.noise, self.proof,
+            self.gray, rays, self.polar, &self.ring, self.noise, self.proof, others,
         )
     }
 }
@@ -278,14 +294,17 @@ mod tests {
             });
             let circle = UnitCircle::new();
             let (mut wide, mut plain) = (Polar::default(), Polar::default());
-            let of = |polar| Proving {
+            let of = |polar, looks| Proving {
                 gray: Pyramid { frame: &frame, sizes: &[] }.gray(0),
                 circle: &circle,
                 polar,
                 start: Ring { x: x + 0.7, y: y - 0.4, r: r + 0.5 },
                 setting: Setting { noise, tests: 5.0, narrow: None },
+                looks,
             };
-            let (wide, plain) = (widest(of(&mut wide)), of(&mut plain).run());
+            let (mut looks, mut others) = (0, 0);
+            let wide = widest(of(&mut wide, &mut looks));
+            let plain = of(&mut plain, &mut others).run();
             prop_assert_eq!(format!("{wide:?}"), format!("{plain:?}"));
         }
     }

@@ -38,6 +38,8 @@ const FAINT: f32 = 0.025;
 const ROUGH: f32 = 2.5;
 /// Number of rays behind its border on which a thing in front is examined.
 const FAR: i32 = 9;
+/// Distance from another circle within which an edge belongs to it, pixels.
+const OTHER: f32 = 1.5;
 /// Weight of a gap with a thing in front at one of its two ends.
 const HALF_EXCUSED: f32 = 0.75;
 
@@ -97,6 +99,7 @@ pub(super) fn left(
     ring: &Ring,
     noise: f32,
     proof: &Proof,
+    others: impl Iterator<Item = Ring>,
 ) -> f32 {
     if proof.visible < WHOLE && proof.covered * proof.visible < LEAST_SEEN {
         return 0.0;
@@ -104,6 +107,9 @@ pub(super) fn left(
     let window = window_for(ring, noise);
     let edges = Edges::around(ring, gray, rays, polar, window);
     let tolerance = if noise > NOISE { 1.0 } else { 0.5 };
+    for other in others.filter(|other| crosses(ring, other)) {
+        leave_to(rays, &edges, polar, ring, &other, tolerance);
+    }
     let mut slopes = [0.0; RAYS];
     let mut contrasts = [0.0; RAYS];
     let (mut hits, mut signs) = (0, 0.0f32);
@@ -432,6 +438,41 @@ impl Around<'_> {
             }
         }
         best
+    }
+}
+
+/// Returns `true` if the outlines cross.
+pub(super) fn crosses(a: &Ring, b: &Ring) -> bool {
+    let (dx, dy) = (a.x - b.x, a.y - b.y);
+    let apart = (dx * dx + dy * dy).sqrt();
+    apart > (a.r - b.r).abs() && apart < a.r + b.r
+}
+
+/// Leaves to a surer circle that crosses this one the rays whose edge is its own or that it hides.
+#[inline(always)]
+fn leave_to(
+    rays: Rays<'_>,
+    edges: &Edges,
+    polar: &mut Polar,
+    ring: &Ring,
+    other: &Ring,
+    tolerance: f32,
+) {
+    for ray in 0..RAYS {
+        let off = edges.distance[ray];
+        if edges.slope[ray] > 0.0 && off.abs() <= tolerance {
+            continue;
+        }
+        let outside = |r: f32| {
+            let (x, y) = (
+                ring.x + r * rays.x[ray] - other.x,
+                ring.y + r * rays.y[ray] - other.y,
+            );
+            (x * x + y * y).sqrt() - other.r
+        };
+        if outside(ring.r) < 0.0 || outside(ring.r + off).abs() <= OTHER {
+            polar.visible[ray] = 0.0;
+        }
     }
 }
 

@@ -7,7 +7,8 @@ use super::directions::UnitCircle;
 use super::measure::{self, Measured};
 use super::polar::{Polar, Ring};
 use super::proof::Proof;
-use super::prover::Pyramid;
+use super::prover::{Prover, Pyramid};
+use super::refute;
 use super::strongest::RAYS;
 use super::{AContrario, Measurement};
 use crate::circle::Circle;
@@ -33,10 +34,35 @@ impl AContrario {
         let rays = self.circle.rays(RAYS);
         self.proofs
             .sort_unstable_by(|a, b| b.certainty.total_cmp(&a.certainty));
-        for proof in &self.proofs {
+        let count = self.proofs.len();
+        for index in 0..2 * count {
+            let Some(mut proof) = self.proofs.get(index % count).copied() else {
+                break;
+            };
+            // At last those that more speaks against, in the light of the circles that are there.
+            if index >= count {
+                let crosses = |other: &Ring| refute::crosses(&proof.in_frame(), other);
+                if proof.left >= 1.0 || !self.reported.iter().any(crosses) {
+                    continue;
+                }
+                let mut prover = Prover {
+                    pyramid,
+                    circle: &self.circle,
+                    polar: &mut self.polar,
+                    noise,
+                    tests: 0.0,
+                    proofs: &mut Vec::new(),
+                };
+                let left = prover.refute(&proof, &self.reported, &mut self.budget.looks);
+                if left <= proof.left {
+                    continue;
+                }
+                proof.leave(left);
+            }
+            let proof = &proof;
             let score = proof.score();
             if score < self.config.min_score {
-                break;
+                continue;
             }
             let others = self.reported.iter().copied();
             if Proof::score_of(proof.certainty_beside(rays, others)) < self.config.min_score {
@@ -94,9 +120,7 @@ impl AContrario {
 
 /// Returns `true` if two outlines are one.
 fn is_same(a: &Ring, b: &Ring) -> bool {
-    let (dx, dy) = (a.x - b.x, a.y - b.y);
-    let off = (dx * dx + dy * dy).sqrt() + (a.r - b.r).abs();
-    off < SAME_PIXELS.max(SAME_SHARE * a.r.min(b.r))
+    a.apart(b) < SAME_PIXELS.max(SAME_SHARE * a.r.min(b.r))
 }
 
 /// The measurement of a proven circle.

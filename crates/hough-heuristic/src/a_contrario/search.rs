@@ -406,21 +406,9 @@ impl Search<'_> {
         if let Some(place) = place {
             found.candidates[place].tried = true;
         }
-        let Some(mut proven) = prover.prove(&candidate, &mut budget.looks) else {
+        let Some(proven) = found.settle(place, &candidate, prover, budget) else {
             return false;
         };
-        let mut is_new = found.prove(place, &candidate, &proven, budget);
-        if !is_new {
-            // Drawn to the stronger edges of another outline: this one may still be there.
-            let Some(own) = prover.prove_narrowly(&candidate, &mut budget.looks) else {
-                return false;
-            };
-            is_new = found.prove(place, &candidate, &own, budget);
-            proven = own;
-        }
-        if is_new {
-            budget.grant();
-        }
         self.outline.explain(
             self.circle,
             level,

@@ -7,8 +7,8 @@ use crate::edges::Candidate;
 const TILE: usize = 64;
 /// Pixels of the frame per edge point that is kept; of more points the strongest are kept.
 const PIXELS_PER_POINT: usize = 12;
-/// Number of points up to which a small frame may keep twice as many.
-const FEW: usize = 600;
+/// Number of points up to which a small frame may keep four times as many.
+const FEW: usize = 1500;
 /// One in so many of the points that the area of a tile allows is kept there, however weak.
 const TILE_SHARE: usize = 4;
 
@@ -32,7 +32,7 @@ impl Thinning {
         (width, height): (usize, usize),
     ) -> &'a [Candidate] {
         let pixels = width * height;
-        let most = (pixels / PIXELS_PER_POINT).max(FEW.min(2 * pixels / PIXELS_PER_POINT));
+        let most = (pixels / PIXELS_PER_POINT).max(FEW.min(4 * pixels / PIXELS_PER_POINT));
         if points.len() <= most {
             return points;
         }

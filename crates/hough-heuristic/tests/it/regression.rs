@@ -201,7 +201,13 @@ fn both_outlines_of_a_ring_are_circles() {
 
 #[test]
 fn a_disc_before_another_of_its_size_leaves_it_a_circle() {
-    for (dx, dy) in [(28.0, 0.0), (20.0, 20.0), (24.5, 10.5)] {
+    for (dx, dy) in [
+        (28.0, 0.0),
+        (20.0, 20.0),
+        (24.5, 10.5),
+        (18.0, 0.0),
+        (14.5, 15.5),
+    ] {
         let (front, back) = (circle(90.0, 95.0, 45.0), circle(90.0 + dx, 95.0 + dy, 45.0));
         let frame = PLAIN.draw(|x, y| {
             if within(&front, x, y) {
@@ -297,6 +303,14 @@ fn hundreds_of_circles_are_all_found() {
 }
 
 #[test]
+fn a_grid_of_discs_is_found_in_the_range_of_its_frame() {
+    let (frame, circles) = discs(10, 38.0, 12.0);
+    let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
+    assert_eq!(detector.detect(&frame).unwrap().len(), circles.len());
+    assert!(!detector.effort().ended_by_count);
+}
+
+#[test]
 fn circles_beyond_the_most_are_left_out_and_told() {
     let (frame, _) = discs(7, 30.0, 12.0);
     for (max_circles, all) in [(48, false), (49, true)] {
@@ -324,4 +338,24 @@ fn thin_lines_are_found_at_all_sizes() {
         if lines.iter().any(on) { 50.0 } else { 190.0 }
     });
     assert_found("thin lines", &frame, &lines);
+}
+
+#[test]
+fn lines_drawn_by_hand_or_dashed_are_found() {
+    for shift in [0.0, 0.5] {
+        let line = circle(100.0 + shift, 101.0, 70.0);
+        let on = |x: f64, y: f64, wobble: f64| {
+            let turn = (y - line.y).atan2(x - line.x);
+            let r = line.radius + wobble * ((3.0 * turn).sin() + (8.0 * turn + 1.0).cos());
+            (((x - line.x).hypot(y - line.y) - r).abs() < 1.0, turn)
+        };
+        let by_hand = PLAIN.draw(|x, y| if on(x, y, 0.9).0 { 50.0 } else { 190.0 });
+        assert_found("by hand", &by_hand, &[line]);
+        let dashed = PLAIN.draw(|x, y| {
+            let (on, turn) = on(x, y, 0.0);
+            let dash = (10.0 * turn / std::f64::consts::TAU).rem_euclid(1.0) < 0.6;
+            if on && dash { 50.0 } else { 190.0 }
+        });
+        assert_found("dashed", &dashed, &[line]);
+    }
 }
