@@ -115,6 +115,8 @@ impl AContrario {
             }
             self.reported.push(measured.ring);
         }
+        self.measurements
+            .sort_unstable_by(|a, b| a.log_false_alarms.total_cmp(&b.log_false_alarms));
     }
 }
 
