@@ -14,10 +14,11 @@ use std::path::PathBuf;
 use clap::Parser;
 use example_support::files::{animated, lock_folder, write_png, write_whole};
 use example_support::learning::paper_cell;
+use example_support::overlay::Overlay;
 use example_support::program::{ExitCode, Outcome, start};
 use example_support::say;
 use hough_heuristic::Y4mWriter;
-use image::GrayImage;
+use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pipeline_sim::{Cell, Renderer, Scene, Workspace};
 use puma_val2::{Joint, Joints};
@@ -68,8 +69,14 @@ fn draw(options: &Options) -> Outcome {
     let mut quiet = Scene::laboratory();
     (quiet.sensor.read_noise, quiet.sensor.shot_noise) = (0.0, 0.0);
     let mut renderer = Renderer::new(&quiet, options.seed);
-    let small = |pose| resize(renderer.render(&cell, pose), 384, 288, FilterType::Triangle);
-    let frames: Vec<GrayImage> = path.iter().map(small).collect();
+    let film = path.iter().map(|pose| {
+        let mut overlay = Overlay::new(renderer.render(&cell, pose));
+        if let Ok(circle) = cell.circle(pose) {
+            overlay.circle(&circle);
+        }
+        resize(&overlay.into_image(), 384, 288, FilterType::Triangle)
+    });
+    let frames: Vec<RgbImage> = film.collect();
     write_whole(&out("run.png"), &animated(&frames, (1, 12), (3, 2))?)?;
     for name in [
         "overview.svg",

@@ -126,7 +126,7 @@ impl RunRecord {
             step: event.cycle,
             shown: features.is_some() || self.gripped,
             image: resize(&overlay.into_image(), width, height, FilterType::Triangle),
-            words: format!("run {} step {}  {found}", self.run, event.cycle),
+            words: format!("run {} move {}  {found}", self.run, event.cycle),
         })
     }
 

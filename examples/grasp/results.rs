@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::record::{Picture, RunRecord, RunSummary};
 use example_support::overlay::Overlay;
+use example_support::trial::{FEATURES, Feature};
 
 /// Content of `summary.json`.
 #[derive(Serialize)]
@@ -69,6 +70,13 @@ impl fmt::Display for Summary<'_> {
                 "{number:4}   {ball:<24}  {moves:6}  {lost:4}   {last:<24} {miss:>9}  {result}"
             )?;
         }
+        write!(
+            f,
+            "\nx, y, r: the last sighting, feature units; goal {}; miss: from the ball's centre to \
+             the gripper when it closed",
+            goal_words()
+        )?;
+        writeln!(f)?;
         let (all, share) = (self.runs.len(), 100.0 * self.success_rate);
         let grasped = self.runs.iter().filter(|run| run.grasped).count();
         write!(f, "\n{grasped} of {all} grasped ({share:.1} %)")?;
@@ -84,6 +92,11 @@ impl fmt::Display for Summary<'_> {
             ),
         }
     }
+}
+
+fn goal_words() -> String {
+    let goal = |f: Feature| format!("{} {}..{}", f.name, f.goal.0, f.goal.1);
+    FEATURES.map(goal).join(", ")
 }
 
 /// Contact sheet that fits a screen: a row of views for each of the first runs, the last one with

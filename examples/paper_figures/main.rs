@@ -13,6 +13,7 @@ use grasp_agent::{
     Percept,
 };
 use hough_heuristic::Features;
+use indicatif::ProgressBar;
 use pipeline_sim::{Cell, ErrorLevel, MoveForm};
 use puma_grasp::Simulator;
 use puma_val2::Joints;
@@ -25,7 +26,7 @@ use example_support::learning::{
 };
 use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
 use example_support::plot::{CURVES, Panel, write_svg};
-use example_support::program::{ExitCode, Outcome, at_least_one, go_on, start};
+use example_support::program::{ExitCode, Outcome, at_least_one, go_on, progress_bar, start};
 use example_support::say;
 use example_support::stages::cpu_time;
 use example_support::trial::{FEATURES, TrialCell, at_goal};
@@ -93,19 +94,20 @@ fn figure_6(options: &Options) -> Outcome<Learned> {
     let optimum = starts.iter().map(|start| start.optimum).sum::<usize>();
     say!(
         "Figure 6: approaching, learned with each simulator and reward, then tried in the exact \
-         plane from {} starts of the search (breadth-first optimum {:.2} steps, loop breaker {}); \
+         plane from {} starts of the search (breadth-first optimum {:.2} moves, loop breaker {}); \
          without search and recovery, so that a ball once lost stays lost",
         starts.len(),
         optimum as f64 / starts.len() as f64,
         Learned::APPROACHING_KAPPA
     );
-    say!("seed  learned in / reward              success %   steps   x optimum  s of CPU");
+    say!("seed  learned in / reward              success %   moves   x optimum  s of CPU");
     let columns = "behaviour,seed,actions,success_share,mean_td_error";
     let mut csv = Table::create(options.out.join("figure6.csv"), columns)?;
     let mut curves = [("centering", Vec::new()), ("approaching", Vec::new())];
     let mut taught = None;
+    let bar = progress_bar(8 * options.seeds as u64, "tables learned", false);
     for seed in (options.first_seed..).take(options.seeds) {
-        let (centering, approaching) = learned_with(options, seed, &starts)?;
+        let (centering, approaching) = learned_with(options, seed, &starts, &bar)?;
         for (name, curve) in [
             ("centering", &centering.curve),
             ("approaching", &approaching.curve),
@@ -123,6 +125,7 @@ fn figure_6(options: &Options) -> Outcome<Learned> {
         curves[1].1.push(approaching.curve);
         taught.get_or_insert(Learned::new(centering.behaviour, approaching.behaviour));
     }
+    bar.finish_and_clear();
     let panels = curves
         .iter()
         .flat_map(|(name, seeds)| CURVES.map(|curve| Panel::of_learning(name, curve, seeds)));
@@ -136,7 +139,12 @@ const SIZE: (u32, u32) = (400, 290);
 
 /// Learns with one seed in all simulators and with all rewards, and prints the results. Returns
 /// centering, and approaching with the mended reward in the exact plane.
-fn learned_with(options: &Options, seed: u64, starts: &[PlaneStart]) -> Outcome<(Lesson, Lesson)> {
+fn learned_with(
+    options: &Options,
+    seed: u64,
+    starts: &[PlaneStart],
+    bar: &ProgressBar,
+) -> Outcome<(Lesson, Lesson)> {
     let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed);
     let plane = ExactPlane::new(20_000, rng);
     let forms = [MoveForm::Rigid22, MoveForm::Linear];
@@ -167,10 +175,9 @@ fn learned_with(options: &Options, seed: u64, starts: &[PlaneStart]) -> Outcome<
             Some(simulator) => simulator.learn(spec, trials, actions, rng, &mut quiet),
         };
         let seconds = cpu_time().saturating_sub(begin).as_secs_f64();
-        say!(
-            "{seed:4}  {name:32} {}  {seconds:8.2}",
-            scored(&lesson, starts)
-        );
+        let row = scored(&lesson, starts);
+        bar.suspend(|| say!("{seed:4}  {name:32} {row}  {seconds:8.2}"));
+        bar.inc(1);
         lesson
     };
     let (found, none): (&[Percept], &[Percept]) = (&found, &[]);

@@ -10,7 +10,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use example_support::files::Table;
 use example_support::learning::{learn_both, paper_cell, simulators};
 use example_support::plot::{Panel, write_svg};
-use example_support::program::{Outcome, go_on, on_all_cores};
+use example_support::program::{Outcome, go_on, on_all_cores, progress_bar};
 use example_support::say;
 use example_support::tally::wilson;
 use example_support::trial::TrialCell;
@@ -41,6 +41,7 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
     let columns = "learned_in,errors,goal,moves_learned_from,success_percent,interval_low,\
                    interval_high,moves";
     let mut csv = Table::create(out.join("on_the_arm.csv"), columns)?;
+    let bar = progress_bar(6 * arms as u64, "arms", false);
     let mut panels = Vec::new();
     for (name, form) in [
         ("rigid regression", MoveForm::Rigid22),
@@ -50,7 +51,11 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
         for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
             // Of each arm: centering at once, then the whole task after each number of moves.
             let mut scores = Vec::new();
-            on_all_cores(arms, &mut scores, |seed| one_arm(form, level, seed as u64))?;
+            on_all_cores(arms, &mut scores, |seed| {
+                let scores = one_arm(form, level, seed as u64)?;
+                bar.inc(1);
+                Ok(scores)
+            })?;
             let mut line = Vec::new();
             let measured = std::iter::once(("x", 0)).chain(MOVES.map(|made| ("all", made)));
             for (column, (goal, made)) in measured.enumerate() {
@@ -69,10 +74,11 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
                     String::new()
                 };
                 let (interval, errors) = (format!("{low:.1}..{high:.1}"), level.to_string());
-                say!(
+                let row = format!(
                     "{name:19} {errors:18} {goal:5} {made:19}  {mean:9.1} {interval:>14} \
                      {moves:>18}"
                 );
+                bar.suspend(|| say!("{row}"));
                 csv.row(format_args!(
                     "{name},{level},{goal},{made},{mean:.2},{low:.2},{high:.2},{moves}"
                 ))?;
@@ -91,6 +97,7 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
             ..Panel::default()
         });
     }
+    bar.finish_and_clear();
     write_svg(&out.join("on_the_arm.svg"), &panels, 2, SIZE)
 }
 

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use example_support::files::{Table, animated, keep_run, lock_folder, write_whole};
+use example_support::overlay::Overlay;
 use example_support::program::{ExitCode, Outcome, at_least_one, go_on, progress_bar, start};
 use example_support::say;
 use example_support::stages::{Stages, Timed};
@@ -18,7 +19,7 @@ use grasp_agent::{
     Agent, AgentConfig, AgentError, Belief, EventKind, Hybrid, HybridSettings, RunEvent, SavedRun,
 };
 use hough_heuristic::CircleDetector;
-use image::GrayImage;
+use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use indicatif::ProgressBar;
 use pipeline_sim::{Cell, ErrorLevel, Workspace};
@@ -166,7 +167,7 @@ struct Runs<'a> {
     detector: Box<dyn CircleDetector + Send>,
     stages: Stages,
     csv: Option<Table>,
-    film: Vec<GrayImage>,
+    film: Vec<RgbImage>,
     tally: Tally,
     bar: ProgressBar,
 }
@@ -288,8 +289,13 @@ impl Runs<'_> {
                 _ => {}
             }
             if let (Some(1), Some(frame)) = (counted, event.frame) {
+                let mut overlay = Overlay::new(frame);
+                if let EventKind::Seen(sighting) = event.kind {
+                    overlay.circle(&sighting.features.to_circle(frame.width()));
+                }
                 let (width, height) = (frame.width() / 2, frame.height() / 2);
-                film.push(resize(frame, width, height, FilterType::Triangle));
+                let picture = overlay.into_image();
+                film.push(resize(&picture, width, height, FilterType::Triangle));
             }
         };
         let end = run_on_rig(rig, &mut *self.detector, agent, &self.stages, &mut observe);

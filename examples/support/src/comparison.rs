@@ -31,7 +31,7 @@ pub struct Row {
 impl Row {
     /// Names of the columns of the printed table.
     pub const HEADER: &str = "level     controller                       success %  95 % interval  \
-                              cells without failure  cycles  losses/run  collisions  runs";
+                              cells without failure   moves  losses/run  collisions  runs";
     /// Names of the columns of the file.
     pub const CSV_HEADER: &str = "level,controller,success_percent,low,high,\
                                   cells_without_failure,cells,cycles,losses_per_run,collisions,\

@@ -6,7 +6,7 @@ use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use grasp_agent::SavedRun;
-use image::{GrayImage, ImageBuffer, ImageFormat, Pixel, PixelWithColorType};
+use image::{ImageBuffer, ImageFormat, Pixel, PixelWithColorType, RgbImage};
 
 use crate::program::Outcome;
 
@@ -114,11 +114,11 @@ impl Table {
 ///
 /// # Errors
 /// No frames, or frames of several sizes.
-pub fn animated(frames: &[GrayImage], delay: (u16, u16), last: (u16, u16)) -> Outcome<Vec<u8>> {
+pub fn animated(frames: &[RgbImage], delay: (u16, u16), last: (u16, u16)) -> Outcome<Vec<u8>> {
     let first = frames.first().ok_or("no frames")?;
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, first.width(), first.height());
-    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
     encoder.set_animated(u32::try_from(frames.len())?, 0)?;
