@@ -33,6 +33,7 @@ pub use config::AContrarioConfig;
 pub use measurement::{Effort, Measurement};
 pub use rings::Rings;
 
+use crate::clock;
 use crate::detect::{CircleDetector, Detection, FrameRefused};
 use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::error::ConfigError;
@@ -259,18 +260,23 @@ impl AContrario {
                 maxima,
                 thinning,
                 level,
+                late,
             } = edges;
             let gray = pyramid.gray(depth);
             let noise = noise / (1 << depth) as f32 + ROUNDING;
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
+            let begun = clock::now();
             let points = maxima.find(gray.pixels, gray.width, threshold, deadline);
+            // Listing them takes up to as long again.
+            let spent = clock::between(begun, clock::now());
+            let is_late = clock::is_past(deadline.and_then(|time| time.checked_sub(spent)));
+            let points = if is_late { &[] } else { points };
+            *late |= is_late;
             let points = thinning.strongest(points, (gray.width, gray.height));
             level.fill(gray.width, gray.height, points);
         };
         let mut search = |depth: usize, level: &mut Level| {
             let scale = (1 << depth) as f32;
-            // The deadline may have left out the edges.
-            self.budget.is_late();
             self.budget.begin_size(depth == finest);
             for proof in prover.proofs.iter().filter(|proof| proof.is_beyond_doubt()) {
                 let ring = proof.in_frame().shrunk(scale);
@@ -305,6 +311,7 @@ impl AContrario {
             });
         };
         let [coarse, fine] = &mut self.edges;
+        (coarse.late, fine.late) = (false, false);
         // The edges of the finest size take about as long as all that is done at the others, and
         // come last so that a deadline leaves the circles of these.
         both(
@@ -318,6 +325,7 @@ impl AContrario {
             || edges_of(finest, fine),
         );
         search(finest, &mut fine.level);
+        self.budget.spent |= fine.late || coarse.late;
         let found = &mut self.collected;
         found
             .candidates
@@ -407,6 +415,8 @@ struct Edges {
     maxima: Maxima,
     thinning: Thinning,
     level: Level,
+    /// Set once a deadline has left out edges of the frame.
+    late: bool,
 }
 
 impl Edges {
@@ -415,6 +425,7 @@ impl Edges {
             maxima: Maxima::new(SMOOTHING),
             thinning: Thinning::default(),
             level: Level::default(),
+            late: false,
         }
     }
 }
