@@ -12,11 +12,10 @@ mod overview;
 use std::path::PathBuf;
 
 use clap::Parser;
-use example_support::files::{animated, lock_folder, write_png, write_whole};
+use example_support::files::animated;
 use example_support::learning::paper_cell;
 use example_support::overlay::Overlay;
-use example_support::program::{ExitCode, Outcome, start};
-use example_support::say;
+use example_support::prelude::*;
 use hough_heuristic::Y4mWriter;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};

@@ -1,6 +1,6 @@
 //! The cell as a drawing: arm, camera, workspace and ball from the side and from above.
 
-use example_support::program::Outcome;
+use example_support::prelude::*;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use pipeline_sim::{Cell, Workspace};
 use plotters::coord::Shift;

@@ -22,15 +22,13 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::comparison::{self, Row};
-use example_support::files::{Table, lock_folder, writable_folder, write_whole};
+use example_support::files::writable_folder;
 use example_support::learning::{
     ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
 };
 use example_support::plane::{ExactPlane, search_percepts};
-use example_support::program::{
-    ExitCode, Outcome, at_least_one, go_on, on_all_cores, progress_bar, start,
-};
-use example_support::say;
+use example_support::prelude::*;
+use example_support::program::on_all_cores;
 use example_support::stages::Stages;
 use example_support::tally::{Counted, Tally};
 use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
@@ -51,54 +49,42 @@ struct Options {
     /// Folder for comparison.csv and comparison.svg
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     out: PathBuf,
-
     /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 2000)]
     seed: u64,
-
     /// Cells per level of errors
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = at_least_one)]
     draws: usize,
-
     /// Balls per cell
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = at_least_one)]
     starts: usize,
-
     /// Moves by which the hybrid learns each cell
     #[arg(long, value_name = "N", default_value_t = 1000)]
     moves: usize,
-
     /// Levels of errors, separated by commas: none, moderate, heavy, extreme
     #[arg(long, value_name = "LEVEL", value_delimiter = ',', default_values_t = ErrorLevel::ALL)]
     levels: Vec<ErrorLevel>,
-
     /// Odd errors beside the level's, separated by commas: zeros, gears, sag, drag, back-drag,
     /// links, stiction, dead-zone, play, lag, slip (at the fifth ball), mirrored, roll, lens,
     /// noise, missed, outliers; NAME=AMOUNT for another than the usual amount
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     odd: Vec<String>,
-
     /// Compare only controllers whose name contains this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
-
     /// Count a run as success if the jaws hold the ball. Without --full-chain the hand can run into
     /// the ball only with this option
     #[arg(long)]
     grip: bool,
-
     /// Teach every controller the goal in each cell, with the ball between the jaws
     #[arg(long, conflicts_with = "full_chain")]
     taught_goal: bool,
-
     /// Render frames, detect the circle in them, and drive an emulated controller by VAL II
     #[arg(long)]
     full_chain: bool,
-
     /// Circle detector for rendered frames: a-contrario, heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t, requires = "full_chain")]
     detector: BallDetector,
-
     /// Write every failed or broken-off run to failures/ in the folder, for the example replay
     #[arg(long)]
     logs: bool,

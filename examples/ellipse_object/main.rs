@@ -28,11 +28,9 @@ use rand::{RngExt, SeedableRng};
 
 use detour::Detour;
 use egg::{Egg, EggCamera};
-use example_support::files::{keep_run, lock_folder, write_png};
 use example_support::learning::{learn_both, simulators};
 use example_support::overlay::Overlay;
-use example_support::program::{ExitCode, Outcome, STOP, at_least_one, go_on, progress_bar, start};
-use example_support::say;
+use example_support::prelude::*;
 use example_support::trial::ball_in_view;
 
 mod detour;
@@ -52,15 +50,12 @@ struct Options {
     /// Folder for a picture of the last view of each egg
     #[arg(long, value_name = "DIR", default_value = "out/egg")]
     out: PathBuf,
-
     /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 2000)]
     seed: u64,
-
     /// Number of eggs
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
     runs: usize,
-
     /// Length of the egg, millimetres; its thickness is 40
     #[arg(long, value_name = "MM", default_value_t = 56.0, value_parser = length)]
     length: f64,

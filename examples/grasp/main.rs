@@ -17,12 +17,11 @@ use puma_grasp::{Rig, RigError, Simulator, bright_ball_scene};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-use example_support::files::{Table, lock_folder, writable_folder, write_png, write_whole};
+use example_support::files::writable_folder;
 use example_support::learning::{ACTIONS, ACTIONS_FINE, SAMPLES, TRIALS, anywhere, simulators};
 use example_support::overlay::Overlay;
 use example_support::plane::search_percepts;
-use example_support::program::{ExitCode, Outcome, STOP, go_on, progress_bar, start};
-use example_support::say;
+use example_support::prelude::*;
 use example_support::stages::Stages;
 use example_support::trial::{ball_in_view, run_on_rig};
 use options::{Options, RewardName};

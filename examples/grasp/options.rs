@@ -1,10 +1,9 @@
 //! The command line.
 
+use example_support::prelude::*;
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
-use example_support::program::at_least_one;
-use example_support::say;
 use grasp_agent::GoalInterval;
 use pipeline_sim::MoveForm;
 use puma_grasp::BallDetector;
@@ -20,71 +19,55 @@ pub(crate) struct Options {
     /// replay; files of an earlier run are replaced
     #[arg(long, value_name = "DIR", default_value = "out/grasp")]
     pub(crate) out: PathBuf,
-
     /// Seed of all random draws; the same seed gives the same run
     #[arg(long, value_name = "N", default_value_t = 2000)]
     pub(crate) seed: u64,
-
     /// Number of balls
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
     pub(crate) runs: usize,
-
     /// Serial device of a VAL II controller or emulator, 9600 8N1; none is started then
     #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     pub(crate) port: Option<String>,
-
     /// Socket of a VAL II controller or emulator, as HOST:PORT
     #[arg(long, value_name = "ADDR")]
     pub(crate) tcp: Option<String>,
-
     /// Policy of an earlier run; skips training. A folder with centering.policy and
     /// approaching.policy is read with the --fine and --reward it was learned with; a file written
     /// by --export needs neither
     #[arg(long, value_name = "PATH", conflicts_with = "simulator")]
     pub(crate) policy: Option<PathBuf>,
-
     /// Write the policy as JSON for other programs; docs/run_policy.py runs it
     #[arg(long, value_name = "FILE")]
     pub(crate) export: Option<PathBuf>,
-
     /// Keep every run in saved/ for the example replay, not only failed ones
     #[arg(long)]
     pub(crate) save_runs: bool,
-
     /// Write the frames of the first N runs and of runs that fail; a frame takes about 130 kB, a
     /// run 20 to 30 of them
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub(crate) frames_of: usize,
-
     /// Go on learning during the runs, and save the policies to the output folder
     #[arg(long)]
     pub(crate) keep_learning: bool,
-
     /// Circle detector: a-contrario, heuristic, rht, sht
     #[arg(long, value_name = "NAME", default_value_t)]
     pub(crate) detector: BallDetector,
-
     /// Reward during training; the paper's formulas as printed do not teach the goal [default:
     /// mended]
     #[arg(long, value_enum)]
     pub(crate) reward: Option<RewardName>,
-
     /// Learn approaching on 540 states instead of 90: fewer moves, longer training
     #[arg(long)]
     pub(crate) fine: bool,
-
     /// Goal interval of y; the paper gives two
     #[arg(long, value_enum, default_value_t = YGoalName::Equation6)]
     pub(crate) y_goal: YGoalName,
-
     /// Form of the regression simulator [default: rigid22]
     #[arg(long, value_enum)]
     pub(crate) simulator: Option<FormName>,
-
     /// Run the emulated arm at the speed of a real one
     #[arg(long, conflicts_with_all = ["port", "tcp"])]
     pub(crate) realtime: bool,
-
     /// Print the final table only
     #[arg(long)]
     pub(crate) quiet: bool,

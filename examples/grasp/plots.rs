@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use example_support::plot::{CURVES, Line, Panel, write_svg};
-use example_support::program::Outcome;
+use example_support::prelude::*;
 use example_support::trial::FEATURES;
 use grasp_agent::Lesson;
 use hough_heuristic::Features;
@@ -39,24 +39,22 @@ pub(crate) fn features_per_step(path: &Path, runs: &[RunRecord]) -> Outcome {
         (tracks.len() / 2, "a start in between"),
         (tracks.len().saturating_sub(1), "the nearest start"),
     ];
-    let panels = FEATURES.map(|feature| {
+    let panels = FEATURES.map(|(name, goal, most, of)| {
         let line = |track: &Vec<(usize, Features)>| {
-            let points = track
-                .iter()
-                .map(|(step, f)| (*step as f64, (feature.of)(f)));
+            let points = track.iter().map(|(step, f)| (*step as f64, of(f)));
             points.collect()
         };
         let named = distinct
             .iter()
             .filter_map(|(index, words)| Some(((*words).into(), line(tracks.get(*index)?))));
         Panel {
-            title: format!("{} until the grip", feature.name),
+            title: format!("{name} until the grip"),
             across: "moves since the first sighting".into(),
-            up: format!("{}, feature units", feature.name),
+            up: format!("{name}, feature units"),
             lines: named.collect::<Vec<Line>>(),
             behind: tracks.iter().map(|track| line(track)).collect(),
-            goal: Some(feature.goal),
-            top: Some(feature.most),
+            goal: Some(goal),
+            top: Some(most),
             ..Panel::default()
         }
     });

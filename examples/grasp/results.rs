@@ -95,7 +95,7 @@ impl fmt::Display for Summary<'_> {
 }
 
 fn goal_words() -> String {
-    let goal = |f: Feature| format!("{} {}..{}", f.name, f.goal.0, f.goal.1);
+    let goal = |(name, (low, high), ..): Feature| format!("{name} {low}..{high}");
     FEATURES.map(goal).join(", ")
 }
 

@@ -18,10 +18,9 @@ use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 
-use example_support::files::{writable_folder, write_png};
+use example_support::files::writable_folder;
 use example_support::overlay::Overlay;
-use example_support::program::{ExitCode, Outcome, start};
-use example_support::say;
+use example_support::prelude::*;
 
 /// Draws original, edges, structure D and the detected circle of a rendered scene.
 #[derive(Parser, Debug)]
@@ -29,7 +28,6 @@ struct Options {
     /// Picture to write, PNG
     #[arg(value_name = "FILE", default_value = "out/figure_3.png")]
     picture: PathBuf,
-
     /// Seed of the scene and of the draws
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,

@@ -20,14 +20,12 @@ use puma_val2::Joints;
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::files::{Table, lock_folder, write_png};
 use example_support::learning::{
     ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
 };
 use example_support::plane::{ExactPlane, PlaneStart, score, search_percepts, search_starts};
 use example_support::plot::{CURVES, Panel, write_svg};
-use example_support::program::{ExitCode, Outcome, at_least_one, go_on, progress_bar, start};
-use example_support::say;
+use example_support::prelude::*;
 use example_support::stages::cpu_time;
 use example_support::trial::{FEATURES, TrialCell, at_goal};
 
@@ -42,27 +40,21 @@ struct Options {
     /// Folder for the figures
     #[arg(long, value_name = "DIR", default_value = "out/figures")]
     out: PathBuf,
-
     /// Number of seeds to learn with
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one)]
     seeds: usize,
-
     /// First seed
     #[arg(long, value_name = "N", default_value_t = 0)]
     first_seed: u64,
-
     /// Balls, placed where the search finds them, to test the learned tables with
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = at_least_one)]
     starts: usize,
-
     /// Make figure 6 and its table only
     #[arg(long)]
     learning_only: bool,
-
     /// Training actions of the fine preset of 540 states
     #[arg(long, value_name = "N", default_value_t = ACTIONS_FINE)]
     fine: u64,
-
     /// Number of arms, each with errors of its own
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one)]
     arms: usize,
@@ -249,18 +241,18 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
             let off = |path: &&&Path| off_centre(&path[0].0);
             (start, third.max_by(|a, b| off(a).total_cmp(&off(b))))
         });
-        for feature in FEATURES {
+        for (name, goal, _, of) in FEATURES {
             let lines = three.iter().filter_map(|(start, path)| {
                 let along = path.as_ref()?.iter().enumerate();
-                let line = along.map(|(i, (f, _))| (i as f64, (feature.of)(f)));
+                let line = along.map(|(i, (f, _))| (i as f64, of(f)));
                 Some((format!("{start} start"), line.collect()))
             });
             panels.push(Panel {
-                title: format!("{}, theta 3 ends in {low}..{high}", feature.name),
+                title: format!("{name}, theta 3 ends in {low}..{high}"),
                 across: "moves".into(),
                 up: "feature units".into(),
                 lines: lines.collect(),
-                goal: Some(feature.goal),
+                goal: Some(goal),
                 ..Panel::default()
             });
         }
@@ -273,7 +265,7 @@ fn figures_7_and_8(options: &Options, taught: &Learned) -> Outcome {
             across: "moves".into(),
             up: "feature units".into(),
             lines: vec![(String::new(), line.collect())],
-            goal: Some(FEATURES[2].goal),
+            goal: Some(FEATURES[2].1),
             top: Some(70.0),
             ..Panel::default()
         }

@@ -7,11 +7,10 @@ use pipeline_sim::{ErrorLevel, MoveForm};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::files::Table;
 use example_support::learning::{learn_both, paper_cell, simulators};
 use example_support::plot::{Panel, write_svg};
-use example_support::program::{Outcome, go_on, on_all_cores, progress_bar};
-use example_support::say;
+use example_support::prelude::*;
+use example_support::program::on_all_cores;
 use example_support::tally::wilson;
 use example_support::trial::TrialCell;
 

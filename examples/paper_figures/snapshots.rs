@@ -13,7 +13,7 @@ use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::overlay::{CAPTION, Overlay, Rgb888};
-use example_support::program::{Outcome, STOP};
+use example_support::prelude::*;
 use example_support::trial::ball_in_view;
 
 /// Size of each picture, below its caption.

@@ -23,9 +23,7 @@ use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
-use example_support::files::{Table, lock_folder, write_png};
-use example_support::program::{ExitCode, Outcome, go_on, progress_bar, start};
-use example_support::say;
+use example_support::prelude::*;
 use example_support::stages::cpu_time;
 use kinds::{Kind, Kinds, repeated, share, size};
 use pipeline_sim::{Camera, Renderer, Round, RoundOutline};

@@ -6,13 +6,11 @@
 
 #![allow(clippy::print_stderr, reason = "a program for a terminal")]
 
+use example_support::prelude::*;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use grasp_agent::{AgentError, RunEvent, SavedRun};
-
-use example_support::program::{ExitCode, Outcome, start};
-use example_support::say;
 
 /// Replays runs that `grasp` (failures/, with --save-runs saved/), `track`, `compare_controllers`
 /// (--logs) or `ellipse_object` have saved, and reports whether they take the same course.
@@ -24,7 +22,6 @@ struct Options {
     /// Saved runs
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-
     /// Print every event too
     #[arg(long)]
     events: bool,

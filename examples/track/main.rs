@@ -8,10 +8,9 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use example_support::files::{Table, animated, keep_run, lock_folder, write_whole};
+use example_support::files::animated;
 use example_support::overlay::Overlay;
-use example_support::program::{ExitCode, Outcome, at_least_one, go_on, progress_bar, start};
-use example_support::say;
+use example_support::prelude::*;
 use example_support::stages::{Stages, Timed};
 use example_support::tally::{Counted, Tally};
 use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
@@ -44,27 +43,21 @@ struct Options {
     /// failed or collided, for the example replay
     #[arg(long, value_name = "DIR", default_value = "out/track")]
     out: PathBuf,
-
     /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 2000)]
     seed: u64,
-
     /// Runs that count
     #[arg(long, value_name = "N", default_value_t = 10)]
     runs: usize,
-
     /// Runs to learn from first, in each cell
     #[arg(long, value_name = "N", default_value_t = 40)]
     teach: usize,
-
     /// Number of cells that the runs are spread over, each with errors drawn anew
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     cells: usize,
-
     /// Movement of the ball
     #[arg(long, value_enum, default_value_t = Fate::Push)]
     ball: Fate,
-
     /// Circle detector: a-contrario, heuristic, rht, sht
     #[arg(
         long,
@@ -73,20 +66,16 @@ struct Options {
         conflicts_with = "shortcut"
     )]
     detector: BallDetector,
-
     /// Use features straight from the geometry, without frames and VAL II. Only failed runs are
     /// written, and collisions are not counted
     #[arg(long)]
     shortcut: bool,
-
     /// Read noise of the camera, gray levels [default: that of the scene]
     #[arg(long, value_name = "LEVELS", conflicts_with = "shortcut")]
     noise: Option<f64>,
-
     /// Start from the camera.belief of an earlier run; the --teach runs go on learning from it
     #[arg(long, value_name = "FILE", conflicts_with = "shortcut")]
     belief: Option<PathBuf>,
-
     /// Errors of the camera: none, moderate, heavy, extreme
     #[arg(long, value_name = "LEVEL", default_value_t = ErrorLevel::Moderate)]
     level: ErrorLevel,

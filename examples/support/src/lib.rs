@@ -7,6 +7,7 @@ pub mod learning;
 pub mod overlay;
 pub mod plane;
 pub mod plot;
+pub mod prelude;
 pub mod program;
 pub mod stages;
 pub mod tally;

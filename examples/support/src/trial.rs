@@ -18,46 +18,21 @@ use crate::learning::paper_cell;
 use crate::program::{Outcome, STOP};
 use crate::stages::Stages;
 
-/// A feature of the ball in the image.
-#[derive(Clone, Copy, Debug)]
-pub struct Feature {
-    /// Its letter.
-    pub name: &'static str,
-    /// Goal interval.
-    pub goal: (f64, f64),
-    /// Largest value of interest.
-    pub most: f64,
-    /// Reader of its value.
-    pub of: fn(&Features) -> f64,
-}
+/// A feature of the ball in the image: its name, its goal interval, its largest value of interest,
+/// and its reader.
+pub type Feature = (&'static str, (f64, f64), f64, fn(&Features) -> f64);
 
 /// All features, in feature units.
 pub const FEATURES: [Feature; 3] = [
-    feature("x", (99.0, 108.0), 192.0, |f| f.x),
-    feature("y", (74.0, 82.0), 144.0, |f| f.y),
-    feature("r", (32.0, 34.0), 68.0, |f| f.r),
+    ("x", (99.0, 108.0), 192.0, |f| f.x),
+    ("y", (74.0, 82.0), 144.0, |f| f.y),
+    ("r", (32.0, 34.0), 68.0, |f| f.r),
 ];
-
-const fn feature(
-    name: &'static str,
-    goal: (f64, f64),
-    most: f64,
-    of: fn(&Features) -> f64,
-) -> Feature {
-    Feature {
-        name,
-        goal,
-        most,
-        of,
-    }
-}
 
 /// Returns whether the ball stands at the paper's goal.
 pub fn at_goal(features: &Features) -> bool {
-    FEATURES.iter().all(|feature| {
-        let (low, high) = feature.goal;
-        (low..=high).contains(&(feature.of)(features))
-    })
+    let inside = |(_, (low, high), _, of): &Feature| (*low..=*high).contains(&of(features));
+    FEATURES.iter().all(inside)
 }
 
 /// A closure that returns the features of the ball in view, as an [`Eye`].
