@@ -70,6 +70,11 @@
 //! character of each kind of call, cuts and closes the line there, and counts the faults recovered
 //! from and reported.
 //!
+//! [`Val2Client::connect`] neither stops the arm or a program nor sets the speed, unless asked to.
+//! [`Val2Client::stop_on`] stops an arm that moves for another program, over any line and without a
+//! prompt. [`Val2Client::store_program`] and [`Val2Client::restore`] replace a program only after
+//! the new one has been listed and compared.
+//!
 //! # Cost of a move
 //!
 //! At 9600 baud a character takes a millisecond. Measured on the emulator with a paced line and an

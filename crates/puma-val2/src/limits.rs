@@ -24,6 +24,14 @@ impl JointRange {
     }
 }
 
+impl JointRange {
+    /// Returns `true` for a turn that leads back towards the range from beyond it.
+    pub(crate) fn inwards(&self, from: f64, to: f64) -> bool {
+        from > self.max && (self.min..from).contains(&to)
+            || from < self.min && to > from && to <= self.max
+    }
+}
+
 /// Returns the classical ranges and speeds of the PUMA 560.
 pub(crate) fn puma_560() -> [JointRange; 6] {
     [

@@ -115,7 +115,14 @@ impl<T: Transport> Val2Client<T> {
             None => self.where_()?.joints,
         };
         let target = start + delta;
-        self.wire.config.params.check(&target)?;
+        let ranges = &self.wire.config.params.ranges;
+        let mut checked = target;
+        for (i, range) in ranges.iter().enumerate() {
+            if range.inwards(start.0[i], target.0[i]) {
+                checked.0[i] = target.0[i].clamp(range.min, range.max);
+            }
+        }
+        self.wire.config.params.check(&checked)?;
         if delta.0.iter().all(|d| d.abs() < STILL) {
             return self.where_().map(|location| location.joints);
         }

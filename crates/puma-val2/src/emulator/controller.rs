@@ -260,6 +260,7 @@ impl Emulator {
             signals: &self.signals,
             arm: &self.arm,
             profile: &self.profile,
+            now: self.now,
         }
     }
 

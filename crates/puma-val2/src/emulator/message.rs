@@ -29,6 +29,8 @@ pub enum Message {
     UndefinedProgram,
     /// A label without a step.
     UndefinedLabel,
+    /// No such switch.
+    UnknownSwitch,
     /// `IF`, `FOR`, `WHILE`, `DO`, `CASE` and their ends do not match.
     ControlStructure,
     /// Too many programs, names or nested calls.
@@ -81,6 +83,7 @@ impl Message {
             Self::UndefinedValue => "Undefined value",
             Self::UndefinedProgram => "Undefined program",
             Self::UndefinedLabel => "Undefined label",
+            Self::UnknownSwitch => "Unknown switch",
             Self::ControlStructure => "Control structure error",
             Self::OutOfMemory => "Out of memory",
             Self::ArithmeticError => "Arithmetic error",

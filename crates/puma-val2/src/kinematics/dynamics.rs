@@ -1,6 +1,6 @@
 //! Joint torques: gravity, inertia, friction.
 
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
@@ -84,6 +84,42 @@ impl ArmDynamics {
             }),
             gravity: 9.81,
         }
+    }
+
+    /// Returns the dynamics with a load at the flange: a mass (kg) whose centre lies on the tool
+    /// axis at this distance (m) from the wrist centre. A load of zero changes nothing.
+    #[must_use]
+    pub fn with_payload(mut self, mass: f64, distance: f64) -> Self {
+        let link = &mut self.links[5];
+        let whole = link.mass + mass;
+        if mass == 0.0 || whole <= 0.0 {
+            return self;
+        }
+        let centre = (link.mass * link.centre[2] + mass * distance) / whole;
+        // Both masses turn about their common centre.
+        let spread = link.mass * (link.centre[2] - centre).powi(2);
+        let spread = spread + mass * (distance - centre).powi(2);
+        link.inertia[0] += spread;
+        link.inertia[1] += spread;
+        link.centre[2] = centre;
+        link.mass = whole;
+        self
+    }
+
+    /// Returns the accelerations (rad/s²) that torques (N m) cause at these speeds (rad/s), without
+    /// friction; the inverse of [`ArmDynamics::inverse`]. `None` if masses and inertias do not
+    /// resist every joint.
+    pub fn accelerations(
+        &self,
+        arm: &PumaParams,
+        joints: &Joints,
+        speeds: [f64; 6],
+        torques: [f64; 6],
+    ) -> Option<[f64; 6]> {
+        let at_rest = Vector6::from(self.inverse(arm, joints, speeds, [0.0; 6]));
+        let free = Vector6::from(torques) - at_rest;
+        let solved = self.mass_matrix(arm, joints).cholesky()?.solve(&free);
+        Some(solved.into())
     }
 
     /// Returns the torques (N m) that hold the arm still.
@@ -225,6 +261,26 @@ mod tests {
         let matrix = ArmDynamics::corke().mass_matrix(&PumaParams::corke(), &joints);
         assert!((matrix - matrix.transpose()).amax() < 1e-12);
         assert!(matrix.cholesky().is_some());
+    }
+
+    #[test]
+    fn accelerations_undo_the_inverse_dynamics_and_bear_a_load() {
+        let (arm, plain) = (PumaParams::corke(), ArmDynamics::corke());
+        let joints = Joints::from_degrees([20.0, -70.0, 120.0, 30.0, 40.0, -50.0]);
+        let speeds = [0.3, -0.2, 0.5, 1.0, -1.0, 0.4];
+        let wanted = [1.0, -2.0, 0.5, 3.0, -1.0, 2.0];
+        for dynamics in [plain, plain.with_payload(2.3, 0.1)] {
+            let torques = dynamics.inverse(&arm, &joints, speeds, wanted);
+            let found = dynamics.accelerations(&arm, &joints, speeds, torques);
+            let pairs = found.unwrap().into_iter().zip(wanted);
+            assert!(pairs.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs())) < 1e-10);
+        }
+        assert_eq!(plain.with_payload(0.0, 0.1), plain);
+        let stretched = Joints::from_degrees([0.0, 0.0, 90.0, 0.0, 0.0, 0.0]);
+        let shoulder = |d: ArmDynamics| d.gravity_torques(&arm, &stretched)[1].abs();
+        let added = shoulder(plain.with_payload(1.0, 0.1)) - shoulder(plain);
+        let lever = 9.81 * (arm.a2 + arm.d4 + 0.1);
+        assert!((added - lever).abs() < 1e-9, "{added} {lever}");
     }
 
     #[test]

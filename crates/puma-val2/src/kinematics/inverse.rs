@@ -100,7 +100,7 @@ impl PumaParams {
             return Err(Unreachable::NotFinite);
         }
         let radius2 = p.x * p.x + p.y * p.y;
-        let forward2 = radius2 - self.d2 * self.d2;
+        let forward2 = beyond_rounding(radius2 - self.d2 * self.d2, radius2);
         if forward2 < 0.0 {
             return Err(Unreachable::TooClose {
                 by: self.d2.abs() - radius2.sqrt(),
@@ -112,7 +112,7 @@ impl PumaParams {
         let forearm2 = self.a3 * self.a3 + self.d4 * self.d4;
         let distance2 = forward2 + p.z * p.z;
         let k = (distance2 - self.a2 * self.a2 - forearm2) / (2.0 * self.a2);
-        let lever2 = forearm2 - k * k;
+        let lever2 = beyond_rounding(forearm2 - k * k, forearm2);
         if lever2.is_nan() || lever2 < 0.0 {
             let (distance, forearm) = (distance2.sqrt(), forearm2.sqrt());
             let by = (distance - (self.a2 + forearm)).max((self.a2 - forearm).abs() - distance);
@@ -159,16 +159,26 @@ impl PumaParams {
                 let w12 = -s1 * r[(0, 2)] + c1 * r[(1, 2)];
                 let w22 = s23 * along(2) + c23 * r[(2, 2)];
                 let bend = (w02 * w02 + w12 * w12).sqrt();
-                let [(t4, t5, t6), flipped] = if bend > 1e-12 {
+                let [(t4, t5, t6), flipped] = if bend > 1e-4 {
                     let w20 = s23 * along(0) + c23 * r[(2, 0)];
                     let w21 = s23 * along(1) + c23 * r[(2, 1)];
                     let (t4, t5, t6) = (w12.atan2(w02), bend.atan2(w22), w21.atan2(-w20));
                     [(t4, t5, t6), (t4 + PI, -t5, t6 + PI)]
                 } else {
+                    // Next to the straight wrist two arc tangents would lose their sum: JT6 is what
+                    // JT4 leaves of the turn.
+                    let w00 = c23 * along(0) - s23 * r[(2, 0)];
+                    let w01 = c23 * along(1) - s23 * r[(2, 1)];
                     let w10 = -s1 * r[(0, 0)] + c1 * r[(1, 0)];
                     let w11 = -s1 * r[(0, 1)] + c1 * r[(1, 1)];
-                    let straight = (0.0, if w22 > 0.0 { 0.0 } else { PI }, w10.atan2(w11));
-                    [straight, (PI, straight.1, straight.2 + PI)]
+                    let (s4, c4) = if bend > 1e-12 {
+                        (w12 / bend, w02 / bend)
+                    } else {
+                        (0.0, 1.0)
+                    };
+                    let t6 = (c4 * w10 - s4 * w00).atan2(c4 * w11 - s4 * w01);
+                    let (t4, t5) = (s4.atan2(c4), bend.atan2(w22));
+                    [(t4, t5, t6), (t4 + PI, -t5, t6 + PI)]
                 };
                 let wrists = [(false, (t4, t5, t6)), (true, flipped)];
                 for ((flip, (t4, t5, t6)), place) in wrists.into_iter().zip(places.by_ref()) {
@@ -306,6 +316,16 @@ const EMPTY: Solution = Solution {
         flip: false,
     },
 };
+
+/// Returns zero for a negative difference of squares that rounding explains: at the border of the
+/// reach the arm is exactly stretched.
+fn beyond_rounding(difference: f64, of: f64) -> f64 {
+    if difference < 0.0 && difference > -1e-12 * of {
+        0.0
+    } else {
+        difference
+    }
+}
 
 /// Wraps an angle to [-pi, pi). Angles here lie within three turns, so steps are cheaper than a
 /// remainder.

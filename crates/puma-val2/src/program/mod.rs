@@ -22,8 +22,9 @@ const EXIT_CODES: &str = "\
 The controller is named by --port or --tcp, or by the variable VAL2_PORT. Commands that move the arm
 ask first, unless --yes, and set the monitor's speed to 10 %, unless --speed. Ctrl-C stops a motion.
 
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 refused by the controller, 4 the line failed or no VAL
-monitor answers, 5 not confirmed, 6 the arm may be moving: press the emergency stop, 130 Ctrl-C.";
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 refused by the controller, 4 the line failed or no
+VAL monitor answers, 5 not confirmed, 6 the arm may be moving: press the emergency stop,
+130 Ctrl-C.";
 
 /// Drives PUMA robots with a VAL II controller, keeps their programs, and emulates one.
 #[derive(Debug, Parser)]

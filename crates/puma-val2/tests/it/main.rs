@@ -27,6 +27,7 @@ mod client_robustness;
 mod console;
 mod emulator_robustness;
 mod faults;
+mod forms;
 mod interpreter;
 mod oracles;
 #[cfg(all(unix, feature = "cli"))]

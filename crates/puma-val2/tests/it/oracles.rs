@@ -236,3 +236,34 @@ fn an_independent_inverse_finds_the_same_solutions() {
     assert!(worst < 1e-9, "{worst}");
     assert_eq!(lost, 0);
 }
+
+/// The reach ends at the stretched arm, and the straight wrist has one turn: neither costs
+/// accuracy.
+#[test]
+fn the_inverse_is_right_at_the_straight_elbow_and_wrist() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(92);
+    for arm in [PumaParams::unimation(), PumaParams::corke()] {
+        let straight = arm.d4.atan2(arm.a3);
+        for turn in 0..2000 {
+            let mut joints = Joints(std::array::from_fn(|i| {
+                random.random_range(arm.ranges[i].min..arm.ranges[i].max)
+            }));
+            if turn % 2 == 0 {
+                joints.0[2] = straight;
+            } else {
+                joints.0[4] = 10_f64.powi(-(turn % 16)) * if turn % 3 == 0 { 1.0 } else { -1.0 };
+            }
+            let pose = arm.forward(&joints);
+            for solution in arm.inverse(&pose).unwrap() {
+                let back = arm.forward(&solution.joints);
+                let moved = (back.translation.vector - pose.translation.vector).norm();
+                let turned = amax(&(back.to_homogeneous() - pose.to_homogeneous()));
+                let bound = if turn % 2 == 0 { 1e-6 } else { 1e-11 };
+                assert!(
+                    moved < bound && turned < bound,
+                    "{joints}: {moved} {turned}"
+                );
+            }
+        }
+    }
+}

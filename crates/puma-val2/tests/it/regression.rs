@@ -163,3 +163,19 @@ fn a_program_that_asks_is_left_alone_at_connection() {
     line.emulator_mut().poll(now + Duration::from_secs(90));
     assert!((waist(&line) - 5.0).abs() < 0.01);
 }
+
+#[test]
+fn an_arm_pushed_beyond_a_limit_can_come_back_by_any_amount() {
+    let mut line = line_after(Profile::val2(), "");
+    let pushed = Joints::from_degrees([161.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    line.emulator_mut().place_arm(pushed);
+    let mut client = Val2Client::connect(line, ClientConfig::default()).unwrap();
+    let outwards = client.drive(Joint::J1, 0.01, 100.0);
+    assert_matches!(outwards, Err(ArmError::JointLimit { .. }));
+    for degrees in [-0.5_f64, -0.5, -10.0] {
+        client
+            .drive(Joint::J1, degrees.to_radians(), 100.0)
+            .unwrap();
+    }
+    assert!((waist(client.line()) - 150.0).abs() < 0.01);
+}

@@ -208,6 +208,7 @@ impl Emulator {
     fn confirmed(&mut self, confirm: Confirm) {
         match confirm {
             Confirm::Calibrate => return self.calibrate(),
+            Confirm::Done => return self.restart(),
             Confirm::Zero => self.forget_everything(),
             Confirm::Format => {
                 for name in std::mem::take(&mut self.floppy).into_keys() {

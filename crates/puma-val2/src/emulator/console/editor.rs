@@ -3,7 +3,7 @@
 use crate::emulator::console::mode::Editing;
 use crate::emulator::console::mode::Mode;
 use crate::emulator::controller::Emulator;
-use crate::emulator::language::lexer::{Cursor, Token};
+use crate::emulator::language::lexer::{Cursor, Token, tokens};
 use crate::emulator::language::program::{Program, Step};
 use crate::emulator::message::{Fault, Message};
 
@@ -111,6 +111,26 @@ impl Emulator {
             ("D", Some(number)) => {
                 let end = (editing.at + number).min(editing.program.steps.len());
                 editing.program.steps.drain(editing.at..end);
+            }
+            ("C", _) if argument.is_some() => {
+                // On to another program.
+                let name = text[1..].to_owned();
+                self.keep(editing);
+                let opened = tokens(&name).and_then(|tokens| self.edit(&mut Cursor::new(&tokens)));
+                if let Err(fault) = opened {
+                    self.refuse(fault);
+                    self.prompt();
+                }
+                return;
+            }
+            ("T", _) if argument.is_some() => {
+                // Teaches the location and moves there.
+                let name = text[1..].trim().to_owned();
+                let taught = tokens(&name).and_then(|tokens| self.teach(&mut Cursor::new(&tokens)));
+                let step = format!("MOVE {name}");
+                if let Err(fault) = taught.and_then(|()| self.enter_step(&mut editing, &step)) {
+                    self.refuse(fault);
+                }
             }
             ("I", Some(_)) if argument.is_none() => editing.inserting = true,
             ("", _) if editing.inserting => editing.inserting = false,

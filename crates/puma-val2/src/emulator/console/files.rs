@@ -87,6 +87,10 @@ impl Emulator {
             of_kind(k) && (names.is_empty() || names.iter().any(|n| n == name))
         };
         let text = text_of(&self.memory, wanted);
+        self.store_file(file, text)
+    }
+
+    pub(crate) fn store_file(&mut self, file: String, text: String) -> Result<(), Fault> {
         if self.floppy.len() >= self.profile.max_entries && !self.floppy.contains_key(&file) {
             return Err(Message::File.into());
         }
@@ -209,6 +213,8 @@ fn take_line(
             *section = match words[..] {
                 [] => return Ok(()),
                 [".PROGRAM", name] => {
+                    // A V+ file names its arguments; without any it is a program like others.
+                    let name = name.strip_suffix("()").unwrap_or(name);
                     Section::Program(sound_name(name, profile)?, Program::default())
                 }
                 [".LOCATIONS"] => Section::Locations,

@@ -39,6 +39,27 @@ impl Emulator {
         named(&self.memory.reals, names, Message::UndefinedValue, line)
     }
 
+    pub(crate) fn parameter_lines(&self, names: &[String]) -> Result<Vec<String>, Fault> {
+        let line = |name: &String, value: &f64| format!("{name:<16}{}", display::plain(*value));
+        named(
+            &self.memory.parameters,
+            names,
+            Message::UndefinedValue,
+            line,
+        )
+    }
+
+    /// Returns the share of the memory for names that is free.
+    pub(crate) fn free_lines(&self) -> Vec<String> {
+        let memory = &self.memory;
+        let used = memory.programs.len() + memory.places.len() + memory.reals.len();
+        let all = 3 * self.profile.max_entries.max(1);
+        vec![format!(
+            "{:.1}% FREE",
+            100.0 - 100.0 * used as f64 / all as f64
+        )]
+    }
+
     pub(crate) fn program_lines(&self, names: &[String]) -> Result<Vec<String>, Fault> {
         let lines = |name: &String, program: &Arc<Program>| {
             let steps = program.steps.iter().enumerate();

@@ -30,6 +30,8 @@ pub(crate) enum Confirm {
     Zero,
     Delete(Vec<(Kind, String)>),
     Format,
+    /// Leave the monitor: the start-up dialogue begins.
+    Done,
 }
 
 /// Kind of a named thing.

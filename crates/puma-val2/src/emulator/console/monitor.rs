@@ -29,10 +29,18 @@ enum Work {
 use Work::{Asks, Does, List, Show};
 
 /// Commands; `true` for those that may be given while a program runs.
-const COMMANDS: [(&str, (bool, Work)); 43] = [
+const COMMANDS: [(&str, (bool, Work)); 51] = [
     ("ABORT", (true, Asks(|e, c| e.abort(c, false)))),
     ("BASE", (false, Does(Emulator::base))),
     ("CALIBRATE", (false, Asks(Emulator::ask_calibration))),
+    ("COMPRESS", (false, Does(|_, c| c.expect_end()))),
+    ("DONE", (false, Asks(|e, c| e.ask_sure(c, Confirm::Done)))),
+    ("FCOPY", (true, Does(Emulator::copy_file))),
+    ("FLIST", (true, Asks(Emulator::list_file))),
+    ("FREE", (true, Show(Emulator::free_lines))),
+    ("PARAMETER", (true, Asks(Emulator::parameter))),
+    ("PRIME", (false, Does(Emulator::prime))),
+    ("TEACH", (false, Does(Emulator::teach))),
     ("COPY", (true, Does(|e, c| e.rename(c, true)))),
     ("DELETE", (false, Asks(|e, c| e.delete(None, c)))),
     (
@@ -109,6 +117,20 @@ const COMMANDS: [(&str, (bool, Work)); 43] = [
     ("SWITCH", (true, Show(Emulator::switch_lines))),
     ("TOOL", (true, Does(Emulator::tool))),
     ("WHERE", (true, Show(Emulator::where_lines))),
+];
+
+/// Switches that `ENABLE` and `DISABLE` know.
+const SWITCHES: [&str; 10] = [
+    "CP",
+    "DRY.RUN",
+    "FORCE",
+    "INT.EVAL",
+    "INTERACTIVE",
+    "MESSAGES",
+    "SCALE.AMPS",
+    "SET.SPEED",
+    "TRACE",
+    "UPPER",
 ];
 
 /// Erases everything; no abbreviation of it is accepted.
@@ -190,6 +212,62 @@ impl Emulator {
         self.memory.set_place(key.clone(), place, &self.profile)?;
         self.ask_change(key, place);
         Ok(())
+    }
+
+    /// Carries out `TEACH name`: the location is where the arm stands, without a dialogue.
+    pub(crate) fn teach(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let name = PlaceName::parse(cursor)?;
+        cursor.expect_end()?;
+        let (key, place) = (name.key(&self.scope())?, self.here(name.precision));
+        self.memory.set_place(key, place, &self.profile)
+    }
+
+    /// Carries out `PARAMETER [name[=value]]`, which shows or sets.
+    fn parameter(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let name = cursor.rest(Cursor::name)?;
+        if let Some(name) = &name
+            && let Some(value) = cursor.after_sign("=", Expr::parse)?
+        {
+            let value = value.value(&self.scope())?;
+            self.memory
+                .set_parameter(name.clone(), value, &self.profile)?;
+        }
+        cursor.expect_end()?;
+        let shown = self.parameter_lines(name.as_slice())?;
+        for line in shown {
+            self.print_line(&line);
+        }
+        self.prompt();
+        Ok(())
+    }
+
+    /// Carries out `PRIME`: `PROCEED` starts the program.
+    fn prime(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        self.execute(cursor)?;
+        self.paused = self.job.take();
+        Ok(())
+    }
+
+    fn list_file(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let name = cursor.name()?;
+        cursor.expect_end()?;
+        let text = self.floppy.get(&name).ok_or(Message::File)?.clone();
+        for line in text.lines() {
+            self.print_line(line);
+        }
+        self.prompt();
+        Ok(())
+    }
+
+    /// Carries out `FCOPY new = old`.
+    fn copy_file(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
+        let new = cursor.name()?;
+        cursor.expect_sign("=")?;
+        let old = cursor.name()?;
+        cursor.expect_end()?;
+        let text = self.floppy.get(&old).ok_or(Message::File)?.clone();
+        self.profile.check_name(&new)?;
+        self.store_file(new, text)
     }
 
     fn set_speed(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
@@ -358,13 +436,18 @@ impl Emulator {
     }
 
     fn set_switch(&mut self, cursor: &mut Cursor<'_>, on: bool) -> Result<(), Fault> {
-        let name = cursor.name()?;
+        let names = cursor.list(Cursor::name)?;
         cursor.expect_end()?;
-        self.profile.check_name(&name)?;
-        if self.switches.len() >= 64 && !self.switches.contains_key(&name) {
-            return Err(Message::OutOfMemory.into());
+        self.set_switches(&names, on)
+    }
+
+    /// Sets switches, all of which there must be.
+    pub(crate) fn set_switches(&mut self, names: &[String], on: bool) -> Result<(), Fault> {
+        if !names.iter().all(|name| SWITCHES.contains(&name.as_str())) {
+            return Err(Message::UnknownSwitch.into());
         }
-        self.switches.insert(name, on);
+        self.switches
+            .extend(names.iter().map(|name| (name.clone(), on)));
         Ok(())
     }
 }

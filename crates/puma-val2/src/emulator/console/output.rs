@@ -4,7 +4,7 @@ use crate::emulator::console::display;
 use crate::emulator::console::mode::Mode;
 use crate::emulator::controller::Emulator;
 use crate::emulator::language::expr::Variable;
-use crate::emulator::language::instruction::Item;
+use crate::emulator::language::item::Item;
 use crate::emulator::message::Fault;
 
 impl Emulator {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use crate::emulator::language::lexer::{Cursor, Token};
-use crate::emulator::language::place_expr::PlaceExpr;
+use crate::emulator::language::place_expr::{PlaceExpr, PlaceName};
 use crate::emulator::language::scope::Scope;
 use crate::emulator::message::{Fault, Message};
 
@@ -24,6 +24,13 @@ pub(crate) enum Expr {
     OfPlaces(OfPositions, Vec<PlaceExpr>),
     /// `SIG`: all of these signals are as their signs say.
     Signals(Vec<Expr>),
+    /// `BITS`: the number whose binary digits are signals, from the first, this many.
+    Bits(Box<[Expr; 2]>),
+    /// `TIMER`: the seconds that this timer shows.
+    Timer(Box<Expr>),
+    /// `DEFINED`: the location has a value. `INRANGE`: 0 if the arm reaches it, otherwise 1.
+    Defined(PlaceName),
+    InRange(PlaceExpr),
 }
 
 /// Real variable, possibly an element of an array.
@@ -159,10 +166,24 @@ impl Expr {
             cursor.expect_sign(")")?;
             return Ok(Self::OfPlaces(function, places));
         }
-        let arguments = Self::parse_list(cursor)?;
+        if name == "DEFINED" || name == "INRANGE" {
+            let of = match name {
+                "DEFINED" => Self::Defined(PlaceName::parse(cursor)?),
+                _ => Self::InRange(PlaceExpr::parse(cursor)?),
+            };
+            cursor.expect_sign(")")?;
+            return Ok(of);
+        }
+        let mut arguments = Self::parse_list(cursor)?;
         cursor.expect_sign(")")?;
-        if name == "SIG" {
-            return Ok(Self::Signals(arguments));
+        match (name, arguments.len()) {
+            ("SIG", _) => return Ok(Self::Signals(arguments)),
+            ("TIMER", 1) => return Ok(Self::Timer(Box::new(arguments.swap_remove(0)))),
+            ("BITS", 2) => {
+                let two = arguments.try_into().map_err(|_| Message::InvalidArgument)?;
+                return Ok(Self::Bits(Box::new(two)));
+            }
+            _ => {}
         }
         let fits = |f: &&(&str, [usize; 2], _)| {
             f.0 == name && (f.1[0]..=f.1[1]).contains(&arguments.len())
@@ -199,6 +220,22 @@ impl Expr {
                 }
                 truth(all)
             }
+            Self::Bits(of) => {
+                let first = whole(of[0].value(scope)?, 1, 2064)?;
+                let count = whole(of[1].value(scope)?, 1, 16)?;
+                let bit = |i: i32| {
+                    scope
+                        .signal(f64::from(first + i))
+                        .map(|on| i32::from(on) << i)
+                };
+                f64::from((0..count).map(bit).sum::<Result<i32, Fault>>()?)
+            }
+            Self::Timer(number) => scope.timer(whole(number.value(scope)?, 0, 8)? as usize),
+            Self::Defined(name) => {
+                let key = name.key(scope)?;
+                truth(scope.place(&key).is_ok() || scope.real(&key).is_ok())
+            }
+            Self::InRange(place) => f64::from(!scope.reaches(&place.place(scope)?)),
         };
         if value.is_finite() {
             Ok(value)

@@ -1,6 +1,7 @@
 //! Program instructions and their parser.
 
 use crate::emulator::language::expr::{Expr, Variable};
+use crate::emulator::language::item::Item;
 use crate::emulator::language::lexer::{Cursor, Token, keyword};
 use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments};
 use crate::emulator::message::{Fault, Message};
@@ -39,6 +40,17 @@ pub(crate) enum Instruction {
     },
     /// A word of posture: the part of the `Configuration` and its value.
     Posture(usize, bool),
+    /// `GRASP`: closes the hand. Where it closes on nothing, narrower than asked, a label follows.
+    Grasp(Option<Expr>, Option<u32>),
+    /// `TIMER n = seconds`.
+    Timer(Expr, Expr),
+    Parameter(String, Expr),
+    Switch(Vec<String>, bool),
+    /// `RUNSIG`: this output is on while the program runs.
+    RunSignal(Expr),
+    /// `EXIT`: behind the loop. `NEXT`: to the loop's end.
+    LeaveLoop,
+    NextTurn,
     Speed {
         value: Expr,
         unit: SpeedUnit,
@@ -96,21 +108,6 @@ pub(crate) enum SpeedUnit {
     InchesPerSecond,
 }
 
-/// Part of the output of `TYPE`.
-#[derive(Clone, Debug)]
-pub(crate) enum Item {
-    Text(String),
-    Value(Expr),
-    /// `/Xn`: blanks.
-    Blanks(usize),
-    /// `/Cn`: line ends.
-    Lines(usize),
-    /// `/S`: no line end at the end.
-    Stay,
-    /// `/Fw.d`: fixed point from here on. `/D`: back to the default.
-    Format(Option<(usize, usize)>),
-}
-
 #[derive(Debug)]
 enum Word {
     Plain(Instruction),
@@ -120,7 +117,7 @@ enum Word {
 use Instruction as I;
 use Word::{Parse, Plain};
 
-static WORDS: [(&str, Word); 64] = [
+static WORDS: [(&str, Word); 72] = [
     ("ABOVE", Plain(I::Posture(1, true))),
     ("ALIGN", Plain(I::Align)),
     ("ANY", Plain(I::Any)),
@@ -138,33 +135,39 @@ static WORDS: [(&str, Word); 64] = [
     ("DELAY", Parse(|c| Expr::parse(c).map(I::Delay))),
     ("DEPART", Parse(|c| depart(c, false))),
     ("DEPARTS", Parse(|c| depart(c, true))),
+    ("DISABLE", Parse(|c| switch(c, false))),
     ("DO", Plain(I::Do)),
     ("DRAW", Parse(|c| arguments(c).map(I::Draw))),
     ("DRIVE", Parse(drive)),
     ("ELSE", Plain(I::Else)),
+    ("ENABLE", Parse(|c| switch(c, true))),
     ("END", Plain(I::End)),
+    ("EXIT", Plain(I::LeaveLoop)),
     ("FINE", Parse(settling)),
     ("FLIP", Plain(I::Posture(2, true))),
     ("FOR", Parse(for_loop)),
     ("GOTO", Parse(|c| label(c).map(I::Goto))),
-    ("GRASP", Parse(|c| hand(c, Gripper::Closed, true))),
+    ("GRASP", Parse(grasp)),
     ("HALT", Plain(I::Halt)),
     ("HERE", Parse(|c| PlaceName::parse(c).map(I::Here))),
     ("IF", Parse(condition)),
-    ("IGNORE", Parse(|c| Expr::parse(c).map(I::Ignore))),
+    ("IGNORE", Parse(ignore)),
     ("INTOFF", Parse(settling)),
     ("INTON", Parse(settling)),
     ("LEFTY", Plain(I::Posture(0, false))),
+    ("LOCK", Parse(|c| Expr::parse(c).map(|_| I::Settling))),
     ("MOVE", Parse(|c| motion(c, false, false))),
     ("MOVES", Parse(|c| motion(c, true, false))),
     ("MOVEST", Parse(|c| motion(c, true, true))),
     ("MOVET", Parse(|c| motion(c, false, true))),
     ("NEST", Plain(I::Nest)),
+    ("NEXT", Plain(I::NextTurn)),
     ("NOFLIP", Plain(I::Posture(2, false))),
     ("NONULL", Parse(settling)),
     ("NULL", Parse(settling)),
     ("OPEN", Parse(|c| hand(c, Gripper::Open, false))),
     ("OPENI", Parse(|c| hand(c, Gripper::Open, true))),
+    ("PARAMETER", Parse(parameter)),
     ("PAUSE", Plain(I::Pause)),
     ("PROMPT", Parse(prompt)),
     ("REACT", Parse(|c| react(c, false))),
@@ -175,15 +178,17 @@ static WORDS: [(&str, Word); 64] = [
     ("RESET", Plain(I::Reset)),
     ("RETURN", Plain(I::Return)),
     ("RIGHTY", Plain(I::Posture(0, true))),
+    ("RUNSIG", Parse(|c| Expr::parse(c).map(I::RunSignal))),
     ("SET", Parse(set)),
     ("SIGNAL", Parse(|c| Expr::parse_list(c).map(I::Signal))),
     ("SPEED", Parse(speed)),
     ("STOP", Plain(I::Stop)),
+    ("TIMER", Parse(timer)),
     ("TOOL", Parse(|c| c.rest(PlaceExpr::parse).map(I::Tool))),
     ("TYPE", Parse(print)),
     ("UNTIL", Parse(|c| Expr::parse(c).map(I::Until))),
     ("VALUE", Parse(value)),
-    ("WAIT", Parse(|c| Expr::parse(c).map(I::Wait))),
+    ("WAIT", Parse(wait)),
     ("WHILE", Parse(while_loop)),
 ];
 
@@ -196,7 +201,8 @@ impl Instruction {
         let Token::Name(name) = first else {
             return Err(Message::UnknownInstruction.into());
         };
-        let instruction = if matches!(cursor.peek_second(), Some(Token::Sign("=" | "["))) {
+        let assigns = matches!(cursor.peek_second(), Some(Token::Sign("=" | "[")));
+        let instruction = if assigns {
             let variable = Variable::parse(cursor)?;
             cursor.expect_sign("=")?;
             Self::Assign(variable, Expr::parse(cursor)?)
@@ -228,7 +234,13 @@ impl Instruction {
     pub(crate) fn needs_program(&self) -> bool {
         let branches = matches!(
             self,
-            Self::Goto(_) | Self::IfGoto(..) | Self::Else | Self::Value(_) | Self::Any
+            Self::Goto(_)
+                | Self::IfGoto(..)
+                | Self::Else
+                | Self::Value(_)
+                | Self::Any
+                | Self::LeaveLoop
+                | Self::NextTurn
         );
         let ends = matches!(self, Self::Return | Self::Pause | Self::Stop | Self::Halt);
         self.opens() || self.closes() || branches || ends
@@ -274,6 +286,56 @@ fn hand(cursor: &mut Cursor<'_>, to: Gripper, at_once: bool) -> Result<Instructi
     // that it is a number.
     Expr::parse_optional(cursor)?;
     Ok(I::Hand { to, at_once })
+}
+
+fn grasp(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
+    let opening = Expr::parse_optional(cursor)?;
+    Ok(I::Grasp(opening, cursor.after_sign(",", label)?))
+}
+
+fn timer(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
+    // `=` compares inside an expression.
+    let number = match cursor.next() {
+        Some(Token::Number(number)) => Expr::Number(*number),
+        Some(Token::Name(name)) => Expr::Variable(Variable {
+            name: name.clone(),
+            index: None,
+        }),
+        _ => return Err(Message::InvalidArgument.into()),
+    };
+    cursor.expect_sign("=")?;
+    Ok(I::Timer(number, Expr::parse(cursor)?))
+}
+
+fn parameter(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
+    let name = cursor.name()?;
+    cursor.expect_sign("=")?;
+    Ok(I::Parameter(name, Expr::parse(cursor)?))
+}
+
+fn switch(cursor: &mut Cursor<'_>, on: bool) -> Result<Instruction, Fault> {
+    Ok(I::Switch(cursor.list(Cursor::name)?, on))
+}
+
+fn ignore(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
+    let signal = Expr::parse(cursor)?;
+    cursor.word("ALWAYS");
+    Ok(I::Ignore(signal))
+}
+
+/// Parses a condition; a number alone is that of a signal.
+fn wait(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
+    let condition = Expr::parse(cursor)?;
+    let is_number = match &condition {
+        Expr::Number(_) => true,
+        Expr::Negate(inner) => matches!(**inner, Expr::Number(_)),
+        _ => false,
+    };
+    Ok(I::Wait(if is_number {
+        Expr::Signals(vec![condition])
+    } else {
+        condition
+    }))
 }
 
 fn settling(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
@@ -323,41 +385,22 @@ fn set(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
 }
 
 fn decompose(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let into = Variable::parse(cursor)?;
+    let mut into = Variable {
+        name: cursor.name()?,
+        index: None,
+    };
+    // Empty brackets begin at element 0.
+    if cursor.sign("[") && !cursor.sign("]") {
+        into.index = Some(Box::new(Expr::parse(cursor)?));
+        cursor.expect_sign("]")?;
+    }
     cursor.expect_sign("=")?;
     Ok(I::Decompose(into, PlaceExpr::parse(cursor)?))
 }
 
 fn print(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
-    let items = cursor.rest(|cursor| cursor.list(print_item))?;
+    let items = cursor.rest(|cursor| cursor.list(Item::parse))?;
     Ok(I::Type(items.unwrap_or_default()))
-}
-
-fn print_item(cursor: &mut Cursor<'_>) -> Result<Item, Fault> {
-    if let Some(text) = cursor.text() {
-        return Ok(Item::Text(text));
-    }
-    if !cursor.sign("/") {
-        return Expr::parse(cursor).map(Item::Value);
-    }
-    let word = cursor.name()?;
-    let number = |text: &str| match text {
-        "" => Some(1),
-        _ => text.parse::<usize>().ok().filter(|n| *n <= 80),
-    };
-    let (letter, rest) = word.split_at(1);
-    let item = match letter {
-        "X" => number(rest).map(Item::Blanks),
-        "C" => number(rest).map(Item::Lines),
-        "S" if rest.is_empty() => Some(Item::Stay),
-        "D" if rest.is_empty() => Some(Item::Format(None)),
-        "F" => rest.split_once('.').and_then(|(width, decimals)| {
-            let decimals = number(decimals).filter(|d| *d <= 10)?;
-            Some(Item::Format(Some((number(width)?, decimals))))
-        }),
-        _ => None,
-    };
-    item.ok_or(Message::InvalidArgument.into())
 }
 
 fn prompt(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {

@@ -32,9 +32,7 @@ pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
             c if c.is_ascii_digit()
                 || (c == '.' && rest[1..].starts_with(|d: char| d.is_ascii_digit())) =>
             {
-                let end = rest
-                    .find(|d: char| !(d.is_ascii_digit() || d == '.'))
-                    .unwrap_or(rest.len());
+                let end = number_length(rest);
                 let number: f64 = rest[..end].parse().map_err(|_| Message::InvalidArgument)?;
                 if !number.is_finite() || number.abs() > 1e15 {
                     return Err(Message::InvalidArgument.into());
@@ -65,6 +63,21 @@ pub(crate) fn tokens(line: &str) -> Result<Vec<Token>, Fault> {
         rest = rest.trim_start();
     }
     Ok(found)
+}
+
+/// Returns the length of the number that a text begins with, an exponent with digits included.
+fn number_length(text: &str) -> usize {
+    let end = |from: usize, part: fn(char) -> bool| {
+        let length = text[from..].find(|c| !part(c));
+        length.map_or(text.len(), |length| from + length)
+    };
+    let whole = end(0, |c| c.is_ascii_digit() || c == '.');
+    let exponent = text[whole..].strip_prefix(['E', 'e']);
+    let digits = exponent.map(|e| text.len() - e.strip_prefix(['+', '-']).unwrap_or(e).len());
+    match digits.map(|from| (from, end(from, |c| c.is_ascii_digit()))) {
+        Some((from, end)) if end > from => end,
+        _ => whole,
+    }
 }
 
 /// Reader over the tokens of a line.

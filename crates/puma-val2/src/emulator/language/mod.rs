@@ -3,6 +3,7 @@
 
 pub(crate) mod expr;
 pub(crate) mod instruction;
+pub(crate) mod item;
 pub(crate) mod lexer;
 pub(crate) mod place;
 pub(crate) mod place_expr;

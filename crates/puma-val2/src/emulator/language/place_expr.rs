@@ -50,6 +50,8 @@ pub(crate) struct PlaceExpr(Vec<Term>);
 enum Term {
     Named(PlaceName),
     Trans([Option<Expr>; 6]),
+    /// `RX`, `RY`, `RZ`: a turn about this axis, degrees.
+    Turn(usize, Box<Expr>),
     Ppoint([Option<Expr>; 6]),
     Shift(Box<PlaceExpr>, [Option<Expr>; 3]),
     Inverse(Box<PlaceExpr>),
@@ -106,6 +108,9 @@ impl Term {
                 cursor.next();
                 let term = match name.as_str() {
                     "TRANS" => Self::Trans(arguments(cursor)?),
+                    "RX" => Self::Turn(0, Box::new(Expr::parse(cursor)?)),
+                    "RY" => Self::Turn(1, Box::new(Expr::parse(cursor)?)),
+                    "RZ" => Self::Turn(2, Box::new(Expr::parse(cursor)?)),
                     "SHIFT" => {
                         let of = PlaceExpr::parse(cursor)?;
                         cursor.expect_word("BY")?;
@@ -149,6 +154,11 @@ impl Term {
             Self::Named(name) => scope.place(&name.key(scope)?)?,
             Self::Trans(arguments) => {
                 Place::Transformation(Xyzoat::from_val(values(arguments, scope)?).pose())
+            }
+            Self::Turn(axis, angle) => {
+                let mut turn = Vector3::zeros();
+                turn[*axis] = angle.value(scope)?.to_radians();
+                Place::Transformation(Isometry3::rotation(turn))
             }
             Self::Ppoint(_) if !scope.has_ppoint() => return Err(Message::InvalidArgument.into()),
             Self::Ppoint(arguments) => {

@@ -101,6 +101,18 @@ impl Program {
         Err(Message::ControlStructure.into())
     }
 
+    /// Returns the head of the loop around `step`.
+    pub(crate) fn loop_of(&self, step: usize) -> Result<usize, Fault> {
+        let mut head = self.head_of(step)?;
+        while matches!(
+            self.steps[head].instruction,
+            Instruction::IfThen(_) | Instruction::Case(_)
+        ) {
+            head = self.head_of(head)?;
+        }
+        Ok(head)
+    }
+
     /// Checks that the words of every structure match. The error is the first step that does not
     /// fit.
     pub(crate) fn check(&self) -> Result<(), usize> {

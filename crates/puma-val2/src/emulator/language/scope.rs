@@ -16,6 +16,12 @@ pub(crate) trait Scope {
     /// Returns `true` if the signal is in the state that the sign of `number` asks for.
     fn signal(&self, number: f64) -> Result<bool, Fault>;
 
+    /// Returns the seconds that the timer of this number shows.
+    fn timer(&self, number: usize) -> f64;
+
+    /// Returns `true` if the arm can go to the place.
+    fn reaches(&self, place: &Place) -> bool;
+
     /// Returns the present hand pose, for `HERE`.
     fn here(&self) -> Isometry3<f64>;
 

@@ -191,7 +191,11 @@ impl Arm {
     }
 
     fn check_limits(&self, joints: &Joints) -> Result<(), Fault> {
-        let out = |joint: &Joint| !self.params.ranges[joint.index()].holds(joints[*joint]);
+        let out = |joint: &Joint| {
+            let range = self.params.ranges[joint.index()];
+            let (from, to) = (self.joints[*joint], joints[*joint]);
+            !range.holds(to) && !range.inwards(from, to)
+        };
         match Joint::ALL.into_iter().find(out) {
             Some(joint) => Err(Fault::at(Message::OutOfRange, joint)),
             None => Ok(()),

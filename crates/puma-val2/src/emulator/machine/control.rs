@@ -44,6 +44,8 @@ impl Emulator {
             Instruction::Else | Instruction::Value(_) | Instruction::Any => {
                 Flow::Jump(program.end_of(at)? + 1)
             }
+            Instruction::LeaveLoop => Flow::Jump(program.end_of(program.loop_of(at)?)? + 1),
+            Instruction::NextTurn => Flow::Jump(program.end_of(program.loop_of(at)?)?),
             Instruction::Case(of) => {
                 let of = of.value(&scope)?;
                 Flow::Jump(self.branch(&program, at, of)?)

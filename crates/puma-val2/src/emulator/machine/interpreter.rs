@@ -90,6 +90,31 @@ impl Emulator {
                 self.note(Event::Gripper(*to));
                 return Ok(Flow::Wait(Wait::Until(self.now + self.profile.hand_time)));
             }
+            Instruction::Grasp(opening, label) => {
+                let opening = opening.as_ref().map(number).transpose()?;
+                let program = job.frames.last_mut().zip(*label);
+                if let Some((frame, label)) = program.filter(|_| opening.is_some_and(|o| o > 0.0)) {
+                    frame.step = frame.program.labelled(label)?;
+                }
+                self.arm.gripper = Gripper::Closed;
+                self.note(Event::Gripper(Gripper::Closed));
+                return Ok(Flow::Wait(Wait::Until(self.now + self.profile.hand_time)));
+            }
+            Instruction::Timer(timer, seconds) => {
+                let (timer, seconds) = (whole(number(timer)?, 0, 8)?, number(seconds)?);
+                self.memory.timers[timer as usize] = self.now.as_secs_f64() - seconds;
+            }
+            Instruction::Parameter(name, value) => {
+                let value = number(value)?;
+                self.memory
+                    .set_parameter(name.clone(), value, &self.profile)?;
+            }
+            Instruction::Switch(names, on) => self.set_switches(names, *on)?,
+            Instruction::RunSignal(signal) => {
+                let signal = whole(number(signal)?, 1, 2064)?;
+                self.signals.command(signal)?;
+                job.run_signal = Some(signal);
+            }
             Instruction::Posture(part, value) => self.arm.set_posture_next(*part, *value),
             Instruction::Speed {
                 value,
@@ -219,7 +244,8 @@ impl Emulator {
         let mut to = self.arm.joints();
         to.0[joint.index()] += change.to_radians();
         self.arm.check_ready()?;
-        if !self.arm.params.ranges[joint.index()].holds(to[joint]) {
+        let range = self.arm.params.ranges[joint.index()];
+        if !range.holds(to[joint]) && !range.inwards(self.arm.joints()[joint], to[joint]) {
             return Err(Fault::at(Message::OutOfRange, joint));
         }
         to.0[joint.index()] -= short.to_radians();
@@ -280,6 +306,7 @@ fn needs_standing_arm(instruction: &Instruction) -> bool {
             | Instruction::Ready
             | Instruction::Nest
             | Instruction::Break
+            | Instruction::Grasp(..)
             | Instruction::Hand { at_once: true, .. }
             | Instruction::Tool(_)
             | Instruction::Base(_)

@@ -28,6 +28,10 @@ pub(crate) struct Job {
     pub(crate) ending: Option<Message>,
     /// Instruction of `DO` that waits for the end of the motion before it.
     pub(crate) pending: Option<Instruction>,
+    /// The last step ended with a fault.
+    pub(crate) faulted: bool,
+    /// Output that is on while the program runs.
+    pub(crate) run_signal: Option<i32>,
     /// Stop after one step, for `NEXT`.
     pub(crate) single: bool,
 }
@@ -96,6 +100,8 @@ impl Job {
             cycles_left: Some(0),
             ending: None,
             pending: None,
+            faulted: false,
+            run_signal: None,
             single: false,
         }
     }
@@ -104,9 +110,13 @@ impl Job {
         self.kind == JobKind::Program
     }
 
-    /// Returns the name and step (from 1) of the innermost program.
+    /// Returns the name and step (from 1) of the innermost program: the next one, or the one with
+    /// the fault.
     pub(crate) fn at(&self) -> Option<(&str, usize)> {
-        self.frames.last().map(|f| (f.name.as_str(), f.step + 1))
+        let ahead = usize::from(!self.faulted);
+        self.frames
+            .last()
+            .map(|f| (f.name.as_str(), f.step + ahead))
     }
 
     pub(crate) fn cycles_left(&self) -> Option<u32> {
@@ -191,6 +201,7 @@ impl Emulator {
             frame.step = frame.step.saturating_sub(1);
         }
         job.ending = None;
+        job.faulted = false;
         job.wait = Wait::Nothing;
         job.next_step = self.now + self.step_time();
         job.single = single;
@@ -264,7 +275,10 @@ impl Emulator {
         let job = self.job.take();
         self.refuse(fault);
         match job {
-            Some(job) => self.end_job(job, Message::Aborted),
+            Some(mut job) => {
+                job.faulted = true;
+                self.end_job(job, Message::Aborted);
+            }
             None => {
                 if self.at_monitor() {
                     self.prompt();
@@ -330,6 +344,7 @@ impl Emulator {
             }
             Ok(Some(how)) => self.end_job(job, how),
             Err(fault) => {
+                job.faulted = true;
                 self.refuse(fault);
                 self.arm.break_off(self.now, self.profile.stop_time);
                 self.end_job(job, Message::Aborted);
@@ -354,6 +369,10 @@ impl Emulator {
                     _ => text,
                 };
                 self.print_line(&line);
+                if let Some(signal) = job.run_signal {
+                    // It could be switched on.
+                    let _ = self.signals.command(-signal);
+                }
                 self.note(Event::ProgramEnded(how));
                 self.reactions.clear();
                 // `HALT` is an end for good; what was stopped in any other way can go on.

@@ -14,6 +14,10 @@ pub(crate) struct Memory {
     pub(crate) programs: BTreeMap<String, Arc<Program>>,
     pub(crate) places: BTreeMap<String, Place>,
     pub(crate) reals: BTreeMap<String, f64>,
+    /// Values of `PARAMETER`.
+    pub(crate) parameters: BTreeMap<String, f64>,
+    /// Time at which each timer showed zero, seconds.
+    pub(crate) timers: [f64; 9],
 }
 
 impl Memory {
@@ -53,6 +57,15 @@ impl Memory {
         profile: &Profile,
     ) -> Result<(), Fault> {
         insert(&mut self.reals, key, value, profile)
+    }
+
+    pub(crate) fn set_parameter(
+        &mut self,
+        name: String,
+        value: f64,
+        profile: &Profile,
+    ) -> Result<(), Fault> {
+        insert(&mut self.parameters, name, value, profile)
     }
 
     pub(crate) fn set_program(

@@ -1,5 +1,7 @@
 //! The controller's state as the expressions of a program see it.
 
+use std::time::Duration;
+
 use nalgebra::Isometry3;
 
 use crate::emulator::language::expr::whole;
@@ -18,6 +20,7 @@ pub(crate) struct View<'a> {
     pub(crate) signals: &'a Signals,
     pub(crate) arm: &'a Arm,
     pub(crate) profile: &'a Profile,
+    pub(crate) now: Duration,
 }
 
 impl Scope for View<'_> {
@@ -34,6 +37,14 @@ impl Scope for View<'_> {
     fn signal(&self, number: f64) -> Result<bool, Fault> {
         let number = whole(number, -9999, 9999).map_err(|_| Message::IllegalSignal)?;
         Ok(self.signals.get(number.unsigned_abs() as u16)? == (number > 0))
+    }
+
+    fn timer(&self, number: usize) -> f64 {
+        self.now.as_secs_f64() - self.memory.timers[number]
+    }
+
+    fn reaches(&self, place: &Place) -> bool {
+        self.arm.resolve(place).is_ok()
     }
 
     fn here(&self) -> Isometry3<f64> {
