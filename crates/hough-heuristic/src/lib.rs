@@ -63,11 +63,12 @@
 //! # Limitations
 //!
 //! [`AContrario`] finds everything round, wheels and letters too. It finds no circle of a radius of
-//! 4 px or less, none of whose outline a quarter or less is visible (half, where the frame cuts it),
-//! and few in a dozen dashes with gaps as long. The other detectors go by the belonging β, the share
-//! of the circle's pixels that are edges, whatever the direction of those edges. Where edges cover more than a tenth of the picture, as in grass or
-//! gravel, chance lifts β above any useful threshold θ ([`Acceptance::theta`]). A sphere far off
-//! the optical axis projects to an ellipse, which a larger `tolerance` accepts up to a point.
+//! 4 px or less, none of whose outline a quarter or less is visible (half, where the frame cuts
+//! it), and few in a dozen dashes with gaps as long. The other detectors go by the belonging β, the
+//! share of the circle's pixels that are edges, whatever the direction of those edges. Where edges
+//! cover more than a tenth of the picture, as in grass or gravel, chance lifts β above any useful
+//! threshold θ ([`Acceptance::theta`]). A sphere far off the optical axis projects to an ellipse,
+//! which a larger `tolerance` accepts up to a point.
 
 mod a_contrario;
 mod acceptance;
