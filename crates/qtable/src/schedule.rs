@@ -24,8 +24,8 @@ validated! {
     ///     let steps = Schedule::piecewise(&[(0, 1.0), (10, 0.2), (100, 0.0)])?;
     ///     assert_eq!((steps.at(5), steps.at(55)), (0.6, 0.1));
     ///     // By the visits of the pair: 1/n, and n^-0.7.
-    ///     let (mean, power) = (Schedule::inverse_visits(1.0, 1.0)?, Schedule::visits_power(1.0, 0.7)?);
-    ///     assert!(mean.at(9) == 0.1 && power.at(9) > 0.19);
+    ///     assert_eq!(Schedule::inverse_visits(1.0, 1.0)?.at(9), 0.1);
+    ///     assert!(Schedule::visits_power(1.0, 0.7)?.at(9) > 0.19);
     ///     let by_hand = Schedule::custom((0.0, 1.0), |step| 1.0 / (1.0 + step as f64));
     ///     assert_eq!(by_hand?.by_episode().at(3), 0.25);
     ///     Ok(())
@@ -221,14 +221,15 @@ impl Schedule {
     /// Returns the value now of a quantity that belongs to no pair.
     #[inline(always)]
     pub(crate) fn at_time(&self, clock: &Clock) -> f64 {
-        if let Shape::Constant(value) = self.shape {
-            return value;
+        let time = || match self.by_episode {
+            true => clock.episodes.saturating_sub(1),
+            false => clock.actions,
+        };
+        match self.shape {
+            Shape::Constant(value) => value,
+            Shape::Linear(start, end, steps) => between(start, end, time(), steps),
+            _ => self.at(time()),
         }
-        self.at(if self.by_episode {
-            clock.episodes.saturating_sub(1)
-        } else {
-            clock.actions
-        })
     }
 
     /// Refuses a schedule that leaves `low..=high`.
@@ -338,7 +339,18 @@ fn between(start: f64, end: f64, step: u64, steps: u64) -> f64 {
 /// Returns a value moved between two others, where rounding may have led out of their range.
 #[inline]
 fn held_between(start: f64, end: f64, value: f64) -> f64 {
-    value.max(start.min(end)).min(start.max(end))
+    let (low, high) = if start < end {
+        (start, end)
+    } else {
+        (end, start)
+    };
+    if value < low {
+        low
+    } else if value > high {
+        high
+    } else {
+        value
+    }
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ mod seeds;
 
 pub use cached::CachedBoltzmann;
 pub use check_env::{EnvironmentReport, check_env};
+pub use course::Until;
 pub use curve::Record;
-pub use driver::{Training, Until};
+pub use driver::Training;
 pub use evaluate::{Evaluation, evaluate};
 pub use seeds::{Estimate, over_seeds};

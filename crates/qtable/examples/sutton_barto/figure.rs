@@ -54,7 +54,8 @@ pub(crate) fn draw(
     let _ = writeln!(
         svg,
         "<text x='{}' y='{}' text-anchor='middle'>{}</text>\
-         <text x='18' y='{middle}' text-anchor='middle' transform='rotate(-90 18 {middle})'>{}</text>",
+         <text x='18' y='{middle}' text-anchor='middle' \
+         transform='rotate(-90 18 {middle})'>{}</text>",
         (70.0 + RIGHT) / 2.0,
         HEIGHT - 12.0,
         axes[0],

@@ -10,9 +10,9 @@ use crate::policy::{Boltzmann, Policy};
 use crate::problem::Environment;
 use crate::step::{Action, State, Step};
 use crate::training::cached::CachedBoltzmann;
-use crate::training::course::Actor;
+use crate::training::course::{Actor, Course, Until};
 use crate::training::curve::Record;
-use crate::training::driver::{Training, Until};
+use crate::training::driver::Training;
 use crate::training::episode::check_fit;
 
 /// Actions below which the plain policy is faster than cached weights.
@@ -48,11 +48,11 @@ impl Training<QLearning, Boltzmann> {
             return self.run_with(environment, until, rng, on_record);
         }
         check_fit(environment, &self.table)?;
-        if self.has_reached(until) {
+        if self.course.has_reached(until) {
             return Ok(false);
         }
         let mut cached = CachedBoltzmann::new(&self.table, self.policy.temperature())?;
-        while !self.has_reached(until) {
+        while !self.course.has_reached(until) {
             let recorded = self.run_block(environment, blocks, &mut cached, &mut rng);
             if !matches!(recorded, Ok(None)) {
                 cached.write_to(&mut self.table)?;
@@ -87,13 +87,13 @@ impl Training<QLearning, Boltzmann> {
             learner: &mut self.learner,
             policy: &mut self.policy,
         };
-        for _ in place..block_end(place, every, blocks) {
-            let record = self.course.step(environment, &mut actor, rng)?;
-            if record.is_some() {
-                return Ok(record);
-            }
-        }
-        Ok(None)
+        let mut left = block_end(place, every, blocks) - place;
+        let is_reached = |_: &Course| {
+            let ends = left == 0;
+            left = left.saturating_sub(1);
+            ends
+        };
+        self.course.run(environment, &mut actor, is_reached, rng)
     }
 }
 

@@ -58,7 +58,11 @@ pub fn check_env<E: Environment + ?Sized>(
             // The actions are repeated, not drawn again, in case the environment counts on the
             // generator's state.
             let second = record(environment, &mut table, limit, episode_seed, &first)?;
-            compare(&first, &second)?;
+            let mut pairs = first.iter().zip(&second);
+            if let Some(step) = pairs.position(|((_, first), (_, second))| first != second) {
+                let (first, second) = (first[step].1, second[step].1);
+                return Err(Error::NotReproducible(step as u64, first, second));
+            }
         }
         met.resize(table.states(), false);
         for (_, step) in &first {
@@ -135,13 +139,4 @@ fn record<E: Environment + ?Sized>(
     let reset = Step::new(begin.unwrap_or_default(), 0.0, Status::Continuing);
     episode.insert(0, (Action(0), reset));
     Ok(episode)
-}
-
-fn compare(first: &[(Action, Step)], second: &[(Action, Step)]) -> Result<(), Error> {
-    for (step, (&(_, first), &(_, second))) in (0..).zip(first.iter().zip(second)) {
-        if first != second {
-            return Err(Error::NotReproducible(step, first, second));
-        }
-    }
-    Ok(())
 }

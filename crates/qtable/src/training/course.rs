@@ -9,6 +9,16 @@ use crate::problem::Environment;
 use crate::step::{Action, State, Status, Step};
 use crate::training::curve::{Record, Tally};
 
+/// The end of [`Training::run`](crate::Training::run): a total since the training began, not since
+/// the call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Until {
+    /// This many actions in all.
+    Actions(u64),
+    /// This many episodes in all.
+    Episodes(u64),
+}
+
 /// Counters of a run, which stop at their largest number, the episode that is going on, and what
 /// has not yet been recorded.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,33 +56,45 @@ impl Running {
 }
 
 impl Course {
-    /// Takes one action and learns from it. Returns a record if one is due.
+    /// Acts and learns until a record is due, which is returned, or the goal is reached.
     ///
     /// After an error the episode is given up; the next action begins another.
-    #[inline]
-    pub(super) fn step<E: Environment + ?Sized>(
+    #[inline(always)]
+    pub(super) fn run<E: Environment + ?Sized>(
         &mut self,
         environment: &mut E,
         actor: &mut impl Actor,
+        mut is_reached: impl FnMut(&Self) -> bool,
         rng: &mut dyn Rng,
     ) -> Result<Option<Record>, Error> {
-        let running = match self.running.take() {
-            Some(running) => running,
-            None => {
-                actor.begin_episode();
-                let state = environment.reset(rng)?;
-                if environment.is_dynamic() {
-                    actor.meet(environment, state)?;
+        let mut running = self.running.take();
+        while !is_reached(self) {
+            let now = match running.take() {
+                Some(running) => running,
+                None => {
+                    actor.begin_episode();
+                    let state = environment.reset(rng)?;
+                    if environment.is_dynamic() {
+                        actor.meet(environment, state)?;
+                    }
+                    Running::at(state)
                 }
-                Running::at(state)
+            };
+            let action = actor.choose(now.state, now.action, rng)?;
+            let step = environment.step(action, rng)?;
+            let record;
+            (running, record) = self.learn(environment, actor, (now, action), step, rng)?;
+            if record.is_some() {
+                self.running = running;
+                return Ok(record);
             }
-        };
-        let action = actor.choose(running.state, running.action, rng)?;
-        let step = environment.step(action, rng)?;
-        self.learn(environment, actor, (running, action), step, rng)
+        }
+        self.running = running;
+        Ok(None)
     }
 
-    /// Learns from the answer to an action of an episode. Returns a record if one is due.
+    /// Learns from the answer to an action of an episode. Returns the episode, if it goes on, and a
+    /// record, if one is due.
     #[inline(always)]
     pub(super) fn learn<E: Environment + ?Sized>(
         &mut self,
@@ -81,7 +103,7 @@ impl Course {
         (running, action): (Running, Action),
         mut step: Step,
         rng: &mut dyn Rng,
-    ) -> Result<Option<Record>, Error> {
+    ) -> Result<(Option<Running>, Option<Record>), Error> {
         if environment.is_dynamic() {
             actor.meet(environment, step.observation)?;
         }
@@ -94,20 +116,31 @@ impl Course {
 
         self.actions = self.actions.saturating_add(1);
         self.tally.add_action(step.reward, td_error);
-        if step.status == Status::Continuing {
-            self.running = Some(Running {
-                state: step.observation,
-                action: next_action,
-                steps,
-                sum,
-            });
-        } else {
+        let goes_on = step.status == Status::Continuing;
+        let next = goes_on.then_some(Running {
+            state: step.observation,
+            action: next_action,
+            steps,
+            sum,
+        });
+        if !goes_on {
             self.episodes = self.episodes.saturating_add(1);
             let success = environment.succeeded(&step);
             self.tally.add_episode(steps, sum, success);
         }
         let due = self.tally.actions >= self.record_every.get();
-        Ok(due.then(|| std::mem::take(&mut self.tally).record(self.actions, self.episodes)))
+        let record =
+            due.then(|| std::mem::take(&mut self.tally).record(self.actions, self.episodes));
+        Ok((next, record))
+    }
+
+    /// Returns `true` once a total is reached.
+    #[inline(always)]
+    pub(super) fn has_reached(&self, until: Until) -> bool {
+        match until {
+            Until::Actions(actions) => self.actions >= actions,
+            Until::Episodes(episodes) => self.episodes >= episodes,
+        }
     }
 }
 

@@ -11,18 +11,9 @@ use crate::policy::Policy;
 use crate::problem::Environment;
 use crate::step::{Action, State, Status, Step};
 use crate::table::QTable;
-use crate::training::course::{Actor, Course};
+use crate::training::course::{Actor, Course, Until};
 use crate::training::curve::{Record, Tally};
 use crate::training::episode::{check_choice, check_fit};
-
-/// The end of [`Training::run`]: a total since the training began, not since the call.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Until {
-    /// This many actions in all.
-    Actions(u64),
-    /// This many episodes in all.
-    Episodes(u64),
-}
 
 /// A training run: table, learner, policy, counters, learning curve, and the episode that is going
 /// on.
@@ -35,7 +26,8 @@ pub enum Until {
 #[cfg_attr(not(feature = "files"), doc = "```ignore")]
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 /// use qtable::{
-///     EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Training, Until, decode, encode,
+///     EpsilonGreedy, ModelEnvironment, QLearning, QTable, Schedule, Training, Until, decode,
+///     encode,
 /// };
 ///
 /// fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -47,9 +39,8 @@ pub enum Until {
 ///     training.run(&mut lake, Until::Actions(7_001), &mut rng)?;
 ///
 ///     let saved = encode("lake-training/1", &(&training, &lake, &rng))?;
-///     type Run = Training<QLearning, EpsilonGreedy>;
-///     let (mut resumed, mut same_lake, mut same_rng): (Run, ModelEnvironment, Xoshiro256PlusPlus) =
-///         decode("lake-training/1", &saved)?;
+///     type Run = (Training<QLearning, EpsilonGreedy>, ModelEnvironment, Xoshiro256PlusPlus);
+///     let (mut resumed, mut same_lake, mut same_rng): Run = decode("lake-training/1", &saved)?;
 ///
 ///     training.run(&mut lake, Until::Actions(20_000), &mut rng)?;
 ///     resumed.run(&mut same_lake, Until::Actions(20_000), &mut same_rng)?;
@@ -173,16 +164,21 @@ impl<L: Learner, P: Policy> Training<L, P> {
         &mut self,
         environment: &mut E,
         until: Until,
-        rng: &mut R,
+        mut rng: &mut R,
         mut on_record: impl FnMut(&Record, &mut Self) -> ControlFlow<()>,
     ) -> Result<bool, Error> {
-        while let Some(record) = self.next_record(environment, until, rng)? {
+        check_fit(environment, &self.table)?;
+        let is_reached = |course: &Course| course.has_reached(until);
+        loop {
+            let (course, mut pair) = self.parts();
+            let Some(record) = course.run(environment, &mut pair, is_reached, &mut rng)? else {
+                return Ok(false);
+            };
             self.curve.push(record);
             if on_record(&record, self).is_break() {
                 return Ok(true);
             }
         }
-        Ok(false)
     }
 
     /// Returns the counters beside the policy and the learner on their table.
@@ -249,32 +245,6 @@ impl<L: Learner, P: Policy> Training<L, P> {
     /// Returns table, learner and policy.
     pub fn into_parts(self) -> (QTable, L, P) {
         (self.table, self.learner, self.policy)
-    }
-
-    /// Returns `true` once a total is reached.
-    pub(super) fn has_reached(&self, until: Until) -> bool {
-        match until {
-            Until::Actions(actions) => self.course.actions >= actions,
-            Until::Episodes(episodes) => self.course.episodes >= episodes,
-        }
-    }
-
-    /// Trains to the next record, or to the total, whichever is first.
-    fn next_record<E: Environment + ?Sized, R: Rng + ?Sized>(
-        &mut self,
-        environment: &mut E,
-        until: Until,
-        mut rng: &mut R,
-    ) -> Result<Option<Record>, Error> {
-        check_fit(environment, &self.table)?;
-        while !self.has_reached(until) {
-            let (course, mut pair) = self.parts();
-            let record = course.step(environment, &mut pair, &mut rng)?;
-            if record.is_some() {
-                return Ok(record);
-            }
-        }
-        Ok(None)
     }
 }
 

@@ -10,8 +10,8 @@ use crate::training::curve::Record;
 /// ```
 /// use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 /// use qtable::{
-///     EpsilonGreedy, Estimate, ModelEnvironment, QLearning, QTable, Schedule, State, Training, Until,
-///     over_seeds,
+///     EpsilonGreedy, Estimate, ModelEnvironment, QLearning, QTable, Schedule, State, Training,
+///     Until, over_seeds,
 /// };
 ///
 /// fn main() -> Result<(), qtable::Error> {
