@@ -76,22 +76,8 @@ pub enum SightError {
     /// An angle, or a measure of arm, mount, ball or rule, that is out of range.
     #[error(transparent)]
     Quantity(#[from] QuantityError),
-    /// A camera whose centre of projection lies inside the ball.
-    #[error(
-        "the camera is inside the ball: its centre is {distance:.4} m away, its radius is \
-         {radius:.4} m"
-    )]
-    Inside {
-        /// Distance of the ball's centre, metres.
-        distance: f64,
-        /// Radius of the ball, metres.
-        radius: f64,
-    },
-    /// A ball behind the camera, or reaching behind it, so that its outline is no ellipse.
-    #[error(
-        "the ball is behind the camera or reaches behind it: depth {depth:.4} m, radius \
-         {radius:.4} m"
-    )]
+    /// A ball that is behind the camera, reaches behind it, or holds it inside.
+    #[error("the ball, of radius {radius:.4} m at depth {depth:.4} m, is not before the camera")]
     Behind {
         /// Depth of the ball's centre along the optical axis, metres.
         depth: f64,
@@ -111,18 +97,14 @@ pub enum SightError {
     },
     /// An outline that does not fit into the frame, wherever it lies.
     #[error(
-        "the ball is larger than the view: its outline is {width_px:.0} x {height_px:.0} px in a \
-         frame of {frame_width} x {frame_height} px"
+        "the ball is larger than the view: its outline is {:.0} x {:.0} px in a frame of {} x {} px",
+        outline.0, outline.1, frame.0, frame.1
     )]
     LargerThanView {
-        /// Width of the outline, pixels.
-        width_px: f64,
-        /// Height of the outline, pixels.
-        height_px: f64,
-        /// Width of the frame, pixels.
-        frame_width: u32,
-        /// Height of the frame, pixels.
-        frame_height: u32,
+        /// Width and height of the outline, pixels.
+        outline: (f64, f64),
+        /// Width and height of the frame, pixels.
+        frame: (u32, u32),
     },
     /// A radius in the image out of the range in which a ball counts as seen.
     #[error(

@@ -322,19 +322,12 @@ pub(crate) fn unit_outline(
     positive("the radius of the ball (m)", radius)?;
     let distance2 = centre.coords.norm_squared();
     finite("the squared distance of the ball (m²)", distance2)?;
-    if distance2 <= radius * radius {
-        return Err(SightError::Inside {
-            distance: distance2.sqrt(),
-            radius,
-        });
-    }
-    if centre.z <= radius {
+    if distance2 <= radius * radius || centre.z <= radius {
         return Err(SightError::Behind {
             depth: centre.z,
             radius,
         });
     }
-    let sideways2 = centre.x * centre.x + centre.y * centre.y;
     let sin2_alpha = radius * radius / distance2;
     let cos2_eta = centre.z * centre.z / distance2;
     // cos²(alpha) - sin²(eta), above zero because the whole sphere is in front of the camera.
@@ -344,11 +337,8 @@ pub(crate) fn unit_outline(
         centre: Point2::new(centre.x * scale, centre.y * scale),
         major: (sin2_alpha * (1.0 - sin2_alpha)).sqrt() / k,
         minor: (sin2_alpha / k).sqrt(),
-        angle: if sideways2 > 0.0 {
-            centre.y.atan2(centre.x)
-        } else {
-            0.0
-        },
+        // 0 on the axis, whatever the signs of the zeros.
+        angle: (centre.y + 0.0).atan2(centre.x + 0.0),
     })
 }
 

@@ -217,39 +217,25 @@ impl Errors {
         ] {
             finite(quantity, value)?;
         }
-        amount(
-            "standard deviation of the features' noise (units)",
-            self.feature_noise,
-        )?;
-        let steps = self.encoder_step.into_iter().zip(1..);
-        let steps = steps.map(|(step, joint)| (format!("encoder step of JT{joint} (rad)"), step));
-        let drive = [
-            ("backlash (rad)", self.backlash),
-            ("stiction (rad)", self.stiction),
-            ("dead zone (rad)", self.dead_zone),
-        ];
-        for (quantity, value) in drive
-            .map(|(name, v)| (name.to_owned(), v))
-            .into_iter()
-            .chain(steps)
-        {
+        let turn = |quantity: String, value: f64| {
             amount(quantity.as_str(), value)?;
-            at_most(quantity, value, PI)?;
+            at_most(quantity, value, PI)
+        };
+        turn("backlash (rad)".to_owned(), self.backlash)?;
+        turn("stiction (rad)".to_owned(), self.stiction)?;
+        turn("dead zone (rad)".to_owned(), self.dead_zone)?;
+        for i in 0..6 {
+            let of_joint = |what: &str| format!("{what} of JT{}", i + 1);
+            turn(of_joint("encoder step (rad)"), self.encoder_step[i])?;
+            finite(of_joint("zero (rad)"), self.joint_zero[i])?;
+            positive(of_joint("gear"), self.gear[i])?;
         }
-        for (zero, joint) in self.joint_zero.iter().zip(1..) {
-            finite(format!("zero of JT{joint} (rad)"), *zero)?;
-        }
-        for (gear, joint) in self.gear.iter().zip(1..) {
-            positive(format!("gear of JT{joint}"), *gear)?;
-        }
+        let (noise, amiss) = (self.feature_noise, self.missed + self.outliers);
+        amount("noise of the features (units)", noise)?;
         at_most("lag (looks)", self.lag as f64, 1000.0)?;
         amount("fraction of missed looks", self.missed)?;
         amount("fraction of outliers", self.outliers)?;
-        at_most(
-            "fraction of missed looks and outliers",
-            self.missed + self.outliers,
-            1.0,
-        )
+        at_most("fraction of missed looks and outliers", amiss, 1.0)
     }
 
     /// Returns the true cell for the believed cell `nominal`.

@@ -4,9 +4,6 @@ use hough_heuristic::Features;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Name of the standard deviation in errors.
-pub(crate) const NOISE: &str = "standard deviation of the features' noise (units)";
-
 /// Adds normal noise of standard deviation `sigma` units to each feature; the radius stays above a
 /// tenth of a unit.
 pub(crate) fn with_noise<R: Rng + ?Sized>(features: Features, sigma: f64, rng: &mut R) -> Features {

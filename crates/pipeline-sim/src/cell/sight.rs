@@ -42,64 +42,39 @@ impl SightRule {
         outline: &ProjectedEllipse,
         size: (u32, u32),
     ) -> Result<(), SightError> {
-        let Self {
-            min_radius,
-            max_radius,
-            min_share,
-        } = *self;
+        let (least, greatest, least_share) = (self.min_radius, self.max_radius, self.min_share);
         for (quantity, value) in [
-            ("the smallest radius seen (units)", min_radius),
-            ("the greatest radius seen (units)", max_radius),
-            (
-                "the least fraction of the outline inside the frame",
-                min_share,
-            ),
+            ("the smallest radius seen (units)", least),
+            ("the greatest radius seen (units)", greatest),
+            ("the least fraction of the outline", least_share),
         ] {
             // Infinite bounds do no harm.
             if value.is_nan() {
                 finite(quantity, value)?;
             }
         }
-        let circle = outline.circle();
-        let Features { r, .. } = Features::from_circle(&circle, size.0);
+        let Circle { x, y, .. } = outline.circle();
+        let Features { r, .. } = Features::from_circle(&outline.circle(), size.0);
         let (width, height) = (f64::from(size.0), f64::from(size.1));
-        let (w, h) = outline.half_extent();
-        // A ball that cannot fit into the frame fails the other conditions for that reason.
-        let why = |error| {
-            if (2.0 * w > width || 2.0 * h > height) && r >= self.min_radius {
-                SightError::LargerThanView {
-                    width_px: 2.0 * w,
-                    height_px: 2.0 * h,
-                    frame_width: size.0,
-                    frame_height: size.1,
-                }
-            } else {
-                error
-            }
-        };
-        if !(self.min_radius..=self.max_radius).contains(&r) {
-            return Err(why(SightError::Radius {
-                r,
-                least: self.min_radius,
-                greatest: self.max_radius,
-            }));
-        }
-        let inside =
-            (-0.5..=width - 0.5).contains(&circle.x) && (-0.5..=height - 0.5).contains(&circle.y);
-        if !inside {
-            return Err(why(SightError::CentreOutside {
-                x: circle.x,
-                y: circle.y,
-            }));
-        }
+        let inside = (-0.5..=width - 0.5).contains(&x) && (-0.5..=height - 0.5).contains(&y);
         let share = outline.share_inside(size.0, size.1);
-        if share >= self.min_share {
+        let fails = if !(least..=greatest).contains(&r) {
+            SightError::Radius { r, least, greatest }
+        } else if !inside {
+            SightError::CentreOutside { x, y }
+        } else if share < least_share {
+            let least = least_share;
+            SightError::CutOff { share, least }
+        } else {
             return Ok(());
+        };
+        // A ball that cannot fit into the frame fails the other conditions for that reason.
+        let (w, h) = outline.half_extent();
+        let (outline, frame) = ((2.0 * w, 2.0 * h), size);
+        if (outline.0 > width || outline.1 > height) && r >= least {
+            return Err(SightError::LargerThanView { outline, frame });
         }
-        Err(why(SightError::CutOff {
-            share,
-            least: self.min_share,
-        }))
+        Err(fails)
     }
 
     /// Returns `true` if a round outline with these features counts as seen in the paper's frame of

@@ -58,16 +58,16 @@ impl CellRecipe {
         let mut scene = Scene {
             lights: lamps(1.1, rng),
             ambient: rng.random_range(0.15..0.30),
-            table: Appearance {
-                albedo: rng.random_range(0.25..0.50),
-                texture: rng.random_range(0.35..0.7),
-                gloss: 0.0,
-            },
-            ball: Appearance {
-                albedo: rng.random_range(0.70..0.90),
-                texture: 0.0,
-                gloss: rng.random_range(0.05..0.4),
-            },
+            table: Appearance::new(
+                rng.random_range(0.25..0.50),
+                rng.random_range(0.35..0.7),
+                0.0,
+            ),
+            ball: Appearance::new(
+                rng.random_range(0.70..0.90),
+                0.0,
+                rng.random_range(0.05..0.4),
+            ),
             sensor: Sensor {
                 gamma: if rng.random_bool(0.3) { 2.2 } else { 1.0 },
                 ..Sensor::default()
@@ -180,11 +180,7 @@ impl BenchmarkRecipe {
 
     /// Draws lamps, table, the ball's surface and the sensor.
     fn surfaces(&self, rng: &mut dyn Rng) -> Scene {
-        let table = Appearance {
-            albedo: rng.random_range(0.30..0.50),
-            texture: drawn(self.grain, rng),
-            gloss: 0.0,
-        };
+        let table = Appearance::new(rng.random_range(0.30..0.50), drawn(self.grain, rng), 0.0);
         let albedo = (self.albedo)(table.albedo, rng);
         let mut sensor = Sensor::default();
         if let Some(noise) = self.noise {

@@ -121,11 +121,11 @@ impl Stage {
             x: centre.x,
             y: centre.y,
             turn: 0.0,
-            appearance: Appearance {
-                albedo: other_than(table_albedo, rng),
-                texture: 0.0,
-                gloss: rng.random_range(0.05..0.3),
-            },
+            appearance: Appearance::new(
+                other_than(table_albedo, rng),
+                0.0,
+                rng.random_range(0.05..0.3),
+            ),
         };
         self.balls.iter().skip(1).map(thing).collect()
     }

@@ -86,11 +86,7 @@ pub(super) fn placed(shape: Shape, (x, y): (f64, f64), rng: &mut dyn Rng) -> Thi
     } else {
         (rng.random_range(0.05..0.9), rng.random_range(0.0..0.5))
     };
-    let appearance = Appearance {
-        albedo,
-        texture,
-        gloss: 0.0,
-    };
+    let appearance = Appearance::new(albedo, texture, 0.0);
     Thing {
         shape,
         x,

@@ -52,22 +52,16 @@ impl SharedCell {
     where
         P: FnMut() -> Joints + Send,
     {
-        CellSensor {
-            cell: self.clone(),
-            pose,
-        }
+        CellSensor(self.clone(), pose)
     }
 }
 
-struct CellSensor<P> {
-    cell: SharedCell,
-    pose: P,
-}
+struct CellSensor<P>(SharedCell, P);
 
 impl<P: FnMut() -> Joints + Send> ProximitySensor for CellSensor<P> {
     fn object_near(&mut self) -> Result<bool, ArmError> {
-        let joints = (self.pose)();
-        Ok(self.cell.with(|cell| cell.proximity(&joints)))
+        let joints = (self.1)();
+        Ok(self.0.with(|cell| cell.proximity(&joints)))
     }
 }
 

@@ -23,16 +23,6 @@ pub struct Contacts {
 }
 
 /// A handle to a cell that camera, arm, sensors and the user share.
-///
-/// ```
-/// use pipeline_sim::nalgebra::Point3;
-/// use pipeline_sim::{Ball, Cell, SharedCell};
-///
-/// let cell = SharedCell::new(Cell::paper(Ball::at(0.6, 0.1, -0.1)));
-/// let same = cell.clone();
-/// same.with(|cell| cell.place_ball(Point3::new(0.65, 0.1, -0.1)));
-/// assert_eq!(cell.get().ball.centre.x, 0.65);
-/// ```
 #[derive(Clone, Debug)]
 pub struct SharedCell(Arc<Mutex<State>>);
 

@@ -12,20 +12,6 @@ use crate::regression::samples::MoveSample;
 /// A regression simulator of one behaviour, fitted to samples of real or simulated moves.
 ///
 /// With the feature `serde` a model can be stored; it is checked when it is read.
-///
-/// ```
-/// use pipeline_sim::{Ball, Cell, MoveForm, MoveModel};
-/// use pipeline_sim::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
-///
-/// fn main() -> Result<(), Box<dyn std::error::Error>> {
-///     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-///     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-///     let (_, reaching) = cell.sample_moves(500, 0.125, &mut rng)?;
-///     let model = MoveModel::fit(&reaching, MoveForm::Rigid22, &[])?;
-///     assert!(model.quality().iter().all(|q| q.r2 > 0.99));
-///     Ok(())
-/// }
-/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -7,7 +7,7 @@ use rand::{Rng, RngExt};
 
 use crate::cell::ball::Ball;
 use crate::cell::geometry::Cell;
-use crate::cell::noise::{NOISE, with_noise};
+use crate::cell::noise::with_noise;
 use crate::error::{QuantityError, amount, at_most, finite, positive};
 
 /// Greatest number of samples of each kind that [`Cell::sample_moves`] draws.
@@ -113,7 +113,7 @@ impl Cell {
         noise: f64,
         rng: &mut R,
     ) -> Result<(Vec<MoveSample>, Vec<MoveSample>), QuantityError> {
-        amount(NOISE, noise)?;
+        amount("standard deviation of the noise (units)", noise)?;
         let name = "the number of samples of each kind";
         at_most(name, count as f64, MOST_SAMPLES as f64)?;
         let (mut centering, mut reaching) = (Vec::new(), Vec::new());

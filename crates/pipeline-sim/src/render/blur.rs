@@ -54,10 +54,7 @@ fn convolve(values: &mut [f32], width: usize, kernel: &[f32], spare: &mut Vec<f3
         let row = |y: usize| &values[y * w..][..w];
         let pairs = kernel.iter().enumerate();
         let pairs = pairs.map(|(i, k)| (*k, row(y.saturating_sub(i)), row((y + i).min(h - 1))));
-        Vectorized::widest(Weighing {
-            pairs,
-            out: &mut mixed[y * w..][..w],
-        });
+        Weighing(pairs, &mut mixed[y * w..][..w]).widest();
     }
     for (row, out) in mixed.chunks_exact(w).zip(values.chunks_exact_mut(w)) {
         padded[..reach].fill(row[0]);
@@ -65,22 +62,19 @@ fn convolve(values: &mut [f32], width: usize, kernel: &[f32], spare: &mut Vec<f3
         padded[reach + w..].fill(row[w - 1]);
         let pairs = kernel.iter().enumerate();
         let pairs = pairs.map(|(i, k)| (*k, &padded[reach - i..][..w], &padded[reach + i..][..w]));
-        Vectorized::widest(Weighing { pairs, out });
+        Weighing(pairs, out).widest();
     }
 }
 
 /// Computes the sum of pairs of rows, each with its weight.
-struct Weighing<'a, P> {
-    pairs: P,
-    out: &'a mut [f32],
-}
+struct Weighing<'a, P>(P, &'a mut [f32]);
 
 impl<'a, P: Iterator<Item = (f32, &'a [f32], &'a [f32])> + Clone> Vectorized for Weighing<'_, P> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { pairs, out } = self;
+        let Self(pairs, out) = self;
         let mut at = 0;
         let mut blocks = out.chunks_exact_mut(BLOCK);
         for block in &mut blocks {

@@ -22,27 +22,20 @@ pub(super) struct Studio<'a> {
 }
 
 /// Arguments of [`Studio::textured_row`].
-struct PlaneRow<'a> {
-    /// Map from pixels to homogeneous plane coordinates in metres.
-    plane: &'a Matrix3<f64>,
-    texture: &'a Texture,
-    strength: f32,
-    start: (usize, usize),
-    row: &'a mut [f32],
-}
+struct PlaneRow<'a>(
+    &'a Matrix3<f64>,
+    &'a Texture,
+    f32,
+    (usize, usize),
+    &'a mut [f32],
+);
 
 impl Vectorized for PlaneRow<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self {
-            plane,
-            texture,
-            row,
-            start: (y, x0),
-            ..
-        } = self;
+        let Self(plane, texture, strength, (y, x0), row) = self;
         let base = plane * Vector3::new(0.0, y as f64, 1.0);
         let step = plane.column(0);
         let place = |x: usize| {
@@ -55,12 +48,13 @@ impl Vectorized for PlaneRow<'_> {
         let below = plane * Vector3::new(middle as f64, y as f64 + 1.0, 1.0);
         let down = (below.x / below.z, below.y / below.z);
         let footprint = ((b.0 - a.0).hypot(b.1 - a.1) * (down.0 - a.0).hypot(down.1 - a.1)).sqrt();
-        texture.walk(texture.level(footprint), place, self.strength, x0, row);
+        texture.walk(texture.level(footprint), place, strength, x0, row);
     }
 }
 
 impl Studio<'_> {
-    /// Writes a row of a textured plane of reflectance 1 from a pixel, given by row and column, on.
+    /// Writes a row of a textured plane of reflectance 1 from a pixel, given by row and column, on;
+    /// `plane` takes pixels to homogeneous plane coordinates in metres.
     pub(super) fn textured_row(
         &self,
         plane: &Matrix3<f64>,
@@ -68,14 +62,7 @@ impl Studio<'_> {
         start: (usize, usize),
         row: &mut [f32],
     ) {
-        let texture = self.texture;
-        Vectorized::widest(PlaneRow {
-            plane,
-            texture,
-            strength,
-            start,
-            row,
-        });
+        PlaneRow(plane, self.texture, strength, start, row).widest();
     }
 
     /// Returns the light that a surface with this normal receives, world frame.
@@ -264,11 +251,7 @@ impl Studio<'_> {
     fn print(&self, canvas: &mut Canvas, thing: &Thing, (length, width): (f64, f64), lines: u32) {
         let [along, across] = axes(thing);
         let middle = Point3::new(thing.x, thing.y, self.table);
-        let ink = Appearance {
-            albedo: 0.1,
-            texture: 0.0,
-            gloss: 0.0,
-        };
+        let ink = Appearance::new(0.1, 0.0, 0.0);
         let pitch = 0.86 * width / f64::from(lines.max(1));
         let size = 0.55 * pitch;
         // No sheet at all, or print that no camera could show: not to be drawn stroke by stroke.

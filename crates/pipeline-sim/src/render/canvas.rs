@@ -60,11 +60,7 @@ impl Canvas {
         polygon: &[Point2<f64>],
         shade: impl FnMut(usize, usize, &mut [f32]),
     ) {
-        Vectorized::widest(Filling {
-            canvas: self,
-            polygon,
-            shade,
-        });
+        Filling(self, polygon, shade).widest();
     }
 
     /// Lays an even layer of light over a convex polygon that replaces `share` of what is below.
@@ -175,32 +171,28 @@ impl Canvas {
 }
 
 /// Arguments of [`Canvas::fill`].
-struct Filling<'a, S> {
-    canvas: &'a mut Canvas,
-    polygon: &'a [Point2<f64>],
-    shade: S,
-}
+struct Filling<'a, S>(&'a mut Canvas, &'a [Point2<f64>], S);
 
 impl<S: FnMut(usize, usize, &mut [f32])> Vectorized for Filling<'_, S> {
     type Output = ();
 
     #[inline(always)]
-    fn run(mut self) {
-        let canvas = self.canvas;
-        for y in canvas.rows_of(self.polygon) {
+    fn run(self) {
+        let Self(canvas, polygon, mut shade) = self;
+        for y in canvas.rows_of(polygon) {
             let Some((start, end, solid)) = canvas.cover_row(y) else {
                 continue;
             };
             let row = &mut canvas.light[y * canvas.width..][start..end];
             if solid {
-                (self.shade)(y, start, row);
+                shade(y, start, row);
                 continue;
             }
             let shades = &mut canvas.shade[..end - start];
-            (self.shade)(y, start, shades);
+            shade(y, start, shades);
             let shares = &canvas.coverage[start..end];
-            for ((light, shade), share) in row.iter_mut().zip(&*shades).zip(shares) {
-                *light += (shade - *light) * share;
+            for ((light, new), share) in row.iter_mut().zip(&*shades).zip(shares) {
+                *light += (new - *light) * share;
             }
         }
     }

@@ -80,11 +80,7 @@ impl Warp {
                 let p = a * weights[0] + b * weights[1] + c * weights[2] + d * weights[3] - low;
                 *place = [p.x, p.y];
             }
-            Vectorized::widest(Sources {
-                row: &row,
-                shares: &shares,
-                sources,
-            });
+            Sources(&row, &shares, sources).widest();
         }
         Some(Self {
             camera: *camera,
@@ -102,27 +98,19 @@ impl Warp {
 
     /// Takes every pixel of `out` from `ideal`.
     pub(super) fn apply(&self, ideal: &Canvas, out: &mut Canvas) {
-        Vectorized::widest(Applying {
-            warp: self,
-            ideal,
-            out,
-        });
+        Applying(self, ideal, out).widest();
     }
 }
 
 /// Arguments of [`Warp::apply`].
-struct Applying<'a> {
-    warp: &'a Warp,
-    ideal: &'a Canvas,
-    out: &'a mut Canvas,
-}
+struct Applying<'a>(&'a Warp, &'a Canvas, &'a mut Canvas);
 
 impl Vectorized for Applying<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { warp, ideal, out } = self;
+        let Self(warp, ideal, out) = self;
         let (w, width) = (ideal.width, out.width);
         // Whole pixels and their 65536ths; no frame is so large that these do not fit.
         let fixed = |v: f32| (v * 65536.0) as i32;
@@ -180,22 +168,20 @@ impl Vectorized for Applying<'_> {
 }
 
 /// Writes the places that pixels of a row are taken from.
-struct Sources<'a> {
-    /// Places at the nodes of the row.
-    row: &'a [[f64; 2]],
-    /// First of four nodes for each place, and their weights.
-    shares: &'a [(usize, [f64; 4])],
-    sources: &'a mut [[f32; 2]],
-}
+///
+/// From the places at the nodes of the row, and the first of four nodes for each source with their
+/// weights.
+struct Sources<'a>(&'a [[f64; 2]], &'a [(usize, [f64; 4])], &'a mut [[f32; 2]]);
 
 impl Vectorized for Sources<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        for (source, (left, w)) in self.sources.iter_mut().zip(self.shares) {
-            let Some([n0, n1, n2, n3]) = self.row.get(*left..).and_then(|row| row.first_chunk())
-            else {
+        let Self(row, shares, sources) = self;
+        for (source, (left, w)) in sources.iter_mut().zip(shares) {
+            let four = row.get(*left..).and_then(|row| row.first_chunk());
+            let Some([n0, n1, n2, n3]) = four else {
                 continue;
             };
             for c in 0..2 {

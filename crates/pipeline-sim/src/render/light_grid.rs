@@ -73,43 +73,24 @@ impl LightGrid {
     /// Computes the light at the nodes whose rays meet the plane; the others are dark. Every second
     /// node along both axes is interpolated where its neighbours are alike.
     pub(super) fn lay(&mut self, view: &View, plane: &Matrix3<f64>, lighting: &impl Lighting) {
-        Vectorized::widest(Laying {
-            grid: self,
-            size: (view.width, view.height),
-            plane,
-            lighting,
-        });
+        Laying(self, (view.width, view.height), plane, lighting).widest();
     }
 
     /// Multiplies the pixels x0.. of row y by the light on them.
     pub(super) fn shine(&self, y: usize, x0: usize, row: &mut [f32]) {
-        Vectorized::widest(Shining {
-            light: self,
-            start: (y, x0),
-            row,
-        });
+        Shining(self, (y, x0), row).widest();
     }
 }
 
 /// Arguments of [`LightGrid::lay`].
-struct Laying<'a, L> {
-    grid: &'a mut LightGrid,
-    size: (usize, usize),
-    plane: &'a Matrix3<f64>,
-    lighting: &'a L,
-}
+struct Laying<'a, L>(&'a mut LightGrid, (usize, usize), &'a Matrix3<f64>, &'a L);
 
 impl<L: Lighting> Vectorized for Laying<'_, L> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self {
-            grid,
-            plane,
-            lighting,
-            size: (width, height),
-        } = self;
+        let Self(grid, (width, height), plane, lighting) = self;
         let nodes = |pixels: usize| pixels / (2 * STEP) * 2 + 3;
         let (columns, rows) = (nodes(width), nodes(height));
         grid.columns = columns;
@@ -164,22 +145,14 @@ impl<L: Lighting> Vectorized for Laying<'_, L> {
 }
 
 /// Arguments of [`LightGrid::shine`].
-struct Shining<'a> {
-    light: &'a LightGrid,
-    start: (usize, usize),
-    row: &'a mut [f32],
-}
+struct Shining<'a>(&'a LightGrid, (usize, usize), &'a mut [f32]);
 
 impl Vectorized for Shining<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self {
-            light,
-            row,
-            start: (y, x0),
-        } = self;
+        let Self(light, (y, x0), row) = self;
         let (j, fy) = (y / STEP, (y % STEP) as f32 / STEP as f32);
         let line = |j: usize| light.values.get(j * light.columns..(j + 1) * light.columns);
         let (Some(upper), Some(lower)) = (line(j), line(j + 1)) else {

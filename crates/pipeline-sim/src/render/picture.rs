@@ -214,11 +214,7 @@ fn in_the_way(thing: &Thing, cell: &Cell) -> bool {
 }
 
 /// Appearance of the holder.
-const ROD: Appearance = Appearance {
-    albedo: 0.35,
-    texture: 0.0,
-    gloss: 0.3,
-};
+const ROD: Appearance = Appearance::new(0.35, 0.0, 0.3);
 
 /// An item drawn over the table.
 #[derive(Clone, Copy, Debug)]

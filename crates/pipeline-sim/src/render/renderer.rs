@@ -21,16 +21,6 @@ use crate::render::view::View;
 /// Owns its buffers: after the first frame only small lists of corners are allocated. The scene's
 /// textures are made once, from the seed; the sensor's noise depends only on the seed and the
 /// number of frames drawn.
-///
-/// ```
-/// use pipeline_sim::{Ball, Cell, Renderer, Scene, Workspace};
-///
-/// let cell = Cell::paper(Ball::at(0.6, 0.15, -0.1));
-/// let mut renderer = Renderer::new(&Scene::laboratory(), 1);
-/// let pose = Workspace::paper().search_poses()[3];
-/// let frame = renderer.render(&cell, &pose);
-/// assert_eq!(frame.dimensions(), (768, 576));
-/// ```
 #[derive(Clone, Debug)]
 pub struct Renderer {
     pub(super) scene: Scene,
@@ -109,14 +99,13 @@ impl Renderer {
     /// Computes the light that reaches the sensor.
     pub(super) fn illuminate(&mut self, cell: &Cell, joints: &Joints) {
         let pose = cell.camera_pose(joints);
-        let numbers = pose
+        let place = pose
             .translation
             .vector
             .iter()
-            .chain(pose.rotation.coords.iter());
-        let finite = numbers
-            .chain(cell.ball.centre.iter())
-            .all(|v| v.is_finite());
+            .chain(cell.ball.centre.iter());
+        let mut numbers = place.chain(pose.rotation.coords.iter());
+        let finite = numbers.all(|v| v.is_finite());
         let (width, height) = cell.camera.size();
         let mut canvas = std::mem::take(&mut self.canvas);
         canvas.resize(width as usize, height as usize);
@@ -145,13 +134,8 @@ impl Renderer {
         if self.image.dimensions() != (width, height) {
             self.image = GrayImage::new(width, height);
         }
-        self.exposure.expose(
-            &self.canvas,
-            &cell.camera,
-            self.seed,
-            self.frames,
-            &mut self.image,
-        );
+        let (canvas, image, number) = (&self.canvas, &mut self.image, (self.seed, self.frames));
+        self.exposure.expose(canvas, &cell.camera, number, image);
         self.frames += 1;
         &self.image
     }

@@ -28,6 +28,17 @@ pub struct Appearance {
     pub gloss: f64,
 }
 
+impl Appearance {
+    /// Returns a surface of this reflectance, strength of texture and strength of highlight.
+    pub const fn new(albedo: f64, texture: f64, gloss: f64) -> Self {
+        Self {
+            albedo,
+            texture,
+            gloss,
+        }
+    }
+}
+
 /// The shape of a [`Thing`], metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -204,22 +215,10 @@ impl Scene {
     /// Returns a light ball over a bare, slightly textured table under one lamp.
     pub fn plain() -> Self {
         Self {
-            lights: vec![Light {
-                toward: Vector3::new(-0.35, 0.45, 1.0),
-                intensity: 0.75,
-                half_angle: 0.06,
-            }],
+            lights: vec![lamp(-0.35, 0.45, 0.75, 0.06)],
             ambient: 0.25,
-            table: Appearance {
-                albedo: 0.30,
-                texture: 0.15,
-                gloss: 0.0,
-            },
-            ball: Appearance {
-                albedo: 0.80,
-                texture: 0.0,
-                gloss: 0.25,
-            },
+            table: Appearance::new(0.30, 0.15, 0.0),
+            ball: Appearance::new(0.80, 0.0, 0.25),
             things: Vec::new(),
             occluders: Vec::new(),
             sensor: Sensor::default(),
@@ -250,36 +249,13 @@ impl Scene {
             x,
             y,
             turn: degrees.to_radians(),
-            appearance: Appearance {
-                albedo,
-                texture,
-                gloss: 0.15,
-            },
+            appearance: Appearance::new(albedo, texture, 0.15),
         };
         Self {
-            lights: vec![
-                Light {
-                    toward: Vector3::new(-0.45, 0.5, 1.0),
-                    intensity: 0.62,
-                    half_angle: 0.05,
-                },
-                Light {
-                    toward: Vector3::new(0.7, -0.35, 1.0),
-                    intensity: 0.28,
-                    half_angle: 0.10,
-                },
-            ],
+            lights: vec![lamp(-0.45, 0.5, 0.62, 0.05), lamp(0.7, -0.35, 0.28, 0.10)],
             ambient: 0.22,
-            table: Appearance {
-                albedo: 0.40,
-                texture: 0.55,
-                gloss: 0.0,
-            },
-            ball: Appearance {
-                albedo: 0.86,
-                texture: 0.03,
-                gloss: 0.30,
-            },
+            table: Appearance::new(0.40, 0.55, 0.0),
+            ball: Appearance::new(0.86, 0.03, 0.30),
             things: [
                 (solid(0.090, 0.050, 0.045), 0.780, 0.210, 28.0, 0.62, 0.25),
                 (solid(0.060, 0.060, 0.060), 0.480, -0.300, -15.0, 0.22, 0.30),
@@ -313,5 +289,14 @@ impl Scene {
 impl Default for Scene {
     fn default() -> Self {
         Self::laboratory()
+    }
+}
+
+/// Returns a lamp in the direction (x, y, 1).
+fn lamp(x: f64, y: f64, intensity: f64, half_angle: f64) -> Light {
+    Light {
+        toward: Vector3::new(x, y, 1.0),
+        intensity,
+        half_angle,
     }
 }

@@ -66,41 +66,23 @@ impl Exposure {
         &mut self,
         canvas: &Canvas,
         camera: &Camera,
-        seed: u64,
-        frame: u64,
+        (seed, frame): (u64, u64),
         out: &mut [u8],
     ) {
-        Vectorized::widest(Exposing {
-            exposure: self,
-            canvas,
-            camera,
-            seed: seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15),
-            out,
-        });
+        let seed = seed ^ frame.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        Exposing(self, canvas, camera, seed, out).widest();
     }
 }
 
 /// Arguments of [`Exposure::expose`].
-struct Exposing<'a> {
-    exposure: &'a mut Exposure,
-    canvas: &'a Canvas,
-    camera: &'a Camera,
-    seed: u64,
-    out: &'a mut [u8],
-}
+struct Exposing<'a>(&'a mut Exposure, &'a Canvas, &'a Camera, u64, &'a mut [u8]);
 
 impl Vectorized for Exposing<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self {
-            exposure: state,
-            canvas,
-            camera,
-            seed,
-            out,
-        } = self;
+        let Self(state, canvas, camera, seed, out) = self;
         let (width, height) = (canvas.width, canvas.height);
         if width == 0 || height == 0 {
             return;
@@ -205,7 +187,7 @@ mod tests {
             *light = k as f32 / (LEVELS - 1) as f32;
         }
         let mut grays = vec![0; LEVELS];
-        exposure.expose(&canvas, &camera, 5, 0, &mut grays);
+        exposure.expose(&canvas, &camera, (5, 0), &mut grays);
         assert_eq!(grays, *exposure.curve);
     }
 
@@ -219,15 +201,8 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let mut exposure = Exposure::new(Sensor::default(), &mut rng);
         let (mut wide, mut plain) = (vec![0; 203 * 31], vec![0; 203 * 31]);
-        exposure.expose(&canvas, &camera, 5, 0, &mut wide);
-        let narrow = Exposing {
-            exposure: &mut exposure,
-            canvas: &canvas,
-            camera: &camera,
-            seed: 5,
-            out: &mut plain,
-        };
-        narrow.run();
+        exposure.expose(&canvas, &camera, (5, 0), &mut wide);
+        Exposing(&mut exposure, &canvas, &camera, 5, &mut plain).run();
         assert_eq!(wide, plain);
         assert!(wide.iter().max() > wide.iter().min());
     }

@@ -261,11 +261,7 @@ mod tests {
 
     #[test]
     fn gloom_at_the_foot_of_a_box_has_its_shape() {
-        let appearance = Appearance {
-            albedo: 0.5,
-            texture: 0.0,
-            gloss: 0.0,
-        };
+        let appearance = Appearance::new(0.5, 0.0, 0.0);
         let scene = Scene {
             lights: Vec::new(),
             things: vec![Thing {

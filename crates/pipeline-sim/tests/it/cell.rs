@@ -1,11 +1,11 @@
 //! The cell against the geometry it was designed to: named poses, the grip by JT5 alone, coverage.
 
 use hough_heuristic::Features;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use pipeline_sim::{Ball, Cell, Grasp, SightError, Workspace};
 use puma_val2::{Joint, JointDelta, Joints};
 
-use crate::rng;
+use crate::{at_goal, rng};
 
 /// Cells with a ball that a search pose sees and the arm reaches, each with its goal pose.
 fn goals(count: usize) -> Vec<(Cell, Joints)> {
@@ -165,96 +165,62 @@ fn search_poses_see_93_percent_of_the_workspace() {
     assert!(reached as f64 > 0.999 * f64::from(seen), "{reached}");
 }
 
+/// Returns the cell with its ball where it shows with these features.
+fn showing(cell: &Cell, pose: &Joints, x: f64, y: f64, r: f64) -> Cell {
+    let place = cell.ball_showing(pose, &Features { x, y, r });
+    let mut shown = *cell;
+    shown.ball.centre = place.expect("some place shows it");
+    shown
+}
+
 #[test]
 fn features_and_places_invert_each_other() {
-    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let pose = Joints::from_degrees([10.0, -60.0, 190.0, 0.0, 45.0, 0.0]);
+    let (cell, pose) = at_goal();
     for (x, y, r) in [
         (96.0, 72.0, 33.0),
         (20.0, 130.0, 10.0),
         (150.0, 30.0, 30.0),
         (103.5, 78.0, 33.0),
     ] {
-        let wanted = Features { x, y, r };
-        let ball = cell
-            .ball_showing(&pose, &wanted)
-            .expect("some place shows it");
-        let shown = Cell {
-            ball: Ball {
-                centre: ball,
-                ..cell.ball
-            },
-            ..cell
-        }
-        .features(&pose)
-        .expect("seen");
-        let error = (shown.x - x)
-            .abs()
-            .max((shown.y - y).abs())
-            .max((shown.r - r).abs());
-        assert!(error < 1e-9, "{wanted:?} {shown:?}");
+        let shown = showing(&cell, &pose, x, y, r);
+        let f = shown.features(&pose).expect("seen");
+        let error = (f.x - x).abs().max((f.y - y).abs()).max((f.r - r).abs());
+        assert!(error < 1e-9, "{f:?}");
     }
 }
 
 #[test]
 fn unseen_balls_are_refused_with_the_reason() {
-    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-    let goal = cell.goal_pose(45.0).expect("within reach");
-    let shown = |x: f64, y: f64, r: f64| -> SightError {
-        let mut shown = cell;
-        let wanted = Features { x, y, r };
-        shown.ball.centre = cell
-            .ball_showing(&goal, &wanted)
-            .expect("some place shows it");
-        shown.features(&goal).expect_err("out of sight")
-    };
-    assert!(matches!(
-        shown(96.0, 72.0, 90.0),
-        SightError::LargerThanView { .. }
-    ));
-    assert!(matches!(
-        shown(96.0, 72.0, 70.0),
-        SightError::Radius { greatest: 68.0, .. }
-    ));
-    assert!(matches!(
-        shown(96.0, 72.0, 4.0),
-        SightError::Radius { least: 5.0, .. }
-    ));
-    assert!(matches!(
-        shown(-3.0, 72.0, 30.0),
-        SightError::CentreOutside { .. }
-    ));
-    assert!(matches!(shown(1.0, 72.0, 30.0), SightError::CutOff { .. }));
-    // Whatever the rule asks for, what is larger than the view is called that; a rule that is
-    // content with part of it sees it.
-    let mut rule = cell;
-    rule.sight.max_radius = 300.0;
-    rule.ball.centre = cell
-        .ball_showing(
-            &goal,
-            &Features {
-                x: 96.0,
-                y: 72.0,
-                r: 90.0,
-            },
-        )
-        .expect("some place shows it");
-    assert!(matches!(
-        rule.features(&goal),
-        Err(SightError::LargerThanView { .. })
-    ));
-    rule.sight.min_share = 0.1;
-    assert!(rule.features(&goal).is_ok());
+    let (cell, goal) = at_goal();
+    for (x, y, r, reason) in [
+        (96.0, 72.0, 90.0, "larger than the view"),
+        (96.0, 72.0, 70.0, "out of the range 5..68"),
+        (96.0, 72.0, 4.0, "out of the range 5..68"),
+        (-3.0, 72.0, 30.0, "centre of the ball is outside"),
+        (1.0, 72.0, 30.0, "at least 60 %"),
+    ] {
+        let refused = showing(&cell, &goal, x, y, r).features(&goal);
+        let refused = refused.expect_err(reason).to_string();
+        assert!(refused.contains(reason), "{refused}");
+    }
+    // A rule that is content with part of a ball larger than the view sees it.
+    let mut large = showing(&cell, &goal, 96.0, 72.0, 90.0);
+    large.sight.max_radius = 300.0;
+    let refused = large.features(&goal);
+    assert!(matches!(refused, Err(SightError::LargerThanView { .. })));
+    large.sight.min_share = 0.1;
+    assert!(large.features(&goal).is_ok());
     // Inside the camera, behind it, nowhere.
-    let camera = cell.camera_pose(&goal);
-    let at = |x, y, z| {
+    for (x, z, reason) in [
+        (0.0, 0.01, "not before the camera"),
+        (0.0, -0.3, "not before the camera"),
+        (f64::NAN, 0.3, "distance of the ball"),
+    ] {
         let mut put = cell;
-        put.ball.centre = camera * nalgebra::Point3::new(x, y, z);
-        put.features(&goal).expect_err("out of sight")
-    };
-    assert!(matches!(at(0.0, 0.0, 0.01), SightError::Inside { .. }));
-    assert!(matches!(at(0.0, 0.0, -0.3), SightError::Behind { .. }));
-    assert!(matches!(at(f64::NAN, 0.0, 0.3), SightError::Quantity(_)));
+        put.ball.centre = cell.camera_pose(&goal) * Point3::new(x, 0.0, z);
+        let refused = put.features(&goal).expect_err(reason).to_string();
+        assert!(refused.contains(reason), "{refused}");
+    }
     let mut nowhere = goal;
     nowhere.0[2] = f64::INFINITY;
     let refused = cell.features(&nowhere).expect_err("nowhere").to_string();
@@ -263,8 +229,7 @@ fn unseen_balls_are_refused_with_the_reason() {
 
 #[test]
 fn finger_sensors_respond_on_their_own_side() {
-    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-    let goal = cell.goal_pose(45.0).expect("within reach");
+    let (cell, goal) = at_goal();
     let mut grip = goal;
     grip.0[4] = cell.grip_angle(&goal);
     assert_eq!(cell.proximity_pair(&grip), [false, false], "straddled");
@@ -280,47 +245,37 @@ fn finger_sensors_respond_on_their_own_side() {
 
 #[test]
 fn unreachable_goals_are_refused_with_the_reason() {
-    let refused = |change: &dyn Fn(&mut Cell)| {
-        let mut cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-        change(&mut cell);
-        cell.goal_pose(45.0).expect_err("no pose")
+    type Spoil = fn(&mut Cell);
+    let refused = |jt5: f64, spoil: Spoil| {
+        let mut cell = at_goal().0;
+        spoil(&mut cell);
+        cell.goal_pose(jt5).expect_err("no pose").to_string()
     };
-    let at =
-        |x: f64, y: f64, z: f64| refused(&|cell| cell.ball.centre = nalgebra::Point3::new(x, y, z));
-    let far = at(3.0, 0.0, 0.0);
-    assert!(
-        matches!(far, SightError::OutOfReach { distance, greatest, .. } if distance > greatest)
-    );
-    assert!(matches!(at(0.1, 0.0, 0.0), SightError::BesideWaist { .. }));
-    let back = at(-0.6, 0.0, -0.1);
-    assert!(
-        matches!(
-            back,
-            SightError::OutOfLimits {
-                joint: Joint::J1,
-                ..
-            }
-        ),
-        "{back}"
-    );
-    assert!(
-        back.to_string().contains("JT1") && back.to_string().contains("160"),
-        "{back}"
-    );
-    assert!(at(0.6, f64::NAN, 0.0).to_string().contains("y coordinate"));
-    let cell = Cell::paper(Ball::at(0.62, 0.20, -0.10));
-    assert!(
-        cell.goal_pose(f64::INFINITY)
-            .expect_err("no angle")
-            .to_string()
-            .contains("JT5")
-    );
+    let spoilt: [(&str, Spoil); 9] = [
+        ("m from the shoulder", |c| c.ball.centre.x = 3.0),
+        ("from the waist's axis", |c| {
+            c.ball.centre = Point3::new(0.1, 0.0, 0.0)
+        }),
+        ("the pose has JT1", |c| {
+            c.ball.centre = Point3::new(-0.6, 0.0, -0.1)
+        }),
+        ("y coordinate", |c| c.ball.centre.y = f64::NAN),
+        ("mount", |c| c.mount.translation.vector.x = f64::NAN),
+        ("a2", |c| c.params.a2 = f64::NAN),
+        ("radius of the ball", |c| c.ball.radius = f64::NAN),
+        ("radius of the ball", |c| c.ball.radius = -0.02),
+        ("radius of the ball", |c| c.ball.radius = 0.0),
+    ];
+    for (named, spoil) in spoilt {
+        let refused = refused(45.0, spoil);
+        assert!(refused.contains(named), "{named}: {refused}");
+    }
+    assert!(refused(f64::INFINITY, |_| ()).contains("JT5"));
 }
 
 #[test]
 fn measures_that_are_not_finite_are_named() {
-    let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let pose = Workspace::paper().search_poses()[3];
+    let (cell, pose) = at_goal();
     let (mut mount, mut arm, mut rule) = (cell, cell, cell);
     mount.mount.translation.vector.x = f64::NAN;
     arm.params.a2 = f64::NAN;
@@ -328,16 +283,6 @@ fn measures_that_are_not_finite_are_named() {
     for (wrong, named) in [(mount, "mount"), (arm, "a2"), (rule, "fraction")] {
         let error = wrong.features(&pose).expect_err("no number").to_string();
         assert!(error.contains(named), "{error}");
-    }
-    for (wrong, named) in [(mount, "mount"), (arm, "a2")] {
-        let error = wrong.goal_pose(45.0).expect_err("no number").to_string();
-        assert!(error.contains(named), "{error}");
-    }
-    for radius in [f64::NAN, -0.02, 0.0] {
-        let mut wrong = cell;
-        wrong.ball.radius = radius;
-        let error = wrong.goal_pose(45.0).expect_err("no ball").to_string();
-        assert!(error.contains("radius of the ball"), "{error}");
     }
 }
 

@@ -16,16 +16,8 @@ fn silhouette() -> Scene {
     Scene {
         lights: Vec::new(),
         ambient: 0.9,
-        table: Appearance {
-            albedo: 1.0,
-            texture: 0.0,
-            gloss: 0.0,
-        },
-        ball: Appearance {
-            albedo: 0.3,
-            texture: 0.0,
-            gloss: 0.0,
-        },
+        table: Appearance::new(1.0, 0.0, 0.0),
+        ball: Appearance::new(0.3, 0.0, 0.0),
         sensor: Sensor {
             read_noise: 0.0,
             shot_noise: 0.0,
@@ -231,11 +223,7 @@ fn noise_has_the_strength_asked_for() {
     let even = Scene {
         lights: Vec::new(),
         ambient: 0.5,
-        table: Appearance {
-            albedo: 0.6,
-            texture: 0.0,
-            gloss: 0.0,
-        },
+        table: Appearance::new(0.6, 0.0, 0.0),
         sensor: Sensor {
             read_noise: 3.0,
             shot_noise: 8.0,

@@ -172,47 +172,19 @@ fn ball_off_its_holder_is_pushed_without_it() {
 
 #[test]
 fn impossible_workspace_is_refused_and_has_no_balls() {
+    type Spoil = fn(&mut Workspace);
     let (cell, _) = at_goal();
-    let paper = Workspace::paper();
-    assert_eq!(paper.check(), Ok(()));
-    let nan = f64::NAN;
-    for (broken, name) in [
-        (
-            Workspace {
-                rho: (0.8, 0.5),
-                ..paper
-            },
-            "distance",
-        ),
-        (
-            Workspace {
-                rho: (-0.5, 0.5),
-                ..paper
-            },
-            "distance",
-        ),
-        (
-            Workspace {
-                azimuth: (0.0, f64::INFINITY),
-                ..paper
-            },
-            "azimuth",
-        ),
-        (
-            Workspace {
-                height: (nan, 0.0),
-                ..paper
-            },
-            "height",
-        ),
-        (
-            Workspace {
-                search_elbow: (nan, 0.0),
-                ..paper
-            },
-            "search poses",
-        ),
-    ] {
+    assert_eq!(Workspace::paper().check(), Ok(()));
+    let spoilt: [(&str, Spoil); 5] = [
+        ("distance", |w| w.rho = (0.8, 0.5)),
+        ("distance", |w| w.rho = (-0.5, 0.5)),
+        ("azimuth", |w| w.azimuth = (0.0, f64::INFINITY)),
+        ("height", |w| w.height = (f64::NAN, 0.0)),
+        ("search poses", |w| w.search_elbow = (f64::NAN, 0.0)),
+    ];
+    for (name, spoil) in spoilt {
+        let mut broken = Workspace::paper();
+        spoil(&mut broken);
         let refused = broken.check().expect_err("no such workspace").to_string();
         assert!(refused.contains(name), "{refused}");
         assert!(broken.sample_ball(&mut rng(1)).centre.x.is_nan());

@@ -117,57 +117,52 @@ fn projected_circle_agrees_with_a_ray_cast() {
 }
 
 #[test]
-fn balls_without_an_outline_are_named() {
+fn impossible_balls_and_cameras_are_named() {
     let camera = Camera::paper();
-    let at = |x, y, z, r| camera.project_sphere(&Point3::new(x, y, z), r);
-    assert!(matches!(
-        at(0.0, 0.0, 0.01, 0.02),
-        Err(SightError::Inside { .. })
-    ));
-    assert!(matches!(
-        at(0.0, 0.0, -0.5, 0.02),
-        Err(SightError::Behind { .. })
-    ));
-    assert!(matches!(
-        at(0.5, 0.0, 0.01, 0.02),
-        Err(SightError::Behind { .. })
-    ));
-    let quantity = |x, r| at(x, 0.0, 0.5, r).expect_err("no ball").to_string();
-    assert!(quantity(f64::NAN, 0.02).contains("distance of the ball"));
-    for r in [0.0, -0.02, f64::NAN, f64::INFINITY] {
-        assert!(quantity(0.0, r).contains("radius of the ball"));
-    }
-    for (f, w, width, height, named) in [
-        (0.0, 0.0088, 768, 576, "focal length (m)"),
-        (-0.01, 0.0088, 768, 576, "focal length (m)"),
-        (f64::NAN, 0.0088, 768, 576, "focal length (m)"),
-        (0.0115, 0.0, 768, 576, "sensor width (m)"),
-        (0.0115, -0.0088, 768, 576, "sensor width (m)"),
-        (0.0115, 0.0088, 0, 576, "frame width (px)"),
-        (0.0115, 0.0088, 768, 0, "frame height (px)"),
+    for (x, z, r, reason) in [
+        (0.0, 0.01, 0.02, "not before the camera"),
+        (0.0, -0.5, 0.02, "not before the camera"),
+        (0.5, 0.01, 0.02, "not before the camera"),
+        (f64::NAN, 0.5, 0.02, "distance of the ball"),
+        (0.0, 0.5, 0.0, "radius of the ball"),
+        (0.0, 0.5, -0.02, "radius of the ball"),
+        (0.0, 0.5, f64::INFINITY, "radius of the ball"),
     ] {
-        let refused = Camera::pinhole(f, w, width, height)
-            .expect_err("no camera")
-            .to_string();
-        assert!(refused.starts_with(named), "{refused}");
+        let refused = camera.project_sphere(&Point3::new(x, 0.0, z), r);
+        let refused = refused.expect_err(reason).to_string();
+        assert!(refused.contains(reason), "{refused}");
     }
-    assert!(camera.with_focal_factor(0.0).is_err());
-    assert!(
-        camera
-            .with_distortion(Distortion {
-                k1: -3.0,
-                ..Distortion::default()
-            })
-            .is_err()
-    );
-    assert!(
-        camera
-            .with_distortion(Distortion {
-                k1: f64::NAN,
-                ..Distortion::default()
-            })
-            .is_err()
-    );
+    let (largest, more) = (Camera::LARGEST_SIDE, Camera::LARGEST_SIDE + 1);
+    assert!(camera.resized(largest, largest).is_ok());
+    let folding = |k1| {
+        let lens = Distortion {
+            k1,
+            ..Distortion::default()
+        };
+        camera.with_distortion(lens)
+    };
+    for (refused, reason) in [
+        (Camera::pinhole(0.0, 0.0088, 768, 576), "focal length (m)"),
+        (
+            Camera::pinhole(f64::NAN, 0.0088, 768, 576),
+            "focal length (m)",
+        ),
+        (
+            Camera::pinhole(0.0115, -0.0088, 768, 576),
+            "sensor width (m)",
+        ),
+        (Camera::pinhole(0.0115, 0.0088, 0, 576), "frame width (px)"),
+        (Camera::pinhole(0.0115, 0.0088, 768, 0), "frame height (px)"),
+        (Camera::pinhole(0.01, 0.01, 1, more), "at most 16384"),
+        (camera.resized(0, 576), "frame width (px)"),
+        (camera.resized(u32::MAX, u32::MAX), "at most 16384"),
+        (camera.with_focal_factor(0.0), "focal factor"),
+        (folding(-3.0), "folds the image over"),
+        (folding(f64::NAN), "k1"),
+    ] {
+        let refused = refused.expect_err(reason).to_string();
+        assert!(refused.contains(reason), "{refused}");
+    }
 }
 
 #[test]
@@ -215,10 +210,8 @@ fn strong_lenses_are_undone_or_refused() {
         .with_distortion(lens(-0.6, 0.0, 0.0))
         .expect("does not fold inside the frame");
     for pixel in [Point2::new(3000.0, 288.0), Point2::new(f64::NAN, 0.0)] {
-        assert!(matches!(
-            barrel.ray(pixel),
-            Err(QuantityError::NoRay { .. })
-        ));
+        let ray = barrel.ray(pixel);
+        assert!(matches!(ray, Err(QuantityError::NoRay { .. })), "{ray:?}");
     }
 }
 
@@ -241,7 +234,6 @@ fn resized_camera_shows_all_of_the_old_frame() {
         assert!((shown.x + 0.5 - beside - scale * (circle.x + 0.5)).abs() < 1e-9);
         assert!((shown.y + 0.5 - scale * (circle.y + 0.5)).abs() < 1e-9);
     }
-    assert!(camera.resized(0, 576).is_err());
 }
 
 #[test]
@@ -330,22 +322,6 @@ fn circle_leads_back_to_its_sphere() {
                 off < 1e-6,
                 "{millimetres} mm: {circle:?} comes back as {back:?}"
             );
-        }
-    }
-}
-
-#[test]
-fn oversized_frame_is_refused() {
-    let (largest, more) = (Camera::LARGEST_SIDE, Camera::LARGEST_SIDE + 1);
-    assert!(Camera::paper().resized(largest, largest).is_ok());
-    for (width, height) in [(u32::MAX, u32::MAX), (1, more), (more, 1)] {
-        let refused = [
-            Camera::paper().resized(width, height),
-            Camera::pinhole(0.01, 0.01, width, height),
-        ];
-        for refused in refused {
-            let refused = refused.expect_err("too large").to_string();
-            assert!(refused.contains("at most 16384"), "{refused}");
         }
     }
 }

@@ -5,7 +5,7 @@ use pipeline_sim::{
     Appearance, Ball, Cell, Distortion, Occluder, ProjectedEllipse, Recipe, Renderer, Round, Scene,
     Shape, Thing, Workspace,
 };
-use puma_val2::JointDelta;
+use puma_val2::{JointDelta, Joints};
 
 use crate::{at_goal, rng};
 
@@ -55,80 +55,46 @@ fn truth_knows_what_hides_the_ball() {
     assert!((0.5..=0.6).contains(&share), "{share}");
 }
 
-#[test]
-fn nearer_things_hide_farther_ones() {
-    // A tall cylinder between the camera and a low ball on the table.
-    let (cell, _) = at_goal();
-    let pose = Workspace::paper().search_poses()[3];
-    let appearance = Appearance {
-        albedo: 0.5,
-        texture: 0.0,
-        gloss: 0.0,
-    };
-    let thing = |shape, x, y| Thing {
-        shape,
-        x,
-        y,
-        turn: 0.0,
-        appearance,
-    };
-    let ball = thing(Shape::Ball { radius: 0.03 }, 0.80, 0.0);
-    let visible = |things: Vec<Thing>| {
-        let truth = Renderer::new(
-            &Scene {
-                things,
-                ..Scene::plain()
-            },
-            1,
-        )
-        .truth(&cell, &pose);
-        truth
-            .iter()
-            .find(|s| s.what == Round::Ball)
-            .map(|s| s.visible)
-    };
-    assert!(visible(vec![ball]).expect("in the frame") > 0.95);
-    let camera = cell.camera_pose(&pose).translation.vector;
-    let (x, y) = (0.80 - 0.053, 0.053 * camera.y / (0.80 - camera.x));
-    let post = thing(
-        Shape::Cylinder {
-            radius: 0.02,
-            height: 0.10,
-        },
-        x,
-        y,
-    );
-    let beside = thing(
-        Shape::Cylinder {
-            radius: 0.02,
-            height: 0.10,
-        },
-        0.80 + 0.09,
-        y,
-    );
-    let (before, behind) = (visible(vec![post, ball]), visible(vec![beside, ball]));
-    assert!(before.is_none_or(|v| v < 0.7), "{before:?}");
-    assert!(behind.expect("in the frame") > 0.95, "{behind:?}");
-}
-
-/// A bare scene with one dull thing.
-fn with_thing(shape: Shape, x: f64, y: f64) -> Scene {
-    let appearance = Appearance {
-        albedo: 0.5,
-        texture: 0.0,
-        gloss: 0.0,
-    };
-    let thing = Thing {
+/// Returns a dull thing.
+fn thing(shape: Shape, x: f64, y: f64) -> Thing {
+    let appearance = Appearance::new(0.5, 0.0, 0.0);
+    Thing {
         shape,
         x,
         y,
         turn: 0.3,
         appearance,
-    };
-    Scene {
-        things: vec![thing],
-        ..Scene::plain()
     }
+}
+
+/// Returns the visible part of the first outline of a kind among things on a bare table; 0 if there
+/// is none.
+fn visible(what: Round, things: &[Thing], cell: &Cell, pose: &Joints) -> f64 {
+    let scene = Scene {
+        things: things.to_vec(),
+        ..Scene::plain()
+    };
+    let truth = Renderer::new(&scene, 1).truth(cell, pose);
+    let first = truth.iter().find(|outline| outline.what == what);
+    first.map_or(0.0, |outline| outline.visible)
+}
+
+#[test]
+fn nearer_things_hide_farther_ones() {
+    // A tall cylinder between the camera and a low ball on the table.
+    let (cell, _) = at_goal();
+    let pose = Workspace::paper().search_poses()[3];
+    let ball = thing(Shape::Ball { radius: 0.03 }, 0.80, 0.0);
+    let camera = cell.camera_pose(&pose).translation.vector;
+    let y = 0.053 * camera.y / (0.80 - camera.x);
+    let post = |x| {
+        let (radius, height) = (0.02, 0.10);
+        thing(Shape::Cylinder { radius, height }, x, y)
+    };
+    let seen = |things: &[Thing]| visible(Round::Ball, things, &cell, &pose);
+    assert!(seen(&[ball]) > 0.95);
+    assert!(seen(&[post(0.80 - 0.053), ball]) < 0.7);
+    assert!(seen(&[post(0.80 + 0.09), ball]) > 0.95);
 }
 
 #[test]
@@ -145,9 +111,8 @@ fn ball_over_a_box_hides_it_and_behind_it_is_hidden() {
     let toward = (eye.xy() - ball.coords.xy()).normalize();
     for nearer in [0.0, 0.02, 0.05, 0.07] {
         let (x, y) = (ball.x + nearer * toward.x, ball.y + nearer * toward.y);
-        let truth = Renderer::new(&with_thing(shape, x, y), 1).truth(&cell, &goal);
-        assert_eq!(truth[0].what, Round::Target);
-        assert!(truth[0].visible > 0.98, "{nearer}: {}", truth[0].visible);
+        let seen = visible(Round::Target, &[thing(shape, x, y)], &cell, &goal);
+        assert!(seen > 0.98, "{nearer}: {seen}");
     }
     // A ball on the table close behind a tall box, as seen from a search pose, is hidden by it.
     let pose = Workspace::paper().search_poses()[3];
@@ -160,13 +125,9 @@ fn ball_over_a_box_hides_it_and_behind_it_is_hidden() {
         width: 0.05,
         height: 0.09,
     };
-    let before = with_thing(tall, 0.75 + 0.06 * toward.x, 0.15 + 0.06 * toward.y);
-    let hidden = Renderer::new(&before, 1).truth(&low, &pose);
-    let visible = hidden
-        .iter()
-        .find(|s| s.what == Round::Target)
-        .map_or(0.0, |s| s.visible);
-    assert!(visible < 0.7, "{visible}");
+    let before = thing(tall, 0.75 + 0.06 * toward.x, 0.15 + 0.06 * toward.y);
+    let seen = visible(Round::Target, &[before], &low, &pose);
+    assert!(seen < 0.7, "{seen}");
 }
 
 #[test]
@@ -184,22 +145,9 @@ fn holder_without_its_ball_keeps_its_place() {
         foot.y + 0.25 * toward.y,
         cell.table + 0.02,
     );
-    let scene = with_thing(
-        Shape::Cylinder {
-            radius: 0.02,
-            height: 0.08,
-        },
-        x,
-        y,
-    );
-    let top = |cell: &Cell| {
-        let truth = Renderer::new(&scene, 1).truth(cell, &pose);
-        let top = truth
-            .into_iter()
-            .find(|s| s.what == Round::Top)
-            .expect("in the frame");
-        top.visible
-    };
+    let (radius, height) = (0.02, 0.08);
+    let post = thing(Shape::Cylinder { radius, height }, x, y);
+    let top = |cell: &Cell| visible(Round::Top, &[post], cell, &pose);
     assert!(top(&cell) > 0.99, "{}", top(&cell));
     // In front of it, the holder does hide it.
     let mut before = cell;
