@@ -287,10 +287,16 @@ impl TrialCell {
         arm.move_to(from)?;
         let mut camera = FeatureCamera::new(shared, arm.pose(), seed);
         let looks = (0..LOOKS).map(|_| camera.look());
-        let Some(seen) = looks.collect::<Option<Vec<Features>>>() else {
+        // Looks that miss the ball, or see it somewhere else, do not count.
+        let mut seen: Vec<Features> = looks.flatten().collect();
+        let mut columns: Vec<f64> = seen.iter().map(|f| f.x).collect();
+        columns.sort_by(f64::total_cmp);
+        seen.retain(|f| (f.x - columns[columns.len() / 2]).abs() < 20.0);
+        if 2 * seen.len() < LOOKS {
             return Ok(None);
-        };
-        let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / LOOKS as f64;
+        }
+        let count = seen.len() as f64;
+        let mean = |of: fn(&Features) -> f64| seen.iter().map(of).sum::<f64>() / count;
         let [x, y, r] = [mean(|f| f.x), mean(|f| f.y), mean(|f| f.r)];
         Ok(Some(Features { x, y, r }).filter(well_inside))
     }
