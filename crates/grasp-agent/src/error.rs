@@ -78,6 +78,15 @@ pub enum AgentError {
         /// Number of images.
         looks: usize,
     },
+    /// A small move has not displaced the ball in the image.
+    #[error(
+        "the image has not changed in {looks} looks after a small move: the camera delivers old \
+         images, or the arm has not moved; see AgentConfig::lag_check"
+    )]
+    Unchanged {
+        /// Number of looks after the move.
+        looks: usize,
+    },
     /// A replayed run took another course than the logged one: another controller, other settings,
     /// or other knowledge.
     #[error("the replayed run differs from the log at event {event} (counted from 0)")]

@@ -166,6 +166,7 @@ fn is_answer(kind: &EventKind) -> bool {
         kind,
         EventKind::Searching
             | EventKind::Reaching
+            | EventKind::Late(_)
             | EventKind::SameFrame
             | EventKind::Lost
             | EventKind::TooFast
@@ -253,6 +254,7 @@ impl Eye for Player<'_, '_> {
         let ball = match tape.answer().map(|event| event.kind) {
             Some(EventKind::Seen(ball)) => Some(ball),
             Some(EventKind::NotSeen) => None,
+            Some(EventKind::Dropped) => return Ok(None),
             _ => return Err(tape.unseen()),
         };
         if !tape.next_if(&EventKind::SameFrame) {

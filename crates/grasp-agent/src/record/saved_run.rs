@@ -45,6 +45,7 @@ struct Camera {
     from: puma_val2::Joints,
     showed: bool,
     same: usize,
+    late: Option<usize>,
 }
 
 impl SavedRun {
@@ -62,6 +63,7 @@ impl SavedRun {
                 from: camera.from,
                 showed: camera.shown.is_some(),
                 same: camera.same(),
+                late: camera.late,
             },
             log: EventLog::default(),
         }
@@ -112,6 +114,7 @@ impl SavedRun {
             from: self.camera.from,
             shown: self.camera.showed.then(|| Shown::Frame(numbered(0))),
             same: self.camera.same,
+            late: self.camera.late,
         };
         let agent = Agent::with_controller(self.config.clone(), controller)?.with_camera(camera);
         Ok(self.log.replay_by(agent)?.0)
@@ -149,7 +152,7 @@ impl SavedRun {
     }
 }
 
-const FORMAT: &str = "grasp-agent run 3";
+const FORMAT: &str = "grasp-agent run 4";
 
 #[derive(Debug, Deserialize)]
 struct Head {

@@ -83,6 +83,11 @@ pub struct AgentConfig {
     /// least 1 (default 2). Nothing is gripped after a single one, and with the jaws closed a
     /// single one ends the run.
     pub same_frames: usize,
+    /// Small move by which the agent measures, at the first ball that it sees, how many looks an
+    /// image is late; it has to displace the ball in the image by 10 units and more (default
+    /// `None`: each image is exposed after the look begins). The agent then drops as many images
+    /// after every move, and before it knows, the largest number that it can measure: 8.
+    pub lag_check: Option<JointDelta>,
 }
 
 impl AgentConfig {
@@ -111,6 +116,7 @@ impl AgentConfig {
             left_behind: 9.0,
             reach_tolerance: 1_f64.to_radians(),
             same_frames: 2,
+            lag_check: None,
         }
     }
 
@@ -167,9 +173,13 @@ impl AgentConfig {
                 ));
             }
         }
-        let lifts = |lift: &JointDelta| *lift != JointDelta::default() && is_finite(lift);
-        if !self.lift.iter().all(lifts) {
-            return Err("lift moves nothing, or is not finite; None is no lift".into());
+        let moves = |delta: &JointDelta| *delta != JointDelta::default() && is_finite(delta);
+        for (name, delta) in [("lift", self.lift), ("lag_check", self.lag_check)] {
+            if !delta.iter().all(moves) {
+                return Err(format!(
+                    "{name} moves nothing, or is not finite; give a move or None"
+                ));
+            }
         }
         if !(self.left_behind.is_finite() && self.left_behind >= 0.0) {
             return Err(format!(

@@ -69,6 +69,12 @@ pub enum EventKind {
     /// [`EventKind::TooNear`] follows. The numbering continues when the poses are tried again with
     /// a displacement.
     AtSearchPose(usize),
+    /// An image was dropped that may show an earlier pose ([`AgentConfig::lag_check`]).
+    ///
+    /// [`AgentConfig::lag_check`]: crate::AgentConfig::lag_check
+    Dropped,
+    /// An image is late by so many looks, as a small move has shown.
+    Late(usize),
     /// The ball is in the frame.
     Seen(Sighting),
     /// No ball is in the frame.
@@ -126,6 +132,8 @@ impl EventKind {
             Self::Searching => "searching",
             Self::Reaching => "reaching",
             Self::AtSearchPose(_) => "search",
+            Self::Dropped => "dropped",
+            Self::Late(_) => "late",
             Self::Seen(_) => "seen",
             Self::NotSeen => "not-seen",
             Self::SameFrame => "same-frame",

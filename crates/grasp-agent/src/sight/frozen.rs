@@ -14,6 +14,8 @@ pub(crate) struct FrozenCheck {
     pub(crate) from: Joints,
     pub(crate) shown: Option<Shown>,
     pub(crate) same: usize,
+    /// Looks by which an image is late, once it was measured.
+    pub(crate) late: Option<usize>,
 }
 
 /// Content of one look: the frame, or the ball for eyes without frames.
@@ -117,6 +119,7 @@ mod tests {
             from: at(10.0),
             shown: Some(Shown::Frame(frame(1))),
             same: usize::MAX,
+            late: None,
         };
         assert!(check.looked(&at(20.0), Some(&frame(1)), None));
         assert_eq!(check.same(), usize::MAX);

@@ -1,6 +1,7 @@
 //! Cells that are wrong in ways beyond camera and play, with a goal that was taught on the arm.
 
-use grasp_agent::{Agent, EventLog, Hybrid};
+use grasp_agent::puma_val2::{Joint, JointDelta};
+use grasp_agent::{Agent, AgentError, EventKind, EventLog, Hybrid};
 
 use crate::cell::{config, hybrid};
 use crate::plant::{EXTREME, Level, MODERATE, Odd, Plant};
@@ -105,4 +106,60 @@ fn without_a_taught_goal_the_arm_is_taken_as_given() {
         (mean[0] - (plant.truth().focal / 250.909).ln()).abs() < 0.03,
         "{mean:?}"
     );
+}
+
+/// An agent that measures the lag of its camera, in a cell with this error.
+fn measured(odd: Odd) -> (Plant, Agent<Hybrid>) {
+    let plant = Plant::new(MODERATE, odd, 5);
+    let goal = plant.taught().unwrap();
+    let mut config = config().with_taught_goal(&goal);
+    config.lag_check = Some(JointDelta::of(Joint::J1, 3_f64.to_radians()));
+    let agent = Agent::with_controller(config, hybrid().shown(&goal));
+    (plant, agent.unwrap())
+}
+
+#[test]
+fn late_images_are_measured_dropped_and_replayed() {
+    for late in [0, 1, 2] {
+        let (plant, mut agent) = measured(Odd {
+            late,
+            ..Odd::default()
+        });
+        for ball in 0..8 {
+            let (before, mut log) = (agent.clone(), EventLog::default());
+            let (end, held) = plant.run(&mut agent, ball, &mut log);
+            let outcome = end.unwrap();
+            assert!(
+                held && outcome.cycles < 10,
+                "{late} looks late: {outcome:?}"
+            );
+            let measured = log.events.iter().find_map(|event| match event.kind {
+                EventKind::Late(looks) => Some(looks),
+                _ => None,
+            });
+            assert_eq!(measured, (ball == 0).then_some(late));
+            assert_eq!(log.replay(&before).unwrap().1, log);
+        }
+    }
+}
+
+#[test]
+fn old_images_for_ever_and_an_arm_that_stands_are_errors() {
+    let none = Odd::default();
+    // From the first ball on; the one that is seen before is the one of the search.
+    for odd in [
+        Odd { late: 40, ..none },
+        Odd {
+            stiction: 4_f64.to_radians(),
+            dishonest: true,
+            ..none
+        },
+    ] {
+        let (plant, mut agent) = measured(odd);
+        let ends = (0..4).map(|ball| plant.run(&mut agent, ball, &mut EventLog::default()).0);
+        let ends: Vec<_> = ends.collect();
+        let unchanged =
+            |end: &Result<_, AgentError>| matches!(end, Err(AgentError::Unchanged { .. }));
+        assert!(ends.iter().any(unchanged), "{odd:?}: {ends:?}");
+    }
 }

@@ -98,7 +98,7 @@ pub struct Belief {
 /// Image noise assumed at first, feature units.
 const FIRST_NOISE: f64 = 1.0;
 
-/// Returns the precision of a standard deviation; that of 0 leaves hardly any room.
+/// Returns the precision of a standard deviation; 0 keeps a parameter as it is.
 fn precision(deviation: f64) -> f64 {
     1.0 / (deviation * deviation).max(1e-18)
 }

@@ -23,17 +23,10 @@ pub(super) enum Went {
 impl Run<'_> {
     /// Looks for the ball from where the arm stands, a few times if need be.
     pub(super) fn look(&mut self) -> Result<Option<Sighting>, AgentError> {
+        self.drop_late_images()?;
         for _ in 0..self.config.looks {
-            let ball = self.devices.eye.look()?;
-            // A user-supplied detector might find anything.
-            let ball = ball.filter(|ball| ball.is_finite() && ball.features.r > 0.0);
+            let ball = self.look_once()?;
             let frame = self.devices.eye.frame();
-            (self.observe)(&RunEvent {
-                cycle: self.cycles,
-                kind: ball.map_or(EventKind::NotSeen, EventKind::Seen),
-                joints: self.joints,
-                frame,
-            });
             if self.camera.looked(&self.joints, frame, ball.as_ref()) {
                 self.tell(EventKind::SameFrame);
             }
@@ -52,6 +45,20 @@ impl Run<'_> {
             }
         }
         Ok(None)
+    }
+
+    /// Takes one image as it comes, and reports what is in it.
+    pub(super) fn look_once(&mut self) -> Result<Option<Sighting>, AgentError> {
+        let ball = self.devices.eye.look()?;
+        // A user-supplied detector might find anything.
+        let ball = ball.filter(|ball| ball.is_finite() && ball.features.r > 0.0);
+        (self.observe)(&RunEvent {
+            cycle: self.cycles,
+            kind: ball.map_or(EventKind::NotSeen, EventKind::Seen),
+            joints: self.joints,
+            frame: self.devices.eye.frame(),
+        });
+        Ok(ball)
     }
 
     pub(super) fn go_by(&mut self, delta: JointDelta, done: EventKind) -> Result<Went, AgentError> {
@@ -124,6 +131,7 @@ impl Run<'_> {
     /// [`AgentError::Pose`] for an angle that is not finite: nothing can be decided from there.
     pub(super) fn stand_at(&mut self, joints: Joints) -> Result<(), AgentError> {
         self.joints = joints;
+        self.moved = true;
         match joints.non_finite() {
             Some(joint) => Err(AgentError::Pose { joint }),
             None => {

@@ -17,6 +17,7 @@ use crate::sight::frozen::FrozenCheck;
 
 mod acting;
 mod gripping;
+mod lag;
 
 use acting::Went;
 pub(crate) use acting::{STOP, jaws_order};
@@ -87,6 +88,8 @@ pub(crate) struct Run<'a> {
     cycles: usize,
     losses: usize,
     last_seen: Option<Sighting>,
+    /// `true` if the arm has moved since the last look.
+    moved: bool,
     /// `true` once the jaws have closed: looks then verify the grip.
     closed: bool,
     /// Moves in a row that were taken back.
@@ -123,6 +126,7 @@ impl<'a> Run<'a> {
             cycles: 0,
             losses: 0,
             last_seen: None,
+            moved: false,
             closed: false,
             taken_back: 0,
             barred: 0,
@@ -153,6 +157,7 @@ impl<'a> Run<'a> {
         loop {
             let next = match state {
                 State::Search => self.search()?,
+                State::Reach(_) if self.has_to_measure_lag() => self.measure_lag()?,
                 State::Reach(ball) => self.reach(&ball)?,
                 State::Recover { ball, from, .. } => self.recover(&ball, &from)?,
                 State::Grip { ball, at_goal } => self.grip(&ball, at_goal)?,
