@@ -297,7 +297,7 @@ impl BehaviourSpec {
         JointDelta::from_degrees(degrees)
     }
 
-    /// Returns the step to the percept `after`; without one, or if it is no number, the ball is lost.
+    /// Returns the step to the percept `after`; without one, or for NaN, the ball is lost.
     pub(crate) fn outcome(
         &self,
         (before, state): (&Percept, State),

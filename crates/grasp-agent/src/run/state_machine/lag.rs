@@ -31,7 +31,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Measures by a small move how many looks an image is late, and goes back. The ball is in view.
+    /// Measures by a small move how many looks an image is late, and goes back.
     pub(super) fn measure_lag(&mut self) -> Result<State, AgentError> {
         let (from, delta) = (self.joints, self.config.lag_check.unwrap_or_default());
         let Some(before) = self.look()? else {
