@@ -234,6 +234,8 @@ def run_ours(name, frames, options, found, scratch):
         str(options.min_radius),
         "--max-radius",
         str(options.max_radius),
+        "--max-circles",
+        "32",
         "--seed",
         str(options.detector_seed),
     ]
