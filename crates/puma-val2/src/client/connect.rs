@@ -34,6 +34,7 @@ impl<T: Transport> Val2Client<T> {
             points: BTreeMap::new(),
             goal_program: None,
             lacks_ppoint: false,
+            frames: Default::default(),
             speed: None,
             guard: None,
         };
@@ -52,6 +53,7 @@ impl<T: Transport> Val2Client<T> {
         self.points.clear();
         self.goal_program = None;
         self.lacks_ppoint = false;
+        self.frames = Default::default();
         self.speed = None;
         self.wire.nudge = SPOIL;
         let outcome = self.find_prompt();

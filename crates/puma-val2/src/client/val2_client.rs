@@ -12,6 +12,7 @@ use crate::client::whereabouts::Location;
 use crate::client::wire::{Failed, Reply, Wire, is_doubt};
 use crate::error::ArmError;
 use crate::joints::{JointDelta, Joints};
+use crate::kinematics::frames::Frames;
 use crate::manipulator::{Gripper, Manipulator};
 use crate::transport::Transport;
 
@@ -39,6 +40,8 @@ pub struct Val2Client<T: Transport> {
     pub(super) goal_program: Option<String>,
     /// The controller has turned out not to know `#PPOINT`.
     pub(super) lacks_ppoint: bool,
+    /// Tool or base that the controller seems to have.
+    pub(super) frames: [Frames; 2],
     /// Monitor speed in percent, if this client has set it.
     pub(super) speed: Option<f64>,
     /// Signal that stops the next motions.
@@ -147,7 +150,8 @@ impl<T: Transport> Val2Client<T> {
     /// Reads the arm's position.
     ///
     /// A reply is accepted if its joint angles and its hand pose belong together. With a tool or
-    /// base set in the controller they do not; then two equal replies in a row are required.
+    /// base set in the controller they do not; then two equal replies in a row are required, which
+    /// a notice says, and the tool or base that explains them is expected from then on.
     ///
     /// # Errors
     /// Errors of the line or the controller; [`ArmError::Garbled`] if no two replies agree.
@@ -157,9 +161,14 @@ impl<T: Transport> Val2Client<T> {
         for _ in 0..self.wire.config.retries.saturating_add(3) {
             match self.where_once() {
                 Ok(location) => {
-                    if location.agrees(&self.wire.config.params)
-                        || before.is_some_and(|b| b == location)
-                    {
+                    let params = &self.wire.config.params;
+                    let agrees = |frames: &Frames| location.agrees(params, frames);
+                    let certain = agrees(&Frames::default()) || self.frames.iter().any(agrees);
+                    if certain || before == Some(location) {
+                        if !certain {
+                            self.frames = location.explanations(params);
+                            self.notice_frames();
+                        }
                         self.last_known = Some(location.joints);
                         return Ok(location);
                     }
@@ -176,6 +185,16 @@ impl<T: Transport> Val2Client<T> {
             self.wire
                 .garbled("WHERE", "two equal replies in a row", "none")
         }))
+    }
+
+    /// Says that every `WHERE` was asked twice, if a tool or base is the reason.
+    fn notice_frames(&mut self) {
+        let tool = self.frames[0].tool;
+        let none = tool.translation.vector.norm() < 1e-4 && tool.rotation.angle() < 1e-3;
+        if !none {
+            let notice = "TOOL or BASE is set on the controller, or the arm is another model";
+            self.wire.notices.push(notice.to_owned());
+        }
     }
 
     fn where_once(&mut self) -> Result<Location, ArmError> {

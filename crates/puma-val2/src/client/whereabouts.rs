@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::joints::Joints;
+use crate::kinematics::frames::Frames;
 use crate::kinematics::params::PumaParams;
 use crate::kinematics::xyzoat::Xyzoat;
 
@@ -65,20 +66,36 @@ impl Location {
         })
     }
 
-    /// Returns `true` if the two halves belong together for an arm without tool and base shift,
-    /// within 0.1 mm and 0.01 degrees: a check against characters that changed on the line.
+    /// Returns `true` if the two halves belong together for an arm with this tool and base, within
+    /// 0.1 mm and 0.01 degrees: a check against characters that changed on the line.
     ///
     /// The hand does not show a turn of 360 degrees. Angles far out of range, or at 180 degrees,
     /// where a sign makes a turn, are therefore never accepted at once.
-    pub(crate) fn agrees(&self, arm: &PumaParams) -> bool {
+    pub(crate) fn agrees(&self, arm: &PumaParams, frames: &Frames) -> bool {
         let certain = self.joints.0.iter().zip(arm.ranges).all(|(angle, range)| {
             let in_range = (range.min - 0.1..=range.max + 0.1).contains(angle);
             in_range && (angle.abs() - PI).abs() > 1e-3
         });
-        let (by_joints, by_hand) = (arm.forward(&self.joints), self.hand.pose());
+        let (by_joints, by_hand) = (frames.hand(arm, &self.joints), self.hand.pose());
         let off = (by_joints.translation.vector - by_hand.translation.vector).norm();
         let turned = by_joints.rotation.angle_to(&by_hand.rotation);
         certain && off < 1e-4 && turned < 0.01_f64.to_radians()
+    }
+}
+
+impl Location {
+    /// Returns the tool alone and the base alone that would explain the pose.
+    pub(crate) fn explanations(&self, arm: &PumaParams) -> [Frames; 2] {
+        let (flange, hand) = (arm.forward(&self.joints), self.hand.pose());
+        let tool = Frames {
+            tool: flange.inverse() * hand,
+            ..Frames::default()
+        };
+        let base = Frames {
+            base: hand * flange.inverse(),
+            ..Frames::default()
+        };
+        [tool, base]
     }
 }
 
@@ -138,7 +155,7 @@ mod tests {
         let location = Location::parse(REPLY).unwrap();
         assert_eq!(location.joints, Joints::READY);
         assert!((location.hand.x + 0.02032).abs() < 1e-12);
-        assert!(location.agrees(&PumaParams::unimation()));
+        assert!(location.agrees(&PumaParams::unimation(), &Frames::default()));
         let swapped = "wh\r\n\r\n J1 J2 J3 J4 J5 J6\r\n\r\n 0 -90.0 90 0 0 0\r\n \
              X[mm] Y[mm] Z[mm] O[deg] A[deg] T[deg] HAND\r\n \
              -20.32 149.09 921.12 90 -90 0 50.00\r\n.";
@@ -160,6 +177,6 @@ mod tests {
             None
         );
         let flipped = Location::parse(&REPLY.replace("    0.000\r\n.", "    2.000\r\n.")).unwrap();
-        assert!(!flipped.agrees(&PumaParams::unimation()));
+        assert!(!flipped.agrees(&PumaParams::unimation(), &Frames::default()));
     }
 }

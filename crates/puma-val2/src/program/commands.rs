@@ -261,6 +261,9 @@ pub(super) fn run(
         }
         Command::Stop | Command::Term | Command::Emulate(_) => {}
     }
+    for notice in client.take_notices() {
+        eprintln!("note: {notice}");
+    }
     Ok(())
 }
 

@@ -210,7 +210,7 @@ fn the_hand_moves_to_its_pose_interpolated_or_straight() {
 }
 
 #[test]
-fn a_tool_makes_the_position_be_read_twice() {
+fn a_tool_makes_the_position_be_read_twice_once() {
     let mut client = client(Profile::val2());
     client
         .line_mut()
@@ -220,6 +220,14 @@ fn a_tool_makes_the_position_be_read_twice() {
     client.execute("T").unwrap();
     let location = client.where_().unwrap();
     assert!((location.hand.z - 1.04112).abs() < 1e-5);
+    assert!(client.take_notices()[0].contains("TOOL"));
+    let sent = client.line().traffic().0;
+    client.where_().unwrap();
+    assert_eq!(
+        client.line().traffic().0 - sent,
+        6,
+        "WHERE and its end, once"
+    );
     client
         .move_by(JointDelta::from_degrees([3.0, 4.0, -5.0, 0.0, 0.0, 0.0]))
         .unwrap();
