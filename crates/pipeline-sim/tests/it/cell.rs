@@ -254,10 +254,10 @@ fn unreachable_goals_are_refused_with_the_reason() {
     let spoilt: [(&str, Spoil); 9] = [
         ("m from the shoulder", |c| c.ball.centre.x = 3.0),
         ("from the waist's axis", |c| {
-            c.ball.centre = Point3::new(0.1, 0.0, 0.0)
+            c.ball.centre = Point3::new(0.1, 0.0, 0.0);
         }),
         ("the pose has JT1", |c| {
-            c.ball.centre = Point3::new(-0.6, 0.0, -0.1)
+            c.ball.centre = Point3::new(-0.6, 0.0, -0.1);
         }),
         ("y coordinate", |c| c.ball.centre.y = f64::NAN),
         ("mount", |c| c.mount.translation.vector.x = f64::NAN),

@@ -56,7 +56,7 @@ fn impossible_errors_are_refused_by_name() {
         ("yaw", |e| e.yaw = f64::NAN),
         ("along its x axis", |e| e.camera_shift[0] = f64::NAN),
         ("along its z axis", |e| {
-            e.camera_shift[2] = f64::NEG_INFINITY
+            e.camera_shift[2] = f64::NEG_INFINITY;
         }),
         ("folds", |e| e.distortion.k1 = -3.0),
         ("forearm", |e| e.link_shift[1] = f64::NAN),
@@ -70,7 +70,7 @@ fn impossible_errors_are_refused_by_name() {
         ("lag", |e| e.lag = usize::MAX),
         ("missed looks", |e| e.missed = -0.1),
         ("missed looks and outliers", |e| {
-            (e.missed, e.outliers) = (0.6, 0.6)
+            (e.missed, e.outliers) = (0.6, 0.6);
         }),
     ];
     for (named, spoil) in spoil {
