@@ -234,7 +234,8 @@ fn by_hand(updates: u64) -> Result<f64> {
             };
             let (next, reward) = transition(state, action);
             let target = reward + GAMMA * table[next][best[next]];
-            let (row, old) = (&mut table[state], table[state][action]);
+            let row = &mut table[state];
+            let old = row[action];
             row[action] = old + ALPHA * (target - old);
             if action == best[state] && row[action] < old {
                 for (other, value) in row.iter().enumerate() {
