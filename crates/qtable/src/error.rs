@@ -19,19 +19,13 @@ pub enum Error {
         /// The problem.
         problem: &'static str,
     },
-    /// Two objects that need the same number of states and actions and differ.
+    /// An object whose numbers of states and actions differ from those needed: its name, for
+    /// example `"the environment"`, the numbers needed, and those found.
     #[error(
         "{what} has {} states and {} actions, but {} and {} are needed",
-        found.0, found.1, needed.0, needed.1
+        .2.0, .2.1, .1.0, .1.1, what = .0
     )]
-    ShapeMismatch {
-        /// The object with the wrong shape, for example `"the environment"`.
-        what: &'static str,
-        /// States and actions needed.
-        needed: (usize, usize),
-        /// States and actions found.
-        found: (usize, usize),
-    },
+    ShapeMismatch(&'static str, (usize, usize), (usize, usize)),
     /// A list of the wrong length, as a damaged or hand-made file may hold.
     #[error("{what} holds {found} entries, but {needed} are needed")]
     WrongLength {
@@ -86,18 +80,10 @@ pub enum Error {
         /// The range in words.
         expected: &'static str,
     },
-    /// Steps of a schedule or edges of intervals that do not ascend.
-    #[error("{what} {index} is {value}, which is not above {before} before it")]
-    NotAscending {
-        /// The kind of list element, for example `"edge"`.
-        what: &'static str,
-        /// Position in the list.
-        index: usize,
-        /// The element.
-        value: f64,
-        /// The element before it.
-        before: f64,
-    },
+    /// Steps of a schedule or edges of intervals that do not ascend: their kind, for example
+    /// `"edge"`, the position in the list, the element there and the one before it.
+    #[error("{0} {1} is {2}, which is not above {3} before it")]
+    NotAscending(&'static str, usize, f64, f64),
     /// A quantity that is NaN and so lies in no interval: its position among the quantities of a
     /// product, 0 for plain intervals.
     #[error("quantity {0} is NaN, which lies in no interval")]
@@ -119,24 +105,13 @@ pub enum Error {
     /// Typical cause: γ = 1 with a policy that never reaches an end.
     #[error("no convergence after {0} sweeps: the last one still changed a value by {1}")]
     NotConverged(u64, f64),
-    /// A letter in the map of a frozen lake that has no meaning.
-    #[error("row {row}, column {column} of the map is {letter:?}: it must be S, F, H or G")]
-    MapLetter {
-        /// The letter.
-        letter: char,
-        /// Its row, counted from 0.
-        row: usize,
-        /// Its column, counted from 0.
-        column: usize,
-    },
-    /// A line of a CSV text that is no part of a table.
-    #[error("line {line} of the CSV text: {problem}")]
-    Csv {
-        /// The line, counted from 1.
-        line: u64,
-        /// The problem and what is expected instead.
-        problem: String,
-    },
+    /// A letter without meaning in the map of a frozen lake, its row and its column, counted from 0.
+    #[error("row {1}, column {2} of the map is {0:?}: it must be S, F, H or G")]
+    MapLetter(char, usize, usize),
+    /// A line of a CSV text that is no part of a table: its number, counted from 1, the problem,
+    /// and what is expected instead.
+    #[error("line {0} of the CSV text: {1}")]
+    Csv(u64, String),
     /// A learner that keeps knowledge of its own met another table than the one it was made for, or
     /// a table that was changed by hand.
     #[error(
@@ -259,4 +234,19 @@ pub(crate) fn check_finite(
         action,
         value,
     })
+}
+
+/// Checks that the elements of a list ascend.
+pub(crate) fn check_ascending(
+    what: &'static str,
+    list: impl IntoIterator<Item = f64>,
+) -> Result<(), Error> {
+    let mut last = f64::NEG_INFINITY;
+    for (index, value) in list.into_iter().enumerate() {
+        let before = std::mem::replace(&mut last, value);
+        if value <= before {
+            return Err(Error::NotAscending(what, index, value, before));
+        }
+    }
+    Ok(())
 }

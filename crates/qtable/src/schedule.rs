@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::elementary::{exp, ln};
-use crate::error::{Error, check_setting};
+use crate::error::{Error, check_ascending, check_setting};
 use crate::validated::validated;
 
 validated! {
@@ -278,15 +278,8 @@ impl Schedule {
             }
             Shape::Piecewise(points) => {
                 enough("the number of points", !points.is_empty())?;
-                let mut pairs = points.windows(2);
-                if let Some(before) = pairs.position(|pair| pair[0].0 >= pair[1].0) {
-                    return Err(Error::NotAscending {
-                        what: "the step of point",
-                        index: before + 1,
-                        value: points[before + 1].0 as f64,
-                        before: points[before].0 as f64,
-                    });
-                }
+                let steps = points.iter().map(|&(step, _)| step as f64);
+                check_ascending("the step of point", steps)?;
             }
             Shape::Constant(_) | Shape::Custom(_) => {}
         }
@@ -444,6 +437,6 @@ mod tests {
             );
         }
         let twice = Schedule::piecewise(&[(3, 0.0), (3, 1.0)]);
-        assert!(matches!(twice, Err(Error::NotAscending { index: 1, .. })));
+        assert!(matches!(twice, Err(Error::NotAscending(_, 1, ..))));
     }
 }

@@ -1,6 +1,6 @@
 //! States from measured quantities: intervals of one quantity, and products of intervals.
 
-use crate::error::{Error, check_index, check_length, check_setting};
+use crate::error::{Error, check_ascending, check_index, check_length, check_setting};
 use crate::step::State;
 use crate::validated::validated;
 
@@ -102,14 +102,7 @@ impl Intervals {
         for &edge in &self.edges {
             check_setting("an edge", edge, edge.is_finite(), "finite")?;
         }
-        if let Some(before) = self.edges.windows(2).position(|pair| pair[0] >= pair[1]) {
-            return Err(Error::NotAscending {
-                what: "edge",
-                index: before + 1,
-                value: self.edges[before + 1],
-                before: self.edges[before],
-            });
-        }
+        check_ascending("edge", self.edges.iter().copied())?;
         self.goal.map_or(Ok(()), |bin| self.check_bin(bin))?;
         Ok(self)
     }

@@ -68,9 +68,9 @@ impl QTable {
             .from_reader(text.as_bytes());
         let mut lines = Vec::new();
         for line in reader.deserialize() {
-            let line: Line = line.map_err(|error| Error::Csv {
-                line: error.position().map_or(1, csv::Position::line),
-                problem: error.to_string(),
+            let line: Line = line.map_err(|error| {
+                let number = error.position().map_or(1, csv::Position::line);
+                Error::Csv(number, error.to_string())
             })?;
             lines.push(line);
         }
@@ -83,10 +83,7 @@ impl QTable {
         let mut table = Self::new(states, actions)?;
         let mut allowed = vec![None; lines.len()];
         for (line, number) in lines.iter().zip(2..) {
-            let problem = |problem: &str| Error::Csv {
-                line: number,
-                problem: problem.to_owned(),
-            };
+            let problem = |problem: &str| Error::Csv(number, problem.to_owned());
             let (state, action) = (State(line.state), Action(line.action));
             let entry = &mut allowed[line.state * actions + line.action];
             if entry.replace(line.offered == 1).is_some() {

@@ -235,11 +235,7 @@ impl QTable {
         if found == needed {
             return Ok(());
         }
-        Err(Error::ShapeMismatch {
-            what,
-            needed,
-            found,
-        })
+        Err(Error::ShapeMismatch(what, needed, found))
     }
 
     /// Returns the number of offered actions that share the highest value.

@@ -29,11 +29,7 @@ impl ModelEnvironment {
         for (row, line) in map.split_whitespace().enumerate() {
             let unknown = |&(_, letter): &(usize, char)| !"SFHG".contains(letter);
             if let Some((column, letter)) = line.chars().enumerate().find(unknown) {
-                return Err(Error::MapLetter {
-                    letter,
-                    row,
-                    column,
-                });
+                return Err(Error::MapLetter(letter, row, column));
             }
             if row > 0 {
                 check_length("a row of the map", columns, line.len())?;

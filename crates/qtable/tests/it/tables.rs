@@ -127,14 +127,7 @@ proptest! {
 #[test]
 fn impossible_discretisations_are_refused() {
     let intervals = Intervals::new;
-    assert_refused!(
-        intervals(&[1.0, 1.0]),
-        Error::NotAscending {
-            what: "edge",
-            index: 1,
-            ..
-        }
-    );
+    assert_refused!(intervals(&[1.0, 1.0]), Error::NotAscending("edge", 1, ..));
     for edge in [f64::NAN, f64::INFINITY] {
         assert_refused!(
             intervals(&[1.0, edge]),

@@ -126,15 +126,8 @@ fn impossible_toys_are_refused() {
     assert_refused!(lake("SF G"), Error::WrongLength { .. });
     assert_refused!(lake(""), Error::Shape { .. });
     assert_refused!(lake("FG"), Error::Setting { .. });
-    assert_refused!(
-        lake("SF\nXG"),
-        Error::MapLetter {
-            letter: 'X',
-            row: 1,
-            column: 0
-        }
-    );
-    assert_refused!(lake("Sé G"), Error::MapLetter { letter: 'é', .. });
+    assert_refused!(lake("SF\nXG"), Error::MapLetter('X', 1, 0));
+    assert_refused!(lake("Sé G"), Error::MapLetter('é', ..));
     assert_refused!(ModelEnvironment::chain(1), Error::Setting { .. });
     assert_eq!(taxi().states(), 500);
 }
