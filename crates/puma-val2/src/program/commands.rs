@@ -118,20 +118,18 @@ fn confirm(globals: &Globals, what: &str) -> Result<(), Failure> {
 }
 
 /// Prints that a command is done.
-pub(super) fn done(globals: &Globals, what: &str) {
-    if globals.json {
-        println!("{}", json!({"done": what}));
-    } else {
-        println!("{what}");
-    }
+pub(super) fn done(globals: &Globals, what: &str) -> Result<(), Failure> {
+    print(globals, what, &json!({ "done": what }))
 }
 
-fn print(globals: &Globals, text: &str, value: &Value) {
+fn print(globals: &Globals, text: &str, value: &Value) -> Result<(), Failure> {
+    let mut out = io::stdout();
     if globals.json {
-        println!("{value}");
+        writeln!(out, "{value}")?;
     } else if !text.is_empty() {
-        println!("{}", text.trim_end());
+        writeln!(out, "{}", text.trim_end())?;
     }
+    Ok(())
 }
 
 pub(super) fn run(
@@ -145,14 +143,14 @@ pub(super) fn run(
     match command {
         Command::Calibrate => {
             client.calibrate()?;
-            show_where(globals, &client.where_()?);
+            show_where(globals, &client.where_()?)?;
         }
         Command::Where { watch } => {
-            show_where(globals, &client.where_()?);
+            show_where(globals, &client.where_()?)?;
             while *watch && !client.line().take_interrupt() {
                 std::thread::sleep(Duration::from_millis(200));
                 match client.where_() {
-                    Ok(location) => show_where(globals, &location),
+                    Ok(location) => show_where(globals, &location)?,
                     Err(_) if client.line().take_interrupt() => return Ok(()),
                     Err(error) => return Err(error.into()),
                 }
@@ -164,14 +162,14 @@ pub(super) fn run(
             ..
         } => {
             client.drive(Joint::ALL[usize::from(*joint) - 1], by.to_radians(), 100.0)?;
-            show_where(globals, &client.where_()?);
+            show_where(globals, &client.where_()?)?;
         }
         Command::Jog { .. } => keys::jog(&mut client)?,
         Command::Move {
             to, hand, straight, ..
         } => {
             go(&mut client, to, *hand, *straight)?;
-            show_where(globals, &client.where_()?);
+            show_where(globals, &client.where_()?)?;
         }
         Command::Hand { state } => {
             let (gripper, text) = match state.as_str() {
@@ -179,11 +177,11 @@ pub(super) fn run(
                 _ => (Gripper::Closed, "hand closed"),
             };
             client.set_gripper(gripper)?;
-            done(globals, text);
+            done(globals, text)?;
         }
         Command::Speed { percent } => {
             client.set_speed(*percent)?;
-            done(globals, &format!("speed {percent} %"));
+            done(globals, &format!("speed {percent} %"))?;
         }
         Command::Teach { name } => {
             let values = client.here(name)?;
@@ -192,14 +190,14 @@ pub(super) fn run(
                 globals,
                 &format!("{name} = {text}"),
                 &json!({"name": name, "values": values}),
-            );
+            )?;
         }
         Command::Ls => list(globals, &mut client)?,
         Command::Get { name } => {
             let steps = client.program(name)?;
             let body: String = steps.iter().map(|step| format!(" {step}\n")).collect();
             let text = format!(".PROGRAM {}\n{body}.END", name.to_ascii_uppercase());
-            print(globals, &text, &json!({"program": name, "steps": steps}));
+            print(globals, &text, &json!({"program": name, "steps": steps}))?;
         }
         Command::Put { file }
         | Command::Restore {
@@ -209,24 +207,24 @@ pub(super) fn run(
             restore(globals, &mut client, &read(file)?)?;
         }
         Command::Restore { file, .. } => {
-            show_plan(globals, &client.restore_plan(&read(file)?)?);
+            show_plan(globals, &client.restore_plan(&read(file)?)?)?;
         }
         Command::Rm { name } => {
             confirm(globals, &format!("{name} will be deleted."))?;
             client.remove(name)?;
-            done(globals, &format!("{name} deleted"));
+            done(globals, &format!("{name} deleted"))?;
         }
         Command::Backup { file } => {
             let text = client.backup()?;
             if file.as_os_str() == "-" {
-                print!("{text}");
+                io::stdout().write_all(text.as_bytes())?;
             } else {
                 write_whole(file, text.as_bytes())?;
                 let lines = text.lines().count();
                 done(
                     globals,
                     &format!("{lines} lines written to {}", file.display()),
-                );
+                )?;
             }
         }
         Command::Run {
@@ -239,11 +237,11 @@ pub(super) fn run(
                 globals,
                 &output.join("\n"),
                 &json!({"program": name, "output": output}),
-            );
+            )?;
         }
         Command::Run { name, cycles, .. } => {
             client.start(name, *cycles)?;
-            done(globals, &format!("{name} started"));
+            done(globals, &format!("{name} started"))?;
         }
         Command::Status => said(globals, &mut client, "STATUS")?,
         Command::Io => said(globals, &mut client, "IO")?,
@@ -257,7 +255,7 @@ pub(super) fn run(
             }
             let on = client.signal(*number)?;
             let text = format!("{number} {}", if on { "on" } else { "off" });
-            print(globals, &text, &json!({"signal": number, "on": on}));
+            print(globals, &text, &json!({"signal": number, "on": on}))?;
         }
         Command::Stop | Command::Term | Command::Emulate(_) => {}
     }
@@ -310,14 +308,14 @@ fn go(client: &mut Client<'_>, to: &[String], hand: bool, straight: bool) -> Res
     Ok(())
 }
 
-fn show_where(globals: &Globals, location: &Location) {
+fn show_where(globals: &Globals, location: &Location) -> Result<(), Failure> {
     let joints = location.joints.degrees();
     let text = format!("joints {}\nhand   {}", location.joints, location.hand);
     print(
         globals,
         &text,
         &json!({"joints_deg": joints.map(rounded), "xyzoat": location.hand.val().map(rounded)}),
-    );
+    )
 }
 
 /// Rounds to the digits that a controller shows.
@@ -329,7 +327,7 @@ fn rounded(value: f64) -> f64 {
 fn said(globals: &Globals, client: &mut Client<'_>, line: &str) -> Result<(), Failure> {
     let text = client.send_line(line)?;
     let lines: Vec<&str> = text.lines().collect();
-    print(globals, &text, &json!({"line": line, "answer": lines}));
+    print(globals, &text, &json!({"line": line, "answer": lines}))?;
     match lines
         .iter()
         .find(|l| l.len() > 2 && l.starts_with('*') && l[1..].contains('*'))
@@ -359,7 +357,7 @@ fn list(globals: &Globals, client: &mut Client<'_>) -> Result<(), Failure> {
     let text =
         all.map(|(kind, names)| format!("{kind}  {}", names.join(" ")).trim_end().to_owned());
     let value = json!({"programs": programs, "locations": locations, "reals": reals});
-    print(globals, &text.join("\n"), &value);
+    print(globals, &text.join("\n"), &value)?;
     Ok(())
 }
 
@@ -392,10 +390,10 @@ fn restore(globals: &Globals, client: &mut Client<'_>, text: &str) -> Result<(),
         }
         outcome => outcome?,
     };
-    show_plan(globals, &plan);
+    show_plan(globals, &plan)?;
     Ok(())
 }
 
-fn show_plan(globals: &Globals, plan: &[String]) {
-    print(globals, &plan.join("\n"), &json!({ "plan": plan }));
+fn show_plan(globals: &Globals, plan: &[String]) -> Result<(), Failure> {
+    print(globals, &plan.join("\n"), &json!({ "plan": plan }))
 }

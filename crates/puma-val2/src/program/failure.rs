@@ -1,6 +1,7 @@
 //! Failures of the program and their exit codes.
 
 use std::error::Error;
+use std::io;
 
 use crate::error::ArmError;
 
@@ -30,8 +31,13 @@ impl From<Box<dyn Error>> for Failure {
     }
 }
 
-impl From<std::io::Error> for Failure {
-    fn from(error: std::io::Error) -> Self {
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        // Whoever reads the output has enough of it.
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            let (text, code) = (String::new(), 141);
+            return Self { text, code };
+        }
         let (text, code) = (error.to_string(), 1);
         Self { text, code }
     }

@@ -62,8 +62,7 @@ pub(super) fn with_line(globals: &Globals, command: &Command) -> Result<(), Fail
     let outcome = match command {
         Command::Stop => {
             Val2Client::stop_on(&mut link, config.clone())?;
-            commands::done(globals, "stopped");
-            Ok(())
+            commands::done(globals, "stopped")
         }
         Command::Term => term::run(&mut link, &config),
         _ => commands::run(globals, command, &mut link, config.clone()),

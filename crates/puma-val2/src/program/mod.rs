@@ -218,6 +218,9 @@ pub fn val2(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let Err(failure) = outcome else {
         return ExitCode::SUCCESS;
     };
+    if failure.text.is_empty() {
+        return ExitCode::from(failure.code);
+    }
     if globals.json {
         eprintln!(
             "{}",

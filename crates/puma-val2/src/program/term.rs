@@ -46,7 +46,7 @@ pub(super) fn run(link: &mut Link, config: &ClientConfig) -> Result<(), Failure>
             Ok(Some(count)) => {
                 said.push(&buffer[..count]);
                 let text = String::from_utf8_lossy(&buffer[..count]).replace('\r', "");
-                print!("{text}");
+                io::stdout().write_all(text.as_bytes())?;
                 io::stdout().flush()?;
                 continue;
             }
@@ -57,8 +57,7 @@ pub(super) fn run(link: &mut Link, config: &ClientConfig) -> Result<(), Failure>
         }
         let asks = said.ending().is_some();
         if ended && asks {
-            println!();
-            return Ok(());
+            return Ok(writeln!(io::stdout())?);
         }
         if !by_person && !asks {
             continue;

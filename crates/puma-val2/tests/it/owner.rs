@@ -356,3 +356,22 @@ fn keys_move_the_arm_only_while_they_come() {
     // Of the eight keys that came at once only one step was made, then one of two degrees back.
     assert_eq!(bench.joints(), [0.0, -91.0, 90.0, 0.0, 0.0, 0.0]);
 }
+
+#[test]
+fn output_that_nobody_reads_ends_the_program_quietly() {
+    let bench = Bench::new(&[]);
+    let mut watch = bench.command(&["where", "--watch"]);
+    let mut child = watch
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = String::new();
+    BufReader::new(child.stdout.take().unwrap())
+        .read_line(&mut first)
+        .unwrap();
+    assert!(first.starts_with("joints"));
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(141));
+    assert!(output.stderr.is_empty());
+}
