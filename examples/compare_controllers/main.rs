@@ -98,6 +98,8 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Outcome {
+    // Refuses unknown names before anything is learned.
+    with_odd(Errors::none(), options)?;
     let _lock = lock_folder(&options.out)?;
     let mut rivals = rivals(options)?;
     rivals.retain(|(name, _)| name.contains(&options.only));
@@ -305,6 +307,12 @@ impl<'a> DrawnCell<'a> {
     }
 }
 
+/// Adds the odd errors asked for.
+fn with_odd(errors: Errors, options: &Options) -> Outcome<Errors> {
+    let mut odd = options.odd.iter();
+    Ok(odd.try_fold(errors, |errors, odd| errors.with_odd(odd))?)
+}
+
 /// The devices in a cell with drawn errors.
 enum World {
     /// Features straight from the geometry, an arm that moves at once.
@@ -316,8 +324,7 @@ enum World {
 impl World {
     fn draw(options: &Options, level: ErrorLevel, seed: u64) -> Outcome<Self> {
         let drawn = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
-        let mut odd = options.odd.iter();
-        let errors = odd.try_fold(drawn, |errors, odd| errors.with_odd(odd))?;
+        let errors = with_odd(drawn, options)?;
         if options.full_chain {
             let rig = rig_with_errors(&errors, &bright_ball_scene(), seed)?;
             let detector = options.detector.build(seed)?;
