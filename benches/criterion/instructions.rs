@@ -42,14 +42,14 @@ fn count_all() -> ExitCode {
         println!("skipped: valgrind is not installed, so no instructions are counted");
         return ExitCode::SUCCESS;
     }
-    println!("{:18} {:22} {:>14}", "scene", "what", "instructions");
+    println!("{:18} {:28} {:>12}", "scene", "what", "instructions");
     for scene in SCENES {
         for case in [EDGES, A_CONTRARIO].into_iter().chain(TRANSFORMS) {
             if case == SMALL_ONLY && !scene.starts_with("192x144") {
                 continue;
             }
             match count(scene, case) {
-                Ok(count) => println!("{scene:18} {case:22} {count:>14}"),
+                Ok(count) => println!("{scene:18} {case:28} {count:>12}"),
                 Err(error) => {
                     eprintln!("{scene}, {case}: {error}");
                     return ExitCode::FAILURE;

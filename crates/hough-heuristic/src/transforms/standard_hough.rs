@@ -214,7 +214,7 @@ impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
                     let at = [pixel.x, pixel.y].map(|at| (f64::from(at) / cell) as i32);
                     match turns.get(index) {
                         Some(&turn) => accumulator.vote(layer, at, ring.along(turn)),
-                        None => accumulator.vote(layer, at, ring.cells().iter()),
+                        None => accumulator.vote(layer, at, [ring.cells(), &[]]),
                     }
                 }
             }
@@ -265,10 +265,10 @@ impl Ring {
         &self.around[self.spread..self.around.len() - self.spread]
     }
 
-    /// The cells in the direction of a gradient, given in turns, and in the opposite one.
-    fn along(&self, turn: f64) -> impl Iterator<Item = &(i32, i32)> {
-        let count = self.cells().len();
-        [turn, turn + 0.5].into_iter().flat_map(move |turn| {
+    /// The cells in the direction of a gradient, given in turns, and those in the opposite one.
+    fn along(&self, turn: f64) -> [&[(i32, i32)]; 2] {
+        let count = self.around.len() - 2 * self.spread;
+        [turn, turn + 0.5].map(|turn| {
             let middle = (turn.rem_euclid(1.0) * count as f64) as usize % count;
             &self.around[middle..=middle + 2 * self.spread]
         })
@@ -284,19 +284,16 @@ impl Accumulator {
     }
 
     /// Votes for the circles of one radius around a cell.
-    fn vote<'c>(
-        &mut self,
-        layer: usize,
-        [x, y]: [i32; 2],
-        cells: impl Iterator<Item = &'c (i32, i32)>,
-    ) {
+    fn vote(&mut self, layer: usize, [x, y]: [i32; 2], cells: [&[(i32, i32)]; 2]) {
         let (columns, rows) = (self.columns, self.rows);
         let votes = &mut self.votes[layer * columns * rows..][..columns * rows];
-        for (dx, dy) in cells {
-            let (column, row) = (x + dx, y + dy);
-            if (column as u32) < columns as u32 && (row as u32) < rows as u32 {
-                let votes = &mut votes[row as usize * columns + column as usize];
-                *votes = votes.saturating_add(1);
+        for arc in cells {
+            for (dx, dy) in arc {
+                let (column, row) = (x + dx, y + dy);
+                if (column as u32) < columns as u32 && (row as u32) < rows as u32 {
+                    let votes = &mut votes[row as usize * columns + column as usize];
+                    *votes = votes.saturating_add(1);
+                }
             }
         }
     }
@@ -383,9 +380,9 @@ mod tests {
     #[test]
     fn a_gradient_votes_for_both_sides() {
         let ring = Ring::new(40.0, 2.0, 0.06);
-        let cells: Vec<_> = ring.along(0.0).collect();
+        let cells = ring.along(0.0).concat();
         assert!(
-            cells.contains(&&(20, 0)) && cells.contains(&&(-20, 0)),
+            cells.contains(&(20, 0)) && cells.contains(&(-20, 0)),
             "{cells:?}"
         );
         assert!(cells.iter().all(|cell| cell.1.abs() <= 3), "{cells:?}");
