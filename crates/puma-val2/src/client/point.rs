@@ -43,9 +43,9 @@ impl<T: Transport> Val2Client<T> {
     ) -> Result<(), ArmError> {
         for tries in 0.. {
             let mut outcome = self.define_point_once(name, values, fits);
-            // Where nothing is echoed the name itself may have been damaged. A name that has shown
-            // its values of before is right; a new one is shown again.
-            let proven = self.wire.checks_echo() || self.points.contains_key(name);
+            // Where nothing is echoed the name may have been damaged, or a value and its display by
+            // the same bit: the point is shown again.
+            let proven = self.wire.checks_echo();
             if let Ok(shown) = outcome
                 && !proven
             {
