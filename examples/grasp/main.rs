@@ -112,14 +112,16 @@ fn run(options: &Options) -> Outcome {
         let ball_mm = (ball.centre.coords * 1000.0).into();
         let mut record = RunRecord::new(run, ball_mm, SavedRun::before(&agent));
         let cell = rig.cell().clone();
-        // A file that cannot be written ends the writing of files, not the run.
+        // A file that cannot be written ends the writing of frames, not the run.
         let mut written: Outcome = Ok(());
         // Frames to be written if the run fails.
         let mut pictures = Vec::new();
         let mut observe = |event: &RunEvent<'_>| {
             let (row, picture) = record.note(event, &cell.get());
+            // Rows are small and find a place where frames do not.
+            let row = events.row(row);
             if written.is_ok() {
-                written = events.row(row);
+                written = row;
             }
             if let Some(picture) = picture
                 && written.is_ok()
