@@ -103,7 +103,7 @@ fn best_approaching(
         percept.features.r = percept.features.r.round();
         percept
     };
-    for _ in 0..400_000 {
+    for _ in 0..200_000 {
         let before = plane.start(&mut rng);
         let action = Action(rng.random_range(0..spec.actions()));
         let Ok(state) = spec.state(&before) else {
@@ -159,7 +159,7 @@ fn equation_6_divides_by_zero_and_mended_it_approaches() {
     let (cycling, worth, none) = best(&floored);
     let (arriving, kept, _) = best(&literal.mended());
     println!(
-        "Eq. 6: {infinite} of 400000 moves between whole pixels have an infinite reward; floored, \
+        "Eq. 6: {infinite} of 200000 moves between whole pixels have an infinite reward; floored, \
          the best policy arrives from {:.0} % and is worth {worth:.0} (arriving: 100); mended, it \
          arrives from {:.0} % and is worth {kept:.0}",
         100.0 * cycling,

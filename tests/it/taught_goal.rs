@@ -62,10 +62,10 @@ fn servoing_with_a_wrong_camera_grasps_once_shown_the_goal() {
 #[test]
 fn what_was_shown_tells_the_hybrid_of_the_camera() {
     let hybrid = Hybrid::new(HybridSettings::paper());
-    let shown: Vec<_> = (0..16)
+    let shown: Vec<_> = (0..8)
         .filter_map(|seed| taught(ErrorLevel::Heavy, seed))
         .collect();
-    assert_eq!(shown.len(), 16);
+    assert_eq!(shown.len(), 8);
     // A ball that shows too far aside is brought into view by a turn of JT4.
     let turned = |goal: &TaughtGoal| goal.grip()[Joint::J4] != 0.0;
     assert!(shown.iter().any(|(_, goal)| turned(goal)));
