@@ -97,7 +97,7 @@ pub enum SightError {
     },
     /// An outline that does not fit into the frame, wherever it lies.
     #[error(
-        "the ball is larger than the view: its outline is {:.0} x {:.0} px in a frame of {} x {} px",
+        "the ball is larger than the view: its outline is {:.0} x {:.0} px, the frame {} x {} px",
         outline.0, outline.1, frame.0, frame.1
     )]
     LargerThanView {
