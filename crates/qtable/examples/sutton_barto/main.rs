@@ -1,4 +1,4 @@
-//! Ten figures and examples of Sutton and Barto, "Reinforcement Learning" (2nd edition, 2018), run
+//! Nine figures and examples of Sutton and Barto, "Reinforcement Learning" (2nd edition, 2018), run
 //! again: their values with 95 % intervals beside the book's, and their curves as SVG.
 //!
 //! `cargo run --release -p qtable --features parallel --example sutton_barto -- FOLDER`
