@@ -81,7 +81,7 @@ use thin::Thinning;
 /// **Evidence against.** Parts of other things are round as well. A ray without the outline refutes
 /// the circle if both sides of it have the level of the thing or both that of the ground, or if the
 /// outline goes on off the circle there. A thing in front excuses a gap: at its borders the levels
-/// change along the outline. Each per cent of refuted rays takes three per cent of `c`. A circle is
+/// change along the outline. A share `s` of refuted rays leaves `(1 - 3 s)^1.5` of `c`. A circle is
 /// dropped if an ellipse or a polygon explains the edges better, if most of the gap has no edge at
 /// all, or if the frame cuts the circle and little of the rest is seen.
 ///

@@ -4,14 +4,14 @@ use super::directions::Rays;
 use super::polar::{Polar, Ring};
 use super::strongest::{Edges, RAYS};
 
-/// The least second harmonic of an ellipse, in radii.
-const OVAL: f32 = 0.07;
+/// The least second harmonic of an ellipse, in radii: in general, and where the circle is covered.
+const OVAL: [f32; 2] = [0.05, 0.09];
 /// Rays that it must explain in addition, as a share of those in the frame.
 const GAIN: f32 = 0.1;
 /// Least slope of an edge that counts, as a fraction of the slope of the outline.
 const LEAST_SLOPE: f32 = 0.5;
 /// The least fourth or fifth harmonic of a polygon, in radii.
-const CORNERS: f32 = 0.055;
+const CORNERS: f32 = 0.043;
 /// Least ratio of that harmonic to the second and third.
 const LEADS: f32 = 1.5;
 /// Largest distance of corners from the circle, in radii.
@@ -19,8 +19,8 @@ const CORNER_REACH: f32 = 0.25;
 /// Share of the rays in the frame on which the outline of a polygon must be seen.
 const CLOSED: f32 = 0.75;
 /// Least ratio of the variance that the harmonics explain to the rest, each per degree of freedom.
-const LEAST_RATIO: f32 = 6.0;
-/// Covered share from which a circle is not tested against an ellipse.
+const LEAST_RATIO: f32 = 4.0;
+/// Covered share from which only a clear ellipse competes with a circle.
 const MOST_COVERED: f32 = 0.85;
 
 /// Returns `true` if another outline explains clearly more of the edges around the circle.
@@ -41,7 +41,15 @@ pub(super) fn fits_better(
     };
     let own: [bool; RAYS] = std::array::from_fn(own);
     is_polygon(rays, edges, polar, &own, ring)
-        || (covered < MOST_COVERED && is_oval(rays, edges, polar, &own, ring, tolerance))
+        || is_oval(
+            rays,
+            edges,
+            polar,
+            &own,
+            ring,
+            tolerance,
+            OVAL[usize::from(covered >= MOST_COVERED)],
+        )
 }
 
 #[inline(always)]
@@ -52,12 +60,13 @@ fn is_oval(
     own: &[bool; RAYS],
     ring: &Ring,
     tolerance: f32,
+    least: f32,
 ) -> bool {
     let Some(ellipse) = fit::<5>(rays, edges, own, ring.r) else {
         return false;
     };
     let flattening = (ellipse[3] * ellipse[3] + ellipse[4] * ellipse[4]).sqrt();
-    if flattening < OVAL * ring.r {
+    if flattening < least * ring.r {
         return false;
     }
     let Some(circle) = fit::<3>(rays, edges, own, ring.r) else {

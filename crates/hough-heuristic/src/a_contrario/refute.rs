@@ -11,11 +11,8 @@ use super::polar::{Gray, Polar, Ring};
 use super::proof::{NOISE, Proof, window_for};
 use super::strongest::{Edges, RAYS};
 
-/// Fraction of the certainty that is lost per unit of the share of refuted rays.
+/// Inverse of the share of refuted rays at which no certainty is left.
 const PRICE: f32 = 3.0;
-/// Share of refuted rays at which no certainty is left, and the loss per unit shortly below it.
-const MOST_REFUTED: f32 = 0.3;
-const LAST_PRICE: f32 = 5.5;
 /// Share of rays without any edge above which a circle is dropped.
 const MOST_BARE: f32 = 0.3;
 /// Least slope of the outline for such rays to count, in deviations of the noise.
@@ -185,10 +182,8 @@ pub(super) fn left(
     if bare > MOST_BARE * RAYS as f32 && around.slope > STEEP * noise {
         return 0.0;
     }
-    let share = refuted / visible;
-    (1.0 - PRICE * share)
-        .min(LAST_PRICE * (MOST_REFUTED - share))
-        .max(0.0)
+    let left = (1.0 - PRICE * refuted / visible).max(0.0);
+    left * left.sqrt()
 }
 
 impl Around<'_> {
