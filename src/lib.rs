@@ -7,7 +7,7 @@
 //! | [`hough_heuristic`] | a gray frame into circles |
 //! | [`qtable`] | experience into a policy |
 //! | [`puma_val2`] | joint angles into VAL II text and back, for a real PUMA 560 or the emulated controller |
-//! | [`pipeline_sim`] | an arm pose into a camera frame or features, and samples of moves into a regression model |
+//! | [`pipeline_sim`] | an arm pose into a frame or features, samples of moves into a model |
 //! | [`grasp_agent`] | circles into joint moves: learned behaviours, search, recovery, grip |
 //!
 //! They are re-exported here under their own names. This package joins the simulated cell to the

@@ -289,7 +289,7 @@ fn small_step(state: State, action: Action) -> Step {
     Step::new(State(mixed % 500), reward, Status::Continuing)
 }
 
-/// The same problem as an environment.
+/// Environment of this problem for `qtable`.
 struct Small(State);
 
 impl Environment for Small {

@@ -44,7 +44,7 @@ const COLOURS: [RGBColor; 6] = [
 const GOAL: RGBColor = RGBColor(120, 190, 120);
 const GRAY: RGBColor = RGBColor(200, 200, 205);
 
-/// What is drawn of learning curves: its name, its value in a record, and the end of its axis.
+/// Quantity drawn as a learning curve: its name, its value in a record, and the end of its axis.
 pub type Curve = (&'static str, fn(&Record) -> Option<f64>, Option<f64>);
 
 /// Success and error of learning, over the actions.

@@ -176,7 +176,7 @@ pub(super) struct Setting {
 pub(super) enum Narrow {
     /// So many pixels on either side.
     Within(f32),
-    /// What is closer to the outline than to this one.
+    /// Edges closer to the outline than to this one.
     Beside(Ring),
 }
 

@@ -13,7 +13,7 @@ use crate::edges::{Vectorized, widest};
 
 /// Radius from which a circle is proven in the frame halved once more, pixels there.
 const LARGE: f32 = 24.0;
-/// The same radius in a noisy frame, pixels.
+/// Radius from which that is done in a noisy frame, pixels there.
 const SMALL: f32 = 9.0;
 /// Noise from which on a frame counts as noisy, gray levels.
 const NOISY: f32 = 8.0;

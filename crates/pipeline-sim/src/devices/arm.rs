@@ -22,7 +22,7 @@ pub struct SimulatedArm {
 struct Drive {
     /// Angles that the encoders read.
     read: Joints,
-    /// The same behind the play of the gears.
+    /// Joint angles behind the play of the gears.
     driven: Joints,
 }
 

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 use puma_val2::SerialLine;
 use rustix::process::{Pid, Signal, kill_process};
 
+use crate::program::{emulate, listening};
+
 /// An emulated controller, served by the program itself.
 struct Bench {
     emulator: Child,
@@ -18,21 +20,7 @@ struct Bench {
 
 impl Bench {
     fn new(options: &[&str]) -> Self {
-        let mut emulator = Command::new(env!("CARGO_BIN_EXE_val2"))
-            .arg("emulate")
-            .args(options)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut first = String::new();
-        let out = emulator.stdout.take().unwrap();
-        BufReader::new(out).read_line(&mut first).unwrap();
-        let port = first
-            .trim()
-            .strip_prefix("listening on ")
-            .unwrap()
-            .to_owned();
+        let (emulator, port) = listening(&mut emulate(options));
         let folder = tempfile::tempdir().unwrap();
         Self {
             emulator,

@@ -8,10 +8,21 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 /// The program with these options.
-fn emulate(options: &[&str]) -> Command {
+pub(crate) fn emulate(options: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_val2"));
     command.arg("emulate").args(options);
     command
+}
+
+/// Starts an emulator and returns it with the address that its first line names.
+pub(crate) fn listening(command: &mut Command) -> (Child, String) {
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut emulator = command.spawn().unwrap();
+    let mut first = String::new();
+    let out = emulator.stdout.take().unwrap();
+    BufReader::new(out).read_line(&mut first).unwrap();
+    let address = first.trim().strip_prefix("listening on ").unwrap();
+    (emulator, address.to_owned())
 }
 
 /// The program on any free socket, with this folder as its floppy disk.
@@ -29,15 +40,7 @@ struct Terminal {
 impl Terminal {
     /// Starts the emulator with this folder as its floppy disk.
     fn with_floppy(folder: &Path) -> Self {
-        let mut emulator = serving(folder)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut first = String::new();
-        let out = emulator.stdout.take().unwrap();
-        BufReader::new(out).read_line(&mut first).unwrap();
-        let address = first.trim().strip_prefix("listening on ").unwrap();
+        let (emulator, address) = listening(&mut serving(folder));
         let line = TcpStream::connect(address).unwrap();
         line.set_read_timeout(Some(Duration::from_secs(20)))
             .unwrap();

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p qtable --features parallel --example sutton_barto -- FOLDER`
 //!
-//! Where the book gives a number only as a curve, it is read off the figure ("about").
+//! Numbers that the book shows only as a curve are read off the figure ("about").
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod figure;

@@ -25,10 +25,10 @@ validated! {
     /// | Expected SARSA | 6.6 | `NStep::new(Target::ExpectedSarsa, 1, alpha, gamma)` |
     /// | n-step SARSA | 7.2 | `NStep::new(Target::Sarsa, n, alpha, gamma)` |
     /// | n-step tree backup | 7.5 | `NStep::new(Target::TreeBackup, n, alpha, gamma)` |
-    /// | Monte Carlo control, every visit | 5.4 | `NStep::new(Target::Sarsa, usize::MAX, alpha, gamma)` |
+    /// | Monte Carlo control | 5.4 | `NStep::new(Target::Sarsa, usize::MAX, alpha, gamma)` |
     /// | differential SARSA | 10.3 | [`with_average_reward`](NStep::with_average_reward) |
     ///
-    /// A return is closed early when the episode ends. A pair is updated up to n steps after its
+    /// A return is closed early when the episode ends. A pair is updated up to n steps after each
     /// visit; the visit is counted at once. For means over all returns, as in the book's Monte
     /// Carlo methods, α is [`Schedule::inverse_visits`]`(1.0, 1.0)`.
     ///
