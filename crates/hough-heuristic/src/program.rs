@@ -221,7 +221,7 @@ fn image(
 ) -> Result<(), Failure> {
     let picture = files.next_picture().map_err(Failure::Image)?;
     let colours = results.needs_colours().then(|| picture.to_rgb8());
-    let frame = files.gray(picture);
+    let frame = results.options.channel.gray(picture);
     let path = files.last_path().unwrap_or(Path::new("image"));
     if let Some(bits) = files.last_depth() {
         eprintln!(

@@ -32,6 +32,45 @@ pub enum Channel {
     Strongest,
 }
 
+impl Channel {
+    /// Turns a picture in memory into a frame, as [`ImageFiles`] does, and returns the bits that
+    /// its values used if they are of 16 bits and used fewer.
+    pub fn frame(self, mut picture: DynamicImage) -> (GrayImage, Option<u32>) {
+        let depth = stretch(&mut picture);
+        (self.gray(picture), depth)
+    }
+
+    /// Takes this part of a picture of 8 bits, or of one that uses all of 16.
+    pub(crate) fn gray(self, picture: DynamicImage) -> GrayImage {
+        let component = match self {
+            Self::Red => 0,
+            Self::Green => 1,
+            Self::Blue => 2,
+            _ => 3,
+        };
+        if !picture.color().has_color() || self == Self::Luma {
+            return picture.into_luma8();
+        }
+        let picture = picture.into_rgb8();
+        let of = |component: usize| {
+            let (width, height) = picture.dimensions();
+            GrayImage::from_fn(width, height, |x, y| {
+                Luma([picture.get_pixel(x, y).0[component]])
+            })
+        };
+        if component < 3 {
+            return of(component);
+        }
+        let mut strongest = of(0);
+        for other in [of(1), of(2)] {
+            if change(&other) > change(&strongest) {
+                strongest = other;
+            }
+        }
+        strongest
+    }
+}
+
 /// A [`FrameSource`] over image files: PNG, JPEG, PGM and BMP, with the feature `cli` also TIFF.
 ///
 /// A picture is turned as its EXIF orientation says, so that coordinates are those that a viewer
@@ -142,42 +181,12 @@ impl ImageFiles {
         self.depth = stretch(&mut picture);
         Ok(picture)
     }
-
-    /// The frame that becomes of a picture.
-    pub(crate) fn gray(&self, picture: DynamicImage) -> GrayImage {
-        let component = match self.channel {
-            Channel::Red => 0,
-            Channel::Green => 1,
-            Channel::Blue => 2,
-            _ => 3,
-        };
-        if !picture.color().has_color() || self.channel == Channel::Luma {
-            return picture.into_luma8();
-        }
-        let picture = picture.into_rgb8();
-        let of = |component: usize| {
-            let (width, height) = picture.dimensions();
-            GrayImage::from_fn(width, height, |x, y| {
-                Luma([picture.get_pixel(x, y).0[component]])
-            })
-        };
-        if component < 3 {
-            return of(component);
-        }
-        let mut strongest = of(0);
-        for other in [of(1), of(2)] {
-            if change(&other) > change(&strongest) {
-                strongest = other;
-            }
-        }
-        strongest
-    }
 }
 
 impl FrameSource for ImageFiles {
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         let picture = self.next_picture()?;
-        *frame = self.gray(picture);
+        *frame = self.channel.gray(picture);
         Ok(())
     }
 }
