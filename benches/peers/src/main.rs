@@ -3,7 +3,8 @@
 //! `cargo run --release` prints a table: millions of updates per second of CPU time (of wall time
 //! where the system does not tell CPU time), the median over the rounds with their range, and the
 //! median over the rounds of the ratio to rurel within the round.
-//! `cargo run --release -- 9 4000000` sets the rounds and the updates in each.
+//! `cargo run --release -- 9 4000000 500x4` sets the rounds, the updates in each, and a word that the
+//! names of the rows contain.
 //!
 //! The problem is the same for all: 90 states and 81 actions, the shape of the approaching
 //! behaviour of the paper, and a transition that costs next to nothing. rurel explores at random
@@ -451,6 +452,9 @@ fn main() -> Result<()> {
             softmax_by_hand(n / 2)
         }),
     ];
+    let word = arguments.next().unwrap_or_default();
+    let entries = entries.iter().filter(|(name, _)| name.contains(&word));
+    let entries: Vec<_> = entries.collect();
     let mut rates = vec![Vec::new(); entries.len()];
     for _ in 0..rounds.max(1) {
         for ((_, run), rates) in entries.iter().zip(&mut rates) {

@@ -113,7 +113,7 @@ impl Learner for QLearning {
         self.rates.clock.begin_episode();
     }
 
-    #[inline]
+    #[inline(always)]
     fn learn(
         &mut self,
         table: &mut QTable,

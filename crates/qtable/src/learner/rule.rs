@@ -179,7 +179,7 @@ impl Rates {
         let entry = table.entry(state, action)?;
         let (old, visits) = table.at(entry);
         let error = target - old;
-        let alpha = self.alpha.now(&self.clock, visits);
+        let alpha = self.alpha.current(&mut self.clock, visits);
         table.store(state, action, old + alpha * error)?;
         table.count(entry);
         self.clock.tick();

@@ -67,7 +67,7 @@ impl Boltzmann {
 
 impl Policy for Boltzmann {
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
-        let temperature = self.temperature();
+        let temperature = self.temperature.current(&mut self.clock, 0);
         self.clock.tick();
         let weights = self.weights.of_length(table.actions());
         let sum = boltzmann_weights(table, state, temperature, weights);

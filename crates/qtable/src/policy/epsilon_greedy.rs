@@ -48,14 +48,23 @@ impl EpsilonGreedy {
         self.epsilon.at_time(&self.clock)
     }
 
-    /// Draws one of several best actions. Rare in a table that has learned, so kept out of line.
+    /// Draws one of the best actions, or of all, by a number in `0..1`. Out of line, since a table
+    /// that has learned has few ties and most have no mask.
     #[cold]
     #[inline(never)]
-    fn draw(&self, table: &QTable, state: State, equals: usize, rng: &mut dyn Rng) -> Action {
-        self.ties.pick(table.best(state), equals, rng, || {
-            let offered = table.offered(state);
-            offered.filter(|&action| is_best(table, state, action))
-        })
+    fn draw(&self, table: &QTable, state: State, share: f64, explores: bool) -> Action {
+        let equals = match self.ties {
+            Ties::Lowest => 1,
+            Ties::Random => table.equals(state),
+        };
+        let count = match explores {
+            true => table.offered(state).count(),
+            false => equals,
+        };
+        let mut wanted = table
+            .offered(state)
+            .filter(|&action| explores || is_best(table, state, action));
+        wanted.nth(part(share, count)).unwrap_or(table.best(state))
     }
 
     fn restore(self) -> Result<Self, Error> {
@@ -65,23 +74,25 @@ impl EpsilonGreedy {
 }
 
 impl Policy for EpsilonGreedy {
-    #[inline]
+    #[inline(always)]
     fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
-        let epsilon = self.epsilon();
+        let epsilon = self.epsilon.current(&mut self.clock, 0);
         self.clock.tick();
-        let lowest = table.best(state);
-        if rng.random::<f64>() >= epsilon {
-            return match table.equals(state) {
-                0 | 1 => lowest,
-                equals => self.draw(table, state, equals, rng),
+        // One number decides both: where it falls below ε, its place there is uniform again.
+        let drawn: f64 = rng.random();
+        let explores = drawn < epsilon;
+        let tied = table.equals(state) > 1 && self.ties == Ties::Random;
+        if table.is_restricted() | (tied & !explores) {
+            let share = match explores {
+                true => drawn / epsilon,
+                false => (drawn - epsilon) / (1.0 - epsilon),
             };
+            return self.draw(table, state, share, explores);
         }
-        let Some(mask) = table.mask_row(state) else {
-            return Action(rng.random_range(0..table.actions()));
-        };
-        let offered = mask.iter().filter(|&&offered| offered).count();
-        let drawn = rng.random_range(0..offered.max(1));
-        table.offered(state).nth(drawn).unwrap_or(lowest)
+        if explores {
+            return Action(part(drawn / epsilon, table.actions()));
+        }
+        table.best(state)
     }
 
     fn probabilities(&self, table: &QTable, state: State, probabilities: &mut [f64]) -> bool {
@@ -103,6 +114,13 @@ impl Policy for EpsilonGreedy {
     fn begin_episode(&mut self) {
         self.clock.begin_episode();
     }
+}
+
+/// Returns the part, of `count` equal ones, that a number of `0..1` falls into.
+#[inline(always)]
+fn part(share: f64, count: usize) -> usize {
+    // As a signed number, which the processor converts at once.
+    ((share * count as i64 as f64) as i64 as usize).min(count.saturating_sub(1))
 }
 
 /// Returns `true` for an action of the highest value.

@@ -67,6 +67,12 @@ impl QTable {
         Some(&mask[self.start(state)..][..self.actions])
     }
 
+    /// Returns `true` if some state does not offer all actions.
+    #[inline(always)]
+    pub(crate) fn is_restricted(&self) -> bool {
+        self.mask.is_some()
+    }
+
     /// Returns `true` if a state offers an action.
     #[inline]
     pub fn allows(&self, state: State, action: Action) -> bool {

@@ -269,7 +269,7 @@ impl<L: Learner, P: Policy> Actor for Pair<'_, L, P> {
         self.table.meet(environment, state)
     }
 
-    #[inline]
+    #[inline(always)]
     fn choose(
         &mut self,
         state: State,
@@ -286,7 +286,7 @@ impl<L: Learner, P: Policy> Actor for Pair<'_, L, P> {
         self.table.check_choice(state, action).map(|()| action)
     }
 
-    #[inline]
+    #[inline(always)]
     fn learn(
         &mut self,
         state: State,

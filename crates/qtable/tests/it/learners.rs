@@ -62,7 +62,7 @@ fn every_learner_walks_along_the_cliff_in_13_steps() {
         let points = [(0, 0.5), (actions / 2, 0.05), (actions * 3 / 4, 0.0)];
         let policy = policy(Schedule::piecewise(&points).unwrap());
         let table = zeros(48, 4);
-        let training = trained(&mut toy, table, learner, policy, (200, actions, 5));
+        let training = trained(&mut toy, table, learner, policy, (200, actions, 6));
         let found = toy.assess(&training.table().greedy(), 0.99, 200).unwrap();
         assert_near!(found.success, 1.0, 1e-12, name);
         // Those that learn the policy that acts, exploration included, have learned to keep away
@@ -86,7 +86,7 @@ fn off_policy_learners_find_the_optimum_on_slippery_ice() {
             continue;
         }
         let (table, policy) = (zeros(16, 4), policy(constant(0.5)));
-        let training = trained(&mut toy, table, learner, policy, (200, actions, 8));
+        let training = trained(&mut toy, table, learner, policy, (200, actions, 6));
         let [found, best] = toy.compare(training.table(), gamma, 10_000).unwrap();
         assert!(found.value >= 0.999 * best.value, "{name}: {found:?}");
         // Double Q, with half the updates for each table, comes from below.
