@@ -7,6 +7,9 @@ use crate::error::{
 };
 use crate::region::Region;
 
+/// Pixels beyond the outline that are searched, for the edges of it.
+const MARGIN: f64 = 16.0;
+
 /// Rules by which the transforms report a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -30,7 +33,8 @@ pub struct Acceptance {
     /// Smallest distance between the centres of two circles, pixels (default 8; at least 0). 0
     /// allows concentric circles.
     pub min_distance: f64,
-    /// Region in which the centre must lie (default None: anywhere, even outside the frame).
+    /// Region in which the centre must lie (default None: anywhere, even outside the frame). Only
+    /// the region and what lies within `max_radius` of it are searched.
     pub region: Option<Region>,
     /// Fits an accepted circle to its edge pixels by least squares (default true). Three whole
     /// pixels give the centre to about a pixel, the fit to a twentieth; it goes beyond the paper.
@@ -73,6 +77,20 @@ impl Acceptance {
     pub(crate) fn check_frame(&self, width: u32, height: u32) -> Result<(), FrameRefused> {
         self.region
             .map_or(Ok(()), |region| region.check_frame(width, height))
+    }
+
+    /// The part of a frame that is searched: the region and what lies within the largest radius of
+    /// it.
+    pub(crate) fn part(&self, width: u32, height: u32) -> Region {
+        let whole = Region {
+            left: 0,
+            top: 0,
+            width,
+            height,
+        };
+        let reach = self.max_radius + self.tolerance + MARGIN;
+        self.region
+            .map_or(whole, |region| region.grown(reach, width, height))
     }
 
     /// The radius, if only one is allowed.

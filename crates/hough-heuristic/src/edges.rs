@@ -109,6 +109,21 @@ impl EdgeMap {
         self.repaint(width, height, |bytes, _, _| bytes.fill(0));
     }
 
+    /// Makes this the map of a frame of this size with only these edges, of a part of it whose
+    /// corner is (left, top).
+    pub(crate) fn place(&mut self, part: &Self, (left, top): (u32, u32), size: (u32, u32)) {
+        let (width, height) = size;
+        self.repaint(width, height, |bytes, pixels, gradients| {
+            bytes.fill(0);
+            for &EdgePixel { x, y } in &part.pixels {
+                let (x, y) = (x + left, y + top);
+                bytes[y as usize * width as usize + x as usize] = 255;
+                pixels.push(EdgePixel { x, y });
+            }
+            gradients.extend_from_slice(&part.gradients);
+        });
+    }
+
     /// Gives the map the size of a frame and lets `paint` set the image, whose old content is of no
     /// meaning, and the lists, which come empty.
     pub(crate) fn repaint(

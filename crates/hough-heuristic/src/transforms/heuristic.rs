@@ -114,8 +114,9 @@ impl<E: EdgeDetector> Heuristic<E> {
 
 impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
     fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
-        let accept = self.frames.accept;
-        accept.check_frame(frame.width(), frame.height())?;
+        self.frames
+            .accept
+            .check_frame(frame.width(), frame.height())?;
         self.sampler.restart();
         Ok(self.frames.run(frame, |pass| {
             for _ in 0..self.iterations {
@@ -124,7 +125,7 @@ impl<E: EdgeDetector> CircleDetector for Heuristic<E> {
                 };
                 let near = &pass.unexplained.near;
                 let promising = |circle: &Circle| {
-                    accept.admits(circle, pass.found) && near.promising(circle, &self.probes)
+                    pass.accept.admits(circle, pass.found) && near.promising(circle, &self.probes)
                 };
                 let Some(circle) = drawn.filter(promising) else {
                     continue;

@@ -13,6 +13,7 @@ use crate::curve::Curve;
 use crate::detect::Detection;
 use crate::edges::{EdgeDetector, EdgeMap};
 use crate::error::ConfigError;
+use crate::region::Region;
 use crate::stages::Stages;
 
 /// The parts that the three transforms share.
@@ -20,6 +21,9 @@ use crate::stages::Stages;
 pub(super) struct Frames<E> {
     edge_detector: E,
     pub(super) accept: Acceptance,
+    /// The part of the frame that is searched, and its edges in the whole frame, if it is not all
+    /// of the frame.
+    window: Option<(GrayImage, EdgeMap)>,
     unexplained: Unexplained,
     /// For circles that are still off by more than the tolerance in places.
     rough: Probes,
@@ -34,7 +38,8 @@ pub(super) struct Frames<E> {
 /// One frame, ready for a search.
 #[derive(Debug)]
 pub(super) struct Pass<'a> {
-    accept: &'a Acceptance,
+    /// The rules, with the region in pixels of what is searched.
+    pub(super) accept: &'a Acceptance,
     pub(super) edges: &'a EdgeMap,
     pub(super) unexplained: &'a mut Unexplained,
     rough: &'a Probes,
@@ -51,6 +56,7 @@ impl<E: EdgeDetector> Frames<E> {
         Ok(Self {
             edge_detector,
             accept,
+            window: None,
             unexplained: Unexplained::new(accept.tolerance),
             rough: Probes::new(0.6 * accept.theta),
             around: Vec::new(),
@@ -68,7 +74,27 @@ impl<E: EdgeDetector> Frames<E> {
     ) -> &[Detection] {
         self.found.clear();
         let start = clock::now();
-        let edges = self.edge_detector.detect_edges(frame);
+        let (width, height) = frame.dimensions();
+        let part = self.accept.part(width, height);
+        let mut accept = self.accept;
+        let edges = match (accept.region, &mut self.window) {
+            (Some(region), window) if (part.width, part.height) != (width, height) => {
+                accept.region = Some(Region {
+                    left: region.left - part.left,
+                    top: region.top - part.top,
+                    ..region
+                });
+                let (cut, shown) = window.get_or_insert_default();
+                *cut = part.cut(frame, std::mem::take(cut));
+                let edges = self.edge_detector.detect_edges(cut);
+                shown.place(edges, (part.left, part.top), (width, height));
+                edges
+            }
+            (_, window) => {
+                *window = None;
+                self.edge_detector.detect_edges(frame)
+            }
+        };
         let with_edges = clock::now();
         self.unexplained.fill(edges);
         // A circle has at most all of them around, so that what is found does not decide who
@@ -80,7 +106,7 @@ impl<E: EdgeDetector> Frames<E> {
             candidates.clear();
         }
         search(&mut Pass {
-            accept: &self.accept,
+            accept: &accept,
             edges,
             unexplained: &mut self.unexplained,
             rough: &self.rough,
@@ -89,6 +115,11 @@ impl<E: EdgeDetector> Frames<E> {
             candidates: self.candidates.as_mut(),
         });
         rank(&mut self.found);
+        let found = self.found.iter_mut().map(|found| &mut found.circle);
+        for circle in found.chain(self.candidates.iter_mut().flatten()) {
+            circle.x += f64::from(part.left);
+            circle.y += f64::from(part.top);
+        }
         self.times = [
             clock::between(start, with_edges),
             clock::between(with_edges, with_structure),
@@ -106,7 +137,10 @@ impl<E: EdgeDetector> Frames<E> {
         let [edge_time, structure_time, search_time] = self.times;
         let around = size_of::<(f64, f64)>() * self.around.capacity();
         Stages {
-            edges: self.edge_detector.edges(),
+            edges: match &self.window {
+                Some((_, edges)) => edges,
+                None => self.edge_detector.edges(),
+            },
             candidates: self.candidates.as_deref().unwrap_or_default(),
             tolerance: self.accept.tolerance,
             memory: self.unexplained.memory() + around + search,

@@ -123,7 +123,7 @@ impl<E: EdgeDetector> CircleDetector for RandomizedHough<E> {
                 };
                 let usable = |circle: &Circle| {
                     radii.contains(&circle.radius)
-                        && accept.region.is_none_or(|region| region.holds(circle))
+                        && pass.accept.region.is_none_or(|region| region.holds(circle))
                 };
                 let mean = drawn
                     .filter(usable)

@@ -170,11 +170,12 @@ impl<E: EdgeDetector> StandardHough<E> {
     /// Refuses a frame whose accumulator would take too much memory.
     fn check_frame(&self, width: u32, height: u32) -> Result<(), FrameRefused> {
         self.config.accept.check_frame(width, height)?;
+        let part = self.config.accept.part(width, height);
         let side = |pixels: u32| (f64::from(pixels) / self.config.cell).ceil() as u64;
-        let layers = self.fitting(width, height) as u64;
-        let needed = [side(height), layers, size_of::<u16>() as u64]
+        let layers = self.fitting(part.width, part.height) as u64;
+        let needed = [side(part.height), layers, size_of::<u16>() as u64]
             .into_iter()
-            .fold(side(width), u64::saturating_mul);
+            .fold(side(part.width), u64::saturating_mul);
         let limit = self.config.max_memory;
         if needed <= limit {
             return Ok(());
@@ -191,7 +192,8 @@ impl<E: EdgeDetector> StandardHough<E> {
 impl<E: EdgeDetector> CircleDetector for StandardHough<E> {
     fn detect(&mut self, frame: &GrayImage) -> Result<&[Detection], FrameRefused> {
         self.check_frame(frame.width(), frame.height())?;
-        let rings = &self.rings[..self.fitting(frame.width(), frame.height())];
+        let part = self.config.accept.part(frame.width(), frame.height());
+        let rings = &self.rings[..self.fitting(part.width, part.height)];
         let StandardHoughConfig {
             accept,
             cell,

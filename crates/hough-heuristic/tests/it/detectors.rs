@@ -1,6 +1,6 @@
 //! Properties of every detector.
 
-use hough_heuristic::image::{GrayImage, imageops};
+use hough_heuristic::image::{GrayImage, Luma, imageops};
 use hough_heuristic::{
     AContrario, AContrarioConfig, Acceptance, Canny, CannyConfig, Circle, CircleDetector,
     RandomizedHough, RandomizedHoughConfig, Region,
@@ -132,6 +132,55 @@ fn the_region_bounds_the_centre() {
         assert!(expected < balls.len());
         assert_eq!(found.len(), expected, "{name}: {found:?}");
     }
+}
+
+#[test]
+fn the_region_of_a_transform_bounds_the_work() {
+    // A ball in a corner of a large frame whose rest is texture.
+    let inside = |x: u32, y: u32| (f64::from(x) - 840.0).hypot(f64::from(y) - 650.0) < 30.0;
+    let frame = GrayImage::from_fn(960, 720, |x, y| {
+        let texture = x < 700 && (x / 3 + y / 3) % 2 == 0;
+        Luma([if inside(x, y) || texture { 200 } else { 60 }])
+    });
+    let region = Region {
+        left: 800,
+        top: 600,
+        width: 100,
+        height: 100,
+    };
+    let accept = Acceptance {
+        region: Some(region),
+        ..ACCEPT
+    };
+    for (name, mut detector) in all_on(accept, CannyConfig::default()) {
+        detector.keep_candidates(true);
+        let found = detector.detect(&frame).unwrap().to_vec();
+        assert_eq!(found.len(), 1, "{name}: {found:?}");
+        let truth = Circle {
+            x: 840.0,
+            y: 650.0,
+            radius: 30.0,
+        };
+        assert!(same(&found[0].circle, &truth, 0.7), "{name}: {found:?}");
+        let stages = detector.stages();
+        assert_eq!(stages.edges.image().dimensions(), (960, 720), "{name}");
+        let mut edges = stages.edges.pixels().iter();
+        assert!(edges.all(|pixel| pixel.x > 730 && pixel.y > 530), "{name}");
+        let mut candidates = stages.candidates.iter();
+        assert!(
+            candidates.all(|circle| region_holds(&region, circle)),
+            "{name}"
+        );
+        // The accumulator of the whole frame has ten times as many cells.
+        assert!(stages.memory < 2_000_000, "{name}: {}", stages.memory);
+    }
+}
+
+fn region_holds(region: &Region, circle: &Circle) -> bool {
+    let inside = |at: f64, start: u32, length: u32| {
+        (-2.0..=f64::from(length) + 2.0).contains(&(at - f64::from(start)))
+    };
+    inside(circle.x, region.left, region.width) && inside(circle.y, region.top, region.height)
 }
 
 /// Of a circle that owns the share p of the edges a draw of two hits p^2, of three p^3.
