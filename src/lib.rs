@@ -1,4 +1,6 @@
-//! See a ball, learn to reach it, and move a real arm to it.
+//! See a ball, learn to reach it, and move a real arm to it, after *the paper*: C. Distante,
+//! A. Anglani and F. Taurisano, "Target Reaching by Using Visual Information and Q-learning
+//! Controllers", Autonomous Robots 9 (2000), 41-50.
 //!
 //! Five libraries, each usable on its own, and this package over them:
 //!

@@ -1,4 +1,6 @@
-//! The controller of the paper: circles into joint moves.
+//! The controller of the paper: circles into joint moves. *The paper* is C. Distante, A. Anglani
+//! and F. Taurisano, "Target Reaching by Using Visual Information and Q-learning Controllers",
+//! Autonomous Robots 9 (2000), 41-50.
 //!
 //! A ball of known size lies somewhere in reach of a PUMA 560 with a camera on its hand. Two
 //! behaviours, learned separately by Q-learning, bring the hand to it: *centering* turns the first
