@@ -42,10 +42,8 @@ impl Thing {
             _ => 0.5 * w + rng.random_range(-20.0..20.0),
         };
         let y = 0.5 * h + rng.random_range(-20.0..20.0);
-        let (turn, sign) = (
-            rng.random_range(0.0..TAU),
-            if seed % 2 == 0 { 1.0 } else { -1.0 },
-        );
+        let turn = rng.random_range(0.0..TAU);
+        let sign = 1.0 - 2.0 * (seed % 2) as f64;
         let soft = |inside: f64| (inside + 0.5).clamp(0.0, 1.0);
         let mut frame = GrayImage::from_fn(WIDTH, HEIGHT, |column, row| {
             let (dx, dy) = (f64::from(column) - x, f64::from(row) - y);

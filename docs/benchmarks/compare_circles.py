@@ -236,9 +236,9 @@ def run_ours(name, frames, options, found, scratch):
         str(options.max_radius),
         "--max-circles",
         "32",
-        "--seed",
-        str(options.detector_seed),
     ]
+    if not name.startswith("sht"):
+        command += ["--seed", str(options.detector_seed)]
     subprocess.run(command + [frame.path for frame in frames], check=True)
     by_path = {frame.path: result for frame, result in zip(frames, found)}
     for result in found:

@@ -77,6 +77,7 @@ impl Detector {
                 height,
             }),
             seed,
+            ..default
         };
         let detector = AContrario::new(config).map_err(value_error)?;
         Ok(Self {

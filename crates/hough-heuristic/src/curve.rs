@@ -6,6 +6,7 @@ mod line;
 
 pub(crate) use circle::{circles_of_radius, longest_outline};
 pub use ellipse::Ellipse;
+pub(crate) use ellipse::solve;
 pub use line::Line;
 
 use crate::edges::EdgePixel;

@@ -27,9 +27,9 @@
 //!
 //! # Detectors
 //!
-//! * [`AContrario`]: for photographs. It finds any number of circles, each with its number of false
-//!   alarms and standard errors, in bounded work. It goes beyond the paper.
-//!   [`detect_circles`] calls it for a single frame.
+//! * [`AContrario`]: for photographs. It finds any number of circles, and ellipses if asked for,
+//!   each with its number of false alarms and standard errors, in bounded work. It goes beyond the
+//!   paper. [`detect_circles`] calls it for a single frame.
 //! * [`Heuristic`]: the detector of the paper that this project follows (section 2.1), a random
 //!   search whose only memory is the edges.
 //! * [`RandomizedHough`] and [`StandardHough`]: the two transforms that the paper compares it with.
@@ -67,8 +67,11 @@
 //! it), and few in a dozen dashes with gaps as long. The other detectors go by the belonging β, the
 //! share of the circle's pixels that are edges, whatever the direction of those edges. Where edges
 //! cover more than a tenth of the picture, as in grass or gravel, chance lifts β above any useful
-//! threshold θ ([`Acceptance::theta`]). A sphere far off the optical axis projects to an ellipse,
-//! which a larger `tolerance` accepts up to a point.
+//! threshold θ ([`Acceptance::theta`]). A sphere far off the optical axis projects to an ellipse:
+//! [`AContrarioConfig::min_axis_ratio`] finds it, a larger `tolerance` accepts it up to a point.
+//!
+//! *The paper* is C. Distante, A. Anglani and F. Taurisano, "Target Reaching by Using Visual
+//! Information and Q-learning Controllers", Autonomous Robots 9 (2000), 41-50.
 
 mod a_contrario;
 mod acceptance;
@@ -81,14 +84,16 @@ mod error;
 mod frame;
 #[cfg(feature = "files")]
 mod output;
-#[cfg(feature = "cli")]
+#[cfg(feature = "program")]
 mod program;
 mod region;
 mod sampling;
 mod stages;
 mod transforms;
 
-pub use a_contrario::{AContrario, AContrarioConfig, Effort, Measurement, Rings, detect_circles};
+pub use a_contrario::{
+    AContrario, AContrarioConfig, Effort, MeasuredEllipse, Measurement, Rings, detect_circles,
+};
 pub use acceptance::Acceptance;
 pub use circle::{Circle, Features};
 pub use curve::{Curve, Ellipse, Line};
@@ -101,7 +106,7 @@ pub use error::ConfigError;
 pub use frame::{Channel, ImageFiles};
 pub use frame::{FrameError, FrameSource, FrameStream, Y4mWriter};
 pub use image;
-#[cfg(feature = "cli")]
+#[cfg(feature = "program")]
 pub use program::run_detect_circles;
 pub use region::Region;
 pub use stages::Stages;

@@ -1,4 +1,4 @@
-//! The program `detect_circles`, which finds circles in image files (feature `cli`).
+//! The program `detect_circles`, which finds circles in image files (feature `program`).
 
 #![allow(
     clippy::print_stdout,
@@ -22,7 +22,7 @@ use crate::region::Region;
 use detector::Staged;
 use results::{Results, writable_folder};
 
-/// Find circles in images: PNG, JPEG, PGM, BMP or TIFF files, or folders of them.
+/// Find circles in images: PNG, JPEG, PGM, BMP or (feature `tiff`) TIFF files, or folders of them.
 ///
 /// Without --csv the circles are printed as a table. Coordinates are pixels of the picture as
 /// viewers show it, (0,0) being the centre of the top-left pixel. The exit code is 1 when a file
@@ -67,6 +67,10 @@ struct Options {
     #[arg(long, value_enum)]
     rings: Option<Rings>,
 
+    /// Least ratio of the axes: below 1 ellipses are found too [default: 1; a-contrario only]
+    #[arg(long, value_name = "RATIO")]
+    min_axis_ratio: Option<f64>,
+
     /// Least contrast of an edge, gray levels [default: 8; a-contrario only]
     #[arg(long, value_name = "LEVELS")]
     contrast: Option<f64>,
@@ -88,13 +92,14 @@ struct Options {
     )]
     repeat: u32,
 
-    /// Seed of the random sampling
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    /// Seed of the random sampling [default: 1; not for sht and sht-gradient, which draw nothing]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
 
     /// Write the circles to FILE, a row a circle, best first; `-` is standard output. The columns
     /// are file,cx,cy,r,score and, from a-contrario, covered,visible,axis_ratio,centre_error,
-    /// radius_error
+    /// radius_error; with --min-axis-ratio also major,minor,angle,major_error,minor_error,
+    /// angle_error: half-axes in pixels, angles in degrees from the x axis toward the y axis
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 

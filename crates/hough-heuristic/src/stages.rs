@@ -3,8 +3,8 @@
 #[cfg(feature = "files")]
 mod pictures;
 
-#[cfg(feature = "cli")]
-pub(crate) use pictures::with_circles;
+#[cfg(feature = "program")]
+pub(crate) use pictures::{with_circles, with_ellipses};
 
 use std::time::Duration;
 
@@ -24,7 +24,8 @@ pub struct Stages<'a> {
     pub candidates: &'a [Circle],
     /// Distance within which an edge pixel matches a circle's pixel, pixels.
     pub tolerance: f64,
-    /// Memory that the circle search holds, bytes, edges not included.
+    /// Memory that the circle search holds, bytes, edges not included; 0 from
+    /// [`AContrario`](crate::AContrario), as all times are.
     pub memory: usize,
     /// Wall-clock time of finding the edges. All times are zero where there is no clock
     /// (`wasm32-unknown-unknown`).

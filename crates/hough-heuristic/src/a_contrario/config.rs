@@ -32,6 +32,11 @@ pub struct AContrarioConfig {
     /// Smallest distance between the centres of two circles, pixels (default 0: any; at least 0).
     /// Of two nearer ones the better is reported.
     pub min_distance: f64,
+    /// Smallest ratio of the half-axes of an outline (default 1: circles only; 0.3..=1). Below 1
+    /// ellipses are found beside the circles, and each [`Measurement`](crate::Measurement) has one.
+    /// The radii of an ellipse, from the shorter half-axis to the longer, must overlap the range.
+    /// It takes several times as long.
+    pub min_axis_ratio: f64,
     /// Smallest score reported (default 0.5, which bounds circles of pure chance by one in ten
     /// frames; 0..=1). Larger values drop things that are hardly round. Smaller values add mostly
     /// circles of chance.
@@ -64,6 +69,7 @@ impl Default for AContrarioConfig {
             max_circles: usize::MAX,
             rings: Rings::All,
             min_distance: 0.0,
+            min_axis_ratio: 1.0,
             min_score: 0.5,
             contrast: 8.0,
             draws_per_megapixel: 50_000,
@@ -83,6 +89,9 @@ impl AContrarioConfig {
         let distance = self.min_distance;
         let usable = distance.is_finite() && distance >= 0.0;
         require("min_distance", distance, "finite and at least 0 px", usable)?;
+        let ratio = self.min_axis_ratio;
+        let usable = (0.3..=1.0).contains(&ratio);
+        require("min_axis_ratio", ratio, "0.3..=1", usable)?;
         require("min_score", score, "0..=1", (0.0..=1.0).contains(&score))?;
         let usable = contrast > 0.0 && contrast <= 128.0;
         require("contrast", contrast, "above 0..=128", usable)?;

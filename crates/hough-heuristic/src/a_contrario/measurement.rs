@@ -1,6 +1,7 @@
 //! The results of the detector beside its detections.
 
 use crate::circle::Circle;
+use crate::curve::Ellipse;
 
 /// A circle found by [`AContrario`](crate::AContrario), with its standard errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +23,39 @@ pub struct Measurement {
     pub visible: f64,
     /// Share of that on which the strongest edge nearby is the outline, 0..=1.
     pub covered: f64,
+    /// The outline as an ellipse; `None` unless
+    /// [`min_axis_ratio`](crate::AContrarioConfig::min_axis_ratio) is below 1. `circle` then has
+    /// its area and centre.
+    pub ellipse: Option<MeasuredEllipse>,
+}
+
+/// An ellipse with its standard errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MeasuredEllipse {
+    /// The ellipse, in pixels of the frame.
+    pub ellipse: Ellipse,
+    /// Standard error of the centre along x and along y, pixels.
+    pub centre_error: f64,
+    /// Standard error of the longer half-axis, pixels.
+    pub major_error: f64,
+    /// Standard error of the shorter half-axis, pixels.
+    pub minor_error: f64,
+    /// Standard error of the angle, radians; 0.9 where the axes are too alike to tell it.
+    pub angle_error: f64,
+}
+
+impl Measurement {
+    /// Returns the measurement in a frame whose corner lies farther left and up by (x, y).
+    pub(super) fn moved(mut self, x: f64, y: f64) -> Self {
+        self.circle.x += x;
+        self.circle.y += y;
+        if let Some(measured) = &mut self.ellipse {
+            measured.ellipse.x += x;
+            measured.ellipse.y += y;
+        }
+        self
+    }
 }
 
 /// The work that the last frame took.

@@ -41,8 +41,7 @@ impl AContrario {
         self.window = window;
         self.show(frame, part);
         for measurement in &mut self.measurements {
-            measurement.circle.x += f64::from(part.left);
-            measurement.circle.y += f64::from(part.top);
+            *measurement = measurement.moved(part.left.into(), part.top.into());
         }
         Ok(())
     }

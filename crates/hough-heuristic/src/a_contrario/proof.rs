@@ -134,7 +134,7 @@ impl Proof {
     }
 
     /// Largest distance from another outline of edges that belong to it, pixels of the frame.
-    fn slack_in_frame(&self) -> f32 {
+    pub(super) fn slack_in_frame(&self) -> f32 {
         (self.slack + MORE_SLACK) * (1 << self.depth) as f32
     }
 

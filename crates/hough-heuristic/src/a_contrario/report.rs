@@ -111,6 +111,7 @@ impl AContrario {
                     axis_ratio: measured.axis_ratio().into(),
                     visible: proof.visible.into(),
                     covered: proof.covered.into(),
+                    ellipse: None,
                 });
             }
             self.reported.push(measured.ring);

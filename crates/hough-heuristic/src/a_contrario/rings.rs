@@ -8,7 +8,7 @@ use crate::circle::Circle;
 /// Two circles are about one centre if one lies in the other and their centres are apart by at most
 /// a tenth of the larger radius and 1 px.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Rings {
@@ -24,7 +24,8 @@ pub enum Rings {
 impl AContrario {
     /// Returns `true` if the settings ask for a choice among the circles found.
     fn chooses(&self) -> bool {
-        self.config.rings != Rings::All || self.config.min_distance > 0.0
+        let config = &self.config;
+        config.rings != Rings::All || config.min_distance > 0.0 || config.min_axis_ratio < 1.0
     }
 
     /// Returns the number of circles with which the report ends; a choice needs all.

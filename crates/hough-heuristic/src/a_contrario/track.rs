@@ -72,17 +72,7 @@ impl AContrario {
         self.find(&window, radii);
         self.config.region = region;
         self.window = window;
-        let moved = |measurement: &Measurement| {
-            let circle = Circle {
-                x: measurement.circle.x + f64::from(left),
-                y: measurement.circle.y + f64::from(top),
-                ..measurement.circle
-            };
-            Measurement {
-                circle,
-                ..*measurement
-            }
-        };
+        let moved = |measurement: &Measurement| measurement.moved(left.into(), top.into());
         self.measurements.iter().map(moved).find(|measurement| {
             let circle = &measurement.circle;
             let off = ((circle.x - last.x).powi(2) + (circle.y - last.y).powi(2)).sqrt();

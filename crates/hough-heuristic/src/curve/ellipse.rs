@@ -31,33 +31,15 @@ impl Ellipse {
             sin * sin * u + cos * cos * v,
         )
     }
-}
 
-impl Curve for Ellipse {
-    const PARAMETERS: usize = 5;
-
-    /// The ellipse through five pixels; none if two are nearer than 3 px, or the conic through them
-    /// is another one, or a half-axis is below one pixel.
-    fn through(pixels: &[EdgePixel]) -> Option<Self> {
-        if pixels.len() != Self::PARAMETERS || crowded(pixels) {
-            return None;
-        }
-        // Relative to the mean and in units of the spread, for numbers of one size.
-        let mean = |of: fn(&EdgePixel) -> u32| {
-            pixels.iter().map(|pixel| f64::from(of(pixel))).sum::<f64>() / 5.0
-        };
-        let (mx, my) = (mean(|pixel| pixel.x), mean(|pixel| pixel.y));
-        let points: [(f64, f64); 5] =
-            std::array::from_fn(|k| (f64::from(pixels[k].x) - mx, f64::from(pixels[k].y) - my));
-        let spread = points
-            .iter()
-            .fold(0.0f64, |most, (x, y)| most.max(x.abs()).max(y.abs()));
-        let rows = points.map(|(x, y)| {
-            let (x, y) = (x / spread, y / spread);
-            [x * x, x * y, y * y, x, y, -1.0]
-        });
-        let [a, b, c, d, e] = solve(rows)?;
-        // a x^2 + b x y + c y^2 + d x + e y + 1 = 0.
+    /// The ellipse `a x^2 + b x y + c y^2 + d x + e y + 1 = 0` in coordinates relative to a place
+    /// and in units of `spread`; none if the conic is another one, or a half-axis is below one
+    /// pixel.
+    pub(crate) fn of_conic(
+        [a, b, c, d, e]: [f64; 5],
+        (mx, my): (f64, f64),
+        spread: f64,
+    ) -> Option<Self> {
         let discriminant = 4.0 * a * c - b * b;
         if discriminant <= 1e-9 * (a * a + b * b + c * c) {
             return None;
@@ -95,6 +77,33 @@ impl Curve for Ellipse {
         };
         (minor >= 1.0 && ellipse.x.is_finite() && ellipse.y.is_finite() && major < 1e6)
             .then_some(ellipse)
+    }
+}
+
+impl Curve for Ellipse {
+    const PARAMETERS: usize = 5;
+
+    /// The ellipse through five pixels; none if two are nearer than 3 px, or the conic through them
+    /// is another one, or a half-axis is below one pixel.
+    fn through(pixels: &[EdgePixel]) -> Option<Self> {
+        if pixels.len() != Self::PARAMETERS || crowded(pixels) {
+            return None;
+        }
+        // Relative to the mean and in units of the spread, for numbers of one size.
+        let mean = |of: fn(&EdgePixel) -> u32| {
+            pixels.iter().map(|pixel| f64::from(of(pixel))).sum::<f64>() / 5.0
+        };
+        let (mx, my) = (mean(|pixel| pixel.x), mean(|pixel| pixel.y));
+        let points: [(f64, f64); 5] =
+            std::array::from_fn(|k| (f64::from(pixels[k].x) - mx, f64::from(pixels[k].y) - my));
+        let spread = points
+            .iter()
+            .fold(0.0f64, |most, (x, y)| most.max(x.abs()).max(y.abs()));
+        let rows = points.map(|(x, y)| {
+            let (x, y) = (x / spread, y / spread);
+            [x * x, x * y, y * y, x, y, -1.0]
+        });
+        Self::of_conic(solve(rows)?, (mx, my), spread)
     }
 
     /// Visits the nearest pixel of each column where the curve is nearer to the horizontal, and
@@ -166,7 +175,7 @@ impl Curve for Ellipse {
 
 /// Solves five linear equations, each given as coefficients and right-hand side; none if they are
 /// (nearly) dependent.
-fn solve(mut rows: [[f64; 6]; 5]) -> Option<[f64; 5]> {
+pub(crate) fn solve(mut rows: [[f64; 6]; 5]) -> Option<[f64; 5]> {
     for column in 0..5 {
         let pivot =
             (column..5).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))?;

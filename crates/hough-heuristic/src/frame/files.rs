@@ -8,7 +8,7 @@ use image::{DynamicImage, GrayImage, ImageDecoder, ImageReader, Luma};
 use crate::frame::{FrameError, FrameSource};
 
 /// The endings that a folder is searched for, in lower case.
-const ENDINGS: &[&str] = if cfg!(feature = "cli") {
+const ENDINGS: &[&str] = if cfg!(feature = "tiff") {
     &["png", "jpg", "jpeg", "pgm", "bmp", "tif", "tiff"]
 } else {
     &["png", "jpg", "jpeg", "pgm", "bmp"]
@@ -16,7 +16,7 @@ const ENDINGS: &[&str] = if cfg!(feature = "cli") {
 
 /// The part of a coloured picture that becomes the gray frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Channel {
     /// Brightness as the eye sees it.
@@ -71,7 +71,7 @@ impl Channel {
     }
 }
 
-/// A [`FrameSource`] over image files: PNG, JPEG, PGM and BMP, with the feature `cli` also TIFF.
+/// A [`FrameSource`] over image files: PNG, JPEG, PGM and BMP, with the feature `tiff` also TIFF.
 ///
 /// A picture is turned as its EXIF orientation says, so that coordinates are those that a viewer
 /// shows. Coloured pictures give their [`Channel`]; transparency is ignored. Values of 16 bits are

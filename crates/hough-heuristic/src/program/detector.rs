@@ -114,18 +114,20 @@ impl Options {
             max_circles: self.max_circles.unwrap_or(default.max_circles),
             rings: self.rings.unwrap_or(default.rings),
             min_distance: self.min_distance.unwrap_or(default.min_distance),
+            min_axis_ratio: self.min_axis_ratio.unwrap_or(default.min_axis_ratio),
             min_score: self.min_score.unwrap_or(default.min_score),
             contrast: self.contrast.unwrap_or(default.contrast),
             draws_per_megapixel: self.draws.unwrap_or(default.draws_per_megapixel),
             milliseconds_per_megapixel: self.time_limit,
             region: self.region,
-            seed: self.seed,
+            seed: self.seed.unwrap_or(default.seed),
         }
     }
 
     fn transform(&self) -> Result<Box<dyn Staged>, Box<dyn Error>> {
         for (option, given) in [
             ("--rings", self.rings.is_some()),
+            ("--min-axis-ratio", self.min_axis_ratio.is_some()),
             ("--contrast", self.contrast.is_some()),
             ("--draws", self.draws.is_some()),
             ("--time-limit", self.time_limit.is_some()),
@@ -134,6 +136,13 @@ impl Options {
                 return Err(format!("{option} is for --detector a-contrario only").into());
             }
         }
+        let (name, canny) = (self.detector, Canny::default());
+        if self.seed.is_some() && matches!(name, DetectorName::Sht | DetectorName::ShtGradient) {
+            return Err(
+                "--seed is for the detectors that draw, not for sht and sht-gradient".into(),
+            );
+        }
+        let seed = self.seed.unwrap_or(1);
         let default = Acceptance::default();
         let accept = Acceptance {
             theta: self.min_score.unwrap_or(default.theta),
@@ -144,7 +153,6 @@ impl Options {
             region: self.region,
             ..default
         };
-        let (name, seed, canny) = (self.detector, self.seed, Canny::default());
         Ok(match name {
             DetectorName::Rht | DetectorName::RhtAnywhere => {
                 let config = RandomizedHoughConfig {

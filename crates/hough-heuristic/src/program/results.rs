@@ -13,11 +13,14 @@ use super::Options;
 use super::detector::{Searched, Staged};
 use crate::a_contrario::Effort;
 use crate::circle::Circle;
+use crate::curve::Ellipse;
 use crate::detect::Detection;
 use crate::output::{write_png, write_whole};
-use crate::stages::with_circles;
+use crate::stages::{with_circles, with_ellipses};
 
 const COLUMNS: &str = "file,cx,cy,r,score,covered,visible,axis_ratio,centre_error,radius_error";
+/// Columns of ellipses, after those.
+const ELLIPSES: &str = ",major,minor,angle,major_error,minor_error,angle_error";
 
 /// The results so far.
 pub(super) struct Results<'a> {
@@ -68,7 +71,16 @@ impl<'a> Results<'a> {
         }
         if let (Some(folder), Some(colours)) = (&self.options.overlay, colours) {
             let name = unused_name(path, ".png", &mut self.overlays);
-            write_png(&folder.join(name), &with_circles(colours, &searched.found))?;
+            let ellipses: Vec<Ellipse> = detector.details().map_or(Vec::new(), |(all, _)| {
+                let ellipses = all.iter().filter_map(|measurement| measurement.ellipse);
+                ellipses.map(|measured| measured.ellipse).collect()
+            });
+            let picture = if ellipses.is_empty() {
+                with_circles(colours, &searched.found)
+            } else {
+                with_ellipses(colours, &ellipses)
+            };
+            write_png(&folder.join(name), &picture)?;
         }
         Ok(())
     }
@@ -88,7 +100,18 @@ impl<'a> Results<'a> {
                     let m = &measurements[index];
                     let (covered, visible, ratio) = (m.covered, m.visible, m.axis_ratio);
                     write!(self.csv, ",{covered:.3},{visible:.3},{ratio:.4}")?;
-                    writeln!(self.csv, ",{:.4},{:.4}", m.centre_error, m.radius_error)?;
+                    write!(self.csv, ",{:.4},{:.4}", m.centre_error, m.radius_error)?;
+                    if let Some(m) = &m.ellipse {
+                        let (ellipse, angle) = (m.ellipse, m.ellipse.angle.to_degrees());
+                        write!(
+                            self.csv,
+                            ",{:.3},{:.3},{angle:.3}",
+                            ellipse.major, ellipse.minor
+                        )?;
+                        write!(self.csv, ",{:.4},{:.4}", m.major_error, m.minor_error)?;
+                        write!(self.csv, ",{:.4}", m.angle_error.to_degrees())?;
+                    }
+                    writeln!(self.csv)?;
                 }
                 None => writeln!(self.csv, ",,,,,")?,
             }
@@ -104,7 +127,9 @@ impl<'a> Results<'a> {
 
     /// Writes the tables that were asked for.
     pub(super) fn write(&self) -> Result<(), Box<dyn Error>> {
-        let csv = format!("{COLUMNS}\n{}", self.csv);
+        let has_ellipses = self.options.min_axis_ratio.is_some_and(|ratio| ratio < 1.0);
+        let more = if has_ellipses { ELLIPSES } else { "" };
+        let csv = format!("{COLUMNS}{more}\n{}", self.csv);
         match &self.options.csv {
             Some(path) if path.as_os_str() == "-" => print_out(&csv),
             Some(path) => write_whole(path, csv.as_bytes())?,
@@ -148,6 +173,16 @@ fn print_table(name: &str, detector: &dyn Staged, searched: &Searched) {
             let m = &measurements[index];
             let (covered, centre, radius) = (100.0 * m.covered, m.centre_error, m.radius_error);
             table += &format!("  covered {covered:3.0} %  errors {centre:.2} and {radius:.2} px");
+            if let Some(Ellipse {
+                major,
+                minor,
+                angle,
+                ..
+            }) = m.ellipse.map(|m| m.ellipse)
+            {
+                let angle = angle.to_degrees();
+                table += &format!("  half-axes {major:.2} and {minor:.2} px at {angle:.1} degrees");
+            }
         }
         table.push('\n');
     }

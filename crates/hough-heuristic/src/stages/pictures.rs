@@ -8,6 +8,8 @@ use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 use super::Stages;
 use crate::circle::Circle;
 use crate::curve::Curve;
+#[cfg(feature = "program")]
+use crate::curve::Ellipse;
 use crate::detect::Detection;
 use crate::output::write_png;
 
@@ -69,13 +71,35 @@ pub(crate) fn with_circles(mut picture: RgbImage, found: &[Detection]) -> RgbIma
         for radius in [circle.radius - 0.5, circle.radius + 0.5] {
             draw(&mut picture, &Circle { radius, ..circle }, FOUND);
         }
-        let (x, y) = (circle.x.round() as i32, circle.y.round() as i32);
-        for step in -4..=4 {
-            plot(&mut picture, x.saturating_add(step), y, FOUND);
-            plot(&mut picture, x, y.saturating_add(step), FOUND);
-        }
+        cross(&mut picture, circle.x, circle.y);
     }
     picture
+}
+
+/// Draws ellipses and their centers into a picture.
+#[cfg(feature = "program")]
+pub(crate) fn with_ellipses(mut picture: RgbImage, ellipses: &[Ellipse]) -> RgbImage {
+    for &ellipse in ellipses {
+        for wider in [-0.5, 0.5] {
+            let (major, minor) = (ellipse.major + wider, ellipse.minor + wider);
+            let outline = Ellipse {
+                major,
+                minor,
+                ..ellipse
+            };
+            draw(&mut picture, &outline, FOUND);
+        }
+        cross(&mut picture, ellipse.x, ellipse.y);
+    }
+    picture
+}
+
+fn cross(picture: &mut RgbImage, x: f64, y: f64) {
+    let (x, y) = (x.round() as i32, y.round() as i32);
+    for step in -4..=4 {
+        plot(picture, x.saturating_add(step), y, FOUND);
+        plot(picture, x, y.saturating_add(step), FOUND);
+    }
 }
 
 fn darkened(frame: &GrayImage, divisor: u8) -> RgbImage {
@@ -84,8 +108,8 @@ fn darkened(frame: &GrayImage, divisor: u8) -> RgbImage {
     })
 }
 
-fn draw(picture: &mut RgbImage, circle: &Circle, color: Rgb<u8>) {
-    circle.outline(picture.width(), picture.height(), |x, y| {
+fn draw(picture: &mut RgbImage, curve: &impl Curve, color: Rgb<u8>) {
+    curve.outline(picture.width(), picture.height(), |x, y| {
         plot(picture, x, y, color);
         true
     });

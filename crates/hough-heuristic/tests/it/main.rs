@@ -11,6 +11,7 @@ mod any_frame;
 mod choice;
 mod curves;
 mod detectors;
+mod ellipses;
 mod heuristic;
 #[cfg(feature = "cli")]
 mod program;

@@ -144,10 +144,14 @@ fn options_reach_the_detector_and_wrong_ones_are_named() {
         (&["--contrast", "128"], 1),
         (&["--min-score", "1"], 0),
         (&["--detector", "rht", "--max-radius", "30"], 0),
-        (&["--detector", "rht", "--channel", "red"], 1),
+        (&["--detector", "rht", "--channel", "red", "--seed", "2"], 1),
+        (&["--min-axis-ratio", "0.5"], 1),
     ] {
         assert_eq!(rows(options).0, count, "{options:?}");
     }
+    let table = fs::read_to_string(&csv).unwrap();
+    let columns: Vec<_> = table.lines().map(|line| line.split(',').count()).collect();
+    assert_eq!(columns, [16, 16], "{table}");
     let (_, note) = rows(&["--time-limit", "0.000001"]);
     assert!(
         note.contains("ball.png") && note.contains("--time-limit"),
@@ -155,6 +159,12 @@ fn options_reach_the_detector_and_wrong_ones_are_named() {
     );
     for (options, named) in [
         (&["--detector", "sht", "--rings", "outer"][..], "--rings"),
+        (
+            &["--detector", "rht", "--min-axis-ratio", "0.5"],
+            "--min-axis-ratio",
+        ),
+        (&["--detector", "sht-gradient", "--seed", "2"], "--seed"),
+        (&["--min-axis-ratio", "0.2"], "min_axis_ratio"),
         (&["--region", "1,2,3"], "LEFT,TOP,WIDTH,HEIGHT"),
         (&["--time-limit", "0"], "milliseconds_per_megapixel"),
         (&["--region", "190,0,20,20"], "200x160"),
