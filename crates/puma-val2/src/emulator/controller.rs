@@ -29,7 +29,7 @@ pub enum Event {
     ArmPower(bool),
     /// The arm found its joint angles.
     Calibrated,
-    /// A motion began.
+    /// A motion began, from a stand or out of the motion before it.
     MotionStarted,
     /// The arm came to a stand.
     MotionEnded,

@@ -56,9 +56,11 @@ pub(crate) enum Instruction {
         unit: SpeedUnit,
         always: bool,
     },
-    /// `COARSE`, `FINE`, `NULL`, `NONULL`, `INTON`, `INTOFF`: accepted; the emulated servos settle
-    /// exactly.
-    Settling,
+    /// `NULL`, `NONULL`, `INTON`, `INTOFF`, `LOCK`: accepted; the emulated servos settle exactly.
+    Accepted,
+    /// `FINE` and `COARSE`: the arm stands at the end of the next motion or, with `ALWAYS`, of
+    /// every motion; or it does not.
+    Fine(bool, bool),
     Break,
     Signal(Vec<Expr>),
     Reset,
@@ -130,7 +132,7 @@ static WORDS: [(&str, Word); 72] = [
     ("CASE", Parse(case)),
     ("CLOSE", Parse(|c| hand(c, Gripper::Closed, false))),
     ("CLOSEI", Parse(|c| hand(c, Gripper::Closed, true))),
-    ("COARSE", Parse(settling)),
+    ("COARSE", Parse(|c| Ok(I::Fine(false, c.word("ALWAYS"))))),
     ("DECOMPOSE", Parse(decompose)),
     ("DELAY", Parse(|c| Expr::parse(c).map(I::Delay))),
     ("DEPART", Parse(|c| depart(c, false))),
@@ -143,7 +145,7 @@ static WORDS: [(&str, Word); 72] = [
     ("ENABLE", Parse(|c| switch(c, true))),
     ("END", Plain(I::End)),
     ("EXIT", Plain(I::LeaveLoop)),
-    ("FINE", Parse(settling)),
+    ("FINE", Parse(|c| Ok(I::Fine(true, c.word("ALWAYS"))))),
     ("FLIP", Plain(I::Posture(2, true))),
     ("FOR", Parse(for_loop)),
     ("GOTO", Parse(|c| label(c).map(I::Goto))),
@@ -155,7 +157,7 @@ static WORDS: [(&str, Word); 72] = [
     ("INTOFF", Parse(settling)),
     ("INTON", Parse(settling)),
     ("LEFTY", Plain(I::Posture(0, false))),
-    ("LOCK", Parse(|c| Expr::parse(c).map(|_| I::Settling))),
+    ("LOCK", Parse(|c| Expr::parse(c).map(|_| I::Accepted))),
     ("MOVE", Parse(|c| motion(c, false, false))),
     ("MOVES", Parse(|c| motion(c, true, false))),
     ("MOVEST", Parse(|c| motion(c, true, true))),
@@ -340,7 +342,7 @@ fn wait(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
 
 fn settling(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {
     cursor.word("ALWAYS");
-    Ok(I::Settling)
+    Ok(I::Accepted)
 }
 
 fn speed(cursor: &mut Cursor<'_>) -> Result<Instruction, Fault> {

@@ -6,7 +6,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::emulator::language::instruction::SpeedUnit;
 use crate::emulator::language::place::Place;
-use crate::emulator::machine::motion::{Motion, Pace};
+use crate::emulator::machine::motion::Motion;
+use crate::emulator::machine::path::{Leg, Pace};
 use crate::emulator::message::{Fault, Message};
 use crate::emulator::profile::Profile;
 use crate::joints::{Joint, Joints};
@@ -34,6 +35,9 @@ pub(crate) struct Arm {
     pub(crate) monitor_speed: f64,
     pub(crate) program_speed: Speed,
     next_speed: Option<Speed>,
+    /// `FINE`: the arm stands at the end of the next motion, or of every one.
+    pub(crate) fine_next: bool,
+    pub(crate) fine_always: bool,
 }
 
 /// A program speed.
@@ -95,6 +99,8 @@ impl Arm {
             monitor_speed: 100.0,
             program_speed: Speed::FULL,
             next_speed: None,
+            fine_next: false,
+            fine_always: false,
         }
     }
 
@@ -121,6 +127,25 @@ impl Arm {
         self.motion
             .as_ref()
             .map_or_else(|| self.shown(), Motion::target)
+    }
+
+    /// Returns the joint angles that the next motion starts from.
+    pub(crate) fn start(&self) -> Joints {
+        self.motion.as_ref().map_or(self.joints, Motion::target)
+    }
+
+    /// Returns the time from which on a motion can follow the present one without a stop between.
+    /// It is the time at which the arm slows down for its stand.
+    pub(crate) fn slows_down(&self) -> Option<Duration> {
+        let open = self.motion.as_ref().filter(|motion| motion.is_open());
+        open.map(Motion::slows_down)
+    }
+
+    /// Makes the arm stand at the end of the present motion, whatever follows.
+    pub(crate) fn close(&mut self) {
+        if let Some(motion) = &mut self.motion {
+            motion.closed = true;
+        }
     }
 
     /// Returns the hand in the world frame.
@@ -164,6 +189,7 @@ impl Arm {
         self.gripper_next = None;
         self.postures_next = [None; 3];
         self.next_speed = None;
+        self.fine_next = false;
     }
 
     pub(crate) fn set_gripper_next(&mut self, to: Gripper) {
@@ -193,7 +219,7 @@ impl Arm {
     fn check_limits(&self, joints: &Joints) -> Result<(), Fault> {
         let out = |joint: &Joint| {
             let range = self.params.ranges[joint.index()];
-            let (from, to) = (self.joints[*joint], joints[*joint]);
+            let (from, to) = (self.start()[*joint], joints[*joint]);
             !range.holds(to) && !range.inwards(from, to)
         };
         match Joint::ALL.into_iter().find(out) {
@@ -202,10 +228,8 @@ impl Arm {
         }
     }
 
-    fn pace(&mut self, profile: &Profile, speed: Option<Speed>) -> Pace {
-        let speed = speed
-            .or(self.next_speed.take())
-            .unwrap_or(self.program_speed);
+    fn pace(&self, profile: &Profile, speed: Option<Speed>) -> Pace {
+        let speed = speed.or(self.next_speed).unwrap_or(self.program_speed);
         let fraction = speed.fraction(profile.line_speed) * self.monitor_speed / 100.0;
         Pace {
             fraction: fraction.clamp(1e-4, 1.0),
@@ -213,28 +237,40 @@ impl Arm {
         }
     }
 
-    fn begin(&mut self, motion: Motion) {
+    /// Starts along a leg, after the present motion if there is one. Returns `false`, and changes
+    /// nothing, if the arm has to stand first.
+    fn begin(&mut self, leg: Leg, failure: Option<Fault>, now: Duration, pace: Pace) -> bool {
+        let begun = match &self.motion {
+            Some(motion) => motion.followed_by(leg, now),
+            None => Some(Motion::new(leg, now, pace, &self.params)),
+        };
+        let Some(mut motion) = begun else {
+            return false;
+        };
+        motion.closed = self.fine_next || self.fine_always;
+        motion.failure = failure;
         if let Some(gripper) = self.gripper_next.take() {
             self.gripper = gripper;
         }
-        self.postures_next = [None; 3];
+        self.forget_words();
         self.motion = Some(motion);
+        true
     }
 
-    /// Starts a joint-interpolated motion. `speed` overrides the program's.
+    /// Starts a joint-interpolated motion. `speed` overrides the program's. Returns `false` if the
+    /// arm has to stand first.
     pub(crate) fn start_joints(
         &mut self,
         to: Joints,
         speed: Option<Speed>,
         now: Duration,
         profile: &Profile,
-    ) -> Result<(), Fault> {
+    ) -> Result<bool, Fault> {
         self.check_ready()?;
         self.check_limits(&to)?;
         let pace = self.pace(profile, speed);
-        let motion = Motion::joint_interpolated(self.joints, to, now, pace, &self.params);
-        self.begin(motion);
-        Ok(())
+        let leg = Leg::straight(self.start(), to, pace, &self.params);
+        Ok(self.begin(leg, None, now, pace))
     }
 
     /// Returns the joint angles that reach a location, in the posture asked for or the present one.
@@ -243,30 +279,28 @@ impl Arm {
             Place::PrecisionPoint(joints) => return Ok(*joints),
             Place::Transformation(pose) => pose,
         };
-        let now = self.params.configuration(&self.joints).parts();
-        let [side_open, wrist_open] = self.between_postures();
+        let start = self.start();
+        let now = self.params.configuration(&start).parts();
+        let [side_open, wrist_open] = self.between_postures(&start);
         let fits = |c: Configuration, open: [bool; 3]| {
             let kept = |i: usize| open[i] || c.parts()[i] == now[i];
             (0..3).all(|i| self.postures_next[i].map_or(kept(i), |asked| asked == c.parts()[i]))
         };
         let keeps = |c| fits(c, [side_open, side_open, wrist_open]);
-        let reached = self.reach(pose, &self.joints, keeps);
+        let reached = self.reach(pose, &start, keeps);
         if self.keeps_posture {
             return reached;
         }
         let obeys = |c| fits(c, [true; 3]);
-        reached.or_else(|fault| self.reach(pose, &self.joints, obeys).map_err(|_| fault))
+        reached.or_else(|fault| self.reach(pose, &start, obeys).map_err(|_| fault))
     }
 
     /// Returns `true` for side and wrist if the arm stands so near to the border between two
     /// postures that it is in neither: the upright arm between left and right, the straight wrist
     /// between flip and no flip.
-    fn between_postures(&self) -> [bool; 2] {
-        let ahead = self.params.wrist_ahead(&self.joints);
-        [
-            ahead.abs() < 0.03,
-            self.joints.0[4].abs() < 0.1_f64.to_radians(),
-        ]
+    fn between_postures(&self, joints: &Joints) -> [bool; 2] {
+        let ahead = self.params.wrist_ahead(joints);
+        [ahead.abs() < 0.03, joints.0[4].abs() < 0.1_f64.to_radians()]
     }
 
     fn reach(
@@ -285,21 +319,23 @@ impl Arm {
             })
     }
 
-    /// Starts a straight-line motion of the hand, in the present posture.
+    /// Starts a straight-line motion of the hand, in the present posture. Returns `false` if the arm
+    /// has to stand first.
     pub(crate) fn start_line(
         &mut self,
         to: &Place,
         now: Duration,
         profile: &Profile,
-    ) -> Result<(), Fault> {
+    ) -> Result<bool, Fault> {
         self.check_ready()?;
+        let start = self.start();
         let to = match to {
             Place::Transformation(pose) => *pose,
             Place::PrecisionPoint(joints) => self.hand(joints),
         };
-        let from = self.hand(&self.joints);
-        let posture = self.params.configuration(&self.joints);
-        self.reach(&to, &self.joints, |c| c == posture)?;
+        let from = self.hand(&start);
+        let posture = self.params.configuration(&start);
+        self.reach(&to, &start, |c| c == posture)?;
         let length = (to.translation.vector - from.translation.vector).norm();
         let turn = from.rotation.angle_to(&to.rotation);
         // A knot every 5 mm or 2 degrees keeps the joint-interpolated chord within some micrometres
@@ -308,7 +344,7 @@ impl Arm {
             .max(turn / 2.0_f64.to_radians())
             .ceil()
             .clamp(1.0, 2000.0) as usize;
-        let mut knots = vec![self.joints];
+        let mut knots = vec![start];
         let mut failure = None;
         for i in 1..=spans {
             let part = i as f64 / spans as f64;
@@ -330,14 +366,12 @@ impl Arm {
         let travelled = (knots.len() - 1) as f64 / spans as f64;
         let mut pace = self.pace(profile, None);
         let seconds = (length / profile.line_speed).max(turn / profile.line_turn) * travelled;
-        let path_speed = pace.fraction / seconds.max(1e-6);
+        let seconds = seconds / pace.fraction;
         // A line's speed is a matter of the hand; the joints are held to their own limits at full
         // speed.
         pace.fraction = 1.0;
-        let mut motion = Motion::along(knots, now, path_speed, pace, &self.params);
-        motion.failure = failure;
-        self.begin(motion);
-        Ok(())
+        let leg = Leg::along(knots, seconds, pace, &self.params);
+        Ok(self.begin(leg, failure, now, pace))
     }
 
     /// Returns `place` moved by `distance` metres back along its own tool axis.
@@ -378,7 +412,9 @@ impl Arm {
                 self.joints.0[i] - by
             }
         }));
-        let knots = vec![self.joints, away, self.joints];
-        self.motion = Some(Motion::along(knots, now, f64::INFINITY, pace, &self.params));
+        let there = Leg::straight(self.joints, away, pace, &self.params);
+        let back = Leg::straight(away, self.joints, pace, &self.params);
+        let motion = Motion::new(there, now, pace, &self.params);
+        self.motion = motion.followed_by(back, now).or(Some(motion));
     }
 }

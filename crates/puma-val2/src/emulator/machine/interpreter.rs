@@ -24,56 +24,18 @@ impl Emulator {
         if self.arm.moving() && needs_standing_arm(instruction) {
             return Ok(Flow::WhenStanding);
         }
+        if is_motion(instruction) {
+            return self.motion_after_motion(instruction, job);
+        }
         let scope = self.scope();
         let number = |e: &Expr| e.value(&scope);
         match instruction {
-            Instruction::Remark | Instruction::Settling | Instruction::Break => {}
-            Instruction::Move { straight, to, hand } => {
-                let place = to.place(&scope)?;
-                let opening = hand.as_ref().map(number).transpose()?;
-                if let Some(opening) = opening {
-                    self.arm.set_gripper_next(if opening > 0.0 {
-                        Gripper::Open
-                    } else {
-                        Gripper::Closed
-                    });
+            Instruction::Remark | Instruction::Accepted | Instruction::Break => {}
+            Instruction::Fine(fine, always) => {
+                self.arm.fine_next = *fine;
+                if *always {
+                    self.arm.fine_always = *fine;
                 }
-                self.start_motion(*straight, &place)?;
-            }
-            Instruction::Appro {
-                straight,
-                to,
-                distance,
-            } => {
-                let place = to.place(&scope)?;
-                let target = self.arm.approach(&place, number(distance)? / 1000.0);
-                self.start_motion(*straight, &target)?;
-            }
-            Instruction::Depart { straight, distance } => {
-                let here = Place::Transformation(scope.destination());
-                let target = self.arm.approach(&here, number(distance)? / 1000.0);
-                self.start_motion(*straight, &target)?;
-            }
-            Instruction::Drive([joint, change, speed]) => {
-                let (joint, change, speed) = (number(joint)?, number(change)?, number(speed)?);
-                self.drive(joint, change, speed)?;
-            }
-            Instruction::Draw(by) => {
-                let mut pose = scope.destination();
-                pose.translation.vector += nalgebra::Vector3::from(values(by, &scope)?) / 1000.0;
-                self.start_motion(true, &Place::Transformation(pose))?;
-            }
-            Instruction::Align => {
-                let target = self.arm.aligned();
-                self.start_motion(false, &target)?;
-            }
-            Instruction::Ready => {
-                let ready = Joints::READY;
-                self.start_motion(false, &Place::PrecisionPoint(ready))?;
-            }
-            Instruction::Nest => {
-                let nest = Place::PrecisionPoint(self.profile.nest);
-                self.start_motion(false, &nest)?;
             }
             Instruction::Delay(seconds) => {
                 let seconds = number(seconds)?.clamp(0.0, 1e6);
@@ -215,45 +177,131 @@ impl Emulator {
         Ok(Flow::Next)
     }
 
-    fn start_motion(&mut self, straight: bool, to: &Place) -> Result<(), Fault> {
+    /// Starts a motion. A program's motion blends with the one under way as soon as that slows down
+    /// for its end; faults are left to the standing arm.
+    fn motion_after_motion(
+        &mut self,
+        instruction: &Instruction,
+        job: &mut Job,
+    ) -> Result<Flow, Fault> {
+        if !self.arm.moving() {
+            self.motion(instruction)?;
+            return Ok(Flow::Next);
+        }
+        let continuous = self.switches.get("CP").is_none_or(|on| *on) && job.is_program();
+        let Some(at) = self.arm.slows_down().filter(|_| continuous) else {
+            return Ok(Flow::WhenStanding);
+        };
+        // The controller plans a period ahead.
+        let at = at.saturating_sub(self.profile.tick);
+        if self.now < at {
+            return Ok(Flow::WhenSlowing(at));
+        }
+        if let Ok(true) = self.motion(instruction) {
+            return Ok(Flow::Next);
+        }
+        self.arm.close();
+        Ok(Flow::WhenStanding)
+    }
+
+    /// Starts the motion of an instruction. Returns `false` if the arm has to stand first.
+    fn motion(&mut self, instruction: &Instruction) -> Result<bool, Fault> {
+        let scope = self.scope();
+        let number = |e: &Expr| e.value(&scope);
+        match instruction {
+            Instruction::Move { straight, to, hand } => {
+                let place = to.place(&scope)?;
+                let opening = hand.as_ref().map(number).transpose()?;
+                if let Some(opening) = opening {
+                    self.arm.set_gripper_next(if opening > 0.0 {
+                        Gripper::Open
+                    } else {
+                        Gripper::Closed
+                    });
+                }
+                self.start_motion(*straight, &place)
+            }
+            Instruction::Appro {
+                straight,
+                to,
+                distance,
+            } => {
+                let place = to.place(&scope)?;
+                let target = self.arm.approach(&place, number(distance)? / 1000.0);
+                self.start_motion(*straight, &target)
+            }
+            Instruction::Depart { straight, distance } => {
+                let here = Place::Transformation(scope.destination());
+                let target = self.arm.approach(&here, number(distance)? / 1000.0);
+                self.start_motion(*straight, &target)
+            }
+            Instruction::Drive([joint, change, speed]) => {
+                let (joint, change, speed) = (number(joint)?, number(change)?, number(speed)?);
+                self.drive(joint, change, speed)
+            }
+            Instruction::Draw(by) => {
+                let mut pose = scope.destination();
+                pose.translation.vector += nalgebra::Vector3::from(values(by, &scope)?) / 1000.0;
+                self.start_motion(true, &Place::Transformation(pose))
+            }
+            Instruction::Align => {
+                let target = self.arm.aligned();
+                self.start_motion(false, &target)
+            }
+            Instruction::Ready => {
+                let ready = Joints::READY;
+                self.start_motion(false, &Place::PrecisionPoint(ready))
+            }
+            Instruction::Nest => {
+                let nest = Place::PrecisionPoint(self.profile.nest);
+                self.start_motion(false, &nest)
+            }
+            _ => Err(Message::IllegalInstruction.into()),
+        }
+    }
+
+    fn start_motion(&mut self, straight: bool, to: &Place) -> Result<bool, Fault> {
         let before = self.arm.gripper;
-        if straight {
-            self.arm.start_line(to, self.now, &self.profile)?;
+        let begun = if straight {
+            self.arm.start_line(to, self.now, &self.profile)?
         } else {
             self.arm.check_ready()?;
             let joints = self.arm.resolve(to)?;
             self.arm
-                .start_joints(joints, None, self.now, &self.profile)?;
-        }
-        self.motion_started(before);
-        Ok(())
+                .start_joints(joints, None, self.now, &self.profile)?
+        };
+        Ok(self.motion_started(begun, before))
     }
 
-    fn motion_started(&mut self, gripper_before: Gripper) {
-        self.next_tick = self.now;
-        self.note(Event::MotionStarted);
-        if self.arm.gripper != gripper_before {
-            self.note(Event::Gripper(self.arm.gripper));
+    fn motion_started(&mut self, begun: bool, gripper_before: Gripper) -> bool {
+        if begun {
+            self.next_tick = self.now;
+            self.note(Event::MotionStarted);
+            if self.arm.gripper != gripper_before {
+                self.note(Event::Gripper(self.arm.gripper));
+            }
         }
+        begun
     }
 
-    fn drive(&mut self, joint: f64, change: f64, speed: f64) -> Result<(), Fault> {
+    fn drive(&mut self, joint: f64, change: f64, speed: f64) -> Result<bool, Fault> {
         let joint = Joint::ALL[(whole(joint, 1, 6)? - 1) as usize];
         let speed = Speed::new(speed, SpeedUnit::Percent)?;
         let short = self.profile.drive_error_degrees.min(change.abs()) * change.signum();
-        let mut to = self.arm.joints();
+        let from = self.arm.start();
+        let mut to = from;
         to.0[joint.index()] += change.to_radians();
         self.arm.check_ready()?;
         let range = self.arm.params.ranges[joint.index()];
-        if !range.holds(to[joint]) && !range.inwards(self.arm.joints()[joint], to[joint]) {
+        if !range.holds(to[joint]) && !range.inwards(from[joint], to[joint]) {
             return Err(Fault::at(Message::OutOfRange, joint));
         }
         to.0[joint.index()] -= short.to_radians();
         let before = self.arm.gripper;
-        self.arm
+        let begun = self
+            .arm
             .start_joints(to, Some(speed), self.now, &self.profile)?;
-        self.motion_started(before);
-        Ok(())
+        Ok(self.motion_started(begun, before))
     }
 
     pub(crate) fn here(&self, precision: bool) -> Place {
@@ -293,8 +341,7 @@ impl Emulator {
     }
 }
 
-/// Returns `true` for motions and other instructions that wait for the end of a motion.
-fn needs_standing_arm(instruction: &Instruction) -> bool {
+fn is_motion(instruction: &Instruction) -> bool {
     matches!(
         instruction,
         Instruction::Move { .. }
@@ -305,7 +352,15 @@ fn needs_standing_arm(instruction: &Instruction) -> bool {
             | Instruction::Align
             | Instruction::Ready
             | Instruction::Nest
-            | Instruction::Break
+    )
+}
+
+/// Returns `true` for instructions other than motions that wait for the end of a motion.
+fn needs_standing_arm(instruction: &Instruction) -> bool {
+    matches!(
+        instruction,
+        Instruction::Break
+            | Instruction::Delay(_)
             | Instruction::Grasp(..)
             | Instruction::Hand { at_once: true, .. }
             | Instruction::Tool(_)

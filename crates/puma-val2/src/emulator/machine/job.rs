@@ -65,6 +65,8 @@ pub(crate) enum Wait {
     Nothing,
     /// Until the arm stands.
     Motion,
+    /// Until this time, or until the arm stands.
+    Slowing(Duration),
     Until(Duration),
     Condition(Expr),
     /// Until the terminal has answered.
@@ -77,6 +79,8 @@ pub(crate) enum Flow {
     Next,
     /// Repeat this step when the arm stands.
     WhenStanding,
+    /// Repeat this step at this time, when the arm slows down.
+    WhenSlowing(Duration),
     /// To this step.
     Jump(usize),
     /// Wait, then on to the next step.
@@ -142,6 +146,8 @@ impl Emulator {
         match &job.wait {
             Wait::Nothing => Some(job.next_step),
             Wait::Motion => (!self.arm.moving()).then_some(job.next_step),
+            Wait::Slowing(at) if self.arm.moving() => Some(*at),
+            Wait::Slowing(_) => Some(job.next_step),
             Wait::Until(at) => Some(*at),
             Wait::Condition(condition) => {
                 let met = condition.value(&self.scope()).map_or(true, is_true);
@@ -162,6 +168,7 @@ impl Emulator {
         let frame = self.frame(name, step)?;
         self.arm.forget_words();
         self.arm.program_speed = Speed::FULL;
+        self.arm.fine_always = false;
         self.reactions.clear();
         let mut job = Job::new(JobKind::Program, self.now + self.step_time());
         job.frames.push(frame);
@@ -407,9 +414,12 @@ impl Emulator {
         };
         match flow {
             Flow::Next => {}
-            Flow::WhenStanding => {
+            Flow::WhenStanding | Flow::WhenSlowing(_) => {
                 frame.step = at;
-                job.wait = Wait::Motion;
+                job.wait = match flow {
+                    Flow::WhenSlowing(at) => Wait::Slowing(at),
+                    _ => Wait::Motion,
+                };
                 return Ok(None);
             }
             Flow::Jump(to) => frame.step = to,

@@ -6,6 +6,7 @@ mod interpreter;
 pub(crate) mod job;
 pub(crate) mod memory;
 mod motion;
+mod path;
 pub(crate) mod reaction;
 pub(crate) mod scope;
 pub(crate) mod signals;

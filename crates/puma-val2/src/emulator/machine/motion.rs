@@ -1,23 +1,93 @@
-//! A motion: a path through joint space and the time it is travelled in.
+//! A motion: a path and the time law it is travelled by.
+//!
+//! The arm keeps the commanded speed where no joint's speed or acceleration is beyond its limit
+//! there, and slows down where one would be. A leg that is added before the arm stands gives a new
+//! law, from the arm's present place and speed on.
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use crate::emulator::machine::path::{Leg, Pace, Piece};
 use crate::emulator::message::Fault;
 use crate::joints::Joints;
 use crate::kinematics::params::PumaParams;
 
-/// Path from knot to knot, evenly spaced, travelled from rest to rest.
+/// Share of a joint's acceleration that the path's curvature may use. The rest remains for gaining
+/// and losing speed there.
+const CURVATURE_SHARE: f64 = 0.8;
+
+/// Stretch of the path with one limit of speed and one of acceleration. The arm gains speed, keeps
+/// it and loses it again.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    piece: usize,
+    from: f64,
+    length: f64,
+    /// Rates at which nominal time passes: at the beginning, at most, at the end.
+    rates: [f64; 3],
+    acceleration: f64,
+    /// Seconds since the start of the time law.
+    begins: f64,
+    /// Seconds of gaining, keeping and losing speed.
+    times: [f64; 3],
+}
+
+impl Cell {
+    fn time(&self) -> f64 {
+        self.times.iter().sum()
+    }
+
+    /// Sets the times from the rates at both ends and the limit.
+    fn pace(&mut self) {
+        let [first, limit, last] = self.rates;
+        let squares = 0.5 * (first * first + last * last);
+        let peak = (squares + self.acceleration * self.length).sqrt();
+        let peak = peak.min(limit).max(first).max(last).max(1e-9);
+        let (gain, loss) = (peak - first, peak - last);
+        let ramps = 0.5 * (gain * (peak + first) + loss * (peak + last)) / self.acceleration;
+        self.rates[1] = peak;
+        self.times = [
+            gain / self.acceleration,
+            (self.length - ramps).max(0.0) / peak,
+            loss / self.acceleration,
+        ];
+    }
+
+    /// Returns the place on the piece and the rate, `t` seconds into the cell.
+    fn at(&self, t: f64) -> (f64, f64) {
+        let [first, peak, last] = self.rates;
+        let [gaining, keeping, _] = self.times;
+        if t < gaining {
+            let rate = first + self.acceleration * t;
+            return (self.from + 0.5 * (first + rate) * t, rate);
+        }
+        if t < gaining + keeping {
+            let gained = 0.5 * (first + peak) * gaining;
+            return (self.from + gained + peak * (t - gaining), peak);
+        }
+        let left = (self.time() - t).max(0.0);
+        let rate = last + self.acceleration * left;
+        (self.from + self.length - 0.5 * (last + rate) * left, rate)
+    }
+}
+
+/// Lengths of an overlap that are tried, each half of the one before.
+const OVERLAPS_TRIED: u32 = 8;
+
+/// Path from rest to rest and the time it is travelled in.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
-    knots: Vec<Joints>,
+    pieces: Vec<Piece>,
+    cells: Vec<Cell>,
+    last: Arc<Leg>,
+    limits: [f64; 6],
     start: Duration,
-    /// Greatest speed and acceleration along the path, whose length is 1.
-    speed: f64,
-    acceleration: f64,
     /// Way of coming to a stand before the end.
     stop: Option<Stop>,
     /// Fault of the place where the path ends.
     pub(crate) failure: Option<Fault>,
+    /// The arm stands at the end, whatever follows.
+    pub(crate) closed: bool,
 }
 
 /// Deceleration of a motion that is broken off.
@@ -32,74 +102,146 @@ struct Stop {
     pace: f64,
 }
 
-/// Speed and acceleration of the joints.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pace {
-    /// Fraction of full joint speed.
-    pub(crate) fraction: f64,
-    /// Time in which full joint speed is reached, seconds.
-    pub(crate) acceleration_time: f64,
-}
-
 impl Motion {
-    /// Creates a motion in which all joints start and stop together and none exceeds its limits.
-    pub(crate) fn joint_interpolated(
-        from: Joints,
-        to: Joints,
-        start: Duration,
-        pace: Pace,
-        arm: &PumaParams,
-    ) -> Self {
-        let mut motion = Self::along(vec![from, to], start, f64::INFINITY, pace, arm);
-        motion.failure = None;
+    /// Creates a motion along one leg.
+    pub(crate) fn new(leg: Leg, start: Duration, pace: Pace, arm: &PumaParams) -> Self {
+        let leg = Arc::new(leg);
+        let mut motion = Self {
+            pieces: vec![Piece::Along {
+                leg: Arc::clone(&leg),
+                from: 0.0,
+                to: leg.nominal,
+            }],
+            cells: Vec::new(),
+            last: leg,
+            limits: arm.ranges.map(|range| range.speed / pace.acceleration_time),
+            start,
+            stop: None,
+            failure: None,
+            closed: false,
+        };
+        // A law from rest to rest always exists.
+        motion.cells = motion.law(0.0, 0.0).unwrap_or_default();
         motion
     }
 
-    /// Creates a motion along the knots, at most `path_speed` (path lengths per second).
-    pub(crate) fn along(
-        knots: Vec<Joints>,
-        start: Duration,
-        path_speed: f64,
-        pace: Pace,
-        arm: &PumaParams,
-    ) -> Self {
-        let spans = (knots.len().max(2) - 1) as f64;
-        let mut speed = path_speed.min(1e6);
-        let mut acceleration = 1e9_f64;
-        for pair in knots.windows(2) {
-            for i in 0..6 {
-                let slope = (pair[1].0[i] - pair[0].0[i]).abs() * spans;
-                if slope > 0.0 {
-                    let limit = arm.ranges[i].speed;
-                    speed = speed.min(limit * pace.fraction / slope);
-                    acceleration = acceleration.min(limit / pace.acceleration_time / slope);
-                }
+    /// Returns the motion that goes on along `leg` without a stop between, if the arm can.
+    pub(crate) fn followed_by(&self, leg: Leg, now: Duration) -> Option<Self> {
+        if !self.is_open() {
+            return None;
+        }
+        let (cell, x, rate) = self.place(now.saturating_sub(self.start).as_secs_f64());
+        let mut pieces = self.pieces[cell.piece..].to_vec();
+        let begun = if pieces.len() == 1 { x } else { 0.0 };
+        let Some(Piece::Along { from, to, .. }) = pieces.pop() else {
+            return None;
+        };
+        let (before, after) = (Arc::clone(&self.last), Arc::new(leg));
+        let (left, joined) = (before.slope(before.nominal), after.slope(0.0));
+        let turn = |i: usize| (joined[i] - left[i]).abs() / self.limits[i];
+        let half = (0..6).map(turn).fold(1e-7, f64::max) / (2.0 * CURVATURE_SHARE);
+        let half = half.min(0.5 * after.nominal).min(0.5 * before.nominal);
+        let half = half.min(to - from - begun);
+        // A shorter overlap begins later, where the arm can be slower.
+        let overlaps = (0..OVERLAPS_TRIED).map(|i| half / f64::from(1 << i));
+        overlaps.filter(|half| *half > 0.0).find_map(|half| {
+            let leaves = Piece::Along {
+                leg: Arc::clone(&before),
+                from,
+                to: to - half,
+            };
+            let overlap = Piece::Overlap {
+                before: Arc::clone(&before),
+                after: Arc::clone(&after),
+                half,
+            };
+            let rest = Piece::Along {
+                leg: Arc::clone(&after),
+                from: half,
+                to: after.nominal,
+            };
+            let mut motion = Self {
+                pieces: [pieces.as_slice(), &[leaves, overlap, rest]].concat(),
+                cells: Vec::new(),
+                last: Arc::clone(&after),
+                start: now,
+                ..self.clone()
+            };
+            motion.cells = motion.law(x, rate)?;
+            Some(motion)
+        })
+    }
+
+    /// Returns `true` if another leg may follow without a stop between.
+    pub(crate) fn is_open(&self) -> bool {
+        !self.closed && self.failure.is_none() && self.stop.is_none()
+    }
+
+    /// Returns the time law from place `x` on the first piece, where nominal time passes at `rate`,
+    /// to a stand at the end; `None` if the arm cannot slow down in time.
+    fn law(&self, x: f64, rate: f64) -> Option<Vec<Cell>> {
+        let mut cells = Vec::new();
+        for (piece, curve) in self.pieces.iter().enumerate() {
+            let cuts = curve.cuts(if piece == 0 { x } else { 0.0 });
+            for pair in cuts.windows(2) {
+                let length = (pair[1] - pair[0]).max(1e-12);
+                let (a, b) = (curve.slope(pair[0]), curve.slope(pair[1]));
+                let bend = |i: usize| (b[i] - a[i]).abs() / length / self.limits[i];
+                let limit = (0..6).map(|i| (CURVATURE_SHARE / bend(i)).sqrt());
+                let limit = limit.fold(1.0, f64::min);
+                let free = |i: usize| {
+                    (1.0 - bend(i) * limit * limit) * self.limits[i] / a[i].abs().max(b[i].abs())
+                };
+                cells.push(Cell {
+                    piece,
+                    from: pair[0],
+                    length,
+                    rates: [0.0, limit, 0.0],
+                    acceleration: (0..6).map(free).fold(1e9, f64::min),
+                    begins: 0.0,
+                    times: [0.0; 3],
+                });
             }
         }
-        Self {
-            knots,
-            start,
-            speed: speed.max(1e-6),
-            acceleration: acceleration.max(1e-6),
-            stop: None,
-            failure: None,
+        let reached = |rate: f64, cell: &Cell| {
+            (rate * rate + 2.0 * cell.acceleration * cell.length)
+                .sqrt()
+                .min(cell.rates[1])
+        };
+        // Backwards: the greatest rate from which the arm can still slow down.
+        let mut after = 0.0;
+        for cell in cells.iter_mut().rev() {
+            cell.rates[2] = after;
+            after = reached(f64::min(after, cell.rates[1]), cell);
+            cell.rates[0] = after;
         }
+        for i in 1..cells.len() {
+            cells[i - 1].rates[2] = cells[i].rates[0];
+        }
+        if rate > cells.first()?.rates[0] * (1.0 + 1e-6) + 1e-9 {
+            return None;
+        }
+        // Forwards: no more than the arm can have gained.
+        let (mut before, mut begins) = (rate, 0.0);
+        for cell in &mut cells {
+            cell.rates[0] = before;
+            cell.rates[2] = reached(before, cell).min(cell.rates[2]);
+            cell.begins = begins;
+            before = cell.rates[2];
+            cell.pace();
+            begins += cell.time();
+        }
+        Some(cells)
     }
 
     /// Returns the last knot.
     pub(crate) fn target(&self) -> Joints {
-        self.knots[self.knots.len() - 1]
+        self.last.last()
     }
 
-    fn ramp(&self) -> (f64, f64) {
-        let peak = self.speed.min(self.acceleration.sqrt());
-        (peak, peak / self.acceleration)
-    }
-
-    /// Returns the seconds from start to rest of an undisturbed motion.
+    /// Returns the seconds from the start of the time law to rest.
     fn undisturbed(&self) -> f64 {
-        let (peak, ramp) = self.ramp();
-        1.0 / peak + ramp
+        self.cells.last().map_or(0.0, |c| c.begins + c.time())
     }
 
     /// Returns the time at which the arm stands.
@@ -111,6 +253,18 @@ impl Motion {
             Some(stop) => end.min(stop.at.saturating_add(stop.time)),
             None => end,
         }
+    }
+
+    /// Returns the time at which the arm begins to slow down for its stand.
+    pub(crate) fn slows_down(&self) -> Duration {
+        let mut seconds = self.undisturbed();
+        for cell in self.cells.iter().rev() {
+            seconds -= cell.times[2];
+            if cell.times[0] + cell.times[1] > 1e-6 {
+                break;
+            }
+        }
+        self.start + Duration::from_secs_f64(seconds.clamp(0.0, 1e9))
     }
 
     /// Returns `true` if the motion was broken off before its end.
@@ -152,26 +306,23 @@ impl Motion {
         }
     }
 
+    /// Returns the cell, the place on its piece and the rate after `seconds` of undisturbed travel.
+    fn place(&self, seconds: f64) -> (Cell, f64, f64) {
+        let index = self.cells.partition_point(|cell| cell.begins <= seconds);
+        let cell = self.cells[index.saturating_sub(1)];
+        let (x, rate) = cell.at(seconds - cell.begins);
+        (cell, x, rate)
+    }
+
     /// Returns the joint angles at `now`.
     pub(crate) fn at(&self, now: Duration) -> Joints {
-        let (peak, ramp) = self.ramp();
-        let whole = self.undisturbed();
-        let t = self.travelled(now).clamp(0.0, whole);
-        let s = if t < ramp {
-            0.5 * self.acceleration * t * t
-        } else if t > whole - ramp {
-            1.0 - 0.5 * self.acceleration * (whole - t) * (whole - t)
-        } else {
-            peak * (t - 0.5 * ramp)
-        };
-        if s >= 1.0 || t >= whole {
+        let seconds = self.travelled(now).max(0.0);
+        // A time has whole nanoseconds.
+        if seconds + 1e-9 >= self.undisturbed() {
             return self.target();
         }
-        let position = s.max(0.0) * (self.knots.len() - 1) as f64;
-        let span = (position as usize).min(self.knots.len() - 2);
-        let (a, b) = (self.knots[span].0, self.knots[span + 1].0);
-        let part = position - span as f64;
-        Joints(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part))
+        let (cell, x, _) = self.place(seconds);
+        self.pieces[cell.piece].at(x)
     }
 }
 
@@ -194,13 +345,9 @@ mod tests {
     fn motion() -> Motion {
         let from = Joints::READY;
         let to = Joints::from_degrees([80.0, -60.0, 90.0, 0.0, -30.0, 0.0]);
-        Motion::joint_interpolated(
-            from,
-            to,
-            Duration::from_secs(5),
-            PACE,
-            &PumaParams::unimation(),
-        )
+        let arm = PumaParams::unimation();
+        let leg = Leg::straight(from, to, PACE, &arm);
+        Motion::new(leg, Duration::from_secs(5), PACE, &arm)
     }
 
     #[test]

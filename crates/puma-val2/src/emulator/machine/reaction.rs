@@ -55,7 +55,7 @@ impl Emulator {
                     }
                 }
                 job.frames.push(frame);
-                if reaction.at_once || !matches!(job.wait, Wait::Motion) {
+                if reaction.at_once || !matches!(job.wait, Wait::Motion | Wait::Slowing(_)) {
                     job.wait = if moves && reaction.at_once {
                         Wait::Motion
                     } else {

@@ -1,5 +1,6 @@
 //! Every instruction and function, in stored programs and through `DO`.
 
+mod blending;
 mod motions;
 mod programs;
 mod reactions;
