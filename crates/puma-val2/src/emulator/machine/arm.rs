@@ -319,8 +319,8 @@ impl Arm {
             })
     }
 
-    /// Starts a straight-line motion of the hand, in the present posture. Returns `false` if the arm
-    /// has to stand first.
+    /// Starts a straight-line motion of the hand, in the present posture. Returns `false` if the
+    /// arm has to stand first.
     pub(crate) fn start_line(
         &mut self,
         to: &Place,
