@@ -278,11 +278,15 @@ impl AContrario {
             let threshold = (STEP_GAIN * contrast).max(NOISE_FACTOR * noise * maxima.noise_gain());
             let begun = clock::now();
             let points = maxima.find(gray.pixels, gray.width, threshold, deadline);
-            // Listing them takes up to as long again.
-            let spent = clock::between(begun, clock::now());
+            // Listing them takes the longer, the more of the pixels are among them.
+            let share = points.len() as f64 / gray.pixels.len().max(1) as f64;
+            let spent = clock::between(begun, clock::now()).mul_f64(LISTING.0 + LISTING.1 * share);
             let is_late = clock::is_past(deadline.and_then(|time| time.checked_sub(spent)));
-            let points = if is_late { &[] } else { points };
             *late |= is_late;
+            if is_late {
+                level.fill(0, 0, &[]);
+                return;
+            }
             let points = thinning.strongest(points, (gray.width, gray.height));
             level.fill(gray.width, gray.height, points);
         };
@@ -405,6 +409,9 @@ const STEP_GAIN: f32 = 2.3;
 const NOISE_FACTOR: f32 = 3.5;
 /// Noise that rounding adds at each size, gray levels.
 const ROUNDING: f32 = 0.3;
+/// Time to list the edges, in times to find them: of none, and for each pixel that is one in
+/// addition.
+const LISTING: (f64, f64) = (0.3, 8.0);
 /// Circles about one place that differ noticeably, at each size.
 const RADII: usize = 12;
 

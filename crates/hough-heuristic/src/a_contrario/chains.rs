@@ -157,7 +157,7 @@ fn fit(level: &Level, points: &[usize]) -> Option<Ellipse> {
     let mut add = |row: [f64; 6]| {
         for (k, sum) in sums.iter_mut().enumerate() {
             for (sum, value) in sum.iter_mut().zip(row) {
-                *sum += row[k] * value / n;
+                *sum += row[k] * value;
             }
         }
     };
@@ -178,7 +178,7 @@ fn fit(level: &Level, points: &[usize]) -> Option<Ellipse> {
         ];
         add(slope.map(|value| weight * value));
     }
-    let [a, b, d, e, f] = solve(sums)?;
+    let [a, b, d, e, f] = solve(sums.map(|row| row.map(|sum| sum / n)))?;
     Ellipse::of_conic(
         [a, b, 1.0 - a, d, e].map(|value| value / f),
         (mx, my),

@@ -46,13 +46,21 @@ impl Patch {
         let from = pyramid.gray(depth);
         let corner = 0.5 * (scale - 1.0);
         let side = 2 * middle as u32 + 1;
+        // The same in pixels of the halved frame.
+        let place = patch.in_frame(0.0, 0.0);
+        let [x0, y0] = [place.0, place.1].map(|at| ((at - corner) / scale) as f32);
+        let [ax, ay, dx, dy] = [patch.across.0, patch.across.1, patch.down.0, patch.down.1]
+            .map(|step| (step / scale) as f32);
+        let (right, bottom) = (
+            (from.width - 1) as f32 - 0.01,
+            (from.height - 1) as f32 - 0.01,
+        );
         patch.gray = GrayImage::from_fn(side, side, |column, row| {
-            let (x, y) = patch.in_frame(f64::from(column), f64::from(row));
-            let split = |at: f64, length: usize| {
-                let at = ((at - corner) / scale).clamp(0.0, (length - 1) as f64 - 0.001);
-                (at as usize, at.fract() as f32)
-            };
-            let ((left, fx), (top, fy)) = (split(x, from.width), split(y, from.height));
+            let (column, row) = (column as f32, row as f32);
+            let x = (x0 + column * ax + row * dx).clamp(0.0, right);
+            let y = (y0 + column * ay + row * dy).clamp(0.0, bottom);
+            let (left, top) = (x as usize, y as usize);
+            let (fx, fy) = (x - left as f32, y - top as f32);
             let at = top * from.width + left;
             let [a, b, c, d] = [at, at + 1, at + from.width, at + from.width + 1]
                 .map(|pixel| f32::from(from.pixels[pixel]));
