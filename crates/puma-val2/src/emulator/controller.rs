@@ -98,6 +98,8 @@ pub struct Emulator {
     /// Job that `PROCEED` and `RETRY` continue.
     pub(super) paused: Option<Job>,
     pub(super) reactions: Vec<Reaction>,
+    /// Program that `REACTE` calls after a fault.
+    pub(super) on_fault: Option<String>,
     pub(super) sensors: Vec<(u16, Sense)>,
     pub(super) next_tick: Duration,
     pub(super) monitor_ready: Duration,
@@ -137,6 +139,7 @@ impl Emulator {
             job: None,
             paused: None,
             reactions: Vec::new(),
+            on_fault: None,
             sensors: Vec::new(),
             next_tick: Duration::ZERO,
             monitor_ready: Duration::ZERO,

@@ -53,6 +53,9 @@ pub struct Profile {
     pub stop_while_busy: bool,
     /// Knows `#PPOINT(...)` (default: yes).
     pub ppoint: bool,
+    /// Takes the forms of VAL of 1980 beside those of VAL II: `SETI`, `GOSUB`, `IFSIG` and the like
+    /// (default: no).
+    pub first_val: bool,
     /// Lets `DO REACTI` watch a signal without a program running (default: yes).
     pub react_at_monitor: bool,
     /// Largest value of the monitor's `SPEED`, percent (default: 200). Larger ones are cut to it.
@@ -144,6 +147,7 @@ impl Profile {
             do_blocks: true,
             stop_while_busy: true,
             ppoint: true,
+            first_val: false,
             react_at_monitor: true,
             speed_max: 200.0,
             messages: BTreeMap::new(),
@@ -202,9 +206,29 @@ impl Profile {
         }
     }
 
+    /// Returns a controller with VAL of 1980: one question at start-up, six-character names, no
+    /// `#PPOINT`, no reactions from the monitor, and VAL's own forms beside the words of VAL II.
+    pub fn val() -> Self {
+        Self {
+            name: "val",
+            boot: vec!["Initialize (Y/N)? ".into()],
+            banner: "PUMA 560  VAL".into(),
+            first_val: true,
+            ppoint: false,
+            react_at_monitor: false,
+            max_name: 6,
+            ..Self::val2()
+        }
+    }
+
     /// Returns the profiles of this crate.
-    pub fn all() -> [Self; 3] {
-        [Self::val2(), Self::val2_strict_miz(), Self::val2_hardware()]
+    pub fn all() -> [Self; 4] {
+        [
+            Self::val2(),
+            Self::val2_strict_miz(),
+            Self::val2_hardware(),
+            Self::val(),
+        ]
     }
 
     /// Returns the profile of this name.

@@ -5,6 +5,8 @@
 //! a textbook, `vplus` the documentation of VAL's successor, `guide` the contents of the guide of
 //! 1980.
 
+use puma_val2::Profile;
+
 use crate::console::Console;
 
 const MONITOR: &str = "
@@ -214,6 +216,42 @@ ofw 10 MOVE P1 ; to the part
 ofw ; a remark
 ";
 
+/// Forms of VAL of 1980 that VAL II does not have, at the monitor and in a program.
+const FIRST_MONITOR: &str = "
+ofw LISTF
+ofw DPOINT P1
+ofw ERASE
+ofw DO SETI N = 4
+";
+
+const FIRST_PROGRAM: &str = "
+ofw SETI I = 3
+ofw SETI I = I + 1
+ofw SETI I = N / 2
+ofw TYPEI N
+ofw TYPE next part
+ofw GOSUB MAIN
+guide RETURN 1
+ofw IF N EQ 3 THEN 20
+guide IF N NE 3 THEN 20
+guide IF N LT 3 THEN 20
+guide IF N GT 3 THEN 20
+guide IF N LE 3 THEN 20
+guide IF N GE 3 THEN 20
+ofw IFSIG 1001 THEN 20
+guide IFSIG 1001,,-1003 THEN 20
+ofw REMARK don't touch the jig
+ofw 20 REMARK a label in front
+ofw GO P1
+ofw MOVEI P1
+ofw APPROI P1,50
+ofw PAUSE change the tool
+guide STOP no parts
+ofw SHIFT P1 BY 10,,5
+ofw INVERSE P3 = P1
+ofw FRAME P3 = P1,P2,P4
+";
+
 /// Forms of V+, for the record.
 const V_PLUS: &str = "
 vplus .PROGRAM belt()
@@ -259,16 +297,16 @@ fn forms(table: &str) -> Vec<&str> {
 }
 
 /// Types a form at the monitor of a controller with programs, locations and files.
-fn is_taken_by_monitor(form: &str) -> bool {
-    let mut console = Console::ready();
+fn is_taken_by_monitor(form: &str, profile: Profile) -> bool {
+    let mut console = Console::ready_with(profile);
     console.emulator.load_text(MEMORY).unwrap();
     console.emulator.insert_file("KEPT", MEMORY.to_owned());
     let said = console.line_now(form);
     !UNKNOWN.iter().any(|fault| said.contains(fault))
 }
 
-fn is_taken_by_editor(form: &str) -> bool {
-    let mut console = Console::ready();
+fn is_taken_by_editor(form: &str, profile: Profile) -> bool {
+    let mut console = Console::ready_with(profile);
     console.line("EDIT FORM");
     let said = console.line(form);
     !UNKNOWN.iter().any(|fault| said.contains(fault))
@@ -279,8 +317,12 @@ fn forms_of_val_2_are_understood() {
     let (monitor, program) = (forms(MONITOR), forms(PROGRAM));
     let all = monitor.len() + program.len();
     let mut missing: Vec<&str> = monitor;
-    missing.retain(|form| !is_taken_by_monitor(form));
-    missing.extend(program.iter().filter(|form| !is_taken_by_editor(form)));
+    missing.retain(|form| !is_taken_by_monitor(form, Profile::val2()));
+    missing.extend(
+        program
+            .iter()
+            .filter(|form| !is_taken_by_editor(form, Profile::val2())),
+    );
     println!(
         "VAL II: {} of {all} forms; missing: {missing:?}",
         all - missing.len()
@@ -288,11 +330,24 @@ fn forms_of_val_2_are_understood() {
     assert!(missing.len() * 100 <= all, "{missing:?}");
     let mut of_v_plus = forms(V_PLUS);
     let all = of_v_plus.len();
-    of_v_plus.retain(|form| !is_taken_by_editor(form));
+    of_v_plus.retain(|form| !is_taken_by_editor(form, Profile::val2()));
     println!(
         "V+: {} of {all} forms; missing: {of_v_plus:?}",
         all - of_v_plus.len()
     );
+}
+
+#[test]
+fn forms_of_the_first_val_are_understood() {
+    let (mut monitor, mut program) = (forms(FIRST_MONITOR), forms(FIRST_PROGRAM));
+    let all = monitor.len() + program.len();
+    // VAL II, by itself, knows none but a few.
+    let of_val_2 = |form: &&str| is_taken_by_editor(form, Profile::val2());
+    assert!(program.iter().filter(|form| of_val_2(form)).count() <= 1);
+    monitor.retain(|form| !is_taken_by_monitor(form, Profile::val()));
+    program.retain(|form| !is_taken_by_editor(form, Profile::val()));
+    println!("VAL: {all} forms; missing: {monitor:?} {program:?}");
+    assert!(monitor.is_empty() && program.is_empty());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::emulator::console::mode::Editing;
 use crate::emulator::console::mode::Mode;
 use crate::emulator::controller::Emulator;
 use crate::emulator::language::lexer::{Cursor, Token, tokens};
-use crate::emulator::language::program::{Program, Step};
+use crate::emulator::language::program::{Program, Step, local_name};
 use crate::emulator::message::{Fault, Message};
 
 /// Formats a step for a listing.
@@ -19,6 +19,11 @@ impl Emulator {
             None => self.edited_last.clone().ok_or(Message::UndefinedProgram)?,
             Some(_) => cursor.name()?,
         };
+        let mut parameters = None;
+        if cursor.sign("(") {
+            parameters = Some(cursor.list(local_name)?);
+            cursor.expect_sign(")")?;
+        }
         let mut at = 0;
         if cursor.sign(",") {
             match cursor.next() {
@@ -30,7 +35,7 @@ impl Emulator {
         }
         cursor.expect_end()?;
         self.profile.check_name(&name)?;
-        let program = match self.memory.programs.get(&name) {
+        let mut program = match self.memory.programs.get(&name) {
             Some(program) => (**program).clone(),
             None => {
                 // It exists from now on, and memory for it is found or not.
@@ -39,7 +44,8 @@ impl Emulator {
                 Program::default()
             }
         };
-        self.print_line(&format!(".PROGRAM {name}"));
+        program.parameters = parameters.unwrap_or(program.parameters);
+        self.print_line(&program.head(&name));
         self.edited_last = Some(name.clone());
         let at = at.min(program.steps.len());
         self.editor_prompt(Editing {
@@ -81,7 +87,8 @@ impl Emulator {
     /// Handles a line typed to the editor: one of its own commands, or a step.
     ///
     /// `E` ends; an empty line goes to the next step; `S n` to step n, `P n` prints n steps, `L`
-    /// goes one step back, `D n` deletes n steps, `I` inserts until an empty line.
+    /// goes one step back, `D n` deletes n steps, `R step` replaces the step, `I` inserts until an
+    /// empty line.
     pub(crate) fn edit_line(&mut self, mut editing: Editing, line: &str) {
         let text = line.trim().to_ascii_uppercase();
         let mut words = text.split_whitespace();
@@ -132,6 +139,15 @@ impl Emulator {
                     self.refuse(fault);
                 }
             }
+            ("R", _) if argument.is_some() => {
+                // Replaces the step.
+                let step = Step::parse(&line.trim()[1..], self.profile.first_val);
+                match (step, editing.program.steps.get_mut(editing.at)) {
+                    (Ok(step), Some(old)) => *old = step,
+                    (Ok(_), None) => self.refuse(Message::InvalidArgument.into()),
+                    (Err(fault), _) => self.refuse(fault),
+                }
+            }
             ("I", Some(_)) if argument.is_none() => editing.inserting = true,
             ("", _) if editing.inserting => editing.inserting = false,
             ("", _) => editing.at = (editing.at + 1).min(editing.program.steps.len()),
@@ -145,7 +161,7 @@ impl Emulator {
     }
 
     fn enter_step(&mut self, editing: &mut Editing, line: &str) -> Result<(), Fault> {
-        let step = Step::parse(line)?;
+        let step = Step::parse(line, self.profile.first_val)?;
         let steps = &mut editing.program.steps;
         if editing.inserting || editing.at >= steps.len() {
             if steps.len() >= self.profile.max_entries {

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 
 use crate::emulator::console::mode::Kind;
 use crate::emulator::controller::{Emulator, Event};
-use crate::emulator::language::lexer::Cursor;
+use crate::emulator::language::lexer::{Cursor, tokens};
 use crate::emulator::language::place::Place;
 use crate::emulator::language::place_expr::PlaceName;
 use crate::emulator::language::program::{Program, Step};
@@ -119,7 +119,7 @@ fn text_of(memory: &Memory, wanted: impl Fn(Kind, &str) -> bool) -> String {
     for (name, program) in &memory.programs {
         if wanted(Kind::Program, name) {
             let steps = program.steps.iter().map(|step| format!(" {}", step.text));
-            section(&mut text, &format!(".PROGRAM {name}"), steps);
+            section(&mut text, &program.head(name), steps);
         }
     }
     let places = memory.places.iter();
@@ -212,10 +212,14 @@ fn take_line(
         Section::None => {
             *section = match words[..] {
                 [] => return Ok(()),
-                [".PROGRAM", name] => {
-                    // A V+ file names its arguments; without any it is a program like others.
-                    let name = name.strip_suffix("()").unwrap_or(name);
-                    Section::Program(sound_name(name, profile)?, Program::default())
+                [".PROGRAM", ..] => {
+                    let tokens = tokens(&upper[".PROGRAM".len()..])?;
+                    let (name, parameters) = Program::parse_head(&mut Cursor::new(&tokens))?;
+                    let program = Program {
+                        parameters,
+                        ..Program::default()
+                    };
+                    Section::Program(sound_name(&name, profile)?, program)
                 }
                 [".LOCATIONS"] => Section::Locations,
                 [".REALS"] => Section::Reals,
@@ -233,7 +237,7 @@ fn take_line(
             if program.steps.len() >= profile.max_entries {
                 return Err(Message::OutOfMemory.into());
             }
-            program.steps.push(Step::parse(line)?);
+            program.steps.push(Step::parse(line, profile.first_val)?);
         }
         Section::Locations => {
             let [name, values] = words[..] else {

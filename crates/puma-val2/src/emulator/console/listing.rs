@@ -63,7 +63,7 @@ impl Emulator {
     pub(crate) fn program_lines(&self, names: &[String]) -> Result<Vec<String>, Fault> {
         let lines = |name: &String, program: &Arc<Program>| {
             let steps = program.steps.iter().enumerate();
-            let mut lines = vec![format!(".PROGRAM {name}")];
+            let mut lines = vec![program.head(name)];
             lines.extend(steps.map(|(i, step)| numbered(i, &step.text)));
             lines.push(".END".into());
             lines

@@ -8,6 +8,7 @@ use crate::emulator::language::lexer::{Cursor, Token, keyword, tokens};
 use crate::emulator::language::place::Place;
 use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments, values};
 use crate::emulator::language::scope::Scope;
+use crate::emulator::language::val;
 use crate::emulator::machine::job::Job;
 use crate::emulator::message::{Fault, Message};
 use crate::joints::Joints;
@@ -146,6 +147,8 @@ impl Emulator {
     }
 
     fn try_command(&mut self, line: &str) -> Result<(), Fault> {
+        let translated = self.profile.first_val.then(|| val::translated(line));
+        let line = translated.as_deref().unwrap_or(line);
         let tokens = tokens(line).map_err(|fault| match line.trim_start().chars().next() {
             Some(c) if c.is_ascii_alphabetic() => fault,
             _ => Message::IllegalCommand.into(),

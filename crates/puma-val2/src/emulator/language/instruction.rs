@@ -1,9 +1,11 @@
 //! Program instructions and their parser.
 
+use crate::emulator::language::argument::{Argument, arguments_of_call};
 use crate::emulator::language::expr::{Expr, Variable};
 use crate::emulator::language::item::Item;
 use crate::emulator::language::lexer::{Cursor, Token, keyword};
 use crate::emulator::language::place_expr::{PlaceExpr, PlaceName, arguments};
+use crate::emulator::language::program::local_name;
 use crate::emulator::message::{Fault, Message};
 use crate::manipulator::Gripper;
 
@@ -96,10 +98,16 @@ pub(crate) enum Instruction {
     Case(Expr),
     Value(Vec<Expr>),
     Any,
-    Call(String),
-    Return,
-    Pause,
-    Stop,
+    Call(String, Vec<Argument>),
+    /// `AUTO`, `LOCAL`: variables and locations of this call alone.
+    Local(Vec<String>),
+    /// `REACTE`: the program to call after a fault.
+    OnFault(Option<String>),
+    /// `RETURN`: the caller leaves out this many steps.
+    Return(u32),
+    /// `PAUSE` and `STOP`, with a text to print.
+    Pause(Option<String>),
+    Stop(Option<String>),
     Halt,
 }
 
@@ -119,16 +127,20 @@ enum Word {
 use Instruction as I;
 use Word::{Parse, Plain};
 
-static WORDS: [(&str, Word); 72] = [
+static WORDS: [(&str, Word); 76] = [
     ("ABOVE", Plain(I::Posture(1, true))),
     ("ALIGN", Plain(I::Align)),
     ("ANY", Plain(I::Any)),
     ("APPRO", Parse(|c| appro(c, false))),
     ("APPROS", Parse(|c| appro(c, true))),
+    ("AUTO", Parse(|c| c.list(local_name).map(I::Local))),
     ("BASE", Parse(|c| arguments(c).map(I::Base))),
     ("BELOW", Plain(I::Posture(1, false))),
     ("BREAK", Plain(I::Break)),
-    ("CALL", Parse(|c| c.name().map(I::Call))),
+    (
+        "CALL",
+        Parse(|c| Ok(I::Call(c.name()?, arguments_of_call(c)?))),
+    ),
     ("CASE", Parse(case)),
     ("CLOSE", Parse(|c| hand(c, Gripper::Closed, false))),
     ("CLOSEI", Parse(|c| hand(c, Gripper::Closed, true))),
@@ -148,6 +160,7 @@ static WORDS: [(&str, Word); 72] = [
     ("FINE", Parse(|c| Ok(I::Fine(true, c.word("ALWAYS"))))),
     ("FLIP", Plain(I::Posture(2, true))),
     ("FOR", Parse(for_loop)),
+    ("GLOBAL", Parse(|c| c.list(local_name).map(|_| I::Accepted))),
     ("GOTO", Parse(|c| label(c).map(I::Goto))),
     ("GRASP", Parse(grasp)),
     ("HALT", Plain(I::Halt)),
@@ -157,6 +170,7 @@ static WORDS: [(&str, Word); 72] = [
     ("INTOFF", Parse(settling)),
     ("INTON", Parse(settling)),
     ("LEFTY", Plain(I::Posture(0, false))),
+    ("LOCAL", Parse(|c| c.list(local_name).map(I::Local))),
     ("LOCK", Parse(|c| Expr::parse(c).map(|_| I::Accepted))),
     ("MOVE", Parse(|c| motion(c, false, false))),
     ("MOVES", Parse(|c| motion(c, true, false))),
@@ -170,21 +184,25 @@ static WORDS: [(&str, Word); 72] = [
     ("OPEN", Parse(|c| hand(c, Gripper::Open, false))),
     ("OPENI", Parse(|c| hand(c, Gripper::Open, true))),
     ("PARAMETER", Parse(parameter)),
-    ("PAUSE", Plain(I::Pause)),
+    ("PAUSE", Parse(|c| Ok(I::Pause(c.text())))),
     ("PROMPT", Parse(prompt)),
     ("REACT", Parse(|c| react(c, false))),
+    ("REACTE", Parse(|c| c.rest(Cursor::name).map(I::OnFault))),
     ("REACTI", Parse(|c| react(c, true))),
     ("READY", Plain(I::Ready)),
     ("RELAX", Parse(|c| hand(c, Gripper::Open, false))),
     ("RELAXI", Parse(|c| hand(c, Gripper::Open, true))),
     ("RESET", Plain(I::Reset)),
-    ("RETURN", Plain(I::Return)),
+    (
+        "RETURN",
+        Parse(|c| c.rest(label).map(|skip| I::Return(skip.unwrap_or(0)))),
+    ),
     ("RIGHTY", Plain(I::Posture(0, true))),
     ("RUNSIG", Parse(|c| Expr::parse(c).map(I::RunSignal))),
     ("SET", Parse(set)),
     ("SIGNAL", Parse(|c| Expr::parse_list(c).map(I::Signal))),
     ("SPEED", Parse(speed)),
-    ("STOP", Plain(I::Stop)),
+    ("STOP", Parse(|c| Ok(I::Stop(c.text())))),
     ("TIMER", Parse(timer)),
     ("TOOL", Parse(|c| c.rest(PlaceExpr::parse).map(I::Tool))),
     ("TYPE", Parse(print)),
@@ -244,7 +262,10 @@ impl Instruction {
                 | Self::LeaveLoop
                 | Self::NextTurn
         );
-        let ends = matches!(self, Self::Return | Self::Pause | Self::Stop | Self::Halt);
+        let ends = matches!(
+            self,
+            Self::Return(_) | Self::Pause(_) | Self::Stop(_) | Self::Halt | Self::Local(_)
+        );
         self.opens() || self.closes() || branches || ends
     }
 }

@@ -81,7 +81,7 @@ fn number_length(text: &str) -> usize {
 }
 
 /// Reader over the tokens of a line.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Cursor<'a> {
     tokens: &'a [Token],
     depth: usize,

@@ -1,6 +1,7 @@
 //! The VAL II language: tokens, expressions, locations, instructions, programs. It parses and
 //! evaluates; it carries nothing out.
 
+pub(crate) mod argument;
 pub(crate) mod expr;
 pub(crate) mod instruction;
 pub(crate) mod item;
@@ -9,3 +10,4 @@ pub(crate) mod place;
 pub(crate) mod place_expr;
 pub(crate) mod program;
 pub(crate) mod scope;
+pub(crate) mod val;

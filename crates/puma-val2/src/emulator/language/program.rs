@@ -2,11 +2,14 @@
 
 use crate::emulator::language::instruction::{Instruction, label};
 use crate::emulator::language::lexer::{Cursor, Token, tokens};
+use crate::emulator::language::val;
 use crate::emulator::message::{Fault, Message};
 
 /// Stored program.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Program {
+    /// Names of what `CALL` hands over, in its order.
+    pub(crate) parameters: Vec<String>,
     pub(crate) steps: Vec<Step>,
 }
 
@@ -20,9 +23,13 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    /// Parses a line: an optional label and an instruction.
-    pub(crate) fn parse(line: &str) -> Result<Self, Fault> {
-        let tokens = tokens(line)?;
+    /// Parses a line: an optional label and an instruction. `first_val` takes the forms of VAL.
+    pub(crate) fn parse(line: &str, first_val: bool) -> Result<Self, Fault> {
+        let tokens = if first_val {
+            tokens(&val::translated(line))?
+        } else {
+            tokens(line)?
+        };
         let mut cursor = Cursor::new(&tokens);
         let labelled = matches!(cursor.peek(), Some(Token::Number(_)));
         Ok(Self {
@@ -31,6 +38,13 @@ impl Step {
             instruction: Instruction::parse(&mut cursor)?,
         })
     }
+}
+
+/// Parses the name of a variable or location; that of a precision point begins with `#`.
+pub(crate) fn local_name(cursor: &mut Cursor<'_>) -> Result<String, Fault> {
+    let precision = cursor.sign("#");
+    let name = cursor.name()?;
+    Ok(if precision { format!("#{name}") } else { name })
 }
 
 /// Converts to upper case, except texts in quotes and comments.
@@ -51,6 +65,26 @@ fn upper_case(line: &str) -> String {
 }
 
 impl Program {
+    /// Returns the first line of a listing: the name and the parameters, if there are any.
+    pub(crate) fn head(&self, name: &str) -> String {
+        match self.parameters[..] {
+            [] => format!(".PROGRAM {name}"),
+            _ => format!(".PROGRAM {name}({})", self.parameters.join(",")),
+        }
+    }
+
+    /// Parses the name of a program and its parameters in brackets.
+    pub(crate) fn parse_head(cursor: &mut Cursor<'_>) -> Result<(String, Vec<String>), Fault> {
+        let name = cursor.name()?;
+        let mut parameters = Vec::new();
+        if cursor.sign("(") && !cursor.sign(")") {
+            parameters = cursor.list(local_name)?;
+            cursor.expect_sign(")")?;
+        }
+        cursor.expect_end()?;
+        Ok((name, parameters))
+    }
+
     /// Returns the step with the label.
     pub(crate) fn labelled(&self, label: u32) -> Result<usize, Fault> {
         self.steps

@@ -167,10 +167,31 @@ impl Emulator {
                 self.ask_values(&text, variables.clone());
                 return Ok(Flow::Wait(Wait::Answer));
             }
-            Instruction::Call(name) => return Ok(Flow::Call(name.clone())),
-            Instruction::Return => return Ok(Flow::Return),
-            Instruction::Pause => return Ok(Flow::Pause),
-            Instruction::Stop => return Ok(Flow::EndOfCycle),
+            Instruction::Call(name, arguments) => {
+                return self.call(name, arguments).map(Flow::Call);
+            }
+            Instruction::Local(names) => self.make_local(names, job)?,
+            Instruction::OnFault(program) => {
+                if let Some(name) = program {
+                    self.memory.program(name)?;
+                }
+                self.on_fault = program.clone();
+            }
+            Instruction::Return(skip) => {
+                if let [.., caller, _] = &mut job.frames[..] {
+                    caller.step += *skip as usize;
+                }
+                return Ok(Flow::Return);
+            }
+            Instruction::Pause(text) | Instruction::Stop(text) => {
+                if let Some(text) = text {
+                    self.print_line(text);
+                }
+                return Ok(match instruction {
+                    Instruction::Pause(_) => Flow::Pause,
+                    _ => Flow::EndOfCycle,
+                });
+            }
             Instruction::Halt => return Ok(Flow::Halt),
             _ => return self.control(instruction, job),
         }

@@ -7,6 +7,7 @@ use crate::emulator::controller::{Emulator, Event};
 use crate::emulator::language::expr::{Expr, is_true};
 use crate::emulator::language::instruction::Instruction;
 use crate::emulator::language::lexer::Cursor;
+use crate::emulator::language::place::Place;
 use crate::emulator::language::program::Program;
 use crate::emulator::machine::arm::Speed;
 use crate::emulator::message::{Fault, Message};
@@ -49,6 +50,10 @@ pub(crate) struct Frame {
     pub(crate) program: Arc<Program>,
     pub(crate) step: usize,
     pub(crate) loops: Vec<Loop>,
+    /// Names of this call alone, with what they meant before.
+    pub(crate) locals: Vec<(String, Option<f64>, Option<Place>)>,
+    /// Parameters whose values go back to the caller's names.
+    pub(crate) returns: Vec<(String, String)>,
 }
 
 /// `FOR` under way.
@@ -86,7 +91,7 @@ pub(crate) enum Flow {
     /// Wait, then on to the next step.
     Wait(Wait),
     /// Into a program.
-    Call(String),
+    Call(Frame),
     Return,
     /// The present cycle is over.
     EndOfCycle,
@@ -166,16 +171,19 @@ impl Emulator {
         single: bool,
     ) -> Result<(), Fault> {
         let frame = self.frame(name, step)?;
+        if let Some(mut paused) = self.paused.take() {
+            self.leave_all(&mut paused);
+        }
         self.arm.forget_words();
         self.arm.program_speed = Speed::FULL;
         self.arm.fine_always = false;
         self.reactions.clear();
+        self.on_fault = None;
         let mut job = Job::new(JobKind::Program, self.now + self.step_time());
         job.frames.push(frame);
         job.cycles_left = cycles.map(|n| n.saturating_sub(1));
         job.single = single;
         self.job = Some(job);
-        self.paused = None;
         self.note(Event::ProgramStarted(name.to_owned()));
         Ok(())
     }
@@ -191,6 +199,8 @@ impl Emulator {
             program,
             step,
             loops: Vec::new(),
+            locals: Vec::new(),
+            returns: Vec::new(),
         })
     }
 
@@ -224,7 +234,9 @@ impl Emulator {
         if matches!(instruction, Instruction::React { .. }) && !self.profile.react_at_monitor {
             return Err(Message::IllegalInstruction.into());
         }
-        if let Instruction::Call(name) = instruction {
+        if let Instruction::Call(name, arguments) = instruction
+            && arguments.is_empty()
+        {
             return self
                 .start_program(name, Some(1), 0, false)
                 .map(|()| self.prompt());
@@ -261,7 +273,11 @@ impl Emulator {
     pub(crate) fn motion_ended(&mut self, outcome: Result<(), Fault>) {
         self.sense();
         self.note(Event::MotionEnded);
-        if let Err(fault) = outcome {
+        let Err(fault) = outcome else { return };
+        let mut job = self.job.take();
+        let recovers = job.as_mut().is_some_and(|job| self.recovers(job));
+        self.job = job;
+        if !recovers {
             self.fail_job(fault);
         }
     }
@@ -350,6 +366,7 @@ impl Emulator {
                 self.job = Some(job);
             }
             Ok(Some(how)) => self.end_job(job, how),
+            Err(_) if self.recovers(&mut job) => self.job = Some(job),
             Err(fault) => {
                 job.faulted = true;
                 self.refuse(fault);
@@ -359,7 +376,7 @@ impl Emulator {
         }
     }
 
-    fn end_job(&mut self, job: Job, how: Message) {
+    fn end_job(&mut self, mut job: Job, how: Message) {
         match job.kind {
             JobKind::Calibration => {
                 if how == Message::Completed {
@@ -383,7 +400,9 @@ impl Emulator {
                 self.note(Event::ProgramEnded(how));
                 self.reactions.clear();
                 // `HALT` is an end for good; what was stopped in any other way can go on.
-                if !matches!(how, Message::Completed | Message::Halted) {
+                if matches!(how, Message::Completed | Message::Halted) {
+                    self.leave_all(&mut job);
+                } else {
                     self.paused = Some(job);
                 }
                 if self.in_dialogue() {
@@ -424,17 +443,17 @@ impl Emulator {
             }
             Flow::Jump(to) => frame.step = to,
             Flow::Wait(wait) => job.wait = wait,
-            Flow::Call(name) => {
+            Flow::Call(frame) => {
                 if job.frames.len() >= CALL_DEPTH {
                     return Err(Message::OutOfMemory.into());
                 }
-                job.frames.push(self.frame(&name, 0)?);
+                self.enter(frame, job)?;
             }
-            Flow::Return if job.frames.len() > 1 => {
-                job.frames.pop();
-            }
+            Flow::Return if job.frames.len() > 1 => self.leave(job)?,
             Flow::Return | Flow::EndOfCycle => {
-                job.frames.truncate(1);
+                while job.frames.len() > 1 {
+                    self.leave(job)?;
+                }
                 match &mut job.cycles_left {
                     Some(0) => return Ok(Some(Message::Completed)),
                     Some(left) => *left -= 1,

@@ -1,6 +1,7 @@
 //! The emulated machine: arm, signals, memory, and the jobs that work on them.
 
 pub(crate) mod arm;
+mod call;
 mod control;
 mod interpreter;
 pub(crate) mod job;
