@@ -28,6 +28,9 @@ pub enum BallDetector {
     StandardHough,
 }
 
+/// Width of the rendered frames, pixels.
+const FRAME_WIDTH: u32 = 768;
+
 /// Radii of the ball's outline, pixels of the camera's frame: 5 to 68 feature units.
 const RADII: (f64, f64) = (20.0, 272.0);
 
@@ -59,17 +62,34 @@ impl BallDetector {
     /// # Errors
     /// None: the settings made here are valid.
     pub fn build(self, seed: u64) -> Result<Box<dyn CircleDetector + Send>, ConfigError> {
+        self.build_for(FRAME_WIDTH, 1.0, seed)
+    }
+
+    /// Builds the detector for frames `width` pixels wide and a ball `size` times as large as that
+    /// of 20 mm radius.
+    ///
+    /// # Errors
+    /// A size for which there are no radii.
+    pub fn build_for(
+        self,
+        width: u32,
+        size: f64,
+        seed: u64,
+    ) -> Result<Box<dyn CircleDetector + Send>, ConfigError> {
+        let scale = f64::from(width) / f64::from(FRAME_WIDTH);
+        // A small ball must be seen from afar too.
+        let radii = (RADII.0 * scale * size.min(1.0), RADII.1 * scale * size);
         let accept = Acceptance {
             theta: THETA,
-            min_radius: RADII.0,
-            max_radius: RADII.1,
+            min_radius: radii.0,
+            max_radius: radii.1,
             ..Acceptance::default()
         };
         Ok(match self {
             Self::AContrario => {
                 let config = AContrarioConfig {
-                    min_radius: RADII.0,
-                    max_radius: Some(RADII.1),
+                    min_radius: radii.0,
+                    max_radius: Some(radii.1),
                     max_circles: 1,
                     min_score: MIN_SCORE,
                     seed,

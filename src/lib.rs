@@ -40,8 +40,10 @@
 //! The whole job, with rendered frames and a controller on a pseudo-terminal, is the example
 //! `grasp`: `cargo run --release --example grasp`.
 
+mod camera;
 mod detector;
 mod rig;
+mod sampling;
 mod simulator;
 
 pub use grasp_agent;
@@ -50,8 +52,10 @@ pub use pipeline_sim;
 pub use puma_val2;
 pub use qtable;
 
+pub use camera::LiveCamera;
 pub use detector::{BallDetector, UnknownDetector, bright_ball_scene};
 pub use rig::{PlaceError, Rig, RigError, RigParts};
+pub use sampling::sample_on_arm;
 pub use simulator::Simulator;
 
 #[cfg(doctest)]

@@ -23,12 +23,15 @@ use puma_val2::{
 /// emulated arm during its moves too, and the sensors are wired to the controller, which stops the
 /// arm. [`Rig::on_port`] and [`Rig::on_socket`] connect to another controller. The cell then
 /// follows the pose that it reports at the end of each move, and its own sensors guard the moves.
+/// [`Rig::seen_by`] replaces the simulated cell by a real camera.
 pub struct Rig {
     name: String,
     arm: Box<dyn Manipulator>,
     pose: Pose,
     cell: SharedCell,
     camera: CellCamera<Box<dyn FnMut() -> Joints + Send>>,
+    /// A real camera, if there is one.
+    real: Option<Box<dyn FrameSource + Send>>,
     stop: StopFlag,
 }
 
@@ -40,6 +43,9 @@ type Pose = Arc<dyn Fn() -> Joints + Send + Sync>;
 
 /// Baud rate of VAL II's terminal line (8 data bits, no parity, one stop bit).
 const BAUD: u32 = 9600;
+
+/// Monitor speed of an emulated arm, percent.
+const FULL_SPEED: f64 = 100.0;
 
 /// Longest time for a socket to connect.
 const SOCKET_TIMEOUT: Duration = Duration::from_secs(5);
@@ -87,37 +93,62 @@ impl Rig {
             Arc::new(move || linked.links(&server.with_emulator(|emulator| emulator.joints())));
         let arm = {
             let pose = Arc::clone(&pose);
-            cell.with_jaws_of(connect(line, client_config, &stop)?, move || pose())
+            cell.with_jaws_of(
+                connect(line, client_config, FULL_SPEED, &stop)?,
+                move || pose(),
+            )
         };
         let arm = Box::new(arm);
         Ok(Self::assemble(name, (arm, stop), pose, cell, (scene, seed)))
     }
 
-    /// Connects to the controller on the serial device `path`.
+    /// Connects to the controller on the serial device `path`, sets its monitor speed to `speed`
+    /// percent, and calibrates the arm, which turns every joint a little.
     ///
     /// # Errors
     /// No such device, a busy one, or no VAL II monitor at its other end.
     #[cfg(feature = "serial")]
-    pub fn on_port(path: &str, scene: &Scene, seed: u64) -> Result<Self, RigError> {
-        Self::elsewhere(SerialLine::open(path, BAUD)?, scene, seed)
+    pub fn on_port(path: &str, speed: f64, scene: &Scene, seed: u64) -> Result<Self, RigError> {
+        Self::elsewhere(SerialLine::open(path, BAUD)?, speed, scene, seed)
     }
 
-    /// Connects to the controller behind the socket `address` (`host:port`).
+    /// Connects to the controller behind the socket `address` (`host:port`), in the same way.
     ///
     /// # Errors
     /// Nothing listens there, or it is not a VAL II monitor.
-    pub fn on_socket(address: &str, scene: &Scene, seed: u64) -> Result<Self, RigError> {
-        Self::elsewhere(TcpLine::connect(address, SOCKET_TIMEOUT)?, scene, seed)
+    pub fn on_socket(
+        address: &str,
+        speed: f64,
+        scene: &Scene,
+        seed: u64,
+    ) -> Result<Self, RigError> {
+        let line = TcpLine::connect(address, SOCKET_TIMEOUT)?;
+        Self::elsewhere(line, speed, scene, seed)
+    }
+
+    /// Replaces the simulated cell by what a real camera on the hand sees. The rendered ball is
+    /// gone, and [`Rig::place`] moves nothing; the controller's own sensors guard the arm.
+    #[must_use]
+    pub fn seen_by(mut self, camera: impl FrameSource + Send + 'static) -> Self {
+        self.cell.remove_ball();
+        self.real = Some(Box::new(camera));
+        self
+    }
+
+    /// Returns `false` if a real camera sees what the arm does.
+    pub fn is_simulated(&self) -> bool {
+        self.real.is_none()
     }
 
     fn elsewhere<T: Transport + 'static>(
         line: T,
+        speed: f64,
         scene: &Scene,
         seed: u64,
     ) -> Result<Self, RigError> {
         let name = line.name().to_owned();
         let stop = StopFlag::default();
-        let mut arm = connect(line, ClientConfig::default(), &stop)?;
+        let mut arm = connect(line, ClientConfig::default(), speed, &stop)?;
         let (cell, start) = (paper_cell(), arm.joints()?);
         let (arm, pose) = cell.follow(arm, start);
         let (arm, pose): (_, Pose) = (Box::new(arm), Arc::new(pose));
@@ -142,6 +173,7 @@ impl Rig {
             pose,
             cell,
             camera,
+            real: None,
             stop,
         }
     }
@@ -169,7 +201,7 @@ impl Rig {
     /// [`PlaceError::InHand`] if ball or holder would still stand in the hand, which leaves the
     /// cell unchanged, and what kept the arm from moving away.
     pub fn place(&mut self, ball: &Ball) -> Result<(), PlaceError> {
-        if !self.put(ball) {
+        if self.is_simulated() && !self.put(ball) {
             self.clear_for(Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]))?;
             if !self.put(ball) {
                 return Err(PlaceError::InHand {
@@ -231,9 +263,17 @@ impl Rig {
 
     /// Returns camera, arm and sensor, for a caller that puts something of its own in between.
     pub fn parts(&mut self) -> RigParts<'_> {
-        let sensor = Box::new(self.cell.sensor(self.pose()));
+        let (camera, sensor): (&mut dyn FrameSource, Box<dyn ProximitySensor>) =
+            match &mut self.real {
+                Some(camera) => (&mut **camera, Box::new(ControllersOwn)),
+                None => {
+                    let pose = Arc::clone(&self.pose);
+                    let sensor = self.cell.sensor(move || pose());
+                    (&mut self.camera, Box::new(sensor))
+                }
+            };
         RigParts {
-            camera: &mut self.camera,
+            camera,
             arm: &mut *self.arm,
             sensor,
         }
@@ -269,6 +309,16 @@ impl std::fmt::Debug for Rig {
             .field("name", &self.name)
             .field("cell", &self.cell)
             .finish_non_exhaustive()
+    }
+}
+
+/// Sensors that the controller alone reads: it stops the arm, whose order then ends with
+/// [`ArmError::ProximityStop`].
+struct ControllersOwn;
+
+impl ProximitySensor for ControllersOwn {
+    fn object_near(&mut self) -> Result<bool, ArmError> {
+        Ok(false)
     }
 }
 
@@ -323,10 +373,11 @@ impl<T: Transport> Transport for StoppableLine<T> {
 fn connect<T: Transport>(
     line: T,
     config: ClientConfig,
+    speed: f64,
     stop: &StopFlag,
 ) -> Result<GuardedArm<StoppableLine<T>>, ArmError> {
     let config = ClientConfig {
-        speed_percent: Some(100.0),
+        speed_percent: Some(speed),
         power_retries: 15,
         ..config
     };

@@ -1,12 +1,17 @@
 //! The command line.
 
-use example_support::prelude::*;
 use std::path::PathBuf;
+
+use example_support::prelude::*;
 
 use clap::{Parser, ValueEnum};
 use grasp_agent::GoalInterval;
 use pipeline_sim::MoveForm;
 use puma_grasp::BallDetector;
+
+use example_support::real::RealOptions;
+
+use crate::taught::ControllerName;
 
 /// Learns to reach a ball in simulation, then sees, reaches and grasps balls with a PUMA 560
 /// through VAL II.
@@ -22,15 +27,24 @@ pub(crate) struct Options {
     /// Seed of all random draws; the same seed gives the same run
     #[arg(long, value_name = "N", default_value_t = 2000)]
     pub(crate) seed: u64,
-    /// Number of balls
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
-    pub(crate) runs: usize,
-    /// Serial device of a VAL II controller or emulator, 9600 8N1; none is started then
-    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
-    pub(crate) port: Option<String>,
-    /// Socket of a VAL II controller or emulator, as HOST:PORT
-    #[arg(long, value_name = "ADDR")]
-    pub(crate) tcp: Option<String>,
+    /// Number of balls [default: 20, with --camera 1]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    runs: Option<usize>,
+    #[command(flatten)]
+    pub(crate) real: RealOptions,
+    /// Controller of the arm
+    #[arg(long, value_enum, default_value_t = ControllerName::Learned)]
+    pub(crate) controller: ControllerName,
+    /// Show the goal on the arm first: the ball is put between the open jaws
+    #[arg(long)]
+    pub(crate) teach_goal: bool,
+    /// Sample N moves of each behaviour on the arm for the regression simulator, as the paper did,
+    /// instead of 2500 in the simulated cell
+    #[arg(long, value_name = "N", conflicts_with = "policy", value_parser = enough)]
+    pub(crate) sample: Option<usize>,
+    /// Start the hybrid controller from the camera.belief of an earlier run
+    #[arg(long, value_name = "FILE")]
+    pub(crate) belief: Option<PathBuf>,
     /// Policy of an earlier run; skips training. A folder with centering.policy and
     /// approaching.policy is read with the --fine and --reward it was learned with; a file written
     /// by --export needs neither
@@ -68,6 +82,11 @@ pub(crate) struct Options {
     /// Run the emulated arm at the speed of a real one
     #[arg(long, conflicts_with_all = ["port", "tcp"])]
     pub(crate) realtime: bool,
+    /// Show the run in a browser while it lasts, with a Stop button (cargo's --features live).
+    /// Other machines can look only at another ADDR than this one, and stop only with the token
+    /// that is then printed
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8000")]
+    pub(crate) live: Option<String>,
     /// Print the final table only
     #[arg(long)]
     pub(crate) quiet: bool,
@@ -95,8 +114,34 @@ impl Options {
         }
     }
 
+    /// Returns the number of balls.
+    pub(crate) fn runs(&self) -> usize {
+        let usual = if self.real.camera.is_some() { 1 } else { 20 };
+        self.runs.unwrap_or(usual)
+    }
+
     /// Refuses options that would have no effect.
     pub(crate) fn check(&self) -> Result<(), String> {
+        self.real.check()?;
+        let of_learned = [
+            ("--policy", self.policy.is_some()),
+            ("--export", self.export.is_some()),
+            ("--sample", self.sample.is_some()),
+            ("--reward", self.reward.is_some()),
+            ("--simulator", self.simulator.is_some()),
+            ("--fine", self.fine),
+        ];
+        match self.controller {
+            ControllerName::Learned if self.belief.is_some() => {
+                return Err("--belief is for --controller hybrid".into());
+            }
+            ControllerName::Hybrid => {
+                if let Some((name, _)) = of_learned.iter().find(|(_, given)| *given) {
+                    return Err(format!("{name} is for --controller learned"));
+                }
+            }
+            ControllerName::Learned => {}
+        }
         match &self.policy {
             Some(path) if path.is_file() && (self.fine || self.reward.is_some()) => Err(format!(
                 "{}: an exported policy records how it was learned; leave out --fine and --reward",
@@ -104,6 +149,17 @@ impl Options {
             )),
             _ => Ok(()),
         }
+    }
+}
+
+/// Parses a number of samples that a simulator can be fitted to.
+fn enough(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(count @ 20..) => Ok(count),
+        Ok(few) => Err(format!(
+            "{few} samples are too few; give 20 or more, the paper 300"
+        )),
+        Err(error) => Err(format!("{error}")),
     }
 }
 

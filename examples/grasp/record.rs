@@ -29,9 +29,9 @@ pub(crate) struct RunRecord {
 /// A run in `summary.json`.
 #[derive(Default, Serialize)]
 pub(crate) struct RunSummary {
-    /// The ball's centre in the arm's world frame.
-    pub(crate) ball_mm: [f64; 3],
-    /// Set if the jaws hold the ball and the agent reports it.
+    /// The ball's centre in the arm's world frame; nobody knows that of a real ball.
+    pub(crate) ball_mm: Option<[f64; 3]>,
+    /// Set if the jaws hold the ball and the agent reports it; of a real ball only the latter.
     pub(crate) grasped: bool,
     pub(crate) cycles: usize,
     pub(crate) losses: usize,
@@ -43,6 +43,9 @@ pub(crate) struct RunSummary {
     pub(crate) miss_mm: Option<f64>,
     /// Reason why the agent gave up, or the fault that ended the run.
     pub(crate) reason: Option<String>,
+    /// Set for a run that a fault or a signal ended, which does not count.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) broken_off: bool,
 }
 
 /// A frame at half size with the detected circle drawn in.
@@ -62,9 +65,9 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl RunRecord {
-    pub(crate) fn new(run: usize, ball_mm: [f64; 3], saved: SavedRun) -> Self {
+    pub(crate) fn new(run: usize, ball_mm: Option<[f64; 3]>, saved: SavedRun) -> Self {
         let summary = RunSummary {
-            ball_mm: ball_mm.map(rounded),
+            ball_mm: ball_mm.map(|mm| mm.map(rounded)),
             ..RunSummary::default()
         };
         Self {
@@ -83,7 +86,7 @@ impl RunRecord {
         self.saved.note(event);
         let (mut features, mut action) = (None, ",,".to_owned());
         match event.kind {
-            EventKind::Gripping(_) => {
+            EventKind::Gripping(_) if self.summary.ball_mm.is_some() => {
                 self.summary.miss_mm = Some(rounded(1000.0 * cell.grip_miss(&event.joints)));
             }
             EventKind::Gripped => self.gripped = true,
@@ -146,6 +149,7 @@ impl RunRecord {
             }),
             miss_mm: self.summary.miss_mm,
             reason: outcome.gave_up.map(|reason| reason.to_string()),
+            broken_off: false,
         };
     }
 }
@@ -155,6 +159,7 @@ impl RunSummary {
     pub(crate) fn result(&self) -> String {
         match &self.reason {
             _ if self.grasped => "grasped".into(),
+            Some(reason) if self.broken_off => format!("broken off: {reason}"),
             Some(reason) => format!("not grasped: {reason}"),
             None => "not grasped: the jaws hold no ball, and none is seen".into(),
         }

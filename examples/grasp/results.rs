@@ -34,6 +34,7 @@ pub(crate) struct TrainingSummary {
 impl<'a> Summary<'a> {
     pub(crate) fn new(seed: u64, training: &'a TrainingSummary, records: &'a [RunRecord]) -> Self {
         let runs: Vec<&RunSummary> = records.iter().map(|record| &record.summary).collect();
+        let counted = runs.iter().filter(|run| !run.broken_off).count();
         let grasped = || runs.iter().filter(|run| run.grasped);
         let (count, cycles) = (
             grasped().count(),
@@ -42,10 +43,29 @@ impl<'a> Summary<'a> {
         Self {
             seed,
             training,
-            success_rate: count as f64 / runs.len().max(1) as f64,
+            success_rate: count as f64 / counted.max(1) as f64,
             mean_cycles: (count > 0).then(|| cycles as f64 / count as f64),
             runs,
         }
+    }
+
+    /// Returns the result of all runs in a line.
+    pub(crate) fn in_words(&self) -> String {
+        let broken_off = self.runs.iter().filter(|run| run.broken_off).count();
+        let (all, share) = (self.runs.len() - broken_off, 100.0 * self.success_rate);
+        let grasped = self.runs.iter().filter(|run| run.grasped).count();
+        let mut words = format!("{grasped} of {all} grasped ({share:.1} %)");
+        if broken_off > 0 {
+            words += &format!(", {broken_off} broken off");
+        }
+        let collisions: usize = self.runs.iter().map(|run| run.collisions).sum();
+        if collisions > 0 {
+            words += &format!(", {collisions} collisions of the hand");
+        }
+        if let Some(mean) = self.mean_cycles {
+            words += &format!(", {mean:.1} moves on average from the first sighting to the grip");
+        }
+        words
     }
 }
 
@@ -58,8 +78,9 @@ impl fmt::Display for Summary<'_> {
              result"
         )?;
         for (run, number) in self.runs.iter().zip(1..) {
-            let [x, y, z] = run.ball_mm;
-            let ball = format!("{x:6.0} {y:6.0} {z:6.0}");
+            let ball = run.ball_mm.map_or("     -".into(), |[x, y, z]| {
+                format!("{x:6.0} {y:6.0} {z:6.0}")
+            });
             let last = run.last_seen.as_ref().map_or("-".into(), |f| {
                 format!("{:6.1} {:6.1} {:6.1}", f.x, f.y, f.r)
             });
@@ -76,21 +97,7 @@ impl fmt::Display for Summary<'_> {
              the gripper when it closed",
             goal_words()
         )?;
-        writeln!(f)?;
-        let (all, share) = (self.runs.len(), 100.0 * self.success_rate);
-        let grasped = self.runs.iter().filter(|run| run.grasped).count();
-        write!(f, "\n{grasped} of {all} grasped ({share:.1} %)")?;
-        let collisions: usize = self.runs.iter().map(|run| run.collisions).sum();
-        if collisions > 0 {
-            write!(f, ", {collisions} collisions of the hand")?;
-        }
-        match self.mean_cycles {
-            None => Ok(()),
-            Some(mean) => write!(
-                f,
-                ", {mean:.1} moves on average from the first sighting to the grip"
-            ),
-        }
+        write!(f, "\n\n{}", self.in_words())
     }
 }
 

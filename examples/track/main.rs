@@ -11,9 +11,10 @@ use clap::Parser;
 use example_support::files::animated;
 use example_support::overlay::Overlay;
 use example_support::prelude::*;
+use example_support::real::RealOptions;
 use example_support::stages::{Stages, Timed};
 use example_support::tally::{Counted, Tally};
-use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
+use example_support::trial::{Trial, TrialCell, ball_in_view, make_errors, run_on_rig};
 use grasp_agent::{
     Agent, AgentConfig, AgentError, Belief, EventKind, Hybrid, HybridSettings, RunEvent, SavedRun,
 };
@@ -36,7 +37,7 @@ mod world;
 /// In each cell the controller first makes --teach runs on resting balls to learn the camera; then
 /// come the runs that count. A grasp counts if the jaws hold the ball and the controller reports
 /// it. Grasps before anything happened to the ball are reported apart; a failure before that
-/// counts.
+/// counts. With --camera the ball is a real one, which rests where it is put.
 #[derive(Parser, Debug)]
 struct Options {
     /// Folder for track.csv, track.png (the first run, animated), camera.belief, and the runs that
@@ -55,9 +56,11 @@ struct Options {
     /// Number of cells that the runs are spread over, each with errors drawn anew
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     cells: usize,
-    /// Movement of the ball
-    #[arg(long, value_enum, default_value_t = Fate::Push)]
-    ball: Fate,
+    /// Movement of the ball [default: push, with --camera rest]
+    #[arg(long, value_enum)]
+    ball: Option<Fate>,
+    #[command(flatten)]
+    real: RealOptions,
     /// Circle detector: a-contrario, heuristic, rht, sht
     #[arg(
         long,
@@ -68,7 +71,7 @@ struct Options {
     detector: BallDetector,
     /// Use features straight from the geometry, without frames and VAL II. Only failed runs are
     /// written, and collisions are not counted
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["port", "tcp", "camera"])]
     shortcut: bool,
     /// Read noise of the camera, gray levels [default: that of the scene]
     #[arg(long, value_name = "LEVELS", conflicts_with = "shortcut")]
@@ -82,6 +85,28 @@ struct Options {
 }
 
 impl Options {
+    /// Returns the movement of the ball.
+    fn fate(&self) -> Fate {
+        let usual = if self.real.camera.is_some() {
+            Fate::Rest
+        } else {
+            Fate::Push
+        };
+        self.ball.unwrap_or(usual)
+    }
+
+    /// Refuses what a real arm or ball cannot do.
+    fn check(&self) -> Result<(), String> {
+        self.real.check()?;
+        if self.real.camera.is_some() && self.fate() != Fate::Rest {
+            return Err("a real ball rests where it is put: leave out --ball".into());
+        }
+        if (self.real.port.is_some() || self.real.tcp.is_some()) && self.cells > 1 {
+            return Err("the arm on the line stands in one cell: leave out --cells".into());
+        }
+        Ok(())
+    }
+
     /// Returns the number of runs in this cell, the first being 0.
     fn runs_in(&self, cell: usize) -> usize {
         (self.runs + self.cells - 1 - cell) / self.cells
@@ -93,6 +118,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Outcome {
+    options.check()?;
     let belief = options.belief.as_deref().map(Belief::load).transpose()?;
     let _lock = lock_folder(&options.out)?;
     let path = options.out.join("track.csv");
@@ -101,7 +127,7 @@ fn run(options: &Options) -> Outcome {
     let mut runs = Runs {
         options,
         belief,
-        detector: options.detector.build(options.seed)?,
+        detector: None,
         stages: Stages::default(),
         csv: csv.transpose()?,
         film: Vec::new(),
@@ -126,16 +152,18 @@ fn run(options: &Options) -> Outcome {
     done.and(film)
 }
 
+type Detector = Box<dyn CircleDetector + Send>;
+
 /// A cell with drawn errors.
 enum Place {
     /// Features straight from the geometry, an arm that moves at once.
     Shortcut(Box<TrialCell>),
-    /// Rendered frames, circle detection, VAL II on a line; and the generator of the balls.
+    /// Frames, circle detection, VAL II on a line; and the generator of the balls.
     Chain(Box<Rig>, Xoshiro256PlusPlus),
 }
 
 impl Place {
-    fn draw(options: &Options, seed: u64) -> Outcome<Self> {
+    fn draw(options: &Options, seed: u64, detector: &mut Option<Detector>) -> Outcome<Self> {
         if options.shortcut {
             let cell = TrialCell::draw(options.level, seed)?;
             return Ok(Self::Shortcut(Box::new(cell)));
@@ -143,7 +171,12 @@ impl Place {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut scene = bright_ball_scene();
         scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
-        let rig = rig_with_errors(&options.level.draw(&mut rng), &scene, seed)?;
+        let errors = options.level.draw(&mut rng);
+        let (rig, for_its_frames) = options.real.open(options.detector, false, &scene, seed)?;
+        detector.get_or_insert(for_its_frames);
+        if rig.is_simulated() {
+            make_errors(&rig, &errors)?;
+        }
         Ok(Self::Chain(Box::new(rig), rng))
     }
 }
@@ -153,7 +186,8 @@ struct Runs<'a> {
     options: &'a Options,
     /// Knowledge of the camera from an earlier run.
     belief: Option<Belief>,
-    detector: Box<dyn CircleDetector + Send>,
+    /// Detector of all cells, once there are frames.
+    detector: Option<Detector>,
     stages: Stages,
     csv: Option<Table>,
     film: Vec<RgbImage>,
@@ -167,10 +201,16 @@ impl Runs<'_> {
         let options = self.options;
         self.tally.cells.push(Vec::new());
         let seed = options.seed.wrapping_add(number as u64);
-        let mut place = Place::draw(options, seed)?;
-        let mut config = AgentConfig::paper(Workspace::paper().search_poses());
-        config.max_cycles = 120;
-        let settings = HybridSettings::paper();
+        let mut place = Place::draw(options, seed, &mut self.detector)?;
+        let config = AgentConfig {
+            max_cycles: 120,
+            ..AgentConfig::paper(Workspace::paper().search_poses())
+        };
+        let goal = options.real.goal(&config)?;
+        let config = options.real.fit(config, goal.as_ref());
+        let mut settings = HybridSettings::paper();
+        settings.nominal.ball_radius = options.real.ball_radius / 1000.0;
+        settings.goal.r *= options.real.ball_size();
         let hybrid = match &self.belief {
             Some(belief) => Hybrid::with_belief(settings, belief.clone()),
             None => Hybrid::new(settings),
@@ -184,7 +224,7 @@ impl Runs<'_> {
                 let learned = agent.controller().inner.clone().frozen();
                 agent = Agent::with_controller(agent.config().clone(), stages.around(learned))?;
             }
-            let fate = if teaching { Fate::Rest } else { options.ball };
+            let fate = if teaching { Fate::Rest } else { options.fate() };
             let run = self.tally.runs().count() + 1;
             let mut saved = SavedRun::before(&agent);
             let (end, happened, collisions) = match &mut place {
@@ -195,6 +235,7 @@ impl Runs<'_> {
                     (end.transpose(), world.has_happened(), None)
                 }
                 Place::Chain(rig, rng) => {
+                    options.real.next_ball(rig, ball + 1)?;
                     rig.place(&ball_in_view(rig.cell(), rng)?)?;
                     let mut world = World::new(fate, rng.random());
                     let counted = (!teaching).then_some(run);
@@ -205,7 +246,7 @@ impl Runs<'_> {
                     (
                         Some(end?),
                         world.has_happened(),
-                        Some(rig.contacts().collisions),
+                        rig.is_simulated().then(|| rig.contacts().collisions),
                     )
                 }
             };
@@ -259,6 +300,7 @@ impl Runs<'_> {
         counted: Option<usize>,
         saved: &mut SavedRun,
     ) -> Outcome<Result<Trial, AgentError>> {
+        let detector = self.detector.as_mut().ok_or("no detector")?;
         let (shared, mut gripped) = (rig.cell().clone(), false);
         let (csv, film, mut written) = (&mut self.csv, &mut self.film, Ok(()));
         let mut observe = |event: &RunEvent<'_>| {
@@ -287,7 +329,7 @@ impl Runs<'_> {
                 film.push(resize(&picture, width, height, FilterType::Triangle));
             }
         };
-        let end = run_on_rig(rig, &mut *self.detector, agent, &self.stages, &mut observe);
+        let end = run_on_rig(rig, &mut **detector, agent, &self.stages, &mut observe);
         written.map(|()| end)
     }
 }

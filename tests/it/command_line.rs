@@ -4,7 +4,7 @@
 //! and is skipped.
 
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -24,8 +24,9 @@ macro_rules! or_skip {
         }
     };
 }
+pub(crate) use or_skip;
 
-fn example(name: &str) -> Option<Command> {
+pub(crate) fn example(name: &str) -> Option<Command> {
     let tests = std::env::current_exe().ok()?;
     let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
     let path: PathBuf = tests.parent()?.parent()?.join("examples").join(file);
@@ -36,7 +37,7 @@ fn example(name: &str) -> Option<Command> {
     Some(Command::new(path))
 }
 
-fn output(command: &mut Command) -> (Output, String) {
+pub(crate) fn output(command: &mut Command) -> (Output, String) {
     let output = command.output().expect("the example starts");
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!errors.contains("panicked"), "{errors}");
@@ -66,7 +67,13 @@ fn grasp_that_cannot_begin_keeps_earlier_results() {
         ["--policy", "no-such-policy"],
         ["--port", "/dev/no-such-port"],
     ] {
-        let errors = or_skip!(grasp_fails(folder.path(), &[option, wrong]));
+        let line: &[&str] = if option == "--port" {
+            &["--rendered", "--yes"]
+        } else {
+            &[]
+        };
+        let arguments = [&[option, wrong], line].concat();
+        let errors = or_skip!(grasp_fails(folder.path(), &arguments));
         assert!(errors.contains(wrong) && kept.exists(), "{errors}");
     }
 }
@@ -88,7 +95,8 @@ fn grasp_names_a_socket_that_is_silent_or_talks_nonsense() {
             }
         });
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let errors = or_skip!(grasp_fails(folder.path(), &["--tcp", &address]));
+        let arguments = ["--tcp", &address, "--rendered", "--yes"];
+        let errors = or_skip!(grasp_fails(folder.path(), &arguments));
         assert!(
             errors.contains(&address) && errors.contains("expected"),
             "{errors}"
@@ -130,7 +138,7 @@ fn blank_policy(pair: BehaviourPair) -> String {
 }
 
 /// Writes a policy that has learned nothing. Returns its path.
-fn policy_file(folder: &Path) -> String {
+pub(crate) fn policy_file(folder: &Path) -> String {
     let path = folder.join("policy.json");
     std::fs::write(&path, blank_policy(BehaviourPair::paper_mended())).expect("a file");
     path.to_str().expect("a plain path").to_owned()
@@ -200,71 +208,11 @@ fn options_that_would_have_no_effect_are_refused() {
 }
 
 /// Waits until the arm has looked around for a while.
-fn wait_for_frames(grasp: &mut Child, out: &Path) {
+pub(crate) fn wait_for_frames(grasp: &mut Child, out: &Path) {
     let frames = || std::fs::read_dir(out.join("frames")).map_or(0, Iterator::count);
     while frames() < 4 && grasp.try_wait().expect("a process").is_none() {
         std::thread::sleep(Duration::from_millis(20));
     }
-}
-
-/// Passes bytes on between a program that connects to the returned address and `controller`.
-/// Returns all that the program sent once it has closed the line.
-fn recording_relay(controller: String) -> (String, std::thread::JoinHandle<Vec<u8>>) {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a socket");
-    let address = listener.local_addr().expect("its address").to_string();
-    let relay = std::thread::spawn(move || {
-        let (mut program, _) = listener.accept().expect("the program connects");
-        let mut controller = TcpStream::connect(controller).expect("the controller listens");
-        let mut answers = controller.try_clone().expect("a second handle");
-        let mut back = program.try_clone().expect("a second handle");
-        std::thread::spawn(move || std::io::copy(&mut answers, &mut back));
-        let (mut heard, mut bytes) = (Vec::new(), [0; 256]);
-        while let Ok(count @ 1..) = program.read(&mut bytes) {
-            heard.extend(&bytes[..count]);
-            controller.write_all(&bytes[..count]).expect("it takes it");
-        }
-        heard
-    });
-    (address, relay)
-}
-
-#[cfg(unix)]
-#[test]
-fn ctrl_c_stops_the_arm_and_keeps_the_results() {
-    use puma_val2::{Emulator, EmulatorServer, Profile, PumaParams, ServeConfig};
-    let emulator = Emulator::new(PumaParams::unimation(), Profile::val2());
-    let config = ServeConfig {
-        realtime: true,
-        ..ServeConfig::default()
-    };
-    let server = EmulatorServer::tcp("127.0.0.1:0", emulator, config).expect("a free port");
-    let (address, relay) = recording_relay(server.address().to_owned());
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let (policy, out) = (policy_file(folder.path()), folder.path().join("out"));
-    let mut grasp = or_skip!(example("grasp"));
-    grasp.args(["--tcp", &address, "--policy", &policy, "--out"]);
-    grasp.arg(&out).stdout(Stdio::null()).stderr(Stdio::piped());
-    let mut grasp = grasp.spawn().expect("grasp starts");
-    wait_for_frames(&mut grasp, &out);
-    let mut kill = Command::new("kill");
-    kill.args(["-INT", &grasp.id().to_string()]);
-    assert!(kill.status().expect("kill is there").success());
-    let output = grasp.wait_with_output().expect("grasp ends");
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(130), "{errors}");
-    let said = "run 1 was broken off: stopped by a signal";
-    assert!(errors.contains(said), "{errors}");
-    let sent = relay.join().expect("the relay ends with the line");
-    let stop = sent.windows(5).position(|bytes| bytes == b"PANIC");
-    let stop = stop.expect("the controller was told to stop");
-    assert!(!sent[stop..].windows(4).any(|bytes| bytes == b"MOVE"));
-    let before = server.with_emulator(|emulator| emulator.joints());
-    std::thread::sleep(Duration::from_millis(200));
-    let after = server.with_emulator(|emulator| emulator.joints());
-    assert_eq!(before, after, "the arm still moves");
-    let file = std::fs::read_to_string(out.join("failures/run001.json")).expect("the run");
-    SavedRun::from_json(&file).expect("a saved run");
-    assert!(out.join("summary.json").exists() && out.join("features.csv").exists());
 }
 
 #[cfg(all(unix, feature = "serial"))]
@@ -287,6 +235,10 @@ fn grasp_keeps_what_it_has_when_the_controller_dies() {
     grasp.args([
         "--port",
         "puma",
+        "--rendered",
+        "--yes",
+        "--speed",
+        "100",
         "--policy",
         &policy,
         "--export",

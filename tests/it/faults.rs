@@ -311,7 +311,8 @@ fn a_line_that_dies_ends_the_run_and_keeps_the_belief() {
         let server =
             EmulatorServer::pty(emulator, ServeConfig::default()).expect("a pseudo-terminal");
         let path = server.address().to_owned();
-        let mut rig = Rig::on_port(&path, &bright_ball_scene(), 5).expect("the controller answers");
+        let mut rig =
+            Rig::on_port(&path, 100.0, &bright_ball_scene(), 5).expect("the controller answers");
         rig.place(&Ball::at(IN_VIEW[0], IN_VIEW[1], IN_VIEW[2]))
             .expect("away from the hand");
         let (mut agent, mut log, mut moves) = (agent(), EventLog::default(), 0);

@@ -17,7 +17,11 @@ mod exported_policy;
 mod faults;
 mod guard;
 mod literal_reward;
+#[cfg(all(unix, feature = "serial"))]
+mod real_camera;
 mod result_files;
+#[cfg(unix)]
+mod stopping;
 mod tallies;
 mod taught_goal;
 

@@ -13,8 +13,12 @@ use std::error::Error;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, ValueEnum};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
 use crate::a_contrario::Rings;
 use crate::frame::{Channel, FrameError, ImageFiles};
@@ -158,8 +162,12 @@ fn region(text: &str) -> Result<Region, String> {
     }
 }
 
+/// Exit code of a program that a signal has stopped.
+const STOPPED: u8 = 130;
+
 /// Runs the program `detect_circles` with a command line, the program's name first, and returns its
-/// exit code. It prints its results, and a usage message where the command line has an error.
+/// exit code. It prints its results, and a usage message where the command line has an error. A
+/// first SIGINT or SIGTERM ends it with the results so far, a second one at once.
 pub fn run_detect_circles(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let options = match Options::try_parse_from(words) {
         Ok(options) => options,
@@ -169,7 +177,17 @@ pub fn run_detect_circles(words: impl IntoIterator<Item = OsString>) -> ExitCode
             return ExitCode::from(error.exit_code() as u8);
         }
     };
-    match process(&options) {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        // Without them a signal ends the program, as it does by default.
+        let _ = flag::register_conditional_shutdown(signal, STOPPED.into(), Arc::clone(&stop));
+        let _ = flag::register(signal, Arc::clone(&stop));
+    }
+    match process(&options, &stop) {
+        _ if stop.load(Ordering::Relaxed) => {
+            eprintln!("error: stopped by a signal; later images were not looked at");
+            ExitCode::from(STOPPED)
+        }
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
@@ -179,8 +197,8 @@ pub fn run_detect_circles(words: impl IntoIterator<Item = OsString>) -> ExitCode
     }
 }
 
-/// Processes every image; false when one could not be read.
-fn process(options: &Options) -> Result<bool, Box<dyn Error>> {
+/// Processes every image until `stop` is set; false when one could not be read.
+fn process(options: &Options, stop: &AtomicBool) -> Result<bool, Box<dyn Error>> {
     let mut detector = options.detector()?;
     if let Some(folder) = &options.overlay {
         writable_folder(folder)?;
@@ -199,7 +217,7 @@ fn process(options: &Options) -> Result<bool, Box<dyn Error>> {
                 continue;
             }
         };
-        loop {
+        while !stop.load(Ordering::Relaxed) {
             match image(&mut files, &mut *detector, &mut results) {
                 Ok(()) => {}
                 Err(Failure::Image(FrameError::End)) => break,

@@ -11,6 +11,8 @@ use crate::program::Outcome;
 
 /// Moves sampled in the cell for the regression.
 pub const SAMPLES: usize = 2_500;
+/// Standard deviation of the features in the samples, feature units.
+pub const FEATURE_NOISE: f64 = 0.5;
 /// Actions to learn from, centering and approaching.
 pub const ACTIONS: (u64, u64) = (60_000, 500_000);
 /// Actions to learn approaching on 540 states from.
@@ -32,8 +34,6 @@ pub fn simulators<const N: usize>(
     forms: [MoveForm; N],
     rng: &mut dyn Rng,
 ) -> Outcome<[Simulator; N]> {
-    /// Standard deviation of the features in the samples, feature units.
-    const FEATURE_NOISE: f64 = 0.5;
     let (centering, reaching) = cell.sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
     let fit = |form: &MoveForm| Simulator::fit(&centering, &reaching, *form);
     let fitted: Vec<Simulator> = forms.iter().map(fit).collect::<Result<_, _>>()?;

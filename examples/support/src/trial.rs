@@ -52,11 +52,11 @@ pub struct Trial {
     pub outcome: RunOutcome,
     /// Moves until the ball stood at the goal for the first time, `None` if it never did.
     pub at_goal: Option<usize>,
-    /// Set if the jaws hold the ball at the end.
+    /// Set if the jaws hold the ball at the end; of a real ball, if the camera says so.
     pub held: bool,
     /// Stops by the proximity sensors.
     pub near: usize,
-    /// Collisions of the hand; counted through the full chain only.
+    /// Collisions of the hand; counted in rendered frames only.
     pub collisions: Option<usize>,
 }
 
@@ -71,7 +71,7 @@ pub fn run_on_rig<C: Controller>(
     stages: &Stages,
     observe: &mut dyn FnMut(&RunEvent<'_>),
 ) -> Result<Trial, AgentError> {
-    let cell = rig.cell().clone();
+    let (cell, simulated) = (rig.cell().clone(), rig.is_simulated());
     let RigParts {
         camera,
         arm,
@@ -82,7 +82,13 @@ pub fn run_on_rig<C: Controller>(
     let mut arm = stages.around(arm);
     let trial = reach(agent, &mut eye, &mut arm, &mut *sensor, &cell, observe)?;
     Ok(Trial {
-        collisions: Some(cell.contacts().collisions),
+        collisions: simulated.then(|| cell.contacts().collisions),
+        // Of a real ball only the camera tells.
+        held: if simulated {
+            trial.held
+        } else {
+            trial.outcome.gave_up.is_none()
+        },
         ..trial
     })
 }
@@ -123,10 +129,18 @@ fn reach<C: Controller>(
 pub fn rig_with_errors(errors: &Errors, scene: &Scene, seed: u64) -> Outcome<Rig> {
     let rig = Rig::emulated(false, scene, seed)?;
     rig.stopped_by(STOP.clone());
+    make_errors(&rig, errors)?;
+    Ok(rig)
+}
+
+/// Gives the cell around an arm these errors, in the same way.
+///
+/// # Errors
+/// The quantity that is out of range.
+pub fn make_errors(rig: &Rig, errors: &Errors) -> Result<(), QuantityError> {
     let wrong = errors.apply(&rig.cell().get())?;
     rig.cell().with(|cell| *cell = wrong);
-    rig.cell().set_errors(errors)?;
-    Ok(rig)
+    rig.cell().set_errors(errors)
 }
 
 /// Draws a ball in view of one of the search poses.

@@ -93,6 +93,11 @@ impl<R: BufRead> FrameStream<R> {
         match read_line(&mut self.reader)? {
             None => return Ok(false),
             Some(line) if line.starts_with(b"FRAME") => {}
+            Some(line) if line.starts_with(b"YUV4MPEG2") => {
+                return Err(invalid(
+                    "a new header begins here, perhaps of another frame size",
+                ));
+            }
             Some(_) => return Err(invalid("it does not begin with FRAME")),
         }
         self.reader.read_exact(luma)?;

@@ -38,6 +38,16 @@ pub struct MoveSample {
 }
 
 impl MoveSample {
+    /// Draws a move of the paper's lists, degrees of `JT1` to `JT3`: of `JT1` alone if `waist` is
+    /// set, otherwise of `JT2` and `JT3`.
+    pub fn draw_turns<R: Rng + ?Sized>(waist: bool, rng: &mut R) -> [f64; 3] {
+        if waist {
+            return [JT1[rng.random_range(0..9)], 0.0, 0.0];
+        }
+        let d2 = JT2[rng.random_range(0..9)];
+        [0.0, d2, JT3[rng.random_range(0..9)]]
+    }
+
     /// Refuses a sample that no model can be fitted to or judged on.
     pub(super) fn check(&self, index: usize) -> Result<(), QuantityError> {
         let [d1, d2, d3] = self.turns;
@@ -118,13 +128,8 @@ impl Cell {
         at_most(name, count as f64, MOST_SAMPLES as f64)?;
         let (mut centering, mut reaching) = (Vec::new(), Vec::new());
         for _ in 0..count {
-            centering.extend(
-                self.sample_move(noise, rng, |rng| [JT1[rng.random_range(0..9)], 0.0, 0.0]),
-            );
-            reaching.extend(self.sample_move(noise, rng, |rng| {
-                let d2 = JT2[rng.random_range(0..9)];
-                [0.0, d2, JT3[rng.random_range(0..9)]]
-            }));
+            centering.extend(self.sample_move(noise, rng, true));
+            reaching.extend(self.sample_move(noise, rng, false));
             if centering.is_empty() && reaching.is_empty() {
                 break;
             }
@@ -137,11 +142,11 @@ impl Cell {
         &self,
         noise: f64,
         rng: &mut R,
-        mut draw: impl FnMut(&mut R) -> [f64; 3],
+        waist: bool,
     ) -> Option<MoveSample> {
         for _ in 0..10_000 {
             let (start, joints) = self.exploring_start(rng)?;
-            let turns = draw(rng);
+            let turns = MoveSample::draw_turns(waist, rng);
             let [d1, d2, d3] = turns;
             let after = joints + JointDelta::from_degrees([d1, d2, d3, 0.0, 0.0, 0.0]);
             if !start.within_limits(&joints) || !start.within_limits(&after) {
