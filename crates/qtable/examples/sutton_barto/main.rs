@@ -1,4 +1,4 @@
-//! Nine figures and examples of Sutton and Barto, "Reinforcement Learning" (2nd edition, 2018), run
+//! Ten figures and examples of Sutton and Barto, "Reinforcement Learning" (2nd edition, 2018), run
 //! again: their values with 95 % intervals beside the book's, and their curves as SVG.
 //!
 //! `cargo run --release -p qtable --features parallel --example sutton_barto -- FOLDER`
@@ -11,10 +11,11 @@ mod worlds;
 
 use std::path::Path;
 
-use qtable::rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
+use qtable::rand::{Rng, RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 use qtable::{
     Action, DoubleQLearning, DynaQ, Environment, EpsilonGreedy, Error, Estimate, Learner, Model,
-    NStep, Outcome, QLearning, QTable, Schedule, State, Target, Training, Until, over_seeds,
+    ModelEnvironment, NStep, Outcome, Policy, QLearning, QTable, Schedule, State, Target, Training,
+    Until, over_seeds,
 };
 
 use crate::figure::{Curves, draw};
@@ -29,13 +30,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .unwrap_or_else(|| "sutton_barto".into());
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
-    println!(
-        "{:34} {:38} {:>12} {:>18}",
-        "figure", "quantity", "book", "here"
-    );
+    let here = "here, 95 % interval";
+    row("figure", "quantity", "book", here);
     let save = |name: &str, svg: String| std::fs::write(folder.join(name), svg);
     save("2.2-bandits.svg", bandits()?)?;
     gambler()?;
+    save("5.2-blackjack.svg", blackjack()?)?;
     save("6.5-windy-grid.svg", windy()?)?;
     save("6.6-cliff.svg", cliff()?)?;
     save("6.7-maximization-bias.svg", bias()?)?;
@@ -53,7 +53,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn row(figure: &str, quantity: &str, book: &str, here: impl std::fmt::Display) {
-    println!("{figure:34} {quantity:38} {book:>12} {here:>18}");
+    println!("{figure:31} {quantity:39} {book:>11}  {here}");
+}
+
+/// Prints a quantity as its mean over the runs.
+fn measured(figure: &str, quantity: &str, book: &str, here: Estimate) {
+    row(
+        figure,
+        quantity,
+        book,
+        format!("{here}, {} runs", here.count),
+    );
 }
 
 fn constant(value: f64) -> Result<Schedule, Error> {
@@ -129,7 +139,7 @@ fn bandits() -> Result<String, Error> {
             })
         })?;
         let name = format!("ε = {epsilon}");
-        row(
+        measured(
             "figure 2.2, bandits",
             &format!("reward at step 1000, {name}"),
             book,
@@ -190,18 +200,100 @@ fn gambler() -> Result<(), Error> {
     Ok(())
 }
 
-/// Example 6.5: SARSA on the windy grid.
-fn windy() -> Result<String, Error> {
-    let runs = over_seeds(0..100, |seed| {
-        let learner = NStep::new(Target::Sarsa, 1, constant(0.5)?, 1.0)?;
-        episodes(
-            &mut worlds::windy(),
-            learner,
-            0.1,
-            (400, seed),
-            |_, steps, _| steps as f64,
-        )
+/// Chooses at random first, then the best action: the exploring starts of the book's section 5.3.
+struct ExploringStarts(bool);
+
+impl Policy for ExploringStarts {
+    fn begin_episode(&mut self) {
+        self.0 = true;
+    }
+
+    fn choose(&mut self, table: &QTable, state: State, rng: &mut dyn Rng) -> Action {
+        match std::mem::take(&mut self.0) {
+            true => Action(rng.random_range(0..table.actions())),
+            false => table.best(state),
+        }
+    }
+}
+
+/// Figure 5.2: blackjack by Monte Carlo control with exploring starts.
+fn blackjack() -> Result<String, Error> {
+    let game = ModelEnvironment::blackjack()?;
+    let optimum = game.model().value_iteration(1.0, 1e-12)?.table;
+    // Every sum from 12 to 21, card of the dealer and kind of hand, equally often.
+    let state = |sum: usize, card: usize, ace: usize| State((sum * 11 + card) * 2 + ace);
+    let cells = (0..200).map(|n| (n / 20 + 12, n / 2 % 10 + 1, n % 2));
+    let cells: Vec<State> = cells
+        .map(|(sum, card, ace)| state(sum, card, ace))
+        .collect();
+    let start: Vec<_> = cells.iter().map(|&cell| (cell, 1.0 / 200.0)).collect();
+    let learned = over_seeds(0..20, |seed| {
+        let mut cards = ModelEnvironment::new(game.model().clone(), &start)?;
+        let means = Schedule::inverse_visits(1.0, 1.0)?;
+        let learner = NStep::new(Target::Sarsa, usize::MAX, means, 1.0)?;
+        let table = QTable::new(cards.states(), cards.actions())?;
+        let mut training = Training::new(&cards, table, learner, ExploringStarts(true))?;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        training.run(&mut cards, Until::Episodes(2_000_000), &mut rng)?;
+        Ok::<_, Error>(training.into_parts().0)
     })?;
+    let figure = "figure 5.2, blackjack";
+    let over = |quantity: &dyn Fn(&QTable) -> f64| {
+        Estimate::of(&learned.iter().map(quantity).collect::<Vec<_>>())
+    };
+    // What an action costs is the difference of the optimum's values.
+    let cost = |table: &QTable, cell| optimum.max(cell) - optimum.value(cell, table.best(cell));
+    let wrong = |table: &QTable| {
+        cells
+            .iter()
+            .filter(|&&cell| cost(table, cell) > 0.0)
+            .count() as f64
+    };
+    let worst = |table: &QTable| {
+        cells
+            .iter()
+            .map(|&cell| cost(table, cell))
+            .fold(0.0, f64::max)
+    };
+    measured(
+        figure,
+        "decisions of 200 off the optimum",
+        "0",
+        over(&wrong),
+    );
+    measured(
+        figure,
+        "reward lost by the worst of them",
+        "0",
+        over(&worst),
+    );
+    let mut curves = Curves::new();
+    for (ace, name) in [(0, "no usable ace"), (1, "usable ace")] {
+        for (table, whose) in [(&optimum, "optimum"), (&learned[0], "learned")] {
+            let sticks = |card: usize| {
+                let lowest = (12..=21).find(|&sum| table.best(state(sum, card, ace)) == Action(0));
+                (card as f64, lowest.unwrap_or(22) as f64)
+            };
+            curves.push((format!("{name}, {whose}"), (1..=10).map(sticks).collect()));
+        }
+    }
+    let axes = ["card of the dealer", "lowest sum to stick at"];
+    Ok(draw("Figure 5.2: blackjack", axes, &curves, (11.0, 21.0)))
+}
+
+/// Example 6.5: SARSA on the windy grid.
+///
+/// The book draws one run, and its 17 steps are those of the best policy with ε = 0.1. A constant α
+/// of 0.5 keeps the values moving, which costs SARSA four steps more.
+fn windy() -> Result<String, Error> {
+    let steps = |alpha: Schedule, count| {
+        over_seeds(0..100, move |seed| {
+            let learner = NStep::new(Target::Sarsa, 1, alpha.clone(), 1.0)?;
+            let measure = |_: &World, steps, _| steps as f64;
+            episodes(&mut worlds::windy(), learner, 0.1, (count, seed), measure)
+        })
+    };
+    let runs = steps(constant(0.5)?, 400)?;
     let by_8000 = |run: &Vec<f64>| {
         let mut time = 0.0;
         run.iter()
@@ -211,18 +303,27 @@ fn windy() -> Result<String, Error> {
             })
             .count() as f64
     };
-    let count = Estimate::of(&runs.iter().map(by_8000).collect::<Vec<_>>());
-    row(
-        "example 6.5, windy grid",
+    let figure = "example 6.5, windy grid";
+    let counts: Vec<f64> = runs.iter().map(by_8000).collect();
+    measured(
+        figure,
         "episodes in 8000 steps",
         "about 170",
-        count,
+        Estimate::of(&counts),
     );
+    let range = |pick: fn(f64, f64) -> f64| counts.iter().copied().reduce(pick).unwrap_or(0.0);
+    let range = format!("{} to {}", range(f64::min), range(f64::max));
+    row(figure, "the same, in single runs", "one of 170", range);
+    let late = mean_of(&runs, 300..400);
+    measured(figure, "steps of a late episode, α = 0.5", "about 17", late);
+    let falling = Schedule::exponential(0.5, 0.01, 4_000)?.by_episode();
+    let late = mean_of(&steps(falling, 4_000)?, 3_900..4_000);
+    measured(figure, "the same, α falling to 0.01", "about 17", late);
     row(
-        "example 6.5, windy grid",
-        "steps of a late episode",
+        figure,
+        "least possible with ε = 0.1",
         "about 17",
-        mean_of(&runs, 300..400),
+        format!("{:.3}, exact", least(0.1)?),
     );
     let curves = vec![curve("SARSA", &runs, 2)];
     let axes = ["episode", "steps"];
@@ -232,6 +333,23 @@ fn windy() -> Result<String, Error> {
         &curves,
         (0.0, 200.0),
     ))
+}
+
+/// Returns the fewest steps that a policy with an ε takes over the windy grid on the average: in
+/// its model every action is replaced by a random one with probability ε.
+fn least(epsilon: f64) -> Result<f64, Error> {
+    let model = Model::new(70, 4, |State(cell), Action(action)| {
+        let outcome = |taken: usize| {
+            let next = worlds::blown(cell, taken);
+            let asked_for = if taken == action { 1.0 - epsilon } else { 0.0 };
+            Outcome {
+                probability: asked_for + epsilon / 4.0,
+                ..Outcome::certain(State(next), -1.0, next == 37)
+            }
+        };
+        (0..4).map(outcome).collect()
+    })?;
+    Ok(-model.value_iteration(1.0, 1e-12)?.table.max(State(30)))
 }
 
 /// Example 6.6: SARSA and Q-learning on the cliff.
@@ -246,13 +364,13 @@ fn cliff() -> Result<String, Error> {
         episodes(&mut worlds::cliff(), learner, 0.1, (500, seed), measure)
     })?;
     let quantity = "return of a late episode";
-    row(
+    measured(
         "example 6.6, cliff: SARSA",
         quantity,
         "about -25",
         mean_of(&sarsa, 400..500),
     );
-    row(
+    measured(
         "example 6.6, cliff: Q-learning",
         quantity,
         "about -50",
@@ -280,13 +398,13 @@ fn bias() -> Result<String, Error> {
         episodes(&mut worlds::bias(), learner, 0.1, (300, seed), left)
     })?;
     let quantity = "% left in the last 10 of 300";
-    row(
+    measured(
         "figure 6.5, bias: Q-learning",
         quantity,
         "about 10",
         mean_of(&q, 290..300),
     );
-    row(
+    measured(
         "figure 6.5, bias: Double Q",
         quantity,
         "about 6",
@@ -334,7 +452,7 @@ fn walk() -> Result<String, Error> {
             }
         }
         let book = if n == 4 { "about 0.25" } else { "-" };
-        row(
+        measured(
             "figure 7.2, random walk",
             &format!("least error, n = {n}"),
             book,
@@ -369,7 +487,7 @@ fn dyna_maze() -> Result<String, Error> {
             late.map_or(50.0, |episode| episode as f64 + 1.0)
         };
         let first = Estimate::of(&runs.iter().map(near).collect::<Vec<_>>());
-        row(
+        measured(
             "figure 8.2, Dyna maze",
             &format!("first short episode, {name}"),
             book,
@@ -386,7 +504,8 @@ fn dyna_maze() -> Result<String, Error> {
     ))
 }
 
-/// Figures 8.4 and 8.5: mazes that change.
+/// Figures 8.4 and 8.5: mazes that change. The book tells neither α nor κ; with α = 1 Dyna-Q+ comes
+/// nearest to its curves.
 fn changing(title: &str, world: fn() -> World) -> Result<String, Error> {
     let blocking = title.contains("blocking");
     let (end, planning) = if blocking { (3_000, 10) } else { (6_000, 50) };
@@ -403,9 +522,9 @@ fn changing(title: &str, world: fn() -> World) -> Result<String, Error> {
             if blocking { "about 150" } else { "about 400" },
         ),
     ] {
-        let runs = over_seeds(0..30, |seed| {
+        let runs = over_seeds(0..100, |seed| {
             let mut world = world();
-            let learner = DynaQ::new(&QTable::new(54, 4)?, constant(0.7)?, 0.95)?;
+            let learner = DynaQ::new(&QTable::new(54, 4)?, constant(1.0)?, 0.95)?;
             let mut learner = learner.with_planning_steps(planning).with_last_outcome();
             if kappa > 0.0 {
                 learner = learner.with_bonus(kappa)?;
@@ -420,8 +539,8 @@ fn changing(title: &str, world: fn() -> World) -> Result<String, Error> {
             Ok::<_, Error>(paid)
         })?;
         let last = runs[0].len() - 1;
-        row(
-            title,
+        measured(
+            &title.to_lowercase(),
             &format!("reward by step {end}, {name}"),
             book,
             mean_of(&runs, last..last + 1),

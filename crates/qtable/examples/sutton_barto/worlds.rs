@@ -101,12 +101,17 @@ pub(crate) fn bandit(rng: &mut dyn Rng) -> World {
 
 /// Example 6.5: a grid with an upward wind.
 pub(crate) fn windy() -> World {
-    const WIND: [usize; 10] = [0, 0, 0, 1, 1, 1, 2, 2, 1, 0];
     World::new((70, 4), 30, |cell, action, _, _| {
-        let (row, column) = moved(cell, action, (7, 10));
-        let next = row.saturating_sub(WIND[cell % 10]) * 10 + column;
+        let next = blown(cell, action);
         (next, -1.0, next == 37)
     })
+}
+
+/// The cell that a move on the windy grid leads to.
+pub(crate) fn blown(cell: usize, action: usize) -> usize {
+    const WIND: [usize; 10] = [0, 0, 0, 1, 1, 1, 2, 2, 1, 0];
+    let (row, column) = moved(cell, action, (7, 10));
+    row.saturating_sub(WIND[cell % 10]) * 10 + column
 }
 
 /// Example 6.6: the cliff.

@@ -1,6 +1,8 @@
 //! The quality of a policy under a known model, exactly.
 
-use crate::error::{Error, check_fraction, check_index, check_setting, positive};
+use crate::error::{
+    Error, check_fraction, check_index, check_not_negative, check_setting, positive,
+};
 use crate::model::dynamics::Model;
 use crate::model::played::ModelEnvironment;
 use crate::problem::Environment;
@@ -88,22 +90,16 @@ impl Model {
         let mut spread = vec![0.0; self.states];
         for &(state, probability) in start {
             check_index("state", state.0, self.states)?;
-            let valid = (0.0..=1.0).contains(&probability);
-            check_setting(
-                "the probability of a first state",
-                probability,
-                valid,
-                "in 0..=1",
-            )?;
+            check_not_negative("the probability of a first state", probability)?;
             spread[state.0] += probability;
         }
         let sum: f64 = spread.iter().sum();
-        let whole = (sum - 1.0).abs() <= 1e-9;
+        let whole = (sum - 1.0).abs() <= 1e-6;
         check_setting(
             "the sum of the first states' probabilities",
             sum,
             whole,
-            "1 to within 1e-9",
+            "1 to within 1e-6",
         )?;
         Ok(spread)
     }

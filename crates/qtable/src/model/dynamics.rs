@@ -186,7 +186,7 @@ impl Model {
         for outcome in outcomes {
             check_index("state", outcome.next.0, self.states)?;
             check_finite("reward", state, action, outcome.reward)?;
-            valid &= (0.0..=1.0).contains(&outcome.probability);
+            valid &= outcome.probability >= 0.0;
         }
         let sum: f64 = outcomes.iter().map(|outcome| outcome.probability).sum();
         if outcomes.is_empty() || (valid && (sum - 1.0).abs() <= 1e-6) {

@@ -455,5 +455,13 @@ fn hot_temperatures_and_thirds_in_single_precision_are_accepted() {
         probability: third,
         ..Outcome::certain(State(next), 0.0, false)
     };
-    assert!(Model::new(3, 1, |_, _| (0..3).map(outcome).collect()).is_ok());
+    let model = Model::new(3, 1, |_, _| (0..3).map(outcome).collect()).unwrap();
+    let start = [0, 1, 2].map(|state| (State(state), third));
+    assert!(ModelEnvironment::new(model, &start).is_ok());
+    // A certainty that is a sum of thirteenths.
+    let certain = Outcome {
+        probability: (0..13).map(|_| 1.0 / 13.0).sum::<f64>() + f64::EPSILON,
+        ..outcome(0)
+    };
+    assert!(Model::new(1, 1, |_, _| vec![certain]).is_ok());
 }

@@ -53,8 +53,13 @@ fn listing(toy: &ModelEnvironment) -> (usize, String) {
     (met.len(), text)
 }
 
+fn blackjack() -> ModelEnvironment {
+    ModelEnvironment::blackjack().unwrap()
+}
+
 /// The checksums are those of the same listing made from `env.unwrapped.P` and
-/// `initial_state_distrib` of Gymnasium 1.4.0 in Python.
+/// `initial_state_distrib` of Gymnasium 1.4.0 in Python. Blackjack has neither: its listing comes
+/// from `env.step` with every sequence of cards, in exact fractions.
 #[test]
 fn the_dynamics_are_those_of_gymnasium() {
     for (name, toy, states, checksum) in [
@@ -64,6 +69,7 @@ fn the_dynamics_are_those_of_gymnasium() {
         ("lake 8x8", lake("8x8", false), 53, 0xaf0a_d373),
         ("cliff", cliff(), 37, 0x2193_c14e),
         ("taxi", taxi(), 400, 0xdaa0_12b8),
+        ("blackjack", blackjack(), 290, 0x3782_c344),
     ] {
         let (met, text) = listing(&toy);
         let found = (met, crc32fast::hash(text.as_bytes()));
@@ -102,6 +108,34 @@ fn the_optima_are_the_known_ones() {
         for state in 0..length - 1 {
             let wanted = 0.9f64.powi((length - 2 - state) as i32);
             assert_near!(plan.table.max(State(state)), wanted, 1e-12);
+        }
+    }
+}
+
+/// Figure 5.2 of Sutton and Barto: the lowest sum at which to stick, for each card of the dealer
+/// from the ace to the ten.
+#[test]
+fn the_optimum_of_blackjack_is_that_of_the_book() {
+    let game = blackjack();
+    let plan = game.model().value_iteration(1.0, 1e-12).unwrap().table;
+    let found = game.assess(&plan.greedy(), 1.0, 100).unwrap();
+    assert_near!(found.total_reward, -0.043_113_105_413_477, 1e-12);
+    for (ace, wanted) in [
+        [17, 13, 13, 12, 12, 12, 17, 17, 17, 17],
+        [19, 18, 18, 18, 18, 18, 18, 18, 19, 19],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        for (card, lowest) in (1..).zip(wanted) {
+            for sum in 12..=21 {
+                let best = plan.best(State((sum * 11 + card) * 2 + ace));
+                assert_eq!(
+                    best,
+                    Action(usize::from(sum < lowest)),
+                    "{sum} {card} {ace}"
+                );
+            }
         }
     }
 }
