@@ -101,8 +101,7 @@ impl Learner for DoubleQLearning {
         _policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        experience.check(table)?;
-        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        let (state, action, step) = experience.parts(table)?;
         for own in &mut self.tables {
             own.grow(table.states())?;
         }

@@ -169,8 +169,7 @@ impl Learner for DynaQ {
         _policy: &dyn Policy,
         rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        experience.check(table)?;
-        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        let (state, action, step) = experience.parts(table)?;
         self.model.follow(table)?;
         let error = self.real.update(table, state, action, step)?;
         self.model.note(state, action, step, self.last_only)?;

@@ -204,7 +204,7 @@ impl NStep {
         experience: &Experience,
         policy: &dyn Policy,
     ) -> Result<f64, Error> {
-        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        let (state, action, step) = experience.parts(table)?;
         let tail = self.tail(table, experience.end(), policy)?;
         let reward = step.reward - self.average.1;
         let target = self.rates.target(&Step { reward, ..*step }, || tail);
@@ -223,7 +223,7 @@ impl NStep {
         experience: &Experience,
         policy: &dyn Policy,
     ) -> Result<f64, Error> {
-        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        let (state, action, step) = experience.parts(table)?;
         if self.target == Target::Q && !is_greedy(table, state, action) {
             self.close(table, Some((state, None)), policy)?;
         }
@@ -276,7 +276,6 @@ impl Learner for NStep {
         policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        experience.check(table)?;
         if self.n == 1 {
             self.learn_one(table, experience, policy)
         } else {

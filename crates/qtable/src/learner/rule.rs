@@ -24,12 +24,13 @@ pub struct Experience {
 }
 
 impl Experience {
-    /// Checks that the experience fits the table.
+    /// Checks that the experience fits the table, and returns its state, action and step.
     #[inline(always)]
-    pub(super) fn check(&self, table: &QTable) -> Result<(), Error> {
+    pub(super) fn parts(&self, table: &QTable) -> Result<(State, Action, &Step), Error> {
         table.check(self.state, self.action)?;
         table.check_state(self.step.observation)?;
-        check_finite("reward", self.state, self.action, self.step.reward)
+        check_finite("reward", self.state, self.action, self.step.reward)?;
+        Ok((self.state, self.action, &self.step))
     }
 }
 

@@ -144,8 +144,7 @@ impl Learner for PrioritizedSweeping {
         _policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        experience.check(table)?;
-        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        let (state, action, step) = experience.parts(table)?;
         self.model.follow(table)?;
         let entries = self.model.states() * self.model.actions();
         self.priorities.resize(entries, 0.0);

@@ -101,8 +101,7 @@ impl Learner for Traces {
         policy: &dyn Policy,
         _rng: &mut dyn Rng,
     ) -> Result<f64, Error> {
-        experience.check(table)?;
-        let (state, action, step) = (experience.state, experience.action, &experience.step);
+        let (state, action, step) = experience.parts(table)?;
         let scratch = &mut self.probabilities;
         let next = match step.status {
             Status::Terminated => 0.0,

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use qtable::*;
 use rand::{Rng, RngExt};
 
-use crate::support::{Settings, constant, corridor, q_learning, rng, step, zeros};
+use crate::support::{Settings, constant, corridor, odd_of, q_learning, rng, step, zeros};
 
 /// After many updates of both forms: the same values, the same best actions, the same
 /// probabilities. Rows of all lengths around the sizes of groups and blocks; jumps far beyond what
@@ -205,29 +205,13 @@ fn faults_are_refused_and_change_nothing() {
     assert_refused!(huge, Error::NotFinite { what: "value", .. });
 }
 
-/// Pays well twice, then breaks.
-struct Breaks(u32);
-
-impl Environment for Breaks {
-    fn states(&self) -> usize {
-        1
-    }
-    fn actions(&self) -> usize {
-        8
-    }
-    fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
-        Ok(State(0))
-    }
-    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
-        self.0 += 1;
-        let reward = if self.0 > 2 { f64::INFINITY } else { 8.0 };
-        Ok(step(0, reward, Status::Terminated))
-    }
-}
-
 #[test]
 fn what_was_learned_before_a_fault_stays() {
-    let mut breaks = Breaks(0);
+    // Pays well twice, then breaks.
+    let mut breaks = odd_of((1, 8), None, |n, _| {
+        let reward = if n > 2 { f64::INFINITY } else { 8.0 };
+        Ok(step(0, reward, Status::Terminated))
+    });
     let settings = Settings {
         alpha: constant(0.5),
         temperature: constant(1e-6),

@@ -3,31 +3,15 @@
 use qtable::*;
 use rand::Rng;
 
-use crate::support::{Settings, constant, odd, rng, step, zeros};
+use crate::support::{Settings, constant, odd, odd_of, rng, step, zeros};
 
 #[test]
 fn a_mask_keeps_its_actions_out_of_everything() {
     // Action 1 of state 0 would be the best by far, and is forbidden.
-    struct Masked;
-    impl Environment for Masked {
-        fn states(&self) -> usize {
-            2
-        }
-        fn actions(&self) -> usize {
-            3
-        }
-        fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
-            Ok(State(0))
-        }
-        fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
-            assert_ne!(action, Action(1), "a forbidden action was taken");
-            Ok(step(1, action.0 as f64, Status::Terminated))
-        }
-        fn allows(&self, state: State, action: Action) -> bool {
-            state == State(1) || action != Action(1)
-        }
-    }
-    let mut environment = Masked;
+    let mut environment = odd_of((2, 3), Some(Action(1)), |_, action| {
+        assert_ne!(action, Action(1), "a forbidden action was taken");
+        Ok(step(1, action.0 as f64, Status::Terminated))
+    });
     let table = QTable::filled(2, 3, 50.0).unwrap();
     let settings = Settings {
         alpha: constant(0.5),
@@ -144,31 +128,12 @@ fn a_time_limit_truncates() {
     assert_refused!(TimeLimit::new(chain(), 0), Error::Setting { .. });
 }
 
-/// An environment that fails after some steps.
-struct Failing(u32);
-
-impl Environment for Failing {
-    fn states(&self) -> usize {
-        1
-    }
-    fn actions(&self) -> usize {
-        1
-    }
-    fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
-        Ok(State(0))
-    }
-    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
-        self.0 += 1;
-        match self.0 {
-            4 => Err(Error::environment("the serial line is gone")),
-            _ => Ok(step(0, 1.0, Status::Continuing)),
-        }
-    }
-}
-
 #[test]
 fn a_failing_environment_ends_the_episode_and_not_the_run() {
-    let mut failing = Failing(0);
+    let mut failing = odd_of((1, 1), None, |n, _| match n {
+        4 => Err(Error::environment("the serial line is gone")),
+        _ => Ok(step(0, 1.0, Status::Continuing)),
+    });
     let mut training = Settings::new(100).begin(&failing, zeros(1, 1)).unwrap();
     let failed = training.run(&mut failing, Until::Actions(10), &mut rng(0));
     let text = failed.unwrap_err().to_string();

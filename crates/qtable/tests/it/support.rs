@@ -82,33 +82,54 @@ pub(crate) fn trained<L: Learner, P: Policy>(
     training
 }
 
-/// An environment of three states and two actions whose n-th answer is given.
-pub(crate) struct Odd<F: FnMut(u64) -> Step> {
+/// An environment whose n-th answer is given.
+pub(crate) struct Odd<F> {
+    shape: (usize, usize),
+    /// An action that state 0 does not offer.
+    forbidden: Option<Action>,
     steps: u64,
     answer: F,
 }
 
-impl<F: FnMut(u64) -> Step> Environment for Odd<F> {
+impl<F: FnMut(u64, Action) -> Result<Step, Error>> Environment for Odd<F> {
     fn states(&self) -> usize {
-        3
+        self.shape.0
     }
     fn actions(&self) -> usize {
-        2
+        self.shape.1
     }
     fn reset(&mut self, _rng: &mut dyn Rng) -> Result<State, Error> {
         Ok(State(0))
     }
-    fn step(&mut self, _action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
+    fn step(&mut self, action: Action, _rng: &mut dyn Rng) -> Result<Step, Error> {
         self.steps += 1;
-        Ok((self.answer)(self.steps))
+        (self.answer)(self.steps, action)
+    }
+    fn allows(&self, state: State, action: Action) -> bool {
+        state.0 > 0 || Some(action) != self.forbidden
     }
     fn succeeded(&self, last: &Step) -> Option<bool> {
         Some(last.status == Status::Terminated)
     }
 }
 
-pub(crate) fn odd(answer: impl FnMut(u64) -> Step) -> Odd<impl FnMut(u64) -> Step> {
-    Odd { steps: 0, answer }
+/// An environment of a shape that may refuse an action in state 0, and may fail.
+pub(crate) fn odd_of<F: FnMut(u64, Action) -> Result<Step, Error>>(
+    shape: (usize, usize),
+    forbidden: Option<Action>,
+    answer: F,
+) -> Odd<F> {
+    Odd {
+        shape,
+        forbidden,
+        steps: 0,
+        answer,
+    }
+}
+
+/// An environment of three states and two actions that answers by the number of the step.
+pub(crate) fn odd(mut answer: impl FnMut(u64) -> Step) -> impl Environment {
+    odd_of((3, 2), None, move |n, _| Ok(answer(n)))
 }
 
 /// 16 cells in a row and 8 actions that go 3 cells back to 4 ahead, or now and then nowhere; the
