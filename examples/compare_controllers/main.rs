@@ -7,8 +7,11 @@
 
 #![allow(clippy::print_stderr, reason = "a program for a terminal")]
 
+mod sweep;
+
 use std::error::Error;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Parser;
 use grasp_agent::{
@@ -21,17 +24,19 @@ use puma_grasp::{BallDetector, Rig, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::comparison::{self, Row};
+use example_support::comparison::Row;
 use example_support::files::writable_folder;
 use example_support::learning::{
     ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
 };
 use example_support::plane::{ExactPlane, search_percepts};
 use example_support::prelude::*;
-use example_support::program::on_all_cores;
+use example_support::program::on_threads;
 use example_support::stages::Stages;
-use example_support::tally::{Counted, Tally};
+use example_support::tally::Counted;
 use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
+
+use crate::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
 
 /// Compares controllers on randomly drawn errors of arm and camera and randomly drawn balls, the
 /// same for all.
@@ -44,9 +49,12 @@ use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, ru
 /// hold the ball at the end. All controllers have the same search, recovery and limits, and none
 /// turns a joint farther in one move than the paper's behaviours do. The hybrid first learns each
 /// cell by up to --moves moves toward other balls; `hybrid, untaught` does not.
+///
+/// Every finished cell is kept in cells/ in the folder. Several processes share a sweep with --shard
+/// and a folder each; --resume goes on after a process was killed; --merge makes one result of all.
 #[derive(Parser, Debug)]
 struct Options {
-    /// Folder for comparison.csv and comparison.svg
+    /// Folder for comparison.csv and comparison.svg, runs.csv, times.csv and the finished cells
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     out: PathBuf,
     /// Seed of all random draws
@@ -88,6 +96,18 @@ struct Options {
     /// Write every failed or broken-off run to failures/ in the folder, for the example replay
     #[arg(long)]
     logs: bool,
+    /// Do only part I of N equal parts of the cells; the parts are put together with --merge
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Number of threads (default: one for each core)
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    threads: Option<usize>,
+    /// Keep the finished cells that are in the folder, and do the others
+    #[arg(long)]
+    resume: bool,
+    /// Merge the results in these folders, and take all settings from them
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "resume"])]
+    merge: Vec<PathBuf>,
 }
 
 /// Ball of each controller, from 0, before which a camera slips.
@@ -101,48 +121,58 @@ fn run(options: &Options) -> Outcome {
     // Refuses unknown names before anything is learned.
     with_odd(Errors::none(), options)?;
     let _lock = lock_folder(&options.out)?;
+    if !options.merge.is_empty() {
+        return merge(options);
+    }
     let mut rivals = rivals(options)?;
     rivals.retain(|(name, _)| name.contains(&options.only));
     if rivals.is_empty() {
         return Err(format!("no controller has {:?} in its name", options.only).into());
     }
-    let mut file = Table::create(options.out.join("comparison.csv"), Row::CSV_HEADER)?;
-    let mut rows = Vec::new();
+    let sweep = Sweep::begin(&options.out, settings(options, &rivals), options.resume)?;
+    let mut tables = Tables::create(&sweep)?;
     if !options.odd.is_empty() {
         say!("odd errors: {}", options.odd.join(", "));
     }
+    let in_shard = |level: usize, draw: usize| {
+        let cell = level * options.draws + draw;
+        options.shard.is_none_or(|shard| shard.has(cell))
+    };
+    let levels = options.levels.iter().enumerate();
+    let levels = levels.map(|(number, level)| {
+        let draws = (0..options.draws).filter(|draw| in_shard(number, *draw));
+        (*level, draws.collect::<Vec<_>>())
+    });
+    let levels: Vec<_> = levels.collect();
+    let count = levels.iter().map(|(_, draws)| draws.len()).sum::<usize>();
+    if options.shard.is_some() {
+        say!("{count} of {} cells", options.levels.len() * options.draws);
+    }
     say!("{}", Row::HEADER);
-    let bar = progress_bar(
-        (options.levels.len() * options.draws) as u64,
-        "cells",
-        false,
-    );
-    for level in &options.levels {
+    let bar = progress_bar(count as u64, "cells", false);
+    for (level, draws) in &levels {
         let mut cells = Vec::new();
-        let done = on_all_cores(options.draws, &mut cells, |draw| {
-            let cell = DrawnCell::new(options, *level, draw as u64)?;
-            let mut world = cell.world()?;
-            let runs = rivals
-                .iter()
-                .map(|(name, rival)| cell.runs(name, rival, &mut world));
-            let runs = runs.collect::<Outcome<Vec<_>>>()?;
+        let done = on_threads(options.threads, draws.len(), &mut cells, |index| {
+            let draw = draws[index];
+            let cell = match sweep.finished(*level, draw)? {
+                Some(cell) => cell,
+                None => {
+                    let cell = cell_runs(options, *level, draw, &rivals)?;
+                    sweep.keep(*level, draw, &cell)?;
+                    cell
+                }
+            };
             bar.inc(1);
-            Ok((runs, options.taught_goal && cell.goal.is_none()))
+            Ok((draw, cell))
         });
-        for (rival, (name, _)) in rivals.iter().enumerate() {
-            let cells = cells.iter().map(|(runs, _)| runs[rival].clone()).collect();
-            let row = Row::new(*level, name, &Tally { cells });
-            bar.suspend(|| say!("{row}"));
-            file.row(row.csv())?;
-            rows.push(row);
-        }
-        let unshown = cells.iter().filter(|(_, unshown)| *unshown).count();
+        bar.suspend(|| tables.level(*level, &cells))?;
+        let unshown = cells.iter().filter(|(_, cell)| cell.unshown).count();
         if unshown > 0 {
             bar.suspend(|| {
                 say!(
                     "{level}: in {unshown} of {} cells the ball between the jaws is out of the \
                      camera's view; the goal there is the untaught one",
-                    options.draws
+                    draws.len()
                 );
             });
         }
@@ -150,15 +180,62 @@ fn run(options: &Options) -> Outcome {
         done?;
     }
     bar.finish_and_clear();
-    let success = if options.grip {
-        "grasped"
-    } else {
-        "at the goal"
-    };
-    let svg = comparison::plot(&rows, success)?;
-    write_whole(&options.out.join("comparison.svg"), svg.as_bytes())?;
+    tables.plot()?;
     say!("results: {}", options.out.display());
     Ok(())
+}
+
+/// Makes one result of those in several folders.
+fn merge(options: &Options) -> Outcome {
+    let merged = Sweep::merge(&options.merge, &options.out)?;
+    let mut tables = Tables::create(&merged)?;
+    say!("{}", Row::HEADER);
+    for level in merged.levels()? {
+        let mut cells = Vec::new();
+        for draw in 0..merged.settings.draws {
+            cells.extend(merged.finished(level, draw)?.map(|cell| (draw, cell)));
+        }
+        tables.level(level, &cells)?;
+    }
+    tables.plot()?;
+    say!("results: {}", options.out.display());
+    Ok(())
+}
+
+/// Returns the settings on which the results depend.
+fn settings(options: &Options, rivals: &[(&'static str, Rival)]) -> Settings {
+    Settings {
+        version: env!("CARGO_PKG_VERSION").into(),
+        seed: options.seed,
+        draws: options.draws,
+        starts: options.starts,
+        moves: options.moves,
+        levels: options.levels.iter().map(ToString::to_string).collect(),
+        odd: options.odd.clone(),
+        grip: options.grip,
+        taught_goal: options.taught_goal,
+        full_chain: options.full_chain,
+        detector: options.detector.to_string(),
+        controllers: rivals.iter().map(|(name, _)| (*name).into()).collect(),
+    }
+}
+
+/// Lets all controllers go for the balls of a cell.
+fn cell_runs(
+    options: &Options,
+    level: ErrorLevel,
+    draw: usize,
+    rivals: &[(&'static str, Rival)],
+) -> Outcome<CellRuns> {
+    let begun = Instant::now();
+    let cell = DrawnCell::new(options, level, draw as u64)?;
+    let mut world = cell.world()?;
+    let runs = rivals
+        .iter()
+        .map(|(name, rival)| cell.runs(name, rival, &mut world));
+    let runs = runs.collect::<Outcome<Vec<_>>>()?;
+    let unshown = options.taught_goal && cell.goal.is_none();
+    Ok(CellRuns::new(&runs, unshown, begun))
 }
 
 /// A cell with drawn errors, in which all controllers are tried.

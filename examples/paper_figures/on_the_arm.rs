@@ -10,7 +10,7 @@ use rand::rngs::Xoshiro256PlusPlus;
 use example_support::learning::{learn_both, paper_cell, simulators};
 use example_support::plot::{Panel, write_svg};
 use example_support::prelude::*;
-use example_support::program::on_all_cores;
+use example_support::program::on_threads;
 use example_support::tally::wilson;
 use example_support::trial::TrialCell;
 
@@ -50,7 +50,7 @@ pub(crate) fn from_simulation_to_the_arm(arms: usize, out: &Path) -> Outcome {
         for level in [ErrorLevel::None, ErrorLevel::Moderate, ErrorLevel::Heavy] {
             // Of each arm: centering at once, then the whole task after each number of moves.
             let mut scores = Vec::new();
-            on_all_cores(arms, &mut scores, |seed| {
+            on_threads(None, arms, &mut scores, |seed| {
                 let scores = one_arm(form, level, seed as u64)?;
                 bar.inc(1);
                 Ok(scores)

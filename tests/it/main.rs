@@ -22,6 +22,7 @@ mod real_camera;
 mod result_files;
 #[cfg(unix)]
 mod stopping;
+mod sweeps;
 mod tallies;
 mod taught_goal;
 

@@ -92,12 +92,13 @@ pub fn progress_bar(length: u64, unit: &str, quiet: bool) -> ProgressBar {
         .with_message(unit.to_owned())
 }
 
-/// Does `work` for each of `0..count` on all processor cores, and adds the results to `done` in
-/// order.
+/// Does `work` for each of `0..count` on a number of threads, by default one for each processor
+/// core, and adds the results to `done` in order.
 ///
 /// # Errors
 /// The first error that occurred. Work that others have begun by then is finished and added.
-pub fn on_all_cores<T: Send>(
+pub fn on_threads<T: Send>(
+    threads: Option<usize>,
     count: usize,
     done: &mut Vec<T>,
     work: impl Fn(usize) -> Outcome<T> + Sync,
@@ -121,9 +122,10 @@ pub fn on_all_cores<T: Send>(
             }
         }
     };
-    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let cores = || thread::available_parallelism().map_or(1, usize::from);
+    let threads = threads.unwrap_or_else(cores);
     thread::scope(|scope| {
-        for _ in 0..cores.min(count) {
+        for _ in 0..threads.min(count) {
             scope.spawn(worker);
         }
     });
