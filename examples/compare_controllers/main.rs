@@ -7,6 +7,7 @@
 
 #![allow(clippy::print_stderr, reason = "a program for a terminal")]
 
+mod rivals;
 mod sweep;
 
 use std::error::Error;
@@ -14,28 +15,22 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Parser;
-use grasp_agent::{
-    Agent, AgentConfig, BehaviourSpec, Controller, Hybrid, HybridSettings, Learned, RunEvent,
-    SavedRun, Servo, ServoLaw as Law, ServoSettings, TaughtGoal,
-};
+use grasp_agent::{Agent, AgentConfig, Controller, Hybrid, RunEvent, SavedRun, TaughtGoal};
 use hough_heuristic::CircleDetector;
-use pipeline_sim::{ErrorLevel, Errors, MoveForm, Workspace};
+use pipeline_sim::{ErrorLevel, Errors, Workspace};
 use puma_grasp::{BallDetector, Rig, bright_ball_scene};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
 use example_support::comparison::Row;
 use example_support::files::writable_folder;
-use example_support::learning::{
-    ACTIONS, ACTIONS_FINE, TRIALS, anywhere, paper_cell, quiet, simulators,
-};
-use example_support::plane::{ExactPlane, search_percepts};
 use example_support::prelude::*;
 use example_support::program::on_threads;
 use example_support::stages::Stages;
 use example_support::tally::Counted;
 use example_support::trial::{Trial, TrialCell, ball_in_view, rig_with_errors, run_on_rig};
 
+use crate::rivals::{Rival, new_hybrid, rivals};
 use crate::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
 
 /// Compares controllers on randomly drawn errors of arm and camera and randomly drawn balls, the
@@ -124,11 +119,7 @@ fn run(options: &Options) -> Outcome {
     if !options.merge.is_empty() {
         return merge(options);
     }
-    let mut rivals = rivals(options)?;
-    rivals.retain(|(name, _)| name.contains(&options.only));
-    if rivals.is_empty() {
-        return Err(format!("no controller has {:?} in its name", options.only).into());
-    }
+    let rivals = rivals(options)?;
     let sweep = Sweep::begin(&options.out, settings(options, &rivals), options.resume)?;
     let mut tables = Tables::create(&sweep)?;
     if !options.odd.is_empty() {
@@ -444,99 +435,6 @@ impl World {
         let trial = run_on_rig(rig, &mut **detector, agent, &Stages::default(), observe)?;
         Ok(Some(trial))
     }
-}
-
-/// A controller in the comparison.
-enum Rival {
-    Servo(Law, f64),
-    Learned(Box<Learned>),
-    Untaught,
-    /// The hybrid, which learns each cell first.
-    Hybrid,
-}
-
-impl Rival {
-    /// Makes the controller for the taught goal if there is one.
-    fn controller(&self, goal: Option<&TaughtGoal>) -> Box<dyn Controller> {
-        match (self, goal) {
-            (Self::Servo(law, gain), _) => {
-                let paper = ServoSettings::paper().with_gain(*gain);
-                let goal = goal.map_or(paper.goal, TaughtGoal::features);
-                Box::new(Servo::new(*law, ServoSettings { goal, ..paper }))
-            }
-            (Self::Learned(learned), None) => learned.clone(),
-            (Self::Learned(learned), Some(goal)) => Box::new((**learned).clone().shown(goal)),
-            (Self::Untaught | Self::Hybrid, _) => Box::new(new_hybrid(goal).frozen()),
-        }
-    }
-}
-
-/// Returns all controllers with their names.
-fn rivals(options: &Options) -> Outcome<Vec<(&'static str, Rival)>> {
-    let servos = [
-        ("position-based, gain 1", Law::PositionBased, 1.0),
-        ("image-based goal J, gain 1", Law::ImageBasedAtGoal, 1.0),
-        ("image-based current J, gain 1", Law::ImageBased, 1.0),
-        ("position-based, gain 0.5", Law::PositionBased, 0.5),
-        ("image-based goal J, gain 0.5", Law::ImageBasedAtGoal, 0.5),
-        ("image-based current J, gain 0.5", Law::ImageBased, 0.5),
-        ("fuzzy, gain 1", Law::Fuzzy, 1.0),
-        ("fuzzy, gain 0.7", Law::Fuzzy, 0.7),
-        ("fuzzy, gain 0.5", Law::Fuzzy, 0.5),
-        ("look-ahead", Law::LookAhead, 1.0),
-    ];
-    let servos = servos.map(|(name, law, gain)| (name, Rival::Servo(law, gain)));
-    let learned = learned(options)?.into_iter();
-    let learned = learned.map(|(name, learned)| (name, Rival::Learned(Box::new(learned))));
-    let hybrids = [
-        ("hybrid, untaught", Rival::Untaught),
-        ("hybrid", Rival::Hybrid),
-    ];
-    Ok(servos.into_iter().chain(learned).chain(hybrids).collect())
-}
-
-/// Returns the hybrid before its first move.
-fn new_hybrid(goal: Option<&TaughtGoal>) -> Hybrid {
-    let hybrid = Hybrid::new(HybridSettings::paper());
-    match goal {
-        Some(goal) => hybrid.shown(goal),
-        None => hybrid,
-    }
-}
-
-/// Learns the paper's controller without errors, in the regression simulator and in the exact
-/// plane. Learns nothing if none of them is compared.
-fn learned(options: &Options) -> Outcome<Vec<(&'static str, Learned)>> {
-    const NAMES: [&str; 5] = [
-        "Q 90, linear regression",
-        "Q 90, rigid regression",
-        "Q 540, rigid regression",
-        "Q 90, exact plane",
-        "Q 540, exact plane",
-    ];
-    if !NAMES.iter().any(|name| name.contains(&options.only)) {
-        return Ok(Vec::new());
-    }
-    let rng = &mut Xoshiro256PlusPlus::seed_from_u64(seed_of(options.seed, &[0]));
-    let forms = [MoveForm::Rigid22, MoveForm::Linear];
-    let [rigid, linear] = simulators(&paper_cell(), forms, rng)?;
-    let plane = ExactPlane::new(20_000, rng);
-    let starts = anywhere(&rigid, TRIALS, rng);
-    let found = search_percepts(TRIALS, seed_of(options.seed, &[4]));
-    let centering = BehaviourSpec::centering();
-    let centering = rigid
-        .learn(centering, &starts, ACTIONS.0, rng, &mut quiet)?
-        .behaviour;
-    let (paper, fine) = (BehaviourSpec::approaching, BehaviourSpec::approaching_fine);
-    let approaching = [
-        linear.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
-        rigid.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
-        rigid.learn(fine(), &found, ACTIONS_FINE, rng, &mut quiet)?,
-        plane.learn(paper(), &found, ACTIONS.1, rng, &mut quiet)?,
-        plane.learn(fine(), &found, ACTIONS_FINE, rng, &mut quiet)?,
-    ];
-    let both = approaching.map(|lesson| Learned::new(centering.clone(), lesson.behaviour));
-    Ok(NAMES.into_iter().zip(both).collect())
 }
 
 /// Derives a seed for each use.
