@@ -202,7 +202,7 @@ impl Schedule {
         held_between(start, end, stretch.value * factor)
     }
 
-    /// Returns values of which one is the smallest and one the largest.
+    /// Returns values among which are the smallest and the largest.
     fn ends(&self) -> Vec<f64> {
         match &self.shape {
             Shape::Constant(value) => vec![*value],
@@ -491,10 +491,8 @@ mod tests {
             Schedule::custom((0.0, f64::INFINITY), |_| 0.0),
         ];
         for schedule in refused {
-            assert!(
-                matches!(schedule, Err(Error::Setting { .. })),
-                "{schedule:?}"
-            );
+            let is_setting = matches!(schedule, Err(Error::Setting { .. }));
+            assert!(is_setting, "{schedule:?}");
         }
         let twice = Schedule::piecewise(&[(3, 0.0), (3, 1.0)]);
         assert!(matches!(twice, Err(Error::NotAscending(_, 1, ..))));
