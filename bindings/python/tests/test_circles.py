@@ -109,7 +109,7 @@ def test_a_wrong_picture_is_named(image, error, words):
         (dict(max_radius=float("nan")), "radius range"),
         (dict(time_limit=0.0), "milliseconds_per_megapixel"),
         (dict(rings="some"), "rings"),
-        (dict(channel="grey"), "channel"),
+        (dict(channel="purple"), "channel"),
         (dict(min_score=1.5), "min_score"),
         (dict(max_circles=0), "max_circles"),
         (dict(region=(150, 0, 100, 100)), "sticks out"),
