@@ -45,7 +45,7 @@ use crate::sweep::{CellRuns, Settings, Shard, Sweep, Tables};
 /// turns a joint farther in one move than the paper's behaviours do. The hybrid first learns each
 /// cell by up to --moves moves toward other balls; `hybrid, untaught` does not.
 ///
-/// Every finished cell is kept in cells/ in the folder. Several processes share a sweep with --shard
+/// Every finished cell is kept in cells/ in the folder. Several processes share a sweep by --shard
 /// and a folder each; --resume goes on after a process was killed; --merge makes one result of all.
 #[derive(Parser, Debug)]
 struct Options {
