@@ -44,7 +44,8 @@ class Finder:
     def __call__(self, batch):
         circles = {field: [] for field in FIELDS}
         for index in range(len(batch["id"])):
-            picture = draw(batch["id"][index]) if "path" not in batch else read(batch["path"][index])
+            stored = "path" in batch
+            picture = read(batch["path"][index]) if stored else draw(batch["id"][index])
             found = self.detector.detect(picture)
             for field in FIELDS:
                 circles[field].append(found[field].tolist())
