@@ -3,8 +3,8 @@
 //! `cargo run --release` prints a table: millions of updates per second of CPU time (of wall time
 //! where the system does not tell CPU time), the median over the rounds with their range, and the
 //! median over the rounds of the ratio to rurel within the round.
-//! `cargo run --release -- 9 4000000 500x4` sets the rounds, the updates in each, and a word that the
-//! names of the rows contain.
+//! `cargo run --release -- 9 4000000 500x4` sets the rounds, the updates in each, and a word that
+//! the names of the rows contain.
 //!
 //! The problem is the same for all: 90 states and 81 actions, the shape of the approaching
 //! behaviour of the paper, and a transition that costs next to nothing. rurel explores at random

@@ -33,7 +33,8 @@ pub fn from_array(
 ) -> PyResult<(GrayImage, Option<u32>)> {
     let array = image.cast::<PyUntypedArray>().map_err(|_| {
         PyTypeError::new_err(format!(
-            "image is of type {}: pass a numpy array of shape (height, width) or (height, width, 3)",
+            "image is of type {}: pass a numpy array of shape (height, width) or (height, width, \
+             3)",
             image.get_type()
         ))
     })?;
