@@ -35,18 +35,23 @@ impl JointRange {
 /// Returns the classical ranges and speeds of the PUMA 560.
 pub(crate) fn puma_560() -> [JointRange; 6] {
     [
-        (-160.0_f64, 160.0_f64, 82.0_f64),
+        (-160.0, 160.0, 82.0),
         (-225.0, 45.0, 74.0),
         (-45.0, 225.0, 122.0),
         (-110.0, 170.0, 228.0),
         (-100.0, 100.0, 241.0),
         (-266.0, 266.0, 228.0),
     ]
-    .map(|(min, max, speed)| JointRange {
+    .map(|(min, max, speed)| in_degrees(min, max, speed))
+}
+
+/// Returns the range of a joint from degrees and degrees per second.
+pub(crate) fn in_degrees(min: f64, max: f64, speed: f64) -> JointRange {
+    JointRange {
         min: min.to_radians(),
         max: max.to_radians(),
         speed: speed.to_radians(),
-    })
+    }
 }
 
 /// Checks that every angle is finite and within its range.

@@ -4,7 +4,7 @@ use crate::error::ArmError;
 use crate::joints::Joints;
 use crate::limits::{self, JointRange};
 
-/// Geometry and limits of a PUMA 560, in VAL's joint angles.
+/// Geometry and limits of a PUMA, in VAL's joint angles.
 ///
 /// Standard Denavit–Hartenberg rows (alpha, a, d) of VAL's description (Fu, Gonzalez, Lee,
 /// *Robotics*, 1987): (-90, 0, 0), (0, `a2`, `d2`), (+90, `a3`, 0), (-90, 0, `d4`), (+90, 0, 0),
@@ -56,6 +56,47 @@ impl PumaParams {
             d4: 0.4318,
             d6: 0.0,
             ranges: limits::puma_560(),
+        }
+    }
+
+    /// Returns the lengths of a course model of the PUMA 260 (203.2, 0, 127.0, 203.2, 63.5 mm).
+    /// Other models have 124.5 mm for the lateral offset and 55.9 mm for the flange.
+    ///
+    /// No source gives the ranges in VAL's angles, or the speeds: take them from your arm.
+    pub fn puma_260(ranges: [JointRange; 6]) -> Self {
+        Self {
+            a2: 0.2032,
+            a3: 0.0,
+            d2: 0.127,
+            d4: 0.2032,
+            d6: 0.0635,
+            ranges,
+        }
+    }
+
+    /// Returns the lengths of public models of the PUMA 762 (650, 0, 190, 600 mm; the flange is
+    /// not known and 0) and the ranges of the 700 series (-160..160, -200..20, -45..225, -266..266,
+    /// -100..100, -266..266 degrees).
+    ///
+    /// No source gives the joint speeds, degrees per second: take them from your arm.
+    pub fn puma_762(speeds: [f64; 6]) -> Self {
+        let ranges = [
+            (-160.0, 160.0),
+            (-200.0, 20.0),
+            (-45.0, 225.0),
+            (-266.0, 266.0),
+            (-100.0, 100.0),
+            (-266.0, 266.0),
+        ];
+        Self {
+            a2: 0.65,
+            a3: 0.0,
+            d2: 0.19,
+            d4: 0.6,
+            d6: 0.0,
+            ranges: std::array::from_fn(|i| {
+                limits::in_degrees(ranges[i].0, ranges[i].1, speeds[i])
+            }),
         }
     }
 

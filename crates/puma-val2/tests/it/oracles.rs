@@ -194,47 +194,62 @@ fn an_independent_inverse_finds_the_same_solutions() {
     use rs_opw_kinematics::kinematics_impl::OPWKinematics;
     use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
 
-    let arm = PumaParams::corke();
-    let opw = OPWKinematics::new(Parameters {
-        a1: 0.0,
-        a2: 0.0203,
-        b: -0.15005,
-        c1: 26.45 * 0.0254,
-        c2: 0.4318,
-        c3: 0.4318,
-        c4: 0.0,
-        offsets: [0.0, -PI / 2.0, PI / 2.0, 0.0, 0.0, 0.0],
-        sign_corrections: [1, -1, -1, 1, -1, 1],
-        dof: 6,
-    });
     let mut random = Xoshiro256PlusPlus::seed_from_u64(560);
-    let (mut worst, mut lost, mut compared) = (0.0_f64, 0, 0);
-    while compared < 10_000 {
-        let q: [f64; 6] = std::array::from_fn(|i| {
-            let range = arm.ranges[i];
-            random.random_range(range.min..range.max)
+    let ranges = PumaParams::unimation().ranges;
+    let arms = [
+        ("560", PumaParams::corke()),
+        ("260", PumaParams::puma_260(ranges)),
+        ("762", PumaParams::puma_762([90.0; 6])),
+    ];
+    for (name, arm) in arms {
+        let opw = OPWKinematics::new(Parameters {
+            a1: 0.0,
+            a2: -arm.a3,
+            b: -arm.d2,
+            c1: 26.45 * 0.0254,
+            c2: arm.a2,
+            c3: arm.d4,
+            c4: arm.d6,
+            offsets: [0.0, -PI / 2.0, PI / 2.0, 0.0, 0.0, 0.0],
+            sign_corrections: [1, -1, -1, 1, -1, 1],
+            dof: 6,
         });
-        let joints = Joints(q);
-        if arm.singularity(&joints, 0.01).is_some() {
-            continue;
+        let (mut worst, mut lost, mut compared) = (0.0_f64, 0, 0);
+        while compared < 4000 {
+            let q: [f64; 6] = std::array::from_fn(|i| {
+                let range = arm.ranges[i];
+                random.random_range(range.min..range.max)
+            });
+            let joints = Joints(q);
+            if arm.singularity(&joints, 0.01).is_some() {
+                continue;
+            }
+            let pose = arm.forward(&joints);
+            let ours = arm.inverse(&pose).unwrap();
+            let toolbox = [q[0], q[1] + PI, q[2] - PI, q[3], q[4], q[5]];
+            let theirs = opw.forward(&toolbox);
+            let position = toolbox_pose(&pose).fixed_view::<3, 1>(0, 3).into_owned();
+            let away = [
+                theirs.translation.x - position.x,
+                theirs.translation.y - position.y,
+                theirs.translation.z - position.z,
+            ];
+            worst = away.iter().fold(worst, |worst, d| greater(worst, d.abs()));
+            let theirs = opw.inverse(&theirs);
+            compared += 1;
+            for solution in &theirs {
+                worst = greater(worst, nearest(&ours, &val(solution)));
+            }
+            lost += usize::from(theirs.len() != ours.len());
+            worst = greater(worst, nearest(&ours, &joints));
         }
-        let pose = arm.forward(&joints);
-        let ours = arm.inverse(&pose).unwrap();
-        let toolbox = [q[0], q[1] + PI, q[2] - PI, q[3], q[4], q[5]];
-        let theirs = opw.inverse(&opw.forward(&toolbox));
-        compared += 1;
-        for solution in &theirs {
-            worst = greater(worst, nearest(&ours, &val(solution)));
-        }
-        lost += usize::from(theirs.len() != ours.len());
-        worst = greater(worst, nearest(&ours, &joints));
+        println!(
+            "rs-opw-kinematics, {name}: {compared} poses, greatest difference {worst:.1e}, \
+             {lost} with another count"
+        );
+        assert!(worst < 1e-9, "{name}: {worst}");
+        assert_eq!(lost, 0, "{name}");
     }
-    println!(
-        "rs-opw-kinematics: {compared} poses, greatest difference {worst:.1e} rad, {lost} with \
-         another count"
-    );
-    assert!(worst < 1e-9, "{worst}");
-    assert_eq!(lost, 0);
 }
 
 /// The reach ends at the stretched arm, and the straight wrist has one turn: neither costs

@@ -4,5 +4,6 @@ mod blending;
 mod dialects;
 mod motions;
 mod programs;
+mod published;
 mod reactions;
 mod texts;
