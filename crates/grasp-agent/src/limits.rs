@@ -28,6 +28,27 @@ impl JointLimits {
         Self(Self::PAPER_DEGREES.map(|(low, high)| (low.to_radians(), high.to_radians())))
     }
 
+    /// Returns the largest share of `delta`, up to `most`, that leads from `from` to a pose within
+    /// the limits; 0 from a pose outside them.
+    pub(crate) fn share_within(&self, from: &Joints, delta: &JointDelta, most: f64) -> f64 {
+        let shares = Joint::ALL.into_iter().map(|joint| {
+            let (low, high) = self.0[joint.index()];
+            let turn = delta[joint];
+            let way = if turn > 0.0 {
+                high - from[joint]
+            } else {
+                from[joint] - low
+            };
+            match way / turn.abs() {
+                _ if turn == 0.0 => most,
+                // `min` turns NaN into a number.
+                share if share.is_nan() => 0.0,
+                share => share,
+            }
+        });
+        shares.fold(most, f64::min).max(0.0)
+    }
+
     /// Checks that every range is one.
     pub(crate) fn check(&self) -> Result<(), String> {
         for (joint, (low, high)) in Joint::ALL.into_iter().zip(self.0) {
@@ -130,5 +151,15 @@ mod tests {
             let delta = limits.step(&at, wanted, &steps);
             assert!(!limits.admit(&(at + delta)), "{wanted:?}: {delta:?}");
         }
+    }
+
+    #[test]
+    fn limits_that_are_no_numbers_leave_no_share_of_a_move() {
+        let (limits, lift) = (JointLimits::paper(), JointDelta::of(Joint::J2, -0.2));
+        let at = Joints::from_degrees([0.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
+        assert!((limits.share_within(&at, &lift, 1.0) - 1.0).abs() < 1e-12);
+        let mut none = limits;
+        none.0[1].0 = f64::NAN;
+        assert!(none.share_within(&at, &lift, 1.0).abs() < 1e-12);
     }
 }

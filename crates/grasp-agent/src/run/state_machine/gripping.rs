@@ -4,7 +4,6 @@ use puma_val2::{Gripper, Joint, JointDelta, Joints};
 
 use crate::controller::{Feedback, GaveUp};
 use crate::error::AgentError;
-use crate::limits::JointLimits;
 use crate::percept::Sighting;
 use crate::run::event::EventKind;
 use crate::run::state_machine::acting::Went;
@@ -128,7 +127,7 @@ impl Run<'_> {
         let [.., from] = back;
         // Lift as far as the limits allow, leaving a third of the first lift for a second.
         let limits = self.modules.supervision.limits();
-        let share = share_within(limits, &from, &lift, 1.0 + AGAIN) / (1.0 + AGAIN);
+        let share = limits.share_within(&from, &lift, 1.0 + AGAIN) / (1.0 + AGAIN);
         if share < LEAST_LIFT {
             return Ok(Err(GaveUp::NoMoveLeft));
         }
@@ -172,27 +171,6 @@ impl Run<'_> {
     }
 }
 
-/// Returns the largest share of `delta`, up to `most`, that leads from `from` to a pose within
-/// `limits`; 0 from a pose outside them.
-fn share_within(limits: &JointLimits, from: &Joints, delta: &JointDelta, most: f64) -> f64 {
-    let shares = Joint::ALL.into_iter().map(|joint| {
-        let (low, high) = limits.0[joint.index()];
-        let turn = delta[joint];
-        let way = if turn > 0.0 {
-            high - from[joint]
-        } else {
-            from[joint] - low
-        };
-        match way / turn.abs() {
-            _ if turn == 0.0 => most,
-            // `min` turns NaN into a number.
-            share if share.is_nan() => 0.0,
-            share => share,
-        }
-    });
-    shares.fold(most, f64::min).max(0.0)
-}
-
 /// Splits a grip into two moves: first the arm and `JT4`, with the fingers still beside the ball,
 /// then the hand, which brings them to both sides of it. Small first moves are left out.
 fn in_two(delta: &JointDelta) -> [JointDelta; 2] {
@@ -226,15 +204,5 @@ mod tests {
         );
         let plain = JointDelta::of(Joint::J5, -0.3);
         assert_eq!(in_two(&plain), [JointDelta::default(), plain]);
-    }
-
-    #[test]
-    fn limits_that_are_no_numbers_leave_no_share_of_a_lift() {
-        let (limits, lift) = (JointLimits::paper(), JointDelta::of(Joint::J2, -0.2));
-        let at = Joints::from_degrees([0.0, -100.0, 200.0, 0.0, 45.0, 0.0]);
-        assert!((share_within(&limits, &at, &lift, 1.0) - 1.0).abs() < 1e-12);
-        let mut none = limits;
-        none.0[1].0 = f64::NAN;
-        assert!(share_within(&none, &at, &lift, 1.0).abs() < 1e-12);
     }
 }
