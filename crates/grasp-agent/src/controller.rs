@@ -4,6 +4,7 @@ use puma_val2::{JointDelta, Joints};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::controllers::hybrid::misfit::Misfit;
 use crate::error::BehaviourError;
 use crate::limits::JointLimits;
 use crate::percept::Sighting;
@@ -105,6 +106,12 @@ pub trait Controller {
     /// Returns the controller's name, for tables and logs.
     fn describe(&self) -> &str;
 
+    /// Returns the cause if the controller's model does not fit what was seen in this run; `None`
+    /// for controllers without a model.
+    fn misfit(&self) -> Option<Misfit> {
+        None
+    }
+
     /// Returns the controller as data, from which a [`SavedRun`](crate::SavedRun) makes it again;
     /// `None` for controllers that cannot be saved.
     fn save(&self) -> Option<SavedController> {
@@ -123,6 +130,10 @@ impl<C: Controller + ?Sized> Controller for Box<C> {
 
     fn describe(&self) -> &str {
         (**self).describe()
+    }
+
+    fn misfit(&self) -> Option<Misfit> {
+        (**self).misfit()
     }
 
     fn save(&self) -> Option<SavedController> {
@@ -146,6 +157,9 @@ pub enum GaveUp {
     /// Something was too near to the hand: on three ways to the ball, when the closed hand was
     /// lifted, or on the way to every viewpoint of a search.
     Obstructed,
+    /// The goal was not reached, or the ball not found or gripped, and the controller's model does
+    /// not fit what was seen.
+    Misfit(Misfit),
 }
 
 impl std::fmt::Display for GaveUp {
@@ -158,6 +172,7 @@ impl std::fmt::Display for GaveUp {
                 "something was too near to the hand on the way to every search pose, to the ball, \
                  or when the hand was lifted"
             }
+            Self::Misfit(cause) => return write!(f, "the model does not fit: {cause}"),
         })
     }
 }

@@ -84,6 +84,7 @@ pub use controller::SavedController;
 pub use controller::{Controller, Decision, Feedback, GaveUp, Request};
 pub use controllers::hybrid::belief::{Belief, Prior};
 pub use controllers::hybrid::controller::Hybrid;
+pub use controllers::hybrid::misfit::Misfit;
 pub use controllers::hybrid::settings::HybridSettings;
 pub use controllers::learned::{Learned, OnlineLearning};
 pub use controllers::servo::controller::{Servo, ServoLaw};

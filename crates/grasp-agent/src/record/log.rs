@@ -170,6 +170,7 @@ fn is_answer(kind: &EventKind) -> bool {
             | EventKind::SameFrame
             | EventKind::Lost
             | EventKind::TooFast
+            | EventKind::Misfit(_)
             | EventKind::AtGoal
             | EventKind::Cornered
             | EventKind::Gripped

@@ -39,10 +39,10 @@ impl SavedController {
                 Ok(Box::new(Servo::new(law, settings)))
             }
             "hybrid" => {
-                let (settings, belief, shown): (HybridSettings, Belief, bool) = self.data()?;
+                let (settings, belief, marks): (HybridSettings, Belief, [bool; 2]) = self.data()?;
                 settings.check()?;
                 belief.check()?;
-                Ok(Box::new(Hybrid::restored(settings, belief, shown)))
+                Ok(Box::new(Hybrid::restored(settings, belief, marks)))
             }
             kind => Err(BehaviourError::Text {
                 what: format!("{kind:?} is not a kind of controller of this crate"),

@@ -152,7 +152,7 @@ impl SavedRun {
     }
 }
 
-const FORMAT: &str = "grasp-agent run 4";
+const FORMAT: &str = "grasp-agent run 5";
 
 #[derive(Debug, Deserialize)]
 struct Head {

@@ -5,6 +5,7 @@ use puma_val2::{JointDelta, Joints};
 use serde::{Deserialize, Serialize};
 
 use crate::controller::GaveUp;
+use crate::controllers::hybrid::misfit::Misfit;
 use crate::percept::Sighting;
 
 /// One event of a run.
@@ -95,8 +96,13 @@ pub enum EventKind {
     TooNear,
     /// The ball came nearer too fast.
     TooFast,
+    /// A joint has not made a small move: it has turned back, or has then gone all the way, to
+    /// overcome its friction.
+    Freed,
     /// The arm has gone back by one move, or by a part of it if [`EventKind::TooNear`] follows.
     TakenBack,
+    /// The controller's model does not fit what was seen in this run, for this cause.
+    Misfit(Misfit),
     /// Centre and radius of the ball are at the goal. The gripper activation begins.
     AtGoal,
     /// The gripper activation begins away from the goal: moves were taken back again and again, so
@@ -142,7 +148,9 @@ impl EventKind {
             Self::Recovering(_) => "recover",
             Self::TooNear => "too-near",
             Self::TooFast => "too-fast",
+            Self::Freed => "freed",
             Self::TakenBack => "taken-back",
+            Self::Misfit(_) => "misfit",
             Self::AtGoal => "at-goal",
             Self::Cornered => "cornered",
             Self::Gripping(_) => "gripping",

@@ -1,7 +1,7 @@
 //! Cells that are wrong in ways beyond camera and play, with a goal that was taught on the arm.
 
 use grasp_agent::puma_val2::{Joint, JointDelta};
-use grasp_agent::{Agent, AgentError, EventKind, EventLog, Hybrid};
+use grasp_agent::{Agent, AgentError, EventKind, EventLog, GaveUp, Hybrid, Misfit};
 
 use crate::cell::{config, hybrid};
 use crate::plant::{EXTREME, Level, MODERATE, Odd, Plant};
@@ -162,4 +162,96 @@ fn old_images_for_ever_and_an_arm_that_stands_are_errors() {
             |end: &Result<_, AgentError>| matches!(end, Err(AgentError::Unchanged { .. }));
         assert!(ends.iter().any(unchanged), "{odd:?}: {ends:?}");
     }
+}
+
+/// Ends of runs on the first balls in this cell, and the causes of a misfit that were reported.
+fn causes(odd: Odd, seed: u64, balls: u64) -> (Vec<Option<GaveUp>>, Vec<Misfit>) {
+    let plant = Plant::new(MODERATE, odd, seed);
+    let mut agent = taught(&plant).unwrap();
+    let mut causes = Vec::new();
+    let mut ends = Vec::new();
+    for ball in 0..balls {
+        let mut log = EventLog::default();
+        ends.push(plant.run(&mut agent, ball, &mut log).0.unwrap().gave_up);
+        causes.extend(log.events.iter().filter_map(|event| match event.kind {
+            EventKind::Misfit(cause) => Some(cause),
+            _ => None,
+        }));
+    }
+    (ends, causes)
+}
+
+#[test]
+fn a_camera_that_slips_is_learned_anew() {
+    let plant = Plant::new(MODERATE, Odd::default(), 7);
+    let mut agent = taught(&plant).unwrap();
+    let mut held = Vec::new();
+    for ball in 0..30 {
+        if ball == 15 {
+            plant.0.borrow_mut().odd.slip = 1.0;
+        }
+        held.push(plant.run(&mut agent, ball, &mut EventLog::default()).1);
+    }
+    assert!(held[25..].iter().all(|held| *held), "{held:?}");
+}
+
+#[test]
+fn a_mirrored_image_is_the_named_cause() {
+    let mirrored = true;
+    let (ends, causes) = causes(
+        Odd {
+            mirrored,
+            ..Odd::default()
+        },
+        5,
+        4,
+    );
+    assert!(causes.contains(&Misfit::TurnedImage), "{causes:?}");
+    let named = |end: &Option<GaveUp>| matches!(end, Some(GaveUp::Misfit(_)));
+    assert!(ends.iter().any(named), "{ends:?}");
+}
+
+#[test]
+fn a_cell_that_fits_reports_no_misfit() {
+    let (ends, causes) = causes(Odd::default(), 5, 10);
+    assert!(
+        causes.is_empty() && ends.iter().all(Option::is_none),
+        "{causes:?} {ends:?}"
+    );
+}
+
+#[test]
+fn friction_is_overcome_by_turning_back_first() {
+    let balls = 5;
+    for degrees in [0.5_f64, 1.5] {
+        let stiction = degrees.to_radians();
+        let odd = Odd {
+            stiction,
+            ..Odd::default()
+        };
+        let (held, _) = held(MODERATE, odd, 5, balls);
+        assert_eq!(held, balls, "{degrees} degrees");
+    }
+}
+
+#[test]
+fn a_run_with_freed_joints_is_replayed() {
+    let stiction = 1.5_f64.to_radians();
+    let plant = Plant::new(
+        MODERATE,
+        Odd {
+            stiction,
+            ..Odd::default()
+        },
+        5,
+    );
+    let agent = taught(&plant).unwrap();
+    let mut log = EventLog::default();
+    plant.run(&mut agent.clone(), 1, &mut log).0.unwrap();
+    assert!(
+        log.events
+            .iter()
+            .any(|event| event.kind == EventKind::Freed)
+    );
+    assert_eq!(log.replay(&agent).unwrap().1, log);
 }

@@ -117,6 +117,20 @@ impl Belief {
         )
     }
 
+    /// Returns the belief of an uncalibrated cell, with an uncertain arm if this one has that.
+    pub(crate) fn fresh(&self, prior: &Prior) -> Self {
+        let fresh = Self::new(prior);
+        if self.knows_arm() {
+            fresh.with_arm(prior)
+        } else {
+            fresh
+        }
+    }
+
+    fn knows_arm(&self) -> bool {
+        (at::ARM..LEARNED).any(|i| self.information[(i, i)] < precision(0.0))
+    }
+
     /// Returns the belief with an arm as uncertain as in `prior`.
     pub(crate) fn with_arm(&self, prior: &Prior) -> Self {
         let (mut belief, deviations) = (self.clone(), prior.deviations());
@@ -161,9 +175,20 @@ impl Belief {
             // Avoids the rounding of two inversions.
             return self;
         }
-        let mut change = (prior.deviations() * share).map(|s| s * s);
-        if self.information[(at::ARM, at::ARM)] >= precision(0.0) {
-            change.rows_mut(at::ARM, LEARNED - at::ARM).fill(0.0);
+        let end = if self.knows_arm() { LEARNED } else { at::ARM };
+        self.widened(&(prior.deviations() * share), 0..end)
+    }
+
+    /// Returns the belief after a slip of the camera in its mount.
+    pub(crate) fn slipped(self, prior: &Prior) -> Self {
+        self.widened(&prior.deviations(), at::TURN..at::RADIUS)
+    }
+
+    /// Adds these standard deviations to some parameters and keeps the means.
+    fn widened(self, deviations: &Numbers, rows: std::ops::Range<usize>) -> Self {
+        let mut change = Numbers::zeros();
+        for i in rows {
+            change[i] = deviations[i].powi(2);
         }
         let information = self.information.try_inverse();
         let information =

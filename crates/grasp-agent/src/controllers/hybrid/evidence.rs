@@ -39,7 +39,9 @@ impl Evidence {
 
     /// Records a sighting from the current pose.
     pub(crate) fn saw(&mut self, features: Features) {
-        if let Some(last) = self.path.len().checked_sub(1) {
+        if let Some(last) = self.path.len().checked_sub(1)
+            && self.sightings.last() != Some(&(last, features))
+        {
             self.sightings.push((last, features));
         }
     }
@@ -63,6 +65,52 @@ impl Evidence {
     pub(crate) fn forget_sightings(&mut self) {
         self.sightings.clear();
         self.held = None;
+    }
+
+    /// Returns the evidence with other features in the sightings.
+    pub(crate) fn seen_as(&self, other: impl Fn(&Features) -> Features) -> Self {
+        let mut evidence = self.clone();
+        for (_, features) in &mut evidence.sightings {
+            *features = other(features);
+        }
+        evidence
+    }
+
+    /// Returns the sightings as made so many poses before. Those after a pose without a sighting
+    /// are left out: the number of looks there is unknown.
+    pub(crate) fn late(&self, poses: usize) -> Self {
+        let mut evidence = self.clone();
+        evidence.sightings.clear();
+        for (at, features) in &self.sightings {
+            let seen = |earlier: usize| self.sightings.iter().any(|(at, _)| *at == earlier);
+            let first = evidence
+                .sightings
+                .last()
+                .is_none_or(|(last, _)| last + poses < *at);
+            if let Some(from) = at.checked_sub(poses)
+                && first
+                && (from..*at).all(seen)
+            {
+                evidence.sightings.push((from, *features));
+            }
+        }
+        evidence
+    }
+
+    /// Returns the evidence with a path on which joints do not make turns of less than `zone`
+    /// radians.
+    pub(crate) fn sticking(&self, zone: f64) -> Self {
+        let mut evidence = self.clone();
+        for i in 1..evidence.path.len() {
+            for joint in 0..3 {
+                let stands = evidence.path[i - 1].0[joint];
+                let wanted = &mut evidence.path[i].0[joint];
+                if (*wanted - stands).abs() < zone {
+                    *wanted = stands;
+                }
+            }
+        }
+        evidence
     }
 
     /// Returns the true joint angles at each sighting and at the grip.

@@ -10,19 +10,13 @@ use crate::controllers::hybrid::parameters::{
 use crate::sight::camera_model::CameraModel;
 
 /// Result of a fit.
-#[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) numbers: Numbers,
     /// Ball position of each piece of evidence; `None` without a sighting.
     pub(crate) balls: Vec<Option<Point3<f64>>>,
-    /// Information matrix of the parameters, marginal over the ball positions.
-    pub(crate) information: Information,
-    /// Joint information matrix of the parameters and the last ball.
-    pub(crate) with_last_ball: WithBall,
-    /// Weighted sum of squared residuals, feature units squared.
-    squares: f64,
-    /// Degrees of freedom: residuals minus fitted values.
-    spare: f64,
+    /// Robust cost: squared standard deviations of residuals and prior.
+    pub(crate) cost: f64,
+    normal: Normal,
 }
 
 /// Largest number of iterations.
@@ -82,31 +76,112 @@ impl Fit {
                 }
             }
         }
-        let information = normal.marginal();
-        let finite = information
-            .iter()
-            .chain(numbers.iter())
-            .all(|v| v.is_finite());
-        finite.then(|| Self {
-            information,
-            with_last_ball: normal.with_last_ball(),
-            squares: normal.squares,
-            spare: normal.spare,
+        let mut all = normal.numbers.iter().chain(numbers.iter());
+        all.all(|v| v.is_finite()).then_some(Self {
             numbers,
             balls,
+            cost: least,
+            normal,
         })
     }
 
     /// Returns the posterior belief.
     pub(crate) fn belief(&self, noise: f64) -> Belief {
-        Belief::of(self.numbers, self.information, noise)
+        Belief::of(self.numbers, self.normal.marginal(), noise)
+    }
+
+    /// Returns the covariance of the parameters and the last ball.
+    pub(crate) fn with_last_ball(&self) -> Option<WithBall> {
+        self.normal.with_last_ball().try_inverse()
+    }
+
+    /// Moves the parameters from the most probable ones, together with the ball positions, to the
+    /// most probable ones over all ball positions.
+    ///
+    /// A position for every few sightings biases a nonlinear fit, however many balls there are
+    /// (Neyman and Scott 1948). By Laplace's approximation, the integral over a position costs half
+    /// the logarithm of the determinant of its information (Tierney and Kadane 1986).
+    #[must_use]
+    pub(crate) fn over_all_places(mut self, nominal: &CameraModel, evidence: &[&Evidence]) -> Self {
+        /// Steps of this derivative over those of the derivatives that it derives.
+        const WIDER: f64 = 100.0;
+        let varied = Varied::new(nominal, &self.numbers, WIDER);
+        let mut gradient = Numbers::zeros();
+        for ((evidence, ball), block) in evidence.iter().zip(&self.balls).zip(&self.normal.balls) {
+            let (Some(ball), Some(block)) = (ball, block) else {
+                continue;
+            };
+            let Some(inverse) = inverse_of(&block.own, 0.0) else {
+                continue;
+            };
+            let here = evidence.stands(&self.numbers);
+            let views = |stands: &Stands, model: &CameraModel, ball: &Point3<f64>| {
+                let mut own = Matrix3::zeros();
+                let (mut nearest, mut unit) = (0.0, 1.0);
+                for ((joints, f), weights) in stands.views.iter().zip(&block.weights) {
+                    let wrist = model.arm.wrist(joints);
+                    let by_place = by_place(model, &wrist, ball);
+                    if nearest == 0.0 {
+                        (nearest, unit) = (f.r, by_place.determinant());
+                    }
+                    own += by_place.transpose() * Matrix3::from_diagonal(weights) * by_place;
+                }
+                if let Some((_, unsure)) = stands.held {
+                    own += Matrix3::identity() * unsure.powi(-2);
+                }
+                (own.determinant() / (unit * unit)).ln()
+            };
+            let before = views(&here, &varied.model, ball);
+            for i in 0..LEARNED {
+                let step = WIDER * STEPS[i];
+                let moved = ball - inverse * block.cross.row(i).transpose() * step;
+                let after = match i.checked_sub(at::PLAY) {
+                    None => views(&here, &varied.models[i], &moved),
+                    Some(arm) => views(&evidence.stands(&varied.arms[arm]), &varied.model, &moved),
+                };
+                let slope = 0.5 * (after - before) / step;
+                if slope.is_finite() {
+                    gradient[i] += slope;
+                }
+            }
+        }
+        if let Some(information) = self.normal.marginal().cholesky() {
+            self.numbers -= information.solve(&gradient);
+        }
+        self
+    }
+
+    /// Returns the share of the sightings in `evidence`, the only one of this fit, that lie far
+    /// from the expected place; `None` if the others do not fit, by their mean squared distance.
+    pub(crate) fn outliers(
+        &self,
+        nominal: &CameraModel,
+        evidence: &Evidence,
+        fits: f64,
+    ) -> Option<f64> {
+        /// Distance in the image, feature units.
+        const FAR: f64 = 10.0;
+        let ball = (*self.balls.first()?)?;
+        let (model, stands) = (
+            corrected(nominal, &self.numbers),
+            evidence.stands(&self.numbers),
+        );
+        let distances = stands.views.iter().map(|(joints, f)| {
+            let expected = seen(&model, &model.arm.wrist(joints), &ball);
+            expected.map_or(f64::INFINITY, |expected| (expected - vector(f)).norm())
+        });
+        let near: Vec<f64> = distances.filter(|distance| *distance < FAR).collect();
+        let squares: f64 = near.iter().map(|distance| distance * distance).sum();
+        let share = 1.0 - near.len() as f64 / stands.views.len().max(1) as f64;
+        (squares < 3.0 * fits * near.len() as f64).then_some(share)
     }
 
     /// Returns the standard deviation of the residuals; `None` if there are too few.
     pub(crate) fn noise(&self) -> Option<f64> {
         const LEAST: f64 = 0.05;
         const MOST: f64 = 4.0;
-        (self.spare >= 20.0).then(|| (self.squares / self.spare).sqrt().clamp(LEAST, MOST))
+        let Normal { squares, spare, .. } = self.normal;
+        (spare >= 20.0).then(|| (squares / spare).sqrt().clamp(LEAST, MOST))
     }
 }
 
@@ -116,6 +191,21 @@ fn seen(model: &CameraModel, wrist: &Isometry3<f64>, ball: &Point3<f64>) -> Opti
         .mount
         .inverse_transform_point(&wrist.inverse_transform_point(ball));
     model.outline(&place).map(|f| vector(&f))
+}
+
+/// Returns the derivative of [`seen`] by the place of the ball, 0 where nothing is seen.
+fn by_place(model: &CameraModel, wrist: &Isometry3<f64>, ball: &Point3<f64>) -> Matrix3<f64> {
+    let mut by_place = Matrix3::zeros();
+    if let Some(expected) = seen(model, wrist, ball) {
+        for i in 0..3 {
+            let mut moved = *ball;
+            moved[i] += METRE_STEP;
+            if let Some(v) = seen(model, wrist, &moved) {
+                by_place.set_column(i, &((v - expected) / METRE_STEP));
+            }
+        }
+    }
+    by_place
 }
 
 /// Cost of a sighting that the model excludes, squared standard deviations.
@@ -165,6 +255,8 @@ struct BallBlock {
     own: Matrix3<f64>,
     cross: SMatrix<f64, LEARNED, 3>,
     gradient: Vector3<f64>,
+    /// Weights of each sighting, inverse variances.
+    weights: Vec<Vector3<f64>>,
 }
 
 impl Normal {
@@ -184,7 +276,7 @@ impl Normal {
             squares: 0.0,
             spare: -(LEARNED as f64),
         };
-        let varied = Varied::new(nominal, numbers);
+        let varied = Varied::new(nominal, numbers, 1.0);
         for (evidence, ball) in evidence.iter().zip(balls) {
             let block = ball.map(|ball| normal.add(&varied, evidence, &ball, noise));
             normal.balls.push(block);
@@ -204,6 +296,7 @@ impl Normal {
             own: Matrix3::zeros(),
             cross: SMatrix::zeros(),
             gradient: Vector3::zeros(),
+            weights: Vec::new(),
         };
         let Stands { views, held } = evidence.stands(&varied.numbers);
         let moved: Vec<Stands> = varied.arms.iter().map(|n| evidence.stands(n)).collect();
@@ -211,6 +304,7 @@ impl Normal {
         for (index, (joints, features)) in views.iter().enumerate() {
             let wrist = varied.model.arm.wrist(joints);
             let Some(expected) = seen(&varied.model, &wrist, ball) else {
+                block.weights.push(Vector3::zeros());
                 continue;
             };
             let mut by_numbers = ThreeBy::<LEARNED>::zeros();
@@ -225,20 +319,14 @@ impl Normal {
                     by_numbers.set_column(i, &((v - expected) / STEPS[i]));
                 }
             }
-            let mut by_place = Matrix3::zeros();
-            for i in 0..3 {
-                let mut moved = *ball;
-                moved[i] += METRE_STEP;
-                if let Some(v) = seen(&varied.model, &wrist, &moved) {
-                    by_place.set_column(i, &((v - expected) / METRE_STEP));
-                }
-            }
+            let by_place = by_place(&varied.model, &wrist, ball);
             let residual = expected - vector(features);
             let weights = residual.map(|r| {
                 let size = r.abs() / noise;
                 (if size <= OUTLIER { 1.0 } else { OUTLIER / size }) / (noise * noise)
             });
             let weighed = Matrix3::from_diagonal(&weights);
+            block.weights.push(weights);
             self.numbers += by_numbers.transpose() * weighed * by_numbers;
             self.gradient += by_numbers.transpose() * weighed * residual;
             block.own += by_place.transpose() * weighed * by_place;
@@ -352,10 +440,11 @@ struct Varied {
 }
 
 impl Varied {
-    fn new(nominal: &CameraModel, numbers: &Numbers) -> Self {
+    /// Varies each parameter by so many times its step.
+    fn new(nominal: &CameraModel, numbers: &Numbers, times: f64) -> Self {
         let other = |i: usize| {
             let mut other = *numbers;
-            other[i] += STEPS[i];
+            other[i] += times * STEPS[i];
             other
         };
         Self {

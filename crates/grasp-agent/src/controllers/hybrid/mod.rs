@@ -9,5 +9,6 @@ pub(crate) mod belief;
 pub(crate) mod controller;
 pub(crate) mod evidence;
 pub(crate) mod fit;
+pub(crate) mod misfit;
 pub(crate) mod parameters;
 pub(crate) mod settings;

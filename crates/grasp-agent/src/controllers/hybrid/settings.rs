@@ -37,7 +37,8 @@ pub struct HybridSettings {
     pub grip_aside: f64,
     /// Largest standard deviation of an aimed grip from the ball, metres, at least 0 (default
     /// 0.008). Above it [`AgentConfig::grip`] is used, and after an aim that has missed if a goal
-    /// was taught.
+    /// was taught. Without a taught goal, aims that follow one that has missed lie beside it, along
+    /// the axes of uncertainty.
     ///
     /// [`AgentConfig::grip`]: crate::AgentConfig::grip
     pub grip_certainty: f64,

@@ -162,6 +162,7 @@ impl Run<'_> {
         target: Joints,
         done: EventKind,
     ) -> Result<Went, AgentError> {
+        let from = self.joints;
         let answer = match answer {
             Ok(reached) => Ok((reached, false, None)),
             Err(ArmError::ProximityStop { joints, .. }) => Ok((joints, true, None)),
@@ -187,6 +188,26 @@ impl Run<'_> {
             self.tell(EventKind::TooNear);
             return Ok(Went::Back);
         }
+        if self.freeing {
+            return Ok(Went::There);
+        }
+        let rests = fault
+            .is_none()
+            .then(|| self.resting(&from, &target, &reached));
+        if let Some(rests) = rests.filter(|rests| rests.contains(&true)) {
+            return self.free(rests, target);
+        }
+        self.judge_arrival(fault, target, reached)
+    }
+
+    /// Fails with `fault`, or if supervision finds a joint that has not arrived.
+    fn judge_arrival(
+        &mut self,
+        fault: Option<ArmError>,
+        target: Joints,
+        reached: Joints,
+    ) -> Result<Went, AgentError> {
+        let supervision = &mut self.modules.supervision;
         let fault = fault.or_else(|| {
             let joint = supervision.stuck(&target, &reached)?;
             Some(ArmError::NotReached {
@@ -197,6 +218,52 @@ impl Run<'_> {
             })
         });
         fault.map_or(Ok(Went::There), |fault| Err(fault.into()))
+    }
+
+    /// Returns the joints that have not begun a small move: static friction holds them.
+    fn resting(&self, from: &Joints, target: &Joints, reached: &Joints) -> [bool; 6] {
+        /// Largest turn that friction is tried for, radians.
+        const SMALL: f64 = 0.06;
+        /// Least one, as a share of the tolerance.
+        const LEAST: f64 = 0.1;
+        let least = LEAST * self.config.reach_tolerance;
+        std::array::from_fn(|i| {
+            let (wanted, made) = (target.0[i] - from.0[i], reached.0[i] - from.0[i]);
+            (least..SMALL).contains(&wanted.abs()) && made.abs() < 0.2 * wanted.abs()
+        })
+    }
+
+    /// Overcomes static friction: turns the resting joints back, then all the way. At a limit they
+    /// go past the target instead.
+    fn free(&mut self, rests: [bool; 6], target: Joints) -> Result<Went, AgentError> {
+        /// Turns back that are tried, radians.
+        const BACK: [f64; 3] = [0.02, 0.04, 0.08];
+        let from = self.joints;
+        for back in BACK {
+            let limits = *self.modules.supervision.limits();
+            let mut aside = self.joints;
+            for i in (0..6).filter(|i| rests[*i]) {
+                let turn = back.copysign(target.0[i] - from.0[i]);
+                let (low, high) = limits.0[i];
+                let behind = from.0[i] - turn;
+                let free = (low..=high).contains(&behind);
+                aside.0[i] = if free { behind } else { target.0[i] + turn };
+            }
+            self.freeing = true;
+            for pose in [limits.nearest(&aside), target] {
+                let answer = self.devices.arm.move_to(pose);
+                let went = self.arrive(answer, pose, EventKind::Freed);
+                if !matches!(went, Ok(Went::There)) {
+                    self.freeing = false;
+                    return went;
+                }
+            }
+            self.freeing = false;
+            if !self.resting(&from, &target, &self.joints).contains(&true) {
+                break;
+            }
+        }
+        self.judge_arrival(None, target, self.joints)
     }
 
     /// Passes the answer to `order` on, and reports [`EventKind::Unanswered`] for an error.

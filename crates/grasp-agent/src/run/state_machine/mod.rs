@@ -6,6 +6,7 @@ use hough_heuristic::image::GrayImage;
 use puma_val2::{Gripper, Joints, Manipulator, ProximitySensor};
 
 use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
+use crate::controllers::hybrid::misfit::Misfit;
 use crate::error::AgentError;
 use crate::percept::{Percept, Sighting};
 use crate::run::config::AgentConfig;
@@ -104,6 +105,10 @@ pub(crate) struct Run<'a> {
     barred_grips: usize,
     /// `true` if the last of them was aimed by the controller.
     own_barred: bool,
+    /// `true` while joints are freed from friction.
+    freeing: bool,
+    /// Cause reported last for a model that does not fit.
+    misfit: Option<Misfit>,
 }
 
 impl<'a> Run<'a> {
@@ -134,6 +139,8 @@ impl<'a> Run<'a> {
             wandered: false,
             barred_grips: 0,
             own_barred: false,
+            freeing: false,
+            misfit: None,
         }
     }
 
@@ -171,6 +178,7 @@ impl<'a> Run<'a> {
                     });
                 }
             };
+            let next = self.with_cause(next);
             if discriminant(&next) != discriminant(&state) {
                 self.tell(next.entry());
             }
@@ -179,6 +187,23 @@ impl<'a> Run<'a> {
                 self.cycles += usize::from(missed);
             }
             state = next;
+        }
+    }
+
+    /// Reports a model that does not fit, and names the cause in a failure without another.
+    fn with_cause(&mut self, next: State) -> State {
+        let cause = self.controller.misfit();
+        if cause != self.misfit {
+            self.misfit = cause;
+            if let Some(cause) = cause {
+                self.tell(EventKind::Misfit(cause));
+            }
+        }
+        match (next, cause) {
+            (State::End(Some(GaveUp::OutOfCycles | GaveUp::NotFound)), Some(cause)) => {
+                State::End(Some(GaveUp::Misfit(cause)))
+            }
+            _ => next,
         }
     }
 

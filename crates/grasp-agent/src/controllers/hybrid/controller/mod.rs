@@ -9,6 +9,7 @@ use crate::controller::{Controller, Decision, Feedback, GaveUp, Request};
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::evidence::{Evidence, Links};
 use crate::controllers::hybrid::fit::Fit;
+use crate::controllers::hybrid::misfit::Misfit;
 use crate::controllers::hybrid::parameters::{
     Numbers, WithBall, corrected, deviations, sensitivity, vector,
 };
@@ -17,6 +18,9 @@ use crate::controllers::taught_goal::TaughtGoal;
 use crate::limits::JointLimits;
 use crate::percept::Sighting;
 use crate::sight::camera_model::CameraModel;
+
+mod aiming;
+mod learning;
 
 /// Visual servoing with a camera model that is calibrated from the sightings.
 ///
@@ -31,6 +35,10 @@ pub struct Hybrid {
     before: Belief,
     belief: Belief,
     remembered: Vec<Evidence>,
+    /// All sightings of the run before.
+    recent: Evidence,
+    /// `true` if the last run has shown that the camera had slipped.
+    slipped: bool,
     /// Set while a remembered run is not yet part of the belief.
     news: bool,
     learning: bool,
@@ -43,6 +51,12 @@ pub struct Hybrid {
 #[derive(Clone, Debug)]
 struct Run {
     evidence: Evidence,
+    /// All sightings of the run, as of a ball at rest.
+    record: Evidence,
+    misfit: Option<Misfit>,
+    /// Sighting after the last move, until a decision is asked for. There is none at the goal, and
+    /// evidence without its best sightings is biased away from the goal.
+    seen: Option<Features>,
     estimate: Option<Estimate>,
     /// Fraction of the planned moves that is made.
     boldness: f64,
@@ -57,12 +71,17 @@ struct Run {
     /// `true` if the last grip was aimed here, and if that one has missed.
     aimed: bool,
     missed: bool,
+    /// Own aims that have missed.
+    misses: usize,
 }
 
 impl Default for Run {
     fn default() -> Self {
         Self {
             evidence: Evidence::default(),
+            record: Evidence::default(),
+            misfit: None,
+            seen: None,
             estimate: None,
             boldness: 1.0,
             losses: 0,
@@ -71,6 +90,7 @@ impl Default for Run {
             grips: 0,
             aimed: false,
             missed: false,
+            misses: 0,
         }
     }
 }
@@ -126,6 +146,8 @@ impl Hybrid {
             before: belief.clone(),
             belief,
             remembered: Vec::new(),
+            recent: Evidence::default(),
+            slipped: false,
             news: false,
             learning: true,
             shown: false,
@@ -133,11 +155,14 @@ impl Hybrid {
         }
     }
 
-    /// Creates a controller that decides by a belief as it is, and learns nothing.
-    pub(crate) fn restored(settings: HybridSettings, belief: Belief, shown: bool) -> Self {
+    /// Creates a controller that decides by a belief as it is, and learns nothing. The marks say
+    /// that a goal was taught, and that the camera has slipped.
+    pub(crate) fn restored(settings: HybridSettings, belief: Belief, marks: [bool; 2]) -> Self {
+        let [shown, slipped] = marks;
         Self {
             learning: false,
             shown,
+            slipped,
             ..Self::beginning(settings, belief)
         }
     }
@@ -179,17 +204,6 @@ impl Hybrid {
         &self.belief
     }
 
-    /// Keeps the sightings of one ball in one place as evidence for later runs.
-    fn remember(&mut self) {
-        // A single sighting determines the ball's place and nothing of the camera.
-        if self.learning && self.run.evidence.tells() {
-            self.remembered.push(self.run.evidence.clone());
-            self.news = true;
-            let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
-            self.remembered.drain(..forgotten);
-        }
-    }
-
     /// Estimates camera and ball from all sightings of this run.
     fn estimate(&mut self) -> Option<Estimate> {
         let start = self
@@ -207,7 +221,7 @@ impl Hybrid {
         Some(Estimate {
             model: corrected(&self.settings.nominal, &fit.numbers),
             numbers: fit.numbers,
-            covariance: fit.with_last_ball.try_inverse()?,
+            covariance: fit.with_last_ball()?,
             ball,
         })
     }
@@ -267,8 +281,21 @@ impl Hybrid {
     }
 
     /// Returns the move to `motors`, cut to the step limits and the joint limits. NaN stays NaN.
+    ///
+    /// A move that a joint limit ends keeps its direction, so that the ball stays in view; from the
+    /// limit itself the other joints go on.
     fn cut(&self, motors: &Joints, from: &Joints, limits: &JointLimits) -> JointDelta {
-        let target = limits.nearest(motors);
+        /// Least share of a way within the limits that is worth a move.
+        const WORTH: f64 = 0.1;
+        let whole = JointDelta(std::array::from_fn(|i| {
+            if i < 3 { motors.0[i] - from.0[i] } else { 0.0 }
+        }));
+        let share = limits.share_within(from, &whole, 1.0);
+        let target = if share > WORTH && share < 1.0 {
+            limits.nearest(&(*from + JointDelta(whole.0.map(|turn| share * turn))))
+        } else {
+            limits.nearest(motors)
+        };
         JointDelta(std::array::from_fn(|i| {
             match self.settings.steps.get(i) {
                 // `min` and `max` turn NaN into a whole step; `clamp` panics on a NaN bound.
@@ -306,6 +333,7 @@ impl Hybrid {
 
 impl Hybrid {
     fn reach(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
+        self.run.seen = None;
         let off = self.surprise(&ball.features);
         let odd = off.is_some();
         if off.is_some_and(|off| off > FAR_OFF) && !self.run.doubt && self.run.moving == 0 {
@@ -338,57 +366,15 @@ impl Hybrid {
         }
         self.plan(self.run.estimate.as_ref()?, request)
     }
-
-    fn aim(&mut self, ball: &Sighting, request: &Request) -> Option<JointDelta> {
-        self.run.evidence.saw(ball.features);
-        self.run.estimate = self.estimate();
-        let estimate = self.run.estimate.as_ref()?;
-        // An aim that has missed is followed by the taught grip.
-        if std::mem::take(&mut self.run.missed) && self.shown {
-            return None;
-        }
-        let links = self.run.evidence.links(&estimate.numbers);
-        let mut from = links.stand();
-        from.0[Joint::J5.index()] += self.settings.grip_turn;
-        from.0[Joint::J4.index()] += self.settings.grip_aside;
-        let stand = estimate.model.pose_gripping(&estimate.ball, &from)?;
-        let motors = links.motors_for(&stand, &request.joints);
-        let miss = |numbers: &Numbers, ball: &Point3<f64>| {
-            let mut links = self.run.evidence.links(numbers);
-            links.follow(&motors);
-            Some(estimate.model.tool_point(&links.stand()) - ball)
-        };
-        let (_, by_all) = sensitivity(&estimate.numbers, &estimate.ball, miss)?;
-        let uncertainty = deviations(&by_all, &estimate.covariance).norm();
-        // The configured grip has missed; accept a less certain aim each time.
-        let enough = self.settings.grip_certainty * 4_f64.powi(self.run.grips);
-        self.run.grips = (self.run.grips + 1).min(10);
-        self.run.aimed = uncertainty <= enough && request.limits.admit(&motors);
-        self.run.aimed.then(|| motors - request.joints)
-    }
-
-    /// Learns from the run that is over.
-    fn learn(&mut self) {
-        self.remember();
-        if !self.learning || !std::mem::take(&mut self.news) {
-            return;
-        }
-        let all: Vec<&Evidence> = self.remembered.iter().collect();
-        let before = self.before.clone().with_noise(self.belief.noise());
-        if let Some(fit) = Fit::of(
-            &before,
-            &self.belief.numbers(),
-            &self.settings.nominal,
-            &all,
-        ) {
-            self.belief = fit.belief(fit.noise().unwrap_or(self.belief.noise()));
-        }
-    }
 }
 
 impl Controller for Hybrid {
     fn decide(&mut self, ball: &Sighting, request: &Request) -> Result<Decision, GaveUp> {
         // As evidence, NaN would spread to the whole belief.
+        if ball.is_finite() && request.joints.non_finite().is_none() {
+            self.run.record.saw(ball.features);
+            self.judge();
+        }
         let decision = if !ball.is_finite() || request.joints.non_finite().is_some() {
             None
         } else if request.grip {
@@ -401,9 +387,16 @@ impl Controller for Hybrid {
 
     fn notice(&mut self, feedback: &Feedback) {
         match feedback {
-            Feedback::Begin => self.run = Run::default(),
-            Feedback::Arm(joints) => self.run.evidence.arm_at(joints),
-            Feedback::Seen { .. } => {
+            Feedback::Begin => {
+                self.run = Run::default();
+                self.run.misfit = self.slipped.then_some(Misfit::CameraSlipped);
+            }
+            Feedback::Arm(joints) => {
+                self.run.evidence.arm_at(joints);
+                self.run.record.arm_at(joints);
+            }
+            Feedback::Seen { ball, .. } => {
+                self.run.seen = ball.is_finite().then_some(ball.features);
                 (self.run.boldness, self.run.losses) = ((1.5 * self.run.boldness).min(1.0), 0);
             }
             Feedback::Lost | Feedback::TakenBack => {
@@ -411,14 +404,13 @@ impl Controller for Hybrid {
                 self.run.losses += usize::from(*feedback == Feedback::Lost);
             }
             // An aim that holds only confirms the belief that it was made by.
-            Feedback::Held(joints) if !self.run.aimed => self.run.evidence.held_at(joints, HELD),
+            Feedback::Held(joints) if !self.run.aimed || self.run.misses > 0 => {
+                self.run.evidence.held_at(joints, HELD)
+            }
             Feedback::Held(_) => {}
             Feedback::Missed => {
                 self.run.missed = std::mem::take(&mut self.run.aimed);
-                // The miss may have moved the ball.
-                self.remember();
-                self.run.evidence.forget_sightings();
-                self.run.estimate = None;
+                self.run.misses += usize::from(self.run.missed);
             }
             Feedback::End => self.learn(),
         }
@@ -428,8 +420,13 @@ impl Controller for Hybrid {
         "hybrid"
     }
 
+    fn misfit(&self) -> Option<Misfit> {
+        self.run.misfit
+    }
+
     fn save(&self) -> Option<SavedController> {
-        SavedController::new("hybrid", (self.settings, &self.belief, self.shown))
+        let marks = [self.shown, self.slipped];
+        SavedController::new("hybrid", (self.settings, &self.belief, marks))
     }
 }
 

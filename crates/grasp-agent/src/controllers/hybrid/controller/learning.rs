@@ -1,0 +1,83 @@
+//! Learning from one run to the next, and the doubt in what was learned.
+
+use crate::controllers::hybrid::belief::Belief;
+use crate::controllers::hybrid::controller::Hybrid;
+use crate::controllers::hybrid::evidence::Evidence;
+use crate::controllers::hybrid::fit::Fit;
+use crate::controllers::hybrid::misfit::{ENOUGH, Misfit, misfit};
+
+/// Slip of the camera in two runs: least number of sightings in each, least cost that a new mount
+/// saves, and largest cost of a residual after it.
+const SLIP_SHOWS: (usize, f64, f64) = (3, 80.0, 3.0);
+/// Number of own aims that may miss in one run before the arm is in doubt.
+const OFTEN: usize = 3;
+
+impl Hybrid {
+    /// Keeps the sightings of one ball in one place as evidence for later runs.
+    pub(super) fn remember(&mut self) {
+        // A single sighting determines the ball's place and nothing of the camera.
+        if self.learning && self.run.evidence.tells() {
+            self.remembered.push(self.run.evidence.clone());
+            self.news = true;
+            let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
+            self.remembered.drain(..forgotten);
+        }
+    }
+
+    /// Looks for the cause of residuals that are too large, now and then.
+    pub(super) fn judge(&mut self) {
+        let (record, settings) = (&self.run.record, &self.settings);
+        if record.len().is_multiple_of(ENOUGH) {
+            let cause = misfit(record, &self.belief, &settings.prior, &settings.nominal);
+            let aims_fail = self.run.misses > OFTEN;
+            let cause = cause.or(aims_fail.then_some(Misfit::Arm));
+            self.run.misfit = cause.or(self.run.misfit);
+        }
+    }
+
+    /// Returns `true` if the last two runs contradict the belief and agree on another mount of the
+    /// camera.
+    fn has_slipped(&self) -> bool {
+        let last = [&self.recent, &self.run.record];
+        let fit =
+            |belief: &Belief| Fit::of(belief, &belief.numbers(), &self.settings.nominal, &last);
+        let slipped = self.belief.clone().slipped(&self.settings.prior);
+        let (Some(before), Some(after)) = (fit(&self.belief), fit(&slipped)) else {
+            return false;
+        };
+        let count = last.map(Evidence::len);
+        let residuals = 3.0 * (count[0] + count[1]) as f64;
+        count.iter().all(|count| *count >= SLIP_SHOWS.0)
+            && before.cost - after.cost > SLIP_SHOWS.1
+            && after.cost < SLIP_SHOWS.2 * residuals
+    }
+
+    /// Learns from the run that is over.
+    pub(super) fn learn(&mut self) {
+        self.remember();
+        self.slipped = self.learning && self.has_slipped();
+        let record = std::mem::take(&mut self.run.record);
+        let recent = std::mem::replace(&mut self.recent, record.clone());
+        if self.slipped {
+            // The older runs, and the taught grip, are of another mount.
+            self.before = self.belief.clone().slipped(&self.settings.prior);
+            self.remembered = vec![recent, record];
+            self.shown = false;
+        }
+        if !self.learning || !std::mem::take(&mut self.news) {
+            return;
+        }
+        let all: Vec<&Evidence> = self.remembered.iter().collect();
+        let before = self.before.clone().with_noise(self.belief.noise());
+        if let Some(fit) = Fit::of(
+            &before,
+            &self.belief.numbers(),
+            &self.settings.nominal,
+            &all,
+        ) {
+            let noise = fit.noise().unwrap_or(self.belief.noise());
+            let fit = fit.over_all_places(&self.settings.nominal, &all);
+            self.belief = fit.belief(noise);
+        }
+    }
+}
