@@ -1,6 +1,6 @@
 //! Aiming of the grip.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use puma_val2::{Joint, JointDelta};
 
 use crate::controller::Request;
