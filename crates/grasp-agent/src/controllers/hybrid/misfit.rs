@@ -81,15 +81,17 @@ pub(crate) fn misfit(
         return (by_learned > 2.0 * FITS).then_some(Misfit::CameraSlipped);
     }
     let (w, h) = (Features::WIDTH, Features::HEIGHT);
-    let turns: [fn(f64, f64) -> (f64, f64); 4] = [
-        |x, y| (-x, y),
-        |x, y| (-x, -y),
-        |x, y| (y, -x),
-        |x, y| (-y, x),
+    // Rows of the matrices by which x and y are turned.
+    let turns = [
+        [-1.0, 0.0, 0.0, 1.0],
+        [-1.0, 0.0, 0.0, -1.0],
+        [0.0, 1.0, -1.0, 0.0],
+        [0.0, -1.0, 1.0, 0.0],
     ];
-    let turned = turns.map(|turn| {
+    let turned = turns.map(|[xx, xy, yx, yy]| {
         let turned = |f: &Features| {
-            let (x, y) = turn(f.x - 0.5 * w, f.y - 0.5 * h);
+            let (x, y) = (f.x - 0.5 * w, f.y - 0.5 * h);
+            let (x, y) = (xx * x + xy * y, yx * x + yy * y);
             Features::new(x + 0.5 * w, y + 0.5 * h, f.r)
         };
         (Misfit::TurnedImage, record.seen_as(turned))

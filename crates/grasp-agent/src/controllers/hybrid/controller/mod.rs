@@ -405,7 +405,7 @@ impl Controller for Hybrid {
             }
             // An aim that holds only confirms the belief that it was made by.
             Feedback::Held(joints) if !self.run.aimed || self.run.misses > 0 => {
-                self.run.evidence.held_at(joints, HELD)
+                self.run.evidence.held_at(joints, HELD);
             }
             Feedback::Held(_) => {}
             Feedback::Missed => {
