@@ -3,7 +3,7 @@
 use std::fs;
 
 use example_support::files::{lock_folder, write_whole};
-use example_support::program::on_all_cores;
+use example_support::program::on_threads;
 
 #[test]
 fn a_file_is_replaced_as_a_whole_and_a_link_stays_a_link() {
@@ -52,13 +52,13 @@ fn a_folder_is_written_to_by_one_program_at_a_time() {
 }
 
 #[test]
-fn work_on_all_cores_keeps_its_order_and_its_first_error() {
+fn work_on_threads_keeps_its_order_and_its_first_error() {
     let mut squares = Vec::new();
-    on_all_cores(9, &mut squares, |i| Ok(i * i)).expect("no error");
+    on_threads(None, 9, &mut squares, |i| Ok(i * i)).expect("no error");
     assert_eq!(squares, [0, 1, 4, 9, 16, 25, 36, 49, 64]);
     let failing = |i| if i == 3 { Err("three".into()) } else { Ok(i) };
     let mut done = Vec::new();
-    let error = on_all_cores(1_000, &mut done, failing).expect_err("of the fourth");
+    let error = on_threads(None, 1_000, &mut done, failing).expect_err("of the fourth");
     assert_eq!(error.to_string(), "three");
     assert!(done.starts_with(&[0, 1, 2]) && done.len() < 1_000);
 }
