@@ -5,7 +5,7 @@
 //!   ([`PumaParams::forward`]) and back: [`PumaParams::inverse`] returns all eight postures,
 //!   [`PumaParams::inverse_near`] the nearest one in range. [`Xyzoat`] is a pose in VAL's own six
 //!   numbers. [`Frames`] holds `BASE` and `TOOL`, [`DriveTrain`] gears, [`ArmDynamics`]
-//!   masses and torques.
+//!   masses and torques. An [`Arm`] is any other arm as data, a UR5 for example.
 //! * [`Emulator`] is a controller without threads and without a clock: bytes in, bytes and
 //!   [`Event`]s out, at times that the caller names. [`Profile`] holds everything that is not known
 //!   for certain about real controllers. [`EmulatorServer`] serves it on a pseudo-terminal or a
@@ -132,8 +132,8 @@ pub use emulator::{Emulator, Event, Fault, Message, Place, Profile, TextError};
 pub use error::ArmError;
 pub use joints::{Joint, JointDelta, Joints};
 pub use kinematics::{
-    ArmDynamics, Configuration, DriveTrain, Frames, LinkDynamics, PumaParams, Singularity,
-    Solution, Unreachable, Xyzoat,
+    Arm, ArmDynamics, Configuration, DriveTrain, Frames, Kinematics, LinkDynamics, PumaParams,
+    Singularity, Solution, Unreachable, Xyzoat,
 };
 pub use limits::JointRange;
 pub use manipulator::{Gripper, Manipulator, ProximitySensor};

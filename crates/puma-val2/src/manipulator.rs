@@ -22,7 +22,10 @@ pub trait Manipulator {
     /// # Errors
     /// [`ArmError::JointLimit`] or [`ArmError::NotFinite`] before anything moves; otherwise errors
     /// of the line or the controller.
-    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError>;
+    fn move_by(&mut self, delta: JointDelta) -> Result<Joints, ArmError> {
+        let target = self.joints()? + delta;
+        self.move_to(target)
+    }
 
     /// Turns the joints to `target` and returns the joint angles that the arm reports afterwards.
     ///
@@ -60,6 +63,13 @@ pub trait ProximitySensor {
     /// # Errors
     /// Errors of the line or the controller.
     fn object_near(&mut self) -> Result<bool, ArmError>;
+}
+
+/// No sensor: nothing is ever near.
+impl ProximitySensor for () {
+    fn object_near(&mut self) -> Result<bool, ArmError> {
+        Ok(false)
+    }
 }
 
 impl<T: Manipulator + ?Sized> Manipulator for &mut T {
