@@ -2,6 +2,7 @@
 
 #[cfg(feature = "files")]
 mod files;
+mod newest;
 mod stream;
 mod y4m;
 
@@ -25,6 +26,19 @@ pub trait FrameSource {
     /// [`FrameError::End`] after the last frame; [`FrameError::Failed`] if the source could not
     /// deliver one. The content of `frame` is then unspecified.
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError>;
+
+    /// Returns a source that delivers the newest frame of a camera that queues, as those of V4L2
+    /// and of OpenCV do.
+    ///
+    /// A thread reads the camera without pause. Dropped is each frame that was asked for before the
+    /// call of [`FrameSource::grab`] or within `latency` after it: the longest time from the
+    /// beginning of an exposure to the delivery of its frame, one or two periods of the camera.
+    fn newest(self, latency: std::time::Duration) -> impl FrameSource
+    where
+        Self: Sized + Send + 'static,
+    {
+        newest::Newest::of(self, latency)
+    }
 }
 
 /// The reason why a [`FrameSource`] delivered no frame.
