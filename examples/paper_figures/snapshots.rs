@@ -8,7 +8,7 @@ use image::imageops::{FilterType, replace, resize};
 use nalgebra::{Point3, Rotation3, Vector3};
 use pipeline_sim::{Ball, Workspace};
 use puma_grasp::{BallDetector, Rig, bright_ball_scene};
-use puma_val2::{Joint, Joints};
+use puma_val2::{Joint, Joints, PumaParams};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -83,7 +83,8 @@ fn pose(moment: &Moment, ball: &Ball, table: f64) -> RgbImage {
     let wrist = model.arm.wrist(joints);
     let camera = wrist * model.mount;
     let (sin, cos) = joints[Joint::J2].sin_cos();
-    let elbow = into_plane.inverse() * Point3::new(model.arm.a2 * cos, 0.0, -model.arm.a2 * sin);
+    let upper = PumaParams::unimation().a2;
+    let elbow = into_plane.inverse() * Point3::new(upper * cos, 0.0, -upper * sin);
     let ground = RgbImage::from_pixel(TILE.0, TILE.1, image::Rgb([250, 250, 252]));
     let mut drawing = Overlay::from(ground);
     let surface = SHOULDER.1 - SCALE * table;

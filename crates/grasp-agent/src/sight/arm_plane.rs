@@ -1,7 +1,7 @@
 //! Exact simulator of approaching, in the plane of the second and third joint.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use puma_val2::{Joint, JointDelta, Joints};
+use puma_val2::{Arm, Joint, JointDelta, Joints, PumaParams};
 
 use crate::limits::JointLimits;
 use crate::percept::Percept;
@@ -9,17 +9,46 @@ use crate::sight::camera_model::CameraModel;
 
 impl CameraModel {
     /// Returns an exact simulator of approaching: the percept after a move of `JT2` and `JT3`, in
-    /// the frame or outside it, with `JT5` at 45 degrees. A move of `JT3` out of its limits is not
-    /// made. The percept is `None` if the ball has no image.
+    /// the frame or outside it. A move of `JT3` out of its limits is not made. The percept is
+    /// `None` if the ball has no image.
     ///
-    /// Turning arm and ball together about the shoulder changes nothing, so the percept (x, y, r,
-    /// theta 3) is the whole state.
+    /// A PUMA has `JT5` at 45 degrees; of any other arm the joints but `JT3` begin in the middle of
+    /// their limits. The axes of `JT2` and `JT3` are parallel: turning arm and ball together about
+    /// the shoulder then changes nothing, and the percept (x, y, r, theta 3) is the whole state.
     pub fn approaching(
         &self,
         limits: JointLimits,
     ) -> impl FnMut(&Percept, &JointDelta) -> Option<Percept> + use<> {
-        let mut plane = ArmPlane::new(self, limits);
-        move |percept, delta| plane.after(percept, delta)
+        let model = *self;
+        let mut plane = match &self.arm {
+            Arm::Puma(arm) => Some(ArmPlane::new(self, arm, limits)),
+            Arm::Serial { .. } => None,
+        };
+        let middle = Joints(limits.0.map(|(low, high)| 0.5 * (low + high)));
+        move |percept, delta| match &mut plane {
+            Some(plane) => plane.after(percept, delta),
+            None => model.approached(percept, delta, &limits, middle),
+        }
+    }
+
+    /// Returns the percept after a move by the general kinematics, with the joints but `JT3` at
+    /// `others` before it.
+    fn approached(
+        &self,
+        percept: &Percept,
+        delta: &JointDelta,
+        limits: &JointLimits,
+        others: Joints,
+    ) -> Option<Percept> {
+        let mut joints = others;
+        joints.0[Joint::J3.index()] = (percept.theta3 + Percept::THETA3_ZERO).to_radians();
+        let moved = joints + *delta;
+        let (low, high) = limits.0[Joint::J3.index()];
+        if !(low..=high).contains(&moved[Joint::J3]) {
+            return Some(*percept);
+        }
+        let ball = self.locate(&joints, &percept.features)?;
+        Some(Percept::new(self.view(&moved, &ball)?, &moved))
     }
 }
 
@@ -39,11 +68,11 @@ struct ArmPlane {
 }
 
 impl ArmPlane {
-    fn new(model: &CameraModel, limits: JointLimits) -> Self {
+    fn new(model: &CameraModel, arm: &PumaParams, limits: JointLimits) -> Self {
         let stretched = Joints::from_degrees([0.0, 0.0, 0.0, 0.0, 45.0, 0.0]);
-        let elbow = Vector3::new(model.arm.a2, model.arm.d2, 0.0);
+        let elbow = Vector3::new(arm.a2, arm.d2, 0.0);
         let from_elbow =
-            Isometry3::translation(-elbow.x, -elbow.y, -elbow.z) * model.arm.wrist(&stretched);
+            Isometry3::translation(-elbow.x, -elbow.y, -elbow.z) * arm.wrist(&stretched);
         Self {
             model: *model,
             limits,
@@ -90,28 +119,11 @@ mod tests {
     use super::*;
     use hough_heuristic::Features;
 
-    /// Percept after a move by the general kinematics.
-    fn general(
-        model: &CameraModel,
-        percept: &Percept,
-        delta: &JointDelta,
-        limits: &JointLimits,
-    ) -> Option<Percept> {
-        let jt3 = percept.theta3 + Percept::THETA3_ZERO;
-        let joints = Joints::from_degrees([0.0, -60.0, jt3, 0.0, 45.0, 0.0]);
-        let moved = joints + *delta;
-        let (low, high) = limits.0[Joint::J3.index()];
-        if !(low..=high).contains(&moved[Joint::J3]) {
-            return Some(*percept);
-        }
-        let ball = model.locate(&joints, &percept.features)?;
-        Some(Percept::new(model.view(&moved, &ball)?, &moved))
-    }
-
     #[test]
     fn the_plane_equals_the_camera_model_along_walks_and_jumps() {
         let (model, limits) = (CameraModel::paper(), JointLimits::paper());
-        let mut plane = ArmPlane::new(&model, limits);
+        let mut plane = model.approaching(limits);
+        let others = Joints::from_degrees([0.0, -60.0, 0.0, 0.0, 45.0, 0.0]);
         let start = Percept {
             features: Features::new(98.0, 60.0, 10.0),
             theta3: 30.0,
@@ -128,8 +140,8 @@ mod tests {
                 0.0,
             ]);
             let (quick, slow) = (
-                plane.after(&percept, &delta),
-                general(&model, &percept, &delta, &limits),
+                plane(&percept, &delta),
+                model.approached(&percept, &delta, &limits, others),
             );
             let (Some(quick), Some(slow)) = (quick, slow) else {
                 assert!(quick.is_none() && slow.is_none());

@@ -2,7 +2,7 @@
 
 use hough_heuristic::Features;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use puma_val2::{Joints, PumaParams};
+use puma_val2::{Arm, Joints, Kinematics, PumaParams};
 use serde::{Deserialize, Serialize};
 
 use crate::checked::above_zero;
@@ -15,13 +15,13 @@ use crate::checked::above_zero;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CameraModel {
     /// Geometry of the arm.
-    pub arm: PumaParams,
+    pub arm: Arm,
     /// Focal length, feature units (192 to the width of the frame).
     pub focal: f64,
     /// Principal point, feature units.
     pub centre: [f64; 2],
     /// Camera frame (z along the optical axis, x right, y down in the image) in the hand frame
-    /// ([`PumaParams::wrist`]).
+    /// ([`Arm::wrist`]).
     pub mount: Isometry3<f64>,
     /// Radius of the ball, metres.
     pub ball_radius: f64,
@@ -40,7 +40,7 @@ impl CameraModel {
             0.0, 0.0, 1.0,
         );
         Self {
-            arm: PumaParams::unimation(),
+            arm: PumaParams::unimation().into(),
             focal: 11.5 / 8.8 * Features::WIDTH,
             centre: [0.5 * Features::WIDTH, 0.5 * Features::HEIGHT],
             mount: Isometry3::from_parts(
@@ -54,13 +54,15 @@ impl CameraModel {
 
     /// Checks that something can be seen by it.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let arm = &self.arm;
+        // No sine or cosine is 0 there, so that each length enters.
+        let hand = self.arm.forward(&Joints([0.5; 6])).to_homogeneous();
         let mount = self.mount.to_homogeneous();
-        let lengths = [arm.a2, arm.a3, arm.d2, arm.d4, arm.d6, self.tool];
-        let mut numbers = lengths
-            .into_iter()
+        let mut numbers = hand
+            .iter()
+            .chain(&mount)
+            .copied()
             .chain(self.centre)
-            .chain(mount.iter().copied());
+            .chain([self.tool]);
         if !numbers.all(f64::is_finite) {
             return Err("a length or an angle of the camera or the arm is not finite".into());
         }
@@ -87,7 +89,7 @@ impl CameraModel {
 
     /// Returns the point between the finger pads.
     pub fn tool_point(&self, joints: &Joints) -> Point3<f64> {
-        self.arm.wrist(joints) * Point3::new(0.0, 0.0, self.arm.d6 + self.tool)
+        self.arm.wrist(joints) * Point3::new(0.0, 0.0, self.arm.flange() + self.tool)
     }
 
     /// Returns the outline of a ball with its centre at `p` in the camera frame: centre and mean

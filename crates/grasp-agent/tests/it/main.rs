@@ -2,6 +2,7 @@
 //! kinematics.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod arms;
 mod cell;
 mod endings;
 mod faults;

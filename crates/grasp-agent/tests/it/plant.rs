@@ -6,12 +6,14 @@ use std::rc::Rc;
 
 use grasp_agent::hough_heuristic::{Features, FrameError};
 use grasp_agent::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use grasp_agent::puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor};
+use grasp_agent::puma_val2::{
+    Arm, ArmError, Gripper, JointDelta, Joints, Manipulator, ProximitySensor,
+};
 use grasp_agent::qtable::rand::rngs::Xoshiro256PlusPlus;
 use grasp_agent::qtable::rand::{RngExt, SeedableRng};
 use grasp_agent::{
-    Agent, AgentError, CameraModel, Controller, EventLog, Eye, RunOutcome, ServoSettings, Sighting,
-    TaughtGoal,
+    Agent, AgentConfig, AgentError, CameraModel, Controller, EventLog, Eye, RunOutcome,
+    ServoSettings, Sighting, TaughtGoal,
 };
 
 use crate::cell::config;
@@ -48,10 +50,37 @@ pub(crate) struct Odd {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Level(pub(crate) [f64; 7]);
 
+pub(crate) const NONE: Level = Level([0.0; 7]);
 pub(crate) const MODERATE: Level = Level([0.10, 3.0, 0.2, 0.5, 0.0, 0.0, 0.0]);
+pub(crate) const HEAVY: Level = Level([0.25, 8.0, 0.6, 1.0, 0.10, 0.020, 5.0]);
 pub(crate) const EXTREME: Level = Level([0.40, 15.0, 1.0, 1.5, 0.20, 0.020, 5.0]);
 
+/// An arm with its camera as they are meant to be, the task's settings, and where balls lie.
+#[derive(Clone, Debug)]
+pub(crate) struct Site {
+    pub(crate) nominal: CameraModel,
+    pub(crate) config: AgentConfig,
+    /// A pose with the ball at the goal, and the grip from there.
+    pub(crate) from: Joints,
+    pub(crate) grip: JointDelta,
+    /// Distance from the base axis (metres), azimuth (degrees) and height (metres) of balls.
+    pub(crate) balls: [(f64, f64); 3],
+}
+
+impl Site {
+    pub(crate) fn puma() -> Self {
+        Self {
+            nominal: CameraModel::paper(),
+            config: config(),
+            from: Joints::from_degrees(ServoSettings::GOAL_POSE),
+            grip: config().grip,
+            balls: [(0.5, 0.8), (-70.0, 70.0), (-0.2, 0.05)],
+        }
+    }
+}
+
 pub(crate) struct State {
+    site: Site,
     truth: CameraModel,
     pub(crate) odd: Odd,
     play: f64,
@@ -74,10 +103,14 @@ pub(crate) struct Plant(pub(crate) Rc<RefCell<State>>);
 
 impl Plant {
     pub(crate) fn new(level: Level, odd: Odd, seed: u64) -> Self {
+        Self::at(Site::puma(), level, odd, seed)
+    }
+
+    pub(crate) fn at(site: Site, level: Level, odd: Odd, seed: u64) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut signed = |amount: f64| if rng.random() { amount } else { -amount };
         let Level([focal, degrees, play, noise, radius, shift, centre]) = level;
-        let nominal = CameraModel::paper();
+        let nominal = site.nominal;
         let turn = Vector3::from_fn(|_, _| signed(degrees.to_radians()));
         let shift = Vector3::from_fn(|_, _| signed(shift));
         let off = Isometry3::from_parts(
@@ -91,10 +124,13 @@ impl Plant {
             ball_radius: nominal.ball_radius * (1.0 + signed(radius)),
             ..nominal
         };
-        truth.arm.a2 += odd.links;
-        truth.arm.d4 += odd.links;
-        let home = Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+        if let Arm::Puma(arm) = &mut truth.arm {
+            arm.a2 += odd.links;
+            arm.d4 += odd.links;
+        }
+        let home = site.config.search_poses[0];
         Self(Rc::new(RefCell::new(State {
+            site,
             truth,
             odd,
             play: play.to_radians(),
@@ -124,11 +160,12 @@ impl Plant {
         let mut state = self.0.borrow_mut();
         state.held = false;
         for _ in 0..10_000 {
-            let rho = rng.random_range(0.5_f64.powi(2)..=0.8_f64.powi(2)).sqrt();
-            let azimuth = rng.random_range(-70.0..=70.0_f64).to_radians();
-            let height = rng.random_range(-0.2..=0.05);
+            let [(near, far), (right, left), (low, high)] = state.site.balls;
+            let rho = rng.random_range(near.powi(2)..=far.powi(2)).sqrt();
+            let azimuth = rng.random_range(right..=left).to_radians();
+            let height = rng.random_range(low..=high);
             state.ball = Point3::new(rho * azimuth.cos(), rho * azimuth.sin(), height);
-            let seen = config().search_poses.iter().any(|pose| {
+            let seen = state.site.config.search_poses.iter().any(|pose| {
                 state
                     .view(&state.bent(&state.turned(pose)))
                     .is_some_and(|f| {
@@ -144,10 +181,13 @@ impl Plant {
 
     /// Shows the goal: the ball between the jaws, the grip taken back, and a few looks.
     pub(crate) fn taught(&self) -> Option<TaughtGoal> {
-        let from = Joints::from_degrees(ServoSettings::GOAL_POSE);
+        let Site {
+            from, grip, config, ..
+        } = self.0.borrow().site.clone();
         let tries = [0.0, 4.0, -4.0, 8.0, -8.0, 12.0, -12.0, 16.0, -16.0];
         for (more, aside) in tries.iter().flat_map(|a| tries.map(|m| (m, *a))) {
-            let grip = JointDelta::from_degrees([0.0, 0.0, 0.0, aside, more - 18.01, 0.0]);
+            let other = JointDelta::from_degrees([0.0, 0.0, 0.0, aside, more, 0.0]);
+            let grip = JointDelta(std::array::from_fn(|i| grip.0[i] + other.0[i]));
             let mut arm = self.clone();
             arm.move_to(from + grip).unwrap();
             {
@@ -170,7 +210,7 @@ impl Plant {
                 );
                 let well = (8.0..184.0).contains(&seen.x) && (8.0..136.0).contains(&seen.y);
                 if well && seen.r > 5.5 {
-                    return TaughtGoal::new(&config().goal, seen, from, grip);
+                    return TaughtGoal::new(&config.goal, seen, from, grip);
                 }
             }
         }
