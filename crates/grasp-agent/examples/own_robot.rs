@@ -2,7 +2,6 @@
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 
 use std::cell::Cell;
-use std::error::Error;
 
 use grasp_agent::hough_heuristic::image::{GrayImage, Luma};
 use grasp_agent::hough_heuristic::{Features, FrameError, FrameSource};
@@ -14,7 +13,6 @@ use grasp_agent::{Sighting, Target, TaughtGoal};
 
 /// The arm. A real one passes the calls on to its driver.
 struct Robot<'a>(&'a Cell<Joints>);
-
 impl Manipulator for Robot<'_> {
     fn joints(&mut self) -> Result<Joints, ArmError> {
         Ok(self.0.get())
@@ -33,7 +31,6 @@ impl Manipulator for Robot<'_> {
 
 /// A camera on the hand. It shows the ball as a white disk.
 struct Camera<'a>(CameraModel, Point3<f64>, &'a Cell<Joints>);
-
 impl FrameSource for Camera<'_> {
     fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
         let disk = self.0.view(&self.2.get(), &self.1);
@@ -48,7 +45,6 @@ impl FrameSource for Camera<'_> {
 
 /// A detector: centre and area of what is white.
 struct White;
-
 impl Target for White {
     fn find(&mut self, frame: &GrayImage) -> Result<Option<Sighting>, FrameError> {
         let white = frame.enumerate_pixels().filter(|pixel| pixel.2.0[0] > 128);
@@ -61,7 +57,7 @@ impl Target for White {
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let pose = |pan, lift, elbow| Joints::from_degrees([pan, lift, elbow, 0.0, 60.0, 0.0]);
     let joints = Cell::new(pose(0.0, -30.0, 30.0));
     let mut nominal = CameraModel::paper();
@@ -69,27 +65,28 @@ fn main() -> Result<(), Box<dyn Error>> {
     nominal.mount.translation = Translation3::new(-0.04, 0.0, 0.02);
     // The goal: from this pose the grip brings the jaws around the ball.
     let (from, grip) = (pose(0.0, 53.0, -33.0), JointDelta::of(Joint::J5, -0.35));
-    let seen = nominal.view(&from, &nominal.tool_point(&(from + grip)));
+    let seen = nominal
+        .view(&from, &nominal.tool_point(&(from + grip)))
+        .ok_or("no view")?;
     let mut config = AgentConfig::paper([-40.0, 0.0, 40.0].map(|pan| pose(pan, -30.0, 30.0)));
     (config.limits.0, config.lift) = (nominal.arm.limits(), None);
-    let goal =
-        TaughtGoal::new(&config.goal, seen.ok_or("no view")?, from, grip).ok_or("no goal")?;
+    let goal = TaughtGoal::new(&config.goal, seen, from, grip).ok_or("no goal")?;
     let mut settings = HybridSettings::paper();
     (settings.nominal, settings.goal) = (nominal, goal.features());
     let mut agent = Agent::with_controller(config.with_taught_goal(&goal), Hybrid::new(settings))?;
-    // The real lens is 8 % longer than the nominal one.
-    let real = CameraModel {
-        focal: 180.0,
-        ..nominal
-    };
+    let mut real = nominal;
+    real.focal *= 1.08;
     for y in [-0.10, 0.0, 0.10, 0.05, -0.05] {
         let mut camera = Camera(real, Point3::new(0.27, y, 0.02), &joints);
         let mut eye = CameraEye::looking_for(&mut camera, White);
         let end = agent.run_and_learn(&mut eye, &mut Robot(&joints), &mut (), &mut |_| {})?;
         println!("moves: {}, gave up: {:?}", end.cycles, end.gave_up);
     }
-    let focal = agent.controller().belief().corrected(&nominal).focal;
-    println!("focal length: {focal:.1}, in truth {}", real.focal);
-    assert!((focal - real.focal).abs() < 5.0, "the lens was not learned");
+    let learned = agent.controller().belief().corrected(&nominal).focal;
+    println!("focal length: {learned:.1}, in truth {:.1}", real.focal);
+    assert!(
+        (learned - real.focal).abs() < 5.0,
+        "the lens was not learned"
+    );
     Ok(())
 }

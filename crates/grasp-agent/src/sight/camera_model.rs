@@ -162,8 +162,11 @@ mod tests {
             ),
             ..CameraModel::paper()
         };
-        let text = serde_json::to_string(&model).unwrap();
-        assert_eq!(serde_json::from_str::<CameraModel>(&text).unwrap(), model);
+        for arm in [model.arm, Arm::ur5(), Arm::so101()] {
+            let model = CameraModel { arm, ..model };
+            let text = serde_json::to_string(&model).unwrap();
+            assert_eq!(serde_json::from_str::<CameraModel>(&text).unwrap(), model);
+        }
     }
 
     #[test]
