@@ -128,7 +128,9 @@ mod tests {
 
     #[test]
     fn a_source_that_nobody_listens_to_is_let_go() {
-        struct Held(Arc<Mutex<()>>);
+        struct Held {
+            _kept: Arc<Mutex<()>>,
+        }
         impl FrameSource for Held {
             fn grab(&mut self, frame: &mut GrayImage) -> Result<(), FrameError> {
                 std::thread::sleep(Duration::from_millis(1));
@@ -137,7 +139,10 @@ mod tests {
             }
         }
         let held = Arc::new(Mutex::new(()));
-        drop(Held(held.clone()).newest(Duration::ZERO));
+        let source = Held {
+            _kept: held.clone(),
+        };
+        drop(source.newest(Duration::ZERO));
         let gone = (0..2000).any(|_| {
             std::thread::sleep(Duration::from_millis(5));
             Arc::strong_count(&held) == 1
