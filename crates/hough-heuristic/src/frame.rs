@@ -33,7 +33,7 @@ pub trait FrameSource {
     /// A thread reads the camera without pause. Dropped is each frame that was asked for before the
     /// call of [`FrameSource::grab`] or within `latency` after it: the longest time from the
     /// beginning of an exposure to the delivery of its frame, one or two periods of the camera.
-    fn newest(self, latency: std::time::Duration) -> impl FrameSource
+    fn newest_only(self, latency: std::time::Duration) -> impl FrameSource
     where
         Self: Sized + Send + 'static,
     {

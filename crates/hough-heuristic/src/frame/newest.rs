@@ -10,7 +10,7 @@ use crate::frame::{FrameError, FrameSource};
 /// Moment at which the source was asked, and its answer.
 type Answer = (Instant, Result<GrayImage, FrameError>);
 
-/// A source that a thread reads without pause; see [`FrameSource::newest`].
+/// A source that a thread reads without pause; see [`FrameSource::newest_only`].
 pub(crate) struct Newest {
     answers: Receiver<Answer>,
     latency: Duration,
@@ -112,14 +112,14 @@ mod tests {
         let scene = Arc::new(AtomicU8::new(0));
         let mut plain = Queueing::showing(scene.clone(), 10_000);
         assert!(late(&mut plain, &scene) >= 9);
-        let mut newest = plain.newest(Duration::from_millis(60));
+        let mut newest = plain.newest_only(Duration::from_millis(60));
         assert_eq!(late(&mut newest, &scene), 0);
     }
 
     #[test]
     fn the_end_of_a_source_is_told_again_and_again() {
         let scene = Arc::new(AtomicU8::new(0));
-        let mut newest = Queueing::showing(scene, 3).newest(Duration::from_secs(5));
+        let mut newest = Queueing::showing(scene, 3).newest_only(Duration::from_secs(5));
         for _ in 0..3 {
             let end = newest.grab(&mut GrayImage::default());
             assert!(matches!(end, Err(FrameError::End)), "{end:?}");
@@ -142,7 +142,7 @@ mod tests {
         let source = Held {
             _kept: held.clone(),
         };
-        drop(source.newest(Duration::ZERO));
+        drop(source.newest_only(Duration::ZERO));
         let gone = (0..2000).any(|_| {
             std::thread::sleep(Duration::from_millis(5));
             Arc::strong_count(&held) == 1
