@@ -4,7 +4,9 @@ mod arcs;
 mod budget;
 mod candidate;
 mod chains;
+mod chance;
 mod config;
+mod consensus;
 mod directions;
 mod ellipse;
 mod ellipses;
@@ -42,10 +44,11 @@ use crate::edges::{Maxima, ROW_STEP, Vectorized, noise_deviation, widest};
 use crate::error::ConfigError;
 use budget::{Budget, Stage};
 use candidate::Collected;
+use chance::log10;
 use directions::UnitCircle;
 use level::Level;
 use polar::{Polar, Ring};
-use proof::{Proof, log10};
+use proof::Proof;
 use prover::{Prover, Pyramid, Size};
 use search::{Outline, Search};
 use thin::Thinning;
@@ -66,7 +69,9 @@ use thin::Thinning;
 ///
 /// **Proof.** A candidate is examined at the size where its radius is 12 to 24 px (smaller ones at
 /// the full size; in noise from 4.5 px on), at twice that size if there is one (in noise also at
-/// four times) and, in doubt, at half of it and in a narrow window; the best result counts. On each
+/// four times) and, in doubt, at half of it and in a narrow window; the best result counts. In
+/// doubt it begins once more at the circle that most of the edges around the candidate agree on, as
+/// in RANSAC. On each
 /// of 64 rays across the outline, the strongest edge along it is sought within a third of the
 /// radius (3 to 8 px) on either side. Under the model of chance that edge lies anywhere in the
 /// window, so it lies within the tolerance (a quarter or half a pixel, in noise and on soft edges

@@ -13,7 +13,7 @@ const STEPS: usize = 6;
 /// Length of a step, pixels.
 const STEP: f32 = 2.0;
 /// Interval between the points that begin an arc, in the list of points.
-const EVERY: usize = 8;
+const EVERY: usize = 5;
 /// Number of steps within which a point does not begin another arc.
 const OWN: usize = 2;
 /// The fewest points of an arc.

@@ -1,8 +1,8 @@
 //! Circles that passed the first looks, waiting for a closer one.
 
 use super::budget::Budget;
+use super::chance::log10;
 use super::polar::Ring;
-use super::proof::log10;
 use super::prover::Prover;
 use super::search::Support;
 

@@ -4,10 +4,11 @@ use image::GrayImage;
 
 use super::candidate::Candidate;
 use super::chains::{self, places};
+use super::chance::log10;
 use super::measure::Measured;
 use super::measurement::{MeasuredEllipse, Measurement};
 use super::patch::Patch;
-use super::proof::{Proof, log10};
+use super::proof::Proof;
 use super::prover::{Prover, Pyramid};
 use super::report::Measuring;
 use super::search::Support;

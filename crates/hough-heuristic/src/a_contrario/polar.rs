@@ -28,6 +28,24 @@ impl Ring {
         (dx * dx + dy * dy).sqrt() + (self.r - other.r).abs()
     }
 
+    /// The circle displaced by the centre and radius of `shift`.
+    pub(super) fn moved(&self, shift: &Self) -> Self {
+        Self {
+            x: self.x + shift.x,
+            y: self.y + shift.y,
+            r: self.r + shift.r,
+        }
+    }
+
+    /// The displacement of centre and radius since `start`.
+    pub(super) fn since(&self, start: &Self) -> Self {
+        Self {
+            x: self.x - start.x,
+            y: self.y - start.y,
+            r: self.r - start.r,
+        }
+    }
+
     /// The circle in the frame whose width and height are divided by `factor`.
     pub(super) fn shrunk(&self, factor: f32) -> Self {
         let corner = 0.5 * (factor - 1.0);

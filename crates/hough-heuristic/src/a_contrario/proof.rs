@@ -2,6 +2,8 @@
 //! one or two dozen pixels.
 
 use super::budget::ROUND;
+use super::chance::divergence;
+use super::consensus;
 use super::directions::{Rays, UnitCircle};
 use super::fit::Moments;
 use super::polar::{Gray, LANES, Polar, Ring};
@@ -46,6 +48,12 @@ const LEAST_UNEVEN: f32 = 0.5;
 const CRISP: f32 = 1.35;
 /// Least number of rays whose edge lies on a circle.
 const LEAST_NEAR: usize = 20;
+/// Distances at which edges count in the narrow window, pixels.
+const NARROW_FOCI: [f32; 3] = [2.0, 1.5, 1.2];
+/// Number of rays by which another start must agree with more edges than the fit.
+const MORE_AGREEING: f32 = 4.0;
+/// Certainty subtracted from a circle from another start: dozens of them are tested.
+const CONSENSUS_TESTS: f32 = 2.0;
 
 /// Least share of the rays in the frame whose edge lies on the circle: before the outline is moved
 /// to the edges, and after. A ball that is hidden to two fifths may show little more.
@@ -83,6 +91,20 @@ impl Proof {
     pub(super) fn is_beyond_doubt(&self) -> bool {
         self.certainty >= BEYOND_DOUBT
             || (self.certainty >= HALF_SURE && self.covered >= ALL_BUT_COVERED)
+    }
+
+    /// The better of two proofs of one candidate, after `price` is subtracted from the certainty of
+    /// the second.
+    pub(super) fn better(first: Option<Self>, second: Option<Self>, price: f32) -> Option<Self> {
+        let second = second.map(|proof| Self {
+            certainty: proof.certainty - price,
+            tests: proof.tests + price,
+            ..proof
+        });
+        match (first, second) {
+            (Some(first), Some(second)) if first.certainty >= second.certainty => Some(first),
+            (first, second) => second.or(first),
+        }
     }
 
     /// The circle in pixels of the frame.
@@ -240,64 +262,111 @@ pub(super) fn prove(
         reach: FIRST_REACH.min((start.r - 1.5) as usize).max(2),
         ..window
     };
-    let mut ring = start;
-    let mut is_crisp = false;
-    let widest = window.reach;
-    for round in 0..4 {
+    if let Some(narrow) = setting.narrow {
+        window.reach = narrow.reach(&start).min(window.reach);
+        wide.reach = window.reach;
+    }
+    *looks += ROUND;
+    let edges = Edges::around(&start, gray, rays, polar, wide);
+    let width = edges.width(polar);
+    window.soft = width > SOFT;
+    let foci = if setting.narrow.is_some() {
+        NARROW_FOCI
+    } else {
+        [4.0, 3.0, 2.0]
+    };
+    let visible: f32 = polar.visible.iter().sum();
+    let mut follow = |fitted: Option<(Ring, usize)>, looks: &mut u64| {
+        let (ring, near) = fitted?;
+        let few = near < LEAST_NEAR || (near as f32) < LEAST_SHARE[0] * visible;
+        if few || !is_near(&ring, &start) {
+            return None;
+        }
+        let path = (&start, ring);
+        settle(gray, rays, polar, path, setting, (window, width), looks)
+    };
+    let fitted = improve(rays, &edges, start, start, foci);
+    let first = follow(fitted, looks);
+    if setting.narrow.is_some() || window.soft || first.is_some_and(|proof| proof.is_beyond_doubt())
+    {
+        return first;
+    }
+    // The fit may have been drawn to another thing: begin where most of the edges agree.
+    let agreeing = fitted.map_or(0.0, |(ring, _)| {
+        consensus::count(rays, &edges, &ring.since(&start))
+    });
+    *looks += ROUND / 2;
+    let (shift, count) = consensus::of(rays, &edges);
+    if count < (agreeing + MORE_AGREEING).max(LEAST_SHARE[0] * visible) {
+        return first;
+    }
+    let second = improve(rays, &edges, start, start.moved(&shift), NARROW_FOCI);
+    Proof::better(first, follow(second, looks), CONSENSUS_TESTS)
+}
+
+/// Returns `true` if a fit has not left the candidate.
+fn is_near(ring: &Ring, start: &Ring) -> bool {
+    ring.apart(start) <= 6.0 && ring.r >= 3.0
+}
+
+/// Moves the outline to its edges until it rests, and weighs them.
+#[inline(always)]
+fn settle(
+    gray: Gray<'_>,
+    rays: Rays<'_>,
+    polar: &mut Polar,
+    (start, fitted): (&Ring, Ring),
+    setting: &Setting,
+    (mut window, width): (Window, f32),
+    looks: &mut u64,
+) -> Option<Proof> {
+    let (mut ring, mut moved) = (fitted, fitted.apart(start));
+    let widest = window.reach.max(window_for(start, setting.noise).reach);
+    for _ in 0..3 {
+        if moved < 0.7 {
+            break;
+        }
         *looks += ROUND;
         if let Some(narrow) = setting.narrow {
             window.reach = narrow.reach(&ring).min(widest);
-            wide.reach = window.reach;
         }
-        let edges = Edges::around(
-            &ring,
-            gray,
-            rays,
-            polar,
-            if round == 0 { wide } else { window },
-        );
-        if round == 0 {
-            let width = edges.width(polar);
-            window.soft = width > SOFT;
-            wide.soft = window.soft;
-            is_crisp = width < CRISP;
-        }
+        let edges = Edges::around(&ring, gray, rays, polar, window);
         let foci = if setting.narrow.is_some() {
-            [2.0, 1.5, 1.2]
-        } else if round == 0 {
-            [4.0, 3.0, 2.0]
+            NARROW_FOCI
         } else if window.soft {
             [3.0, 2.5, 2.0]
         } else {
             [3.0, 2.0, 1.5]
         };
-        let (better, near) = improve(rays, &edges, ring, foci)?;
+        let (better, near) = improve(rays, &edges, ring, ring, foci)?;
         let visible: f32 = polar.visible.iter().sum();
-        if (near as f32) < LEAST_SHARE[round.min(1)] * visible {
+        if (near as f32) < LEAST_SHARE[1] * visible || near < LEAST_NEAR || !is_near(&better, start)
+        {
             return None;
         }
-        if near < LEAST_NEAR || !(better.apart(&start) <= 6.0 && better.r >= 3.0) {
-            return None;
-        }
-        let moved = better.apart(&ring);
+        moved = better.apart(&ring);
         ring = better;
-        if moved < 0.7 {
-            break;
-        }
     }
     *looks += ROUND;
     let mut edges = Edges::around(&ring, gray, rays, polar, window);
     if edges.are_clipped(polar) {
         edges.leave_out_glow(&ring, gray, rays, polar, window);
     }
-    Some(weigh(polar, &edges, ring, setting, window, is_crisp))
+    Some(weigh(polar, &edges, ring, setting, window, width < CRISP))
 }
 
-/// Moves the outline to the edges, in one step for each of `foci`, the largest distance at which
-/// edges count, pixels. Returns the outline and the number of edges that counted last.
+/// Moves the outline `from` to the edges sampled around `start`, in one step for each of `foci`,
+/// the largest distance at which edges count, pixels. Returns the outline and the number of edges
+/// that counted last.
 #[inline(always)]
-fn improve(rays: Rays<'_>, edges: &Edges, start: Ring, foci: [f32; 3]) -> Option<(Ring, usize)> {
-    let mut ring = start;
+fn improve(
+    rays: Rays<'_>,
+    edges: &Edges,
+    start: Ring,
+    from: Ring,
+    foci: [f32; 3],
+) -> Option<(Ring, usize)> {
+    let mut ring = from;
     let mut near = 0.0;
     for focus in foci {
         let mut moments = Moments::default();
@@ -398,55 +467,4 @@ fn weigh(
         }
     }
     best
-}
-
-/// The divergence of the share found from the share expected, in decimal digits per sample; 0
-/// unless more is found.
-fn divergence(share: f32, p: f32) -> f32 {
-    if share <= p {
-        return 0.0;
-    }
-    let term = |q: f32, p: f32| if q > 0.0 { q * log10(q / p) } else { 0.0 };
-    term(share, p) + term(1.0 - share, 1.0 - p)
-}
-
-/// The decimal logarithm of a normal number above 0, by the four operations alone: the same bits on
-/// every machine.
-pub(super) fn log10(x: f32) -> f32 {
-    let bits = f64::from(x).to_bits();
-    let exponent = (bits >> 52) as i64 - 1023;
-    // The mantissa, 1..2.
-    let m = f64::from_bits((bits & ((1 << 52) - 1)) | (1023 << 52));
-    // ln m = 2 artanh z, with z up to 1/3.
-    let z = (m - 1.0) / (m + 1.0);
-    let mut power = z;
-    let mut sum = 0.0;
-    for k in 0..14 {
-        sum += power / f64::from(2 * k + 1);
-        power *= z * z;
-    }
-    let natural = 2.0 * sum + exponent as f64 * std::f64::consts::LN_2;
-    (natural * std::f64::consts::LOG10_E) as f32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn logarithms_are_those_of_the_library() {
-        for x in [1e-30f32, 0.001, 0.3, 0.999, 1.0, 1.5, 1.999, 2.0, 10.0, 1e7] {
-            assert!(
-                (log10(x) - x.log10()).abs() <= 1e-6 * x.log10().abs().max(1.0),
-                "{x}"
-            );
-        }
-    }
-
-    #[test]
-    fn only_more_than_expected_is_evidence() {
-        assert!(divergence(0.1, 0.2) <= 0.0 && divergence(0.2, 0.2) <= 0.0);
-        assert!((divergence(1.0, 0.1) - 1.0).abs() < 1e-6);
-        assert!(divergence(0.6, 0.1) > divergence(0.5, 0.1));
-    }
 }

@@ -30,10 +30,10 @@ const LEAST_NARROW_REACH: f32 = 2.0;
 const LEAST_NARROW: f32 = -3.0;
 /// Weight from which a candidate is examined there at any certainty.
 const LEAST_WEIGHT: f32 = 10.0;
-/// Least certainty of a circle for which evidence against it is sought.
-const LEAST_REFUTED: f32 = 0.5;
 /// Certainty subtracted from a second proof of one candidate: it is one more test.
 const SECOND_LOOK: f32 = 1.0;
+/// Least certainty of a circle for which evidence against it is sought.
+const LEAST_REFUTED: f32 = 0.5;
 
 /// The frame and its repeated halvings.
 #[derive(Clone, Copy, Debug)]
@@ -108,9 +108,10 @@ impl Prover<'_> {
             && candidate.r >= LEAST_SECOND * (2 << coarsest) as f32
             && best.is_none_or(|first| !first.is_beyond_doubt())
         {
-            best = better(
+            best = Proof::better(
                 best,
                 self.prove_at(coarsest + 1, &candidate.ring(), None, looks),
+                SECOND_LOOK,
             );
         }
         // A second outline close by may have the stronger edges.
@@ -120,7 +121,7 @@ impl Prover<'_> {
         {
             let narrow = Some(Narrow::Within(NARROW * candidate.r));
             let narrow = self.prove_at(finest, &candidate.ring(), narrow, looks);
-            best = better(best, narrow);
+            best = Proof::better(best, narrow, SECOND_LOOK);
         }
         self.conclude(best?, looks)
     }
@@ -139,7 +140,7 @@ impl Prover<'_> {
         }
         let narrow = Narrow::Beside(*other);
         let proof = self.prove_at(depth, &candidate.ring(), Some(narrow), looks);
-        self.conclude(better(None, proof)?, looks)
+        self.conclude(Proof::better(None, proof, SECOND_LOOK)?, looks)
     }
 
     /// Weighs the evidence against a circle, and keeps the proof.
@@ -205,19 +206,6 @@ impl Prover<'_> {
             r *= 0.5;
         }
         depth
-    }
-}
-
-/// The better of two proofs, of which the second one has its price.
-fn better(first: Option<Proof>, second: Option<Proof>) -> Option<Proof> {
-    let second = second.map(|proof| Proof {
-        certainty: proof.certainty - SECOND_LOOK,
-        tests: proof.tests + SECOND_LOOK,
-        ..proof
-    });
-    match (first, second) {
-        (Some(first), Some(second)) if first.certainty >= second.certainty => Some(first),
-        (first, second) => second.or(first),
     }
 }
 

@@ -40,6 +40,17 @@ pub(super) struct Edges {
 }
 
 impl Edges {
+    /// Edges at these distances, for tests.
+    #[cfg(test)]
+    pub(super) fn at_distances(distance: [f32; RAYS]) -> Self {
+        Self {
+            distance,
+            slope: [10.0; RAYS],
+            sign: [1.0; RAYS],
+            at: [1; RAYS],
+        }
+    }
+
     /// Finds the strongest edge along the outline's normal on each ray.
     #[inline(always)]
     pub(super) fn around(
