@@ -261,10 +261,12 @@ impl Instruction {
                 | Self::Any
                 | Self::LeaveLoop
                 | Self::NextTurn
+                | Self::Local(_)
+                | Self::OnFault(_)
         );
         let ends = matches!(
             self,
-            Self::Return(_) | Self::Pause(_) | Self::Stop(_) | Self::Halt | Self::Local(_)
+            Self::Return(_) | Self::Pause(_) | Self::Stop(_) | Self::Halt
         );
         self.opens() || self.closes() || branches || ends
     }

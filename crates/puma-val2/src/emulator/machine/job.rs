@@ -234,12 +234,16 @@ impl Emulator {
         if matches!(instruction, Instruction::React { .. }) && !self.profile.react_at_monitor {
             return Err(Message::IllegalInstruction.into());
         }
-        if let Instruction::Call(name, arguments) = instruction
-            && arguments.is_empty()
-        {
-            return self
-                .start_program(name, Some(1), 0, false)
-                .map(|()| self.prompt());
+        if let Instruction::Call(name, arguments) = instruction {
+            let frame = self.call(name, arguments)?;
+            self.start_program(name, Some(1), 0, false)?;
+            if let Some(mut job) = self.job.take() {
+                job.frames.clear();
+                self.enter(frame, &mut job)?;
+                self.job = Some(job);
+            }
+            self.prompt();
+            return Ok(());
         }
         let mut job = Job::new(JobKind::Do, self.now);
         match self.carry_out(instruction, &mut job)? {

@@ -85,6 +85,16 @@ fn calls_hand_over_values_and_bring_them_back() {
             .run("CALL SUB(1,2,3)")
             .contains("*Invalid argument*")
     );
+    console.line("DO N = 40");
+    let said = console.line("DO CALL SUB(N,2)");
+    assert!(said.contains("42\r\nProgram completed"), "{said}");
+    assert!(console.line("DO AUTO N").contains("*Illegal instruction*"));
+    assert!(
+        console
+            .line("DO CALL NONE(N)")
+            .contains("*Undefined program*")
+    );
+    assert_eq!(console.emulator.real("N"), Some(40.0));
     let kept = console.emulator.text();
     assert!(kept.contains(".PROGRAM PART(A,B,PLACE,OTHER,#POINT)"));
     console.emulator.load_text(&kept).unwrap();
