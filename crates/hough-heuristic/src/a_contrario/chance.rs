@@ -1,8 +1,8 @@
 //! The bound on the probability that chance alone puts so many edges on an outline.
 
 /// The Kullback-Leibler divergence of the share found from the share expected, in decimal digits
-/// per sample; 0 unless more is found. By Hoeffding's bound, `n` samples show that share by chance with
-/// a probability of at most `10^(-n divergence)`.
+/// per sample; 0 unless more is found. By Hoeffding's bound, `n` samples show that share by chance
+/// with a probability of at most `10^(-n divergence)`.
 pub(super) fn divergence(share: f32, p: f32) -> f32 {
     if share <= p {
         return 0.0;
