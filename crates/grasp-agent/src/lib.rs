@@ -78,6 +78,7 @@ pub use behaviour::learning::{LearningSettings, Lesson};
 pub use behaviour::policy::Behaviour;
 pub use behaviour::preset::BehaviourPair;
 pub use behaviour::reward::{Reward, RewardTerm};
+pub use behaviour::space::StateSpace;
 pub use behaviour::spec::{BehaviourSpec, GoalInterval, JointSteps};
 pub use behaviour::task::BehaviourTask;
 pub use controller::SavedController;

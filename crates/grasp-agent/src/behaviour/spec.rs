@@ -2,10 +2,11 @@
 
 use hough_heuristic::Features;
 use puma_val2::{Joint, JointDelta};
-use qtable::{Action, Error, Intervals, Product, State, Status, Step};
+use qtable::{Action, Error, Intervals, State, Status, Step};
 use serde::{Deserialize, Serialize};
 
 use crate::behaviour::reward::Reward;
+use crate::behaviour::space::StateSpace;
 use crate::percept::{Input, Percept};
 
 /// A behaviour as data, without its table.
@@ -18,8 +19,8 @@ pub struct BehaviourSpec {
     pub name: String,
     /// Inputs, in the order of the intervals of `space`.
     pub inputs: Vec<Input>,
-    /// Intervals of each input.
-    pub space: Product,
+    /// Bins of each input.
+    pub space: StateSpace,
     /// Joints that it moves, and their steps.
     pub moves: Vec<JointSteps>,
     /// Goal intervals; at the goal all of them hold at once.
@@ -124,7 +125,7 @@ impl BehaviourSpec {
         Self {
             name: "centering".into(),
             inputs: vec![Input::X, Input::R],
-            space: product([
+            space: space([
                 (
                     &[
                         50.0,
@@ -134,9 +135,9 @@ impl BehaviourSpec {
                         125.0,
                         157.0,
                     ],
-                    3,
+                    Some(3),
                 ),
-                (&R_EDGES, 3),
+                (&R_EDGES, Some(3)),
             ]),
             moves: vec![JointSteps {
                 joint: Joint::J1,
@@ -156,10 +157,10 @@ impl BehaviourSpec {
         Self {
             name: "approaching".into(),
             inputs: vec![Input::Y, Input::R, Input::Theta3],
-            space: product([
-                (&[43.0, Y.low, Y.high, 98.0], 2),
-                (&[15.0, 27.0, R.low, R.high, 50.0], 3),
-                (&[6.0, 27.0], NO_GOAL),
+            space: space([
+                (&[43.0, Y.low, Y.high, 98.0], Some(2)),
+                (&[15.0, 27.0, R.low, R.high, 50.0], Some(3)),
+                (&[6.0, 27.0], None),
             ]),
             moves: vec![
                 JointSteps {
@@ -190,10 +191,16 @@ impl BehaviourSpec {
                 lost: -1000.0,
                 ..approaching.reward
             },
-            space: product([
-                (&[20.0, 40.0, 60.0, Y.low, Y.high, 96.0, 114.0, 130.0], 4),
-                (&[9.5, 12.0, 16.0, 21.0, 27.0, R.low, R.high, 40.0, 50.0], 6),
-                (&[-3.0, 5.0, 15.0, 25.0, 33.0], NO_GOAL),
+            space: space([
+                (
+                    &[20.0, 40.0, 60.0, Y.low, Y.high, 96.0, 114.0, 130.0],
+                    Some(4),
+                ),
+                (
+                    &[9.5, 12.0, 16.0, 21.0, 27.0, R.low, R.high, 40.0, 50.0],
+                    Some(6),
+                ),
+                (&[-3.0, 5.0, 15.0, 25.0, 33.0], None),
             ]),
             ..approaching
         }
@@ -209,28 +216,12 @@ impl BehaviourSpec {
     /// Edges that do not increase: ends that are not finite or not in order.
     pub fn with_y_goal(mut self, goal: GoalInterval) -> Result<Self, Error> {
         let GoalInterval { low, high, .. } = goal;
-        let mut axes = self.space.quantities().to_vec();
-        for (input, axis) in self.inputs.iter().zip(&mut axes) {
-            let Some(bin) = axis.goal() else {
-                continue;
-            };
-            if *input == Input::Y {
-                // All edges but the two of the goal.
-                let others = axis.edges().iter().enumerate();
-                let others = others
-                    .filter(|(i, _)| *i != bin && i + 1 != bin)
-                    .map(|(_, edge)| edge);
-                let below = others.clone().filter(|edge| **edge < low).copied();
-                let above = others.filter(|edge| **edge > high).copied();
-                let edges: Vec<f64> = below.chain([low, high]).chain(above).collect();
-                let bin = edges
-                    .iter()
-                    .position(|edge| *edge >= low)
-                    .map_or(1, |i| i + 1);
-                *axis = Intervals::new(&edges)?.with_goal(bin)?;
-            }
-        }
-        self.space = Product::new(axes)?;
+        let space = self.space.inputs().zip(&self.inputs);
+        let space = space.map(|((bins, goal), input)| match goal {
+            Some(goal) if *input == Input::Y => with_ends(bins, goal, low, high),
+            _ => Ok((bins.clone(), goal)),
+        });
+        self.space = StateSpace::new(space.collect::<Result<_, _>>()?)?;
         for interval in &mut self.goal {
             if interval.input == Input::Y {
                 (interval.low, interval.high) = (low, high);
@@ -262,22 +253,8 @@ impl BehaviourSpec {
     /// # Errors
     /// An input that is NaN, with its position.
     pub fn state(&self, percept: &Percept) -> Result<State, Error> {
-        let axes = self.space.quantities();
-        if axes.len() != self.inputs.len() {
-            return Err(Error::WrongLength {
-                what: "the list of inputs",
-                needed: axes.len(),
-                found: self.inputs.len(),
-            });
-        }
-        let mut state = 0;
-        for (quantity, (input, axis)) in self.inputs.iter().zip(axes).enumerate() {
-            let bin = axis
-                .index(input.of(percept))
-                .map_err(|_| Error::NotANumber(quantity))?;
-            state = state * axis.bins() + bin;
-        }
-        Ok(State(state))
+        self.space
+            .state(self.inputs.iter().map(|input| input.of(percept)))
     }
 
     /// Returns the joint move of `action`, a mixed-radix number in which the last joint's step
@@ -321,7 +298,7 @@ impl BehaviourSpec {
 
     /// Checks that a program could run it.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let axes = self.space.quantities().len();
+        let axes = self.space.inputs().len();
         if self.inputs.len() != axes {
             return Err(format!(
                 "there are {} inputs and intervals for {axes}",
@@ -364,21 +341,31 @@ impl BehaviourSpec {
     }
 }
 
-const NO_GOAL: usize = usize::MAX;
+/// Returns the bins with other ends of the goal bin, without edges inside it, and its new place.
+fn with_ends(
+    bins: &Intervals,
+    goal: usize,
+    low: f64,
+    high: f64,
+) -> Result<(Intervals, Option<usize>), Error> {
+    // All edges but the two of the goal.
+    let others = bins.edges().iter().copied().enumerate();
+    let others = others.filter(|(i, _)| *i != goal && i + 1 != goal);
+    let others = others.map(|(_, edge)| edge);
+    let below = others.clone().filter(|edge| *edge < low);
+    let above = others.filter(|edge| *edge > high);
+    let edges: Vec<f64> = below.chain([low, high]).chain(above).collect();
+    let place = edges.iter().position(|edge| *edge >= low);
+    Ok((Intervals::new(&edges)?, Some(place.map_or(1, |i| i + 1))))
+}
 
-/// Returns the product of intervals with these edges and goal bins.
-fn product<const N: usize>(axes: [(&[f64], usize); N]) -> Product {
-    let intervals = axes.into_iter().map(|(edges, goal)| {
-        let intervals = Intervals::new(edges)?;
-        if goal == NO_GOAL {
-            Ok(intervals)
-        } else {
-            intervals.with_goal(goal)
-        }
-    });
-    intervals
-        .collect::<Result<Vec<_>, _>>()
-        .and_then(Product::new)
+/// Returns the state space with these edges and goal bins.
+fn space<const N: usize>(inputs: [(&[f64], Option<usize>); N]) -> StateSpace {
+    let inputs = inputs.map(|(edges, goal)| Ok((Intervals::new(edges)?, goal)));
+    inputs
+        .into_iter()
+        .collect::<Result<_, _>>()
+        .and_then(StateSpace::new)
         .expect("the edges of the presets increase strictly and their goals exist")
 }
 
@@ -427,7 +414,6 @@ mod tests {
                 && !spec.at_goal(&percept(0.0, 93.0, 33.0, 10.0))
         );
         let inside = spec.state(&percept(0.0, 80.0, 33.0, 10.0)).unwrap();
-        assert!(spec.space.is_goal(inside));
         assert_eq!(spec.state(&percept(0.0, 92.0, 33.0, 10.0)).unwrap(), inside);
         assert!(
             BehaviourSpec::approaching()

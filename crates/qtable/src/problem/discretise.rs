@@ -9,16 +9,15 @@ validated! {
     ///
     /// The outer bins are unbounded, so every number has a bin, also the infinite ones; NaN has
     /// none. A bin is closed below and open above: a value on an edge belongs to the bin above it.
-    /// One bin can be named the *goal*; it is closed at both ends.
     ///
     /// ```
     /// use qtable::Intervals;
     ///
     /// fn main() -> Result<(), qtable::Error> {
-    ///     let x = Intervals::new(&[50.0, 82.0, 99.0, 108.0, 125.0])?.with_goal(3)?;
+    ///     let x = Intervals::new(&[50.0, 82.0, 99.0, 108.0, 125.0])?;
     ///     assert_eq!(x.index(98.9)?, 2);
     ///     assert_eq!(x.index(99.0)?, 3);
-    ///     assert_eq!(x.index(108.0)?, 3);
+    ///     assert_eq!(x.index(108.0)?, 4);
     ///     assert_eq!(x.index(125.0)?, 5);
     ///     assert_eq!(x.index(f64::NEG_INFINITY)?, 0);
     ///     Ok(())
@@ -27,7 +26,6 @@ validated! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct Intervals {
         edges: Vec<f64>,
-        goal: Option<usize>,
     }
 }
 
@@ -39,18 +37,8 @@ impl Intervals {
     pub fn new(edges: &[f64]) -> Result<Self, Error> {
         Self {
             edges: edges.to_vec(),
-            goal: None,
         }
         .restore()
-    }
-
-    /// Names a bin the goal and closes it at both ends.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`].
-    pub fn with_goal(self, bin: usize) -> Result<Self, Error> {
-        let goal = Some(bin);
-        Self { goal, ..self }.restore()
     }
 
     /// Returns the bin of a value.
@@ -61,22 +49,12 @@ impl Intervals {
         if value.is_nan() {
             return Err(Error::NotANumber(0));
         }
-        let bin = self.edges.partition_point(|&edge| edge <= value);
-        match self.goal {
-            // On the goal's upper edge.
-            Some(goal) if bin == goal + 1 && self.edges[goal] >= value => Ok(goal),
-            _ => Ok(bin),
-        }
+        Ok(self.edges.partition_point(|&edge| edge <= value))
     }
 
     /// Returns the number of bins, at least 1.
     pub fn bins(&self) -> usize {
         self.edges.len() + 1
-    }
-
-    /// Returns the goal bin, if one was named.
-    pub fn goal(&self) -> Option<usize> {
-        self.goal
     }
 
     /// Returns the edges, ascending.
@@ -94,16 +72,11 @@ impl Intervals {
         Some((below, self.edges.get(bin).copied().unwrap_or(f64::INFINITY)))
     }
 
-    fn check_bin(&self, bin: usize) -> Result<(), Error> {
-        check_index("bin", bin, self.bins())
-    }
-
     fn restore(self) -> Result<Self, Error> {
         for &edge in &self.edges {
             check_setting("an edge", edge, edge.is_finite(), "finite")?;
         }
         check_ascending("edge", self.edges.iter().copied())?;
-        self.goal.map_or(Ok(()), |bin| self.check_bin(bin))?;
         Ok(self)
     }
 }
@@ -116,14 +89,13 @@ validated! {
     /// use qtable::{Intervals, Product, State};
     ///
     /// fn main() -> Result<(), qtable::Error> {
-    ///     let height = Intervals::new(&[50.0, 74.0, 82.0, 108.0])?.with_goal(2)?;
-    ///     let radius = Intervals::new(&[14.0, 22.0, 32.0, 34.0, 47.0])?.with_goal(3)?;
+    ///     let height = Intervals::new(&[50.0, 74.0, 82.0, 108.0])?;
+    ///     let radius = Intervals::new(&[14.0, 22.0, 32.0, 34.0, 47.0])?;
     ///     let angle = Intervals::new(&[5.0, 20.0])?;
     ///     let states = Product::new(vec![height, radius, angle])?;
     ///     assert_eq!(states.states(), 90);
     ///     assert_eq!(states.index(&[78.0, 33.0, 10.0])?, State((2 * 6 + 3) * 3 + 1));
     ///     assert_eq!(states.bins(State(46)), [2, 3, 1]);
-    ///     assert!(states.is_goal(State(46)));
     ///     Ok(())
     /// }
     /// ```
@@ -170,7 +142,7 @@ impl Product {
         check_length(QUANTITIES, self.quantities.len(), bins.len())?;
         let mut state = 0;
         for (intervals, &bin) in self.quantities.iter().zip(bins) {
-            intervals.check_bin(bin)?;
+            check_index("bin", bin, intervals.bins())?;
             state = state * intervals.bins() + bin;
         }
         Ok(State(state))
@@ -190,20 +162,6 @@ impl Product {
             rest /= intervals.bins();
         }
         bins
-    }
-
-    /// Returns `true` if every quantity with a goal bin is in it, `false` if none has one.
-    ///
-    /// # Panics
-    /// If the state is not below [`states`](Product::states).
-    pub fn is_goal(&self, state: State) -> bool {
-        let mut goals = self
-            .bins(state)
-            .into_iter()
-            .zip(&self.quantities)
-            .filter(|(_, of)| of.goal().is_some())
-            .peekable();
-        goals.peek().is_some() && goals.all(|(bin, of)| of.goal() == Some(bin))
     }
 
     /// Returns the number of states, at least 1.

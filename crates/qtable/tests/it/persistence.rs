@@ -41,7 +41,7 @@ fn what_is_saved_is_loaded() {
     let files = std::fs::read_dir(folder.path()).unwrap().count();
     assert_eq!(files, 1, "no temporary file is left");
 
-    let intervals = Intervals::new(&[1.0, 2.0]).unwrap().with_goal(1).unwrap();
+    let intervals = Intervals::new(&[1.0, 2.0]).unwrap();
     let product = Product::new(vec![intervals]).unwrap();
     let both = (product, Schedule::exponential(0.6, 0.02, 500).unwrap());
     let bytes = encode("x", &both).unwrap();

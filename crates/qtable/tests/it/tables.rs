@@ -88,23 +88,20 @@ proptest! {
     fn every_value_has_its_bin_and_every_state_its_bins(
         mut edges in prop::collection::vec(-1e6f64..1e6, 0..8),
         value in prop::num::f64::ANY,
-        goal in any::<prop::sample::Index>(),
     ) {
         edges.sort_by(f64::total_cmp);
         edges.dedup();
-        let goal = goal.index(edges.len() + 1);
-        let intervals = Intervals::new(&edges).unwrap().with_goal(goal).unwrap();
+        let intervals = Intervals::new(&edges).unwrap();
         if value.is_nan() {
             prop_assert_eq!(intervals.index(value), Err(Error::NotANumber(0)));
         } else {
             let bin = intervals.index(value).unwrap();
             let (low, high) = intervals.bounds(bin).unwrap();
             prop_assert!(low <= value && value <= high);
-            prop_assert!(value < high || bin == goal || value.is_infinite());
+            prop_assert!(value < high || value.is_infinite());
         }
         for (bin, &edge) in edges.iter().enumerate() {
-            let wanted = if bin == goal { goal } else { bin + 1 };
-            prop_assert_eq!(intervals.index(edge).unwrap(), wanted);
+            prop_assert_eq!(intervals.index(edge).unwrap(), bin + 1);
         }
         let halves = Intervals::new(&[0.0]).unwrap();
         let product = Product::new(vec![intervals.clone(), halves, intervals]).unwrap();
@@ -138,14 +135,6 @@ fn impossible_discretisations_are_refused() {
         );
     }
     let two = intervals(&[1.0]).unwrap();
-    assert_refused!(
-        two.clone().with_goal(2),
-        Error::OutOfRange {
-            what: "bin",
-            index: 2,
-            count: 2
-        }
-    );
     let product = Product::new(vec![two.clone(), two.clone()]).unwrap();
     assert_refused!(
         product.index(&[0.0]),
