@@ -52,6 +52,9 @@ pub(super) struct Budget {
     pub(super) left_out: bool,
     /// Set once any part was cut short.
     pub(super) spent: bool,
+    /// Looks at the last reading of the clock, and the most between two readings.
+    #[cfg(test)]
+    readings: (u64, u64),
 }
 
 impl Budget {
@@ -104,8 +107,40 @@ impl Budget {
 
     /// Reads the clock if there is a deadline, and returns `true` if it has passed.
     pub(super) fn is_late(&mut self) -> bool {
+        #[cfg(test)]
+        {
+            let (last, most) = self.readings;
+            self.readings = (self.looks, most.max(self.looks - last));
+        }
         self.late |= clock::is_past(self.deadline);
         self.spent |= self.late;
         self.late
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{GrayImage, Luma};
+
+    use crate::a_contrario::{AContrario, AContrarioConfig};
+    use crate::detect::CircleDetector;
+
+    /// A look takes some nanoseconds, so that these are well below a millisecond.
+    #[test]
+    fn little_work_lies_between_two_readings_of_the_clock() {
+        let frame = GrayImage::from_fn(640, 480, |x, y| {
+            let (dx, dy) = (f64::from(x % 80) - 40.0, f64::from(y % 80) - 40.0);
+            let disc = if dx.hypot(dy) < 25.0 { 90 } else { 0 };
+            let texture = if x < 320 {
+                (x / 7 * 31 + y / 5 * 17) % 64
+            } else {
+                0
+            };
+            Luma([(60 + disc + texture) as u8])
+        });
+        let mut detector = AContrario::new(AContrarioConfig::default()).unwrap();
+        assert!(detector.detect(&frame).unwrap().len() >= 24);
+        let (_, most) = detector.budget.readings;
+        assert!(most > 0 && most < 60_000, "{most}");
     }
 }

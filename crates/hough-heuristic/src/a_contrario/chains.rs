@@ -16,14 +16,19 @@ const LEAST_TURN: f32 = 0.7;
 const BACK: f32 = 0.45;
 /// Weight of the direction of an edge against its place, pixels per radian.
 const DIRECTION: f64 = 2.0;
-/// Places along an ellipse that are looked at.
-const PLACES: usize = 64;
-/// Largest distance of an edge from an ellipse, in each round of the fit, pixels.
-const REACH: [f64; 4] = [3.0, 2.0, 1.5, 1.2];
+/// Rounds of the fit: largest distance of an edge from the ellipse, pixels; number of places along
+/// it that are looked at; and the least share of them with an edge. The first is a glance.
+const ROUNDS: [(f64, usize, f64); 5] = [
+    (3.0, 16, 0.3),
+    (3.0, 64, 0.4),
+    (2.0, 64, 0.4),
+    (1.5, 64, 0.4),
+    (1.2, 64, 0.4),
+];
+/// Share from which on the edges along an ellipse are taken to be its own.
+const CLEAR: f64 = 0.7;
 /// Cosine of the largest angle between an edge and an ellipse.
 const LEAST_PARALLEL: f64 = 0.9;
-/// The least share of an ellipse that must lie on edges.
-const LEAST_SHARE: f64 = 0.4;
 
 /// A place on an ellipse, and the normal there.
 pub(super) struct Place {
@@ -47,7 +52,7 @@ pub(super) fn places(ellipse: &Ellipse, count: usize) -> impl Iterator<Item = Pl
         let turn = std::f64::consts::TAU * index as f64 / count as f64;
         let (s, c) = turn.sin_cos();
         let (nx, ny) = (c * minor, s * major);
-        let length = nx.hypot(ny);
+        let length = (nx * nx + ny * ny).sqrt();
         let (nx, ny) = (nx / length, ny / length);
         Place {
             x: x + major * c * cos - minor * s * sin,
@@ -87,13 +92,30 @@ pub(super) fn ellipses(level: &Level, looks: &mut u64) -> Vec<(Ellipse, f64)> {
             &chain.points[count / 2..],
         ] {
             let ellipse = fit(level, points).and_then(|ellipse| settle(level, ellipse, looks));
-            if let Some(ellipse) = ellipse {
-                found.push(ellipse);
+            if let Some((ellipse, share)) = ellipse {
+                if share >= CLEAR {
+                    take_along(level, &ellipse, &mut used);
+                }
+                found.push((ellipse, share * (ellipse.major + ellipse.minor)));
                 break;
             }
         }
     }
     found
+}
+
+/// Marks the points along an ellipse as used, so that no other chain begins there.
+fn take_along(level: &Level, ellipse: &Ellipse, used: &mut [bool]) {
+    for place in places(ellipse, (6.3 * ellipse.major) as usize) {
+        for step in [-1.5, 0.0, 1.5] {
+            let (x, y) = (place.x + step * place.nx, place.y + step * place.ny);
+            if let Some((mark, pixel)) = level.mark(x as f32, y as f32)
+                && mark & EDGE != 0
+            {
+                used[level.id_at(pixel)] = true;
+            }
+        }
+    }
 }
 
 /// Points of an edge, one after the other.
@@ -186,16 +208,17 @@ fn fit(level: &Level, points: &[usize]) -> Option<Ellipse> {
     )
 }
 
-/// Fits an ellipse to the edges along it until it rests; none if too little of it lies on edges.
+/// Fits an ellipse to the edges along it, and returns it with the share of it that lies on edges;
+/// none if that is too little.
 fn settle(level: &Level, mut ellipse: Ellipse, looks: &mut u64) -> Option<(Ellipse, f64)> {
     let mut share = 0.0;
-    for reach in REACH {
+    for (round, (reach, count, least)) in ROUNDS.into_iter().enumerate() {
         let (width, height) = (level.width as f64, level.height as f64);
         if ellipse.major > width + height || ellipse.minor < 3.0 {
             return None;
         }
         let (mut points, mut visible) = (Vec::new(), 0);
-        for place in places(&ellipse, PLACES) {
+        for place in places(&ellipse, count) {
             let inside = |at: f64, end: f64| at >= 0.5 && at <= end - 1.5;
             if !inside(place.x, width) || !inside(place.y, height) {
                 continue;
@@ -222,10 +245,12 @@ fn settle(level: &Level, mut ellipse: Ellipse, looks: &mut u64) -> Option<(Ellip
             }
         }
         share = points.len() as f64 / visible.max(1) as f64;
-        if share < LEAST_SHARE || 3 * visible < PLACES {
+        if share < least || 3 * visible < count {
             return None;
         }
-        ellipse = fit(level, &points)?;
+        if round > 0 {
+            ellipse = fit(level, &points)?;
+        }
     }
-    Some((ellipse, share * (ellipse.major + ellipse.minor)))
+    Some((ellipse, share))
 }

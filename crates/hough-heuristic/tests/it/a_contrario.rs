@@ -308,7 +308,13 @@ fn an_empty_budget_is_refused_and_a_spent_one_is_reported() {
     assert!(hasty.effort().ended_by_budget);
     let mut late = with(|config| config.milliseconds_per_megapixel = Some(1e-6));
     assert_eq!(late.detect(&frame).unwrap(), []);
-    assert!(late.effort().ended_by_budget);
+    let effort = late.effort();
+    assert!(effort.ended_by_budget);
+    assert_eq!(
+        (effort.draws, effort.looks),
+        (0, 0),
+        "work after the deadline"
+    );
     let (mut calm, mut ample) = (
         plain(),
         with(|config| config.milliseconds_per_megapixel = Some(1e6)),
