@@ -121,7 +121,8 @@ def draw_shapes(rng, noise):
             t, r = np.arctan2(v, u), 1.0
             for k in (2, 3, 4, 5):
                 least = 0.15 if k == 3 else 0.05
-                r = r + rng.uniform(least, 0.34) / (k - 1) ** 0.5 * np.cos(k * t + rng.uniform(0, 7))
+                lobe = rng.uniform(least, 0.34) / (k - 1) ** 0.5
+                r = r + lobe * np.cos(k * t + rng.uniform(0, 7))
             off = np.hypot(u, v) - size * r
         elif kind == "box":
             ratio = rng.uniform(0.35, 1)
@@ -211,7 +212,7 @@ def row(name, found, spent, truth, empty):
     centre = [math.hypot(e["cx"] - t[0], e["cy"] - t[1]) for e, t in pairs]
     axes = [100 * max(abs(e["major"] / t[2] - 1), abs(e["minor"] / t[3] - 1)) for e, t in pairs]
     exact = np.mean([c <= 0.2 and a <= 1 for c, a in zip(centre, axes)]) if pairs else 0
-    both = lambda values: f"{np.median(values):.2f} {np.percentile(values, 95):.2f}" if values else ""
+    both = lambda values: " ".join(f"{np.percentile(values, p):.2f}" for p in (50, 95) if values)
     false = 100 * sum(map(len, empty.values())) / len(truth)
     sure = 100 * sum(e["score"] >= 0.8 for all_found in empty.values() for e in all_found)
     cells = [name, f"{len(pairs) / len(total):.3f}", " ".join(parts),
