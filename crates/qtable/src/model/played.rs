@@ -14,8 +14,8 @@ validated! {
     /// Its presets have the rules and the numbering of
     /// [Gymnasium](https://gymnasium.farama.org/environments/toy_text/). A time limit is not part
     /// of the dynamics; Gymnasium sets 100 steps for the 4x4 lake, 200 for the 8x8 lake and the
-    /// taxi, and none for the cliff and blackjack. [`TimeLimit`](crate::TimeLimit) and the episode limit of
-    /// training set one.
+    /// taxi, and none for the cliff and blackjack. [`TimeLimit`](crate::TimeLimit) and the episode
+    /// limit of training set one.
     ///
     /// ```
     /// use qtable::{ModelEnvironment, State};
