@@ -161,11 +161,11 @@ impl Sampler<'_> {
         &self,
         turn_waist: bool,
         (low, high): (f64, f64),
-        (far, near): (f64, f64),
+        range: (f64, f64),
         rng: &mut R,
     ) -> Option<(Joints, JointDelta)> {
         let towards = self.cell.ball.centre.y.atan2(self.cell.ball.centre.x);
-        (0..50_000).find_map(|_| {
+        (0..20_000).find_map(|_| {
             let mut pose = Joints::from_degrees([
                 rng.random_range(-30.0..30.0),
                 rng.random_range(-125.0..-30.0),
@@ -177,22 +177,23 @@ impl Sampler<'_> {
             pose.0[Joint::J1.index()] += towards;
             let [d1, d2, d3] = MoveSample::draw_turns(turn_waist, rng);
             let delta = JointDelta::from_degrees([d1, d2, d3, 0.0, 0.0, 0.0]);
-            let there = self.shows(&pose).is_some_and(|r| (far..=near).contains(&r));
-            (there && self.shows(&(pose + delta)).is_some()).then_some((pose, delta))
+            let there = self.shows(&pose, range) && self.shows(&(pose + delta), (0.0, NEAREST));
+            there.then_some((pose, delta))
         })
     }
 
-    /// Returns the radius at which the ball should show, for that of the paper; `None` if the hand
-    /// cannot stand there, clear of everything and with the ball in view.
-    fn shows(&self, pose: &Joints) -> Option<f64> {
-        if !self.cell.within_limits(pose) || self.cell.proximity(pose) {
-            return None;
-        }
-        let f = self.cell.features(pose).ok()?;
-        let r = f.r * 0.020 / self.cell.ball.radius;
-        let inside = (MARGIN..Features::WIDTH - MARGIN).contains(&f.x)
-            && (MARGIN..Features::HEIGHT - MARGIN).contains(&f.y);
-        (inside && r < NEAREST).then_some(r)
+    /// Returns whether the ball should show from there with a radius in this range, for a ball of
+    /// the paper's size, and the hand can stand there, clear of everything.
+    fn shows(&self, pose: &Joints, (far, near): (f64, f64)) -> bool {
+        let seen = |f: Features| {
+            (far..=near).contains(&(f.r * 0.020 / self.cell.ball.radius))
+                && (MARGIN..Features::WIDTH - MARGIN).contains(&f.x)
+                && (MARGIN..Features::HEIGHT - MARGIN).contains(&f.y)
+        };
+        // The quickest first: most poses are turned down.
+        self.cell.within_limits(pose)
+            && self.cell.features(pose).is_ok_and(seen)
+            && !self.cell.proximity(pose)
     }
 
     /// Moves to a pose and looks. `None` if the controller stopped the arm or no ball is seen.

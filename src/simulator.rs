@@ -34,14 +34,18 @@ impl Simulator {
         Ok(Self {
             centre: MoveModel::fit(centering, MoveForm::Centering, &[])?,
             reach: MoveModel::fit(reaching, form, &ELBOW_EDGES)?,
-            starts: reaching
-                .iter()
-                .map(|sample| Percept {
-                    features: sample.before,
-                    theta3: sample.jt3_degrees - Percept::THETA3_ZERO,
-                })
-                .collect(),
+            starts: starts(reaching),
         })
+    }
+
+    /// Draws the starts of episodes from these samples instead: a few samples of an arm fit a
+    /// model, and those of a nominal cell show the ball everywhere.
+    #[must_use]
+    pub fn starting_from(self, samples: &[MoveSample]) -> Self {
+        Self {
+            starts: starts(samples),
+            ..self
+        }
     }
 
     /// Returns the quality of fit of each output: `dx` of centering, `dy` and `dr` of approaching,
@@ -98,4 +102,12 @@ impl Simulator {
         let config = LearningSettings::paper(actions)?;
         spec.learn(simulate, start, trials, &config, rng, on_progress)
     }
+}
+
+fn starts(samples: &[MoveSample]) -> Vec<Percept> {
+    let start = |sample: &MoveSample| Percept {
+        features: sample.before,
+        theta3: sample.jt3_degrees - Percept::THETA3_ZERO,
+    };
+    samples.iter().map(start).collect()
 }

@@ -16,7 +16,9 @@ use puma_val2::Joints;
 use rand::Rng;
 use rand::rngs::Xoshiro256PlusPlus;
 
-use example_support::learning::{ACTIONS, ACTIONS_FINE, FEATURE_NOISE, SAMPLES, TRIALS, anywhere};
+use example_support::learning::{
+    ACTIONS, ACTIONS_FINE, FEATURE_NOISE, SAMPLES, TRIALS, anywhere, paper_cell,
+};
 use example_support::live::Live;
 use example_support::plane::search_percepts;
 use example_support::prelude::*;
@@ -199,10 +201,14 @@ impl Taught {
     ) -> Outcome<Self> {
         let (centering, reaching) = samples(options, goal, seeing, rng)?;
         let fitted = Simulator::fit(&centering, &reaching, options.form());
-        let simulator = fitted.map_err(|error| match options.sample {
+        let mut simulator = fitted.map_err(|error| match options.sample {
             Some(count) => format!("{error}; more than --sample {count} are needed"),
             None => error.to_string(),
         })?;
+        if options.sample.is_some() {
+            let (_, anywhere) = paper_cell().sample_moves(SAMPLES, FEATURE_NOISE, rng)?;
+            simulator = simulator.starting_from(&anywhere);
+        }
         let mut r2 = BTreeMap::new();
         for quality in simulator.quality() {
             let (output, fit, rmse) = (quality.output, quality.r2, quality.rmse);
