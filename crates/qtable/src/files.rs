@@ -165,6 +165,9 @@ fn write<T: Serialize>(writer: impl Write, kind: &str, value: &T) -> Result<(), 
         bincode::serde::encode_into_std_write(value, &mut file, bincode::config::standard());
     match written {
         Err(bincode::error::EncodeError::Io { inner, .. }) => return Err(inner.into()),
+        Err(bincode::error::EncodeError::OtherString(cause)) => {
+            return Err(FileError::Encode(cause));
+        }
         written => written.map_err(|error| FileError::Encode(error.to_string()))?,
     };
     let sum = file.sum.finalize();
