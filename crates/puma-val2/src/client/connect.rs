@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use crate::client::config::ClientConfig;
 use crate::client::dialogue::{
-    CANCEL, NUDGE, SPOIL, STOP, is_boot_question, is_own_echo, last_line, last_question, shortened,
-    way_out,
+    CANCEL, Mode, STOP, State, at_silence, is_boot_question, is_own_echo, last_line, last_question,
+    shortened, way_out,
 };
 use crate::client::number::check_percent;
 use crate::client::reader;
@@ -55,9 +55,9 @@ impl<T: Transport> Val2Client<T> {
         self.lacks_ppoint = false;
         self.frames = Default::default();
         self.speed = None;
-        self.wire.nudge = SPOIL;
+        self.wire.mode = Mode::Connecting;
         let outcome = self.find_prompt();
-        self.wire.nudge = NUDGE;
+        self.wire.mode = Mode::Session;
         outcome?;
         self.find_echo()?;
         match self.wire.config.speed_percent {
@@ -81,7 +81,7 @@ impl<T: Transport> Val2Client<T> {
             .saturating_mul(4)
             .max(Duration::from_millis(1500));
         let mut wire = Wire::new(transport, config);
-        wire.nudge = b"PANIC\r";
+        wire.mode = Mode::Stopping;
         wire.send(STOP, "PANIC")?;
         match wire.read_reply("PANIC", waited) {
             Ok(reply) if reply.ending != Ending::Running => Ok(()),
@@ -100,9 +100,9 @@ impl<T: Transport> Val2Client<T> {
     fn find_prompt(&mut self) -> Result<(), ArmError> {
         let timeout = self.wire.config.connect_timeout;
         let until = self.wire.after(timeout);
-        // Something that is no command and no answer: a half-typed line is spoilt by it, a question
-        // asked again.
-        self.wire.send(SPOIL, "connecting")?;
+        self.wire.state = State::Open;
+        let spoil = at_silence(self.wire.state, self.wire.mode);
+        self.wire.send(spoil, "connecting")?;
         let expected = "the prompt `.` of the VAL monitor or a start-up question";
         let mut ways = 0;
         for questions in 0.. {
@@ -160,7 +160,6 @@ impl<T: Transport> Val2Client<T> {
             }
             self.wire.send(answer, "connecting")?;
         }
-        self.wire.half_typed = false;
         self.wire.restarted = false;
         Ok(())
     }
@@ -219,10 +218,6 @@ impl<T: Transport> Val2Client<T> {
         loop {
             match self.calibrate_once() {
                 Ok(()) => return Ok(()),
-                Err(error) if is_doubt(&error) && doubts < self.wire.config.retries => {
-                    doubts += 1;
-                    self.wire.settle()?;
-                }
                 Err(ArmError::Refused { message, .. })
                     if message.to_ascii_uppercase().contains("POWER")
                         && refusals < self.wire.config.power_retries =>
@@ -230,7 +225,7 @@ impl<T: Transport> Val2Client<T> {
                     refusals += 1;
                     self.pause(self.wire.config.power_retry_delay)?;
                 }
-                Err(error) => return Err(error),
+                Err(error) => self.wire.retry(error, &mut doubts)?,
             }
         }
     }

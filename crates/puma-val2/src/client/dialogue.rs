@@ -1,15 +1,62 @@
-//! Questions of the controller, and the bytes that leave a dialogue or a half-typed line.
+//! States of the line, and the bytes that answer silence and questions in them.
 
-/// Deletes a half-typed line, or spoils it where Ctrl-U is unknown, so that it cannot be carried
-/// out. Ctrl-Q comes first: a flipped bit can make a Ctrl-S, which holds all output.
-pub(super) const SPOIL: &[u8] = b"\x11\x15!!\r";
+use crate::client::reader::Ending;
 
-/// Stops the arm and a program, without a prompt. The first `PANIC` may be appended to a half-typed
+/// State of the line to the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// A line may be open: its characters have been sent, or nothing is certain.
+    Open,
+    /// The end of a line has been sent, its echo has not come.
+    Ended,
+    /// The end has come back, or nothing is echoed. The reply has not ended.
+    Replying,
+    /// The reply has ended with a prompt or a question.
+    Asking(Ending),
+}
+
+/// Task of the client at which silence is met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// A line of the client's own, at a monitor that is known.
+    Session,
+    /// The search for a prompt. Somebody else may have typed half a line.
+    Connecting,
+    /// A stop, while the arm may move.
+    Stopping,
+    /// A program of the user runs and may ask for values.
+    Program,
+}
+
+/// Deletes an open line, or spoils it where Ctrl-U is unknown, so that it cannot be carried out.
+/// Ctrl-Q comes first: a flipped bit can make a Ctrl-S, which holds all output.
+const SPOIL: &[u8] = b"\x11\x15!!\r";
+
+/// Returns the bytes that are sent after silence: the only ones that no caller has asked for.
+///
+/// | state | mode | sent | reason |
+/// |---|---|---|---|
+/// | open, ended | any | Ctrl-U `!!` CR | a bare CR would carry out a damaged line |
+/// | replying | session | CR | asks for a lost prompt; a busy controller answers later |
+/// | replying | connecting | Ctrl-U `!!` CR | the open line may be another user's |
+/// | replying | stopping | `PANIC` CR | every repetition stops |
+/// | replying | program | nothing | the program may take a CR for an answer |
+/// | asking | any | nothing | the reply is complete |
+///
+/// Without an echo *ended* is never seen, and the CR of *replying* may end a damaged line. There
+/// the client moves the arm by `READY`, or by a program whose listing has been compared.
+pub(super) fn at_silence(state: State, mode: Mode) -> &'static [u8] {
+    match (state, mode) {
+        (State::Open | State::Ended, _) | (State::Replying, Mode::Connecting) => SPOIL,
+        (State::Replying, Mode::Session) => b"\x11\r",
+        (State::Replying, Mode::Stopping) => b"PANIC\r",
+        (State::Replying, Mode::Program) | (State::Asking(_), _) => b"",
+    }
+}
+
+/// Stops the arm and a program, without a prompt. The first `PANIC` may be appended to an open
 /// line, which it makes invalid.
 pub(super) const STOP: &[u8] = b"\x11PANIC\rPANIC\r\x03";
-
-/// Asks for the prompt.
-pub(super) const NUDGE: &[u8] = b"\x11\r";
 
 /// Cancels a dialogue, where control characters are known.
 pub(super) const CANCEL: &[u8] = b"\x03";
@@ -66,7 +113,7 @@ pub(super) fn last_line(text: &str) -> &str {
         .unwrap_or_default()
 }
 
-/// Returns `true` for a text that is nothing but the echo of [`SPOIL`].
+/// Returns `true` for a text that is nothing but the echo of a spoilt line.
 pub(super) fn is_own_echo(text: &str) -> bool {
     let echo = |c: char| c.is_whitespace() || "!^UQ".contains(c);
     text.contains('!') && text.chars().all(echo)
@@ -82,5 +129,26 @@ pub(super) fn shortened(text: &str) -> String {
         text.to_owned()
     } else {
         format!("...{}", text.chars().skip(count - 117).collect::<String>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_open_line_is_never_answered_by_a_bare_line_end() {
+        for mode in [
+            Mode::Session,
+            Mode::Connecting,
+            Mode::Stopping,
+            Mode::Program,
+        ] {
+            for state in [State::Open, State::Ended] {
+                assert_eq!(at_silence(state, mode), SPOIL);
+            }
+            let complete = State::Asking(Ending::Question);
+            assert_eq!(at_silence(complete, mode), b"");
+        }
     }
 }

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use crate::client::config::MoveWay;
+use crate::client::dialogue::State;
 use crate::client::number::{check_percent, plain};
+use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
 use crate::client::wire::{Failed, is_doubt};
 use crate::error::ArmError;
@@ -345,7 +347,7 @@ impl<T: Transport> Val2Client<T> {
     /// that is possible.
     fn given_up(&mut self, failed: Failed) -> ArmError {
         let refused = matches!(failed.error, ArmError::Refused { .. });
-        if refused && self.wire.running {
+        if refused && self.wire.state == State::Asking(Ending::Running) {
             // Whatever moves the arm is the program of somebody else.
             self.last_known = None;
             return failed.error;

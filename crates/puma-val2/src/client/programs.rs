@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::client::dialogue::NUDGE;
+use crate::client::dialogue::Mode;
 use crate::client::reader::{Ending, lines_said};
 use crate::client::val2_client::Val2Client;
 use crate::client::wire::{Failed, is_doubt};
@@ -218,10 +218,10 @@ impl<T: Transport> Val2Client<T> {
         check_line("the name of a program", program)?;
         self.refuse_under_guard("a program")?;
         self.last_known = None;
-        self.wire.nudge = b"";
+        self.wire.mode = Mode::Program;
         let limit = self.wire.config.motion_timeout;
         let outcome = self.run(&format!("EXECUTE {program}"), limit);
-        self.wire.nudge = NUDGE;
+        self.wire.mode = Mode::Session;
         let Err(failed) = outcome else {
             return outcome.map_err(ArmError::from);
         };
@@ -252,28 +252,15 @@ impl<T: Transport> Val2Client<T> {
                 }
                 Err(failed) => failed.error,
             };
-            if !is_doubt(&error) || tries >= self.wire.config.retries {
-                return Err(error);
-            }
-            tries += 1;
             // A program that asks for values is left here.
-            self.wire.settle()?;
+            self.wire.retry(error, &mut tries)?;
         }
     }
 
     /// Runs a program until it ends. A question of the program is an error.
     pub(super) fn run(&mut self, line: &str, limit: Duration) -> Result<String, Failed> {
         let reply = self.wire.exchange_to_end(line, limit)?;
-        self.without_message(line, &reply)?;
-        if reply.ending == Ending::Question {
-            let expected = "a program that asks for nothing";
-            return Err(Failed::after(self.wire.garbled(
-                line,
-                expected,
-                &reply.text,
-            )));
-        }
-        Ok(reply.text)
+        self.answered(line, reply, "a program that asks for nothing")
     }
 }
 

@@ -94,11 +94,7 @@ impl<T: Transport> Val2Client<T> {
         loop {
             match self.command_once(line, self.wire.config.patience()) {
                 Ok(text) => return Ok(text),
-                Err(failed) if is_doubt(&failed.error) && tries < self.wire.config.retries => {
-                    tries += 1;
-                    self.wire.settle()?;
-                }
-                Err(failed) => return Err(failed.error),
+                Err(failed) => self.wire.retry(failed.error, &mut tries)?,
             }
         }
     }
@@ -106,14 +102,20 @@ impl<T: Transport> Val2Client<T> {
     /// Carries out a line once. The reply must end with the monitor's prompt and hold no message.
     pub(super) fn command_once(&mut self, line: &str, timeout: Duration) -> Result<String, Failed> {
         let reply = self.wire.exchange(line, timeout)?;
+        self.answered(line, reply, "the monitor's prompt")
+    }
+
+    /// Returns the text of a reply without a message that ends with a prompt.
+    pub(super) fn answered(
+        &self,
+        line: &str,
+        reply: Reply,
+        expected: &str,
+    ) -> Result<String, Failed> {
         self.without_message(line, &reply)?;
         if reply.ending == Ending::Question {
-            let expected = "the monitor's prompt";
-            return Err(Failed::after(self.wire.garbled(
-                line,
-                expected,
-                &reply.text,
-            )));
+            let error = self.wire.garbled(line, expected, &reply.text);
+            return Err(Failed::after(error));
         }
         Ok(reply.text)
     }

@@ -4,7 +4,9 @@ use std::io;
 use std::time::Duration;
 
 use crate::client::config::ClientConfig;
-use crate::client::dialogue::{CANCEL, NUDGE, SPOIL, is_boot_question, shortened, way_out};
+use crate::client::dialogue::{
+    CANCEL, Mode, State, at_silence, is_boot_question, shortened, way_out,
+};
 use crate::client::reader;
 use crate::client::reader::{Ending, ReplyReader};
 use crate::error::ArmError;
@@ -61,13 +63,10 @@ pub(super) struct Wire<T> {
     pub(super) echo: Option<bool>,
     /// Messages that came unasked.
     pub(super) notices: Vec<String>,
-    /// A line has been begun that was neither ended nor deleted.
-    pub(super) half_typed: bool,
-    /// Bytes that ask again for a reply that does not come. The program of another user may take an
-    /// empty line for an answer.
-    pub(super) nudge: &'static [u8],
-    /// The last reply ended with the prompt under which a program runs.
-    pub(super) running: bool,
+    /// State of the line.
+    pub(super) state: State,
+    /// Task at hand.
+    pub(super) mode: Mode,
     /// The start-up dialogue has been met since the monitor was last reached.
     pub(super) restarted: bool,
 }
@@ -79,9 +78,8 @@ impl<T: Transport> Wire<T> {
             config,
             echo: None,
             notices: Vec::new(),
-            half_typed: false,
-            nudge: NUDGE,
-            running: false,
+            state: State::Open,
+            mode: Mode::Session,
             restarted: false,
         }
     }
@@ -153,7 +151,6 @@ impl<T: Transport> Wire<T> {
     /// Returns the reply, or the error of a controller that asks its start-up questions in
     /// mid-session.
     fn not_restarted(&mut self, reply: Reply) -> Result<Reply, ArmError> {
-        self.running = reply.ending == Ending::Running;
         if reply.ending != Ending::Question || !is_boot_question(&reply.text) {
             return Ok(reply);
         }
@@ -167,7 +164,7 @@ impl<T: Transport> Wire<T> {
     /// Types `line` at a prompt or question, ends it and reads the reply for up to `timeout`.
     pub(super) fn exchange(&mut self, line: &str, timeout: Duration) -> Result<Reply, Failed> {
         self.take_unasked()?;
-        if self.half_typed {
+        if matches!(self.state, State::Open | State::Ended) {
             // Left by a call that failed: what is typed now must not be added to it.
             self.spoil()?;
         }
@@ -187,15 +184,14 @@ impl<T: Transport> Wire<T> {
     }
 
     fn end_line(&mut self, line: &str, timeout: Duration) -> Result<Reply, ArmError> {
+        self.state = State::Ended;
         self.send(b"\r", line)?;
         let mut reader = self.reader();
         if self.checks_echo() && !self.hears_line_end(&mut reader, line)? {
-            // The line may still be open at the other end. An empty line would complete whatever
-            // its damaged end has made of it.
             self.spoil()?;
             return Err(self.silence(line, "the echo of its end", "", self.config.reply_timeout));
         }
-        self.half_typed = false;
+        self.state = State::Replying;
         let reply = self.read_on(reader, line, timeout)?;
         self.not_restarted(reply)
     }
@@ -246,7 +242,7 @@ impl<T: Transport> Wire<T> {
     /// Sends the text and, where there is an echo, waits until it has come back unchanged. The line
     /// is not ended.
     fn type_text(&mut self, text: &str) -> Result<(), ArmError> {
-        self.half_typed = true;
+        self.state = State::Open;
         self.send(text.as_bytes(), text)?;
         if !self.checks_echo() {
             return Ok(());
@@ -277,15 +273,15 @@ impl<T: Transport> Wire<T> {
     }
 
     /// Reads until a prompt or question is followed by silence.
-    ///
-    /// After a silence of `config.reply_timeout` an empty line is sent. It brings back a lost
-    /// prompt, and a busy controller answers it later. A line that says too much, or never falls
-    /// silent, is given up.
     pub(super) fn read_reply(&mut self, sent: &str, timeout: Duration) -> Result<Reply, ArmError> {
+        self.state = State::Replying;
         self.read_on(self.reader(), sent, timeout)
     }
 
     /// Continues a reply of which `reader` holds the beginning.
+    ///
+    /// A silence of `config.reply_timeout` is answered by [`at_silence`]. A line that says too
+    /// much, or never falls silent, is given up.
     fn read_on(
         &mut self,
         mut reader: ReplyReader,
@@ -322,16 +318,15 @@ impl<T: Transport> Wire<T> {
             }
             if let Some(ending) = ending {
                 let text = reader.text().to_owned();
+                self.state = State::Asking(ending);
                 return Ok(Reply { text, ending });
             }
             if self.left(until).is_zero() {
                 let expected = format!("the prompt `{}`", self.config.idle_prompt);
                 return Err(self.silence(sent, &expected, reader.text(), timeout));
             }
-            if !self.nudge.is_empty() {
-                self.send(self.nudge, sent)?;
-                patience = patience.saturating_mul(2);
-            }
+            self.send(at_silence(self.state, self.mode), sent)?;
+            patience = patience.saturating_mul(2);
         }
     }
 
@@ -356,13 +351,14 @@ impl<T: Transport> Wire<T> {
         Ok(reply)
     }
 
-    /// Makes a half-typed line harmless and reads the reply.
+    /// Makes an open line harmless and reads the reply.
     pub(super) fn spoil(&mut self) -> Result<Reply, ArmError> {
         let doing = "clearing the line";
         let patience = self.config.patience();
         let until = self.after(patience);
         let mut reader = self.reader();
         let mut taken = 0;
+        self.state = State::Open;
         while let Some(bytes) = self.receive(self.config.quiet, doing)? {
             reader.push(&bytes);
             taken += bytes.len();
@@ -370,9 +366,8 @@ impl<T: Transport> Wire<T> {
                 return Err(self.garbled("an empty line", "silence", reader.text()));
             }
         }
-        self.send(SPOIL, doing)?;
-        let reply = self.read_reply("an empty line", patience)?;
-        self.half_typed = false;
+        self.send(at_silence(self.state, self.mode), doing)?;
+        let reply = self.read_on(self.reader(), "an empty line", patience)?;
         self.not_restarted(reply)
     }
 
@@ -396,6 +391,16 @@ impl<T: Transport> Wire<T> {
         }
         let heard = "one question after another";
         Err(self.garbled("an empty line", "the monitor's prompt", heard))
+    }
+
+    /// Leaves the doubt of a failed exchange, so that it can be tried again. Returns the error if
+    /// it is another one, or if `tries` has reached `config.retries`.
+    pub(super) fn retry(&mut self, error: ArmError, tries: &mut usize) -> Result<(), ArmError> {
+        if !is_doubt(&error) || *tries >= self.config.retries {
+            return Err(error);
+        }
+        *tries += 1;
+        self.settle().map(drop)
     }
 
     pub(super) fn silence(
