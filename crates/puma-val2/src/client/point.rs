@@ -1,7 +1,6 @@
 //! Points typed to the controller and compared with its display.
 
 use crate::client::hand::apart;
-use crate::client::number::plain;
 use crate::client::reader::Ending;
 use crate::client::val2_client::Val2Client;
 use crate::error::ArmError;
@@ -43,12 +42,12 @@ impl<T: Transport> Val2Client<T> {
         fits: Fits<'_>,
     ) -> Result<(), ArmError> {
         for tries in 0.. {
-            let known = self.points.contains_key(name);
             let mut outcome = self.define_point_once(name, values, fits);
-            // Where nothing is echoed the name of a new point may have been damaged.
+            // Where nothing is echoed the name may have been damaged, or a value and its display by
+            // the same bit: the point is shown again.
+            let proven = self.wire.checks_echo();
             if let Ok(shown) = outcome
-                && !known
-                && !self.wire.checks_echo()
+                && !proven
             {
                 outcome = self.show_point(name, fits).map(|()| shown);
             }
@@ -84,18 +83,7 @@ impl<T: Transport> Val2Client<T> {
             return Err(self.wire.garbled("POINT", expected, "others"));
         }
         let typed = values.map(|v| format!("{v:.3}")).join(",");
-        let mut shown = self.ask_point(&typed)?;
-        if !self.wire.checks_echo() && before.is_some() {
-            // One bit may have changed a value on its way and the display back: the shortest value
-            // is typed once more, and all six are shown again.
-            let again = (0..6).map(|i| ",".repeat(i) + &plain(values[i]));
-            let again = again.min_by_key(String::len).unwrap_or_default();
-            shown = match shown.filter(|shown| fits(shown)) {
-                Some(_) => self.ask_point(&again)?,
-                None => None,
-            };
-        }
-        let Some(shown) = shown.filter(|shown| fits(shown)) else {
+        let Some(shown) = self.ask_point(&typed)?.filter(|shown| fits(shown)) else {
             let expected = "the same values displayed";
             return Err(self.wire.garbled(&typed, expected, "others"));
         };
