@@ -169,6 +169,7 @@ fn rows(measurements: &[Measurement]) -> Array2<f64> {
             axis_ratio,
             visible,
             covered,
+            ellipse: _,
         } = *found;
         let values = [
             x,
