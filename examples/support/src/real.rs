@@ -83,7 +83,7 @@ impl RealOptions {
     /// without an arm.
     ///
     /// # Errors
-    /// What is missing.
+    /// An option without the one that it needs.
     pub fn check(&self) -> Result<(), String> {
         match (self.line(), &self.camera) {
             (Some(line), None) if !self.rendered => Err(format!(

@@ -83,9 +83,10 @@ fn the_hybrid_grasps_with_three_arms() {
     }
 }
 
-/// Prints the table of docs/FIDELITY.
+/// Prints the table of docs/FIDELITY. It plays 1,920 balls, too many for every run of the tests;
+/// `the_hybrid_grasps_with_three_arms` asks the same of fewer.
 #[test]
-#[ignore = "a measurement of minutes"]
+#[ignore = "the measurement of a table, minutes long"]
 #[allow(clippy::print_stdout)]
 fn table_of_three_arms() {
     use crate::plant::{EXTREME, HEAVY};
@@ -108,6 +109,7 @@ fn table_of_three_arms() {
                 "{name} level {level}: {sum} of {} held, {mean:.2} moves",
                 20 * cells
             );
+            assert!(20 * sum >= 19 * 20 * cells, "{name} level {level}");
         }
     }
 }
