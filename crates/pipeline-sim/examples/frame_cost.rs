@@ -3,6 +3,8 @@
 //! ```text
 //! cargo run --release -p pipeline-sim --example frame_cost
 //! ```
+//!
+//! An argument is the number of frames of each recipe (default 12).
 
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
@@ -12,14 +14,12 @@ use pipeline_sim::Recipe;
 use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
 
-/// Frames of each recipe.
-const FRAMES: u64 = 12;
-
 fn main() -> Result<(), Box<dyn Error>> {
+    let frames: u64 = std::env::args().nth(1).map_or(Ok(12), |frames| frames.parse())?;
     println!("{:20} {:>7} {:>7}", "recipe", "median", "best");
     for recipe in Recipe::cell().iter().chain(Recipe::benchmark()) {
         let mut times = Vec::new();
-        for seed in 0..FRAMES {
+        for seed in 0..frames.max(1) {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
             let (mut renderer, snapshot) = recipe.draw((768, 576), &mut rng)?;
             // The first frame allocates.

@@ -4,6 +4,8 @@
 //! ```text
 //! cargo run --release -p pipeline-sim --example regression_table
 //! ```
+//!
+//! An argument is the number of seeds, at least 2 (default 20).
 
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
@@ -14,51 +16,51 @@ use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
 use pipeline_sim::{Ball, Cell, MoveForm, MoveModel, Quality};
 
 const SAMPLES: usize = 2083;
-const SEEDS: u64 = 20;
+const EDGES: &[f64] = &MoveModel::PAPER_ELBOW_EDGES;
+const FORMS: [(&str, MoveForm, &[f64]); 5] = [
+    ("Linear", MoveForm::Linear, EDGES),
+    ("Rigid8", MoveForm::Rigid8, EDGES),
+    ("Rigid22", MoveForm::Rigid22, EDGES),
+    ("RigidBody", MoveForm::RigidBody, &[]),
+    ("centering", MoveForm::Centering, &[]),
+];
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let seeds = std::env::args().nth(1).map_or(Ok(20), |seeds| seeds.parse())?;
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
-    let edges = &MoveModel::PAPER_ELBOW_EDGES[..];
-    println!("{SAMPLES} samples, {SEEDS} fits, errors in feature units");
+    println!("{SAMPLES} samples, {seeds} fits, errors in feature units");
     for noise in [0.125, 0.5] {
         println!("\nnoise of {noise} units");
-        for (name, form, edges) in [
-            ("Linear", MoveForm::Linear, edges),
-            ("Rigid8", MoveForm::Rigid8, edges),
-            ("Rigid22", MoveForm::Rigid22, edges),
-            ("RigidBody", MoveForm::RigidBody, &[]),
-        ] {
-            print(name, |seed| {
-                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let (_, training) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
-                let (_, fresh) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
-                Ok(MoveModel::fit(&training, form, edges)?.quality_on(&fresh)?)
-            })?;
-        }
-        print("centering", |seed| {
+        let mut fits = [const { Vec::new() }; FORMS.len()];
+        for seed in 0..seeds {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let (training, _) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
-            let (fresh, _) = cell.sample_moves(SAMPLES, noise, &mut rng)?;
-            Ok(MoveModel::fit(&training, MoveForm::Centering, &[])?.quality_on(&fresh)?)
-        })?;
+            let training = cell.sample_moves(SAMPLES, noise, &mut rng)?;
+            let fresh = cell.sample_moves(SAMPLES, noise, &mut rng)?;
+            for ((_, form, edges), fits) in FORMS.into_iter().zip(&mut fits) {
+                let (training, fresh) = match form {
+                    MoveForm::Centering => (&training.0, &fresh.0),
+                    _ => (&training.1, &fresh.1),
+                };
+                fits.push(MoveModel::fit(training, form, edges)?.quality_on(fresh)?);
+            }
+        }
+        for ((name, ..), fits) in FORMS.iter().zip(&fits) {
+            print(name, fits);
+        }
     }
     Ok(())
 }
 
 /// Prints a row per output of the fits to all seeds.
-fn print(
-    name: &str,
-    fit: impl Fn(u64) -> Result<Vec<Quality>, Box<dyn Error>>,
-) -> Result<(), Box<dyn Error>> {
-    let fits = (0..SEEDS).map(fit).collect::<Result<Vec<_>, _>>()?;
-    for (k, first) in fits[0].iter().enumerate() {
+fn print(name: &str, fits: &[Vec<Quality>]) {
+    let seeds = fits.len() as f64;
+    for (k, first) in fits.first().into_iter().flatten().enumerate() {
         let [r2, error] = [|q: &Quality| q.r2, |q: &Quality| q.rmse].map(|of| {
             let values = || fits.iter().map(|fit| of(&fit[k]));
-            let mean = values().sum::<f64>() / SEEDS as f64;
-            let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / (SEEDS - 1) as f64;
+            let mean = values().sum::<f64>() / seeds;
+            let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / (seeds - 1.0);
             format!("{mean:.4} ± {:.4}", 1.96 * variance.sqrt())
         });
         println!("{name:10} {}: R² {r2}, error {error}", first.output);
     }
-    Ok(())
 }
