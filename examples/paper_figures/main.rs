@@ -154,7 +154,8 @@ fn learned_with(
     let centering = rigid.learn(centering, &trials, ACTIONS.0, rng, &mut quiet)?;
     let found = search_percepts(1_000, seed.wrapping_add(1_000_000));
     // A table of more states has more corners in which a ball can be lost.
-    let more_found = search_percepts(10_000, seed.wrapping_add(1_000_000));
+    let more = options.fine.min(10_000) as usize;
+    let more_found = search_percepts(more, seed.wrapping_add(1_000_000));
     let mut learn = |name, simulator: Option<&Simulator>, spec: &BehaviourSpec, trials: &[_]| {
         let actions = if *spec == fine {
             options.fine
