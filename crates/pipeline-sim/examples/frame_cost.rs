@@ -15,7 +15,9 @@ use pipeline_sim::rand::SeedableRng;
 use pipeline_sim::rand::rngs::Xoshiro256PlusPlus;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let frames: u64 = std::env::args().nth(1).map_or(Ok(12), |frames| frames.parse())?;
+    let frames: u64 = std::env::args()
+        .nth(1)
+        .map_or(Ok(12), |frames| frames.parse())?;
     println!("{:20} {:>7} {:>7}", "recipe", "median", "best");
     for recipe in Recipe::cell().iter().chain(Recipe::benchmark()) {
         let mut times = Vec::new();

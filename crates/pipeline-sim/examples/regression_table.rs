@@ -26,7 +26,9 @@ const FORMS: [(&str, MoveForm, &[f64]); 5] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let seeds = std::env::args().nth(1).map_or(Ok(20), |seeds| seeds.parse())?;
+    let seeds = std::env::args()
+        .nth(1)
+        .map_or(Ok(20), |seeds| seeds.parse())?;
     let cell = Cell::paper(Ball::at(0.6, 0.0, -0.1));
     println!("{SAMPLES} samples, {seeds} fits, errors in feature units");
     for noise in [0.125, 0.5] {
