@@ -1,4 +1,4 @@
-//! Circle detectors by name, configured for the camera on the hand, and a scene they suit.
+//! Circle detectors by name, configured for the camera on the hand.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,8 @@ use hough_heuristic::{
     Heuristic, HeuristicConfig, RandomizedHough, RandomizedHoughConfig, StandardHough,
     StandardHoughConfig,
 };
-use pipeline_sim::{Scene, Shape};
+
+use crate::rig::RigError;
 
 /// A circle detector for the ball in frames of the camera on the hand.
 ///
@@ -147,7 +148,7 @@ impl fmt::Display for BallDetector {
 }
 
 impl FromStr for BallDetector {
-    type Err = UnknownDetector;
+    type Err = RigError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         // Former name of the a contrario detector.
@@ -159,29 +160,6 @@ impl FromStr for BallDetector {
         Self::ALL
             .into_iter()
             .find(|detector| detector.name() == text)
-            .ok_or_else(|| UnknownDetector(text.into()))
+            .ok_or_else(|| RigError::UnknownDetector(text.into()))
     }
-}
-
-/// Error for a name that no detector has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "there is no detector {0:?}; there are {names}",
-    names = BallDetector::ALL.map(BallDetector::name).join(", ")
-)]
-pub struct UnknownDetector(String);
-
-/// Returns a scene of a bright ball over a dark wooden table with boxes and tape on it.
-///
-/// Nothing else in the scene is round: the outline of a disc seen straight on is that of a ball.
-pub fn bright_ball_scene() -> Scene {
-    let mut scene = Scene::laboratory();
-    (scene.table.albedo, scene.table.texture) = (0.20, 0.30);
-    scene
-        .things
-        .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
-    for thing in &mut scene.things {
-        thing.appearance.albedo *= 0.5;
-    }
-    scene
 }

@@ -53,9 +53,8 @@ pub use puma_val2;
 pub use qtable;
 
 pub use camera::LiveCamera;
-pub use detector::{BallDetector, UnknownDetector, bright_ball_scene};
-pub use rig::{PlaceError, Rig, RigError, RigParts};
-pub use sampling::sample_on_arm;
+pub use detector::BallDetector;
+pub use rig::{Rig, RigError, RigParts};
 pub use simulator::Simulator;
 
 #[cfg(doctest)]

@@ -15,6 +15,8 @@ use puma_val2::{
     Profile, ProximitySensor, PumaParams, ServeConfig, TcpLine, Transport, Val2Client,
 };
 
+use crate::detector::BallDetector;
+
 /// An arm behind a VAL II controller, calibrated, in a simulated cell: a ball to place, a camera on
 /// the hand whose frames are rendered from the arm's pose, proximity sensors, and a gripper that
 /// holds the ball or misses it.
@@ -198,13 +200,13 @@ impl Rig {
     /// is in the way, the arm first moves to VAL's READY pose, straight up.
     ///
     /// # Errors
-    /// [`PlaceError::InHand`] if ball or holder would still stand in the hand, which leaves the
+    /// [`RigError::InHand`] if ball or holder would still stand in the hand, which leaves the
     /// cell unchanged, and what kept the arm from moving away.
-    pub fn place(&mut self, ball: &Ball) -> Result<(), PlaceError> {
+    pub fn place(&mut self, ball: &Ball) -> Result<(), RigError> {
         if self.is_simulated() && !self.put(ball) {
             self.clear_for(Joints::from_degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]))?;
             if !self.put(ball) {
-                return Err(PlaceError::InHand {
+                return Err(RigError::InHand {
                     ball_mm: (ball.centre.coords * 1000.0).into(),
                 });
             }
@@ -391,10 +393,19 @@ fn connect<T: Transport>(
     GuardedArm::new(client)
 }
 
-/// Error of placing a ball.
+/// Error of choosing a detector, setting up a rig, or placing a ball.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum PlaceError {
+pub enum RigError {
+    /// The emulator could not be served.
+    #[error("the controller emulator cannot be served: {0}")]
+    Serve(#[source] io::Error),
+    /// No detector has this name.
+    #[error(
+        "there is no detector {0:?}; there are {names}",
+        names = BallDetector::ALL.map(BallDetector::name).join(", ")
+    )]
+    UnknownDetector(String),
     /// Ball or holder would stand in the hand.
     #[error(
         "a ball at {:.0} {:.0} {:.0} mm would stand in the hand; move the arm away first",
@@ -404,18 +415,6 @@ pub enum PlaceError {
         /// The ball's centre, millimetres.
         ball_mm: [f64; 3],
     },
-    /// The arm could not be moved away.
-    #[error(transparent)]
-    Arm(#[from] ArmError),
-}
-
-/// Error of setting up a rig.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RigError {
-    /// The emulator could not be served.
-    #[error("the controller emulator cannot be served: {0}")]
-    Serve(#[source] io::Error),
     /// The line or the controller failed.
     #[error(transparent)]
     Arm(#[from] ArmError),

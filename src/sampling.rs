@@ -6,6 +6,8 @@ use pipeline_sim::{Ball, Cell, MoveSample, Workspace};
 use puma_val2::{ArmError, Gripper, Joint, JointDelta, Joints, Manipulator};
 use rand::{Rng, RngExt};
 
+use crate::simulator::Simulator;
+
 /// Largest radius that a sampled move is planned to lead to, feature units: the hand stays clear of
 /// the ball.
 const NEAREST: f64 = 48.0;
@@ -16,55 +18,59 @@ const ELBOW: [(f64, f64); 3] = [(150.0, 175.0), (175.0, 190.0), (190.0, 214.0)];
 /// Least distance of a planned ball from the border of the frame, feature units.
 const MARGIN: f64 = 12.0;
 
-/// Samples `count` moves of `JT1`, and as many of `JT2` and `JT3`, on an arm whose camera sees a
-/// ball at rest. The lists, in this order, are those of [`Cell::sample_moves`], in whose place they
-/// are given to [`Simulator::fit`](crate::Simulator::fit).
-///
-/// The ball is searched for from the paper's poses. Each sample begins at a random pose from which
-/// the ball should be seen, and keeps what the camera shows before and after the move. `nominal`
-/// plans them: an approximate cell, whose ball is put where the arm sees one, and which keeps the
-/// hand away from it. Poses and moves that lose the ball are tried again elsewhere. `on_progress`
-/// is called with the number of samples so far, and ends the sampling by `false`.
-///
-/// # Errors
-/// Faults of camera and arm; [`FrameError::Failed`] if no ball is in view, or lost again and again.
-pub fn sample_on_arm<R: Rng + ?Sized>(
-    eye: &mut dyn Eye,
-    arm: &mut dyn Manipulator,
-    nominal: &Cell,
-    count: usize,
-    rng: &mut R,
-    on_progress: &mut dyn FnMut(usize) -> bool,
-) -> Result<(Vec<MoveSample>, Vec<MoveSample>), AgentError> {
-    arm.set_gripper(Gripper::Open)?;
-    let mut sampler = Sampler {
-        cell: searched(eye, arm, nominal)?,
-        eye,
-        arm,
-    };
-    let (mut centering, mut reaching) = (Vec::new(), Vec::new());
-    let mut misses = 0;
-    while centering.len() < count || reaching.len() < count {
-        let turn_waist = centering.len() < count && centering.len() <= reaching.len();
-        let Some(sample) = sampler.sample(turn_waist, reaching.len() + misses, rng)? else {
-            misses += 1;
-            if misses > 50 + centering.len() + reaching.len() {
-                return Err(unseen(
-                    "the ball is lost again and again; check the light on it",
-                ));
-            }
-            continue;
+impl Simulator {
+    /// Samples `count` moves of `JT1`, and as many of `JT2` and `JT3`, on an arm whose camera sees
+    /// a ball at rest. The lists, in this order, are those of [`Cell::sample_moves`], in whose
+    /// place they are given to [`Simulator::fit`].
+    ///
+    /// The ball is searched for from the paper's poses. Each sample begins at a random pose from
+    /// which the ball should be seen, and keeps what the camera shows before and after the move.
+    /// `nominal` plans them: an approximate cell, whose ball is put where the arm sees one, and
+    /// which keeps the hand away from it. Poses and moves that lose the ball are tried again
+    /// elsewhere. `on_progress` is called with the number of samples so far, and ends the sampling
+    /// by `false`.
+    ///
+    /// # Errors
+    /// Faults of camera and arm; [`FrameError::Failed`] if no ball is in view, or lost again and
+    /// again.
+    pub fn sample_on_arm<R: Rng + ?Sized>(
+        eye: &mut dyn Eye,
+        arm: &mut dyn Manipulator,
+        nominal: &Cell,
+        count: usize,
+        rng: &mut R,
+        on_progress: &mut dyn FnMut(usize) -> bool,
+    ) -> Result<(Vec<MoveSample>, Vec<MoveSample>), AgentError> {
+        arm.set_gripper(Gripper::Open)?;
+        let mut sampler = Sampler {
+            cell: searched(eye, arm, nominal)?,
+            eye,
+            arm,
         };
-        if turn_waist {
-            centering.push(sample);
-        } else {
-            reaching.push(sample);
+        let (mut centering, mut reaching) = (Vec::new(), Vec::new());
+        let mut misses = 0;
+        while centering.len() < count || reaching.len() < count {
+            let turn_waist = centering.len() < count && centering.len() <= reaching.len();
+            let Some(sample) = sampler.sample(turn_waist, reaching.len() + misses, rng)? else {
+                misses += 1;
+                if misses > 50 + centering.len() + reaching.len() {
+                    return Err(unseen(
+                        "the ball is lost again and again; check the light on it",
+                    ));
+                }
+                continue;
+            };
+            if turn_waist {
+                centering.push(sample);
+            } else {
+                reaching.push(sample);
+            }
+            if !on_progress(centering.len() + reaching.len()) {
+                break;
+            }
         }
-        if !on_progress(centering.len() + reaching.len()) {
-            break;
-        }
+        Ok((centering, reaching))
     }
-    Ok((centering, reaching))
 }
 
 fn unseen(reason: &str) -> AgentError {

@@ -17,8 +17,8 @@ use std::time::Instant;
 use clap::Parser;
 use grasp_agent::{Agent, AgentConfig, Controller, Hybrid, RunEvent, SavedRun, TaughtGoal};
 use hough_heuristic::CircleDetector;
-use pipeline_sim::{ErrorLevel, Errors, Workspace};
-use puma_grasp::{BallDetector, Rig, bright_ball_scene};
+use pipeline_sim::{ErrorLevel, Errors, Scene, Workspace};
+use puma_grasp::{BallDetector, Rig};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -394,7 +394,7 @@ impl World {
         let drawn = level.draw(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
         let errors = with_odd(drawn, options)?;
         if options.full_chain {
-            let rig = rig_with_errors(&errors, &bright_ball_scene(), seed)?;
+            let rig = rig_with_errors(&errors, &Scene::bright_ball(), seed)?;
             let detector = options.detector.build(seed)?;
             return Ok(Self::Chain(Box::new(rig), detector, Box::new(errors)));
         }

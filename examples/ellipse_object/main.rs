@@ -20,8 +20,8 @@ use grasp_agent::{
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{Canny, CannyConfig, CurveSearch, CurveSearchConfig, Ellipse, FrameError};
 use nalgebra::Vector3;
-use pipeline_sim::{MoveForm, Workspace};
-use puma_grasp::{Rig, RigParts, bright_ball_scene};
+use pipeline_sim::{MoveForm, Scene, Workspace};
+use puma_grasp::{Rig, RigParts};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -78,7 +78,7 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Outcome {
     let _lock = lock_folder(&options.out)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(options.seed);
-    let scene = bright_ball_scene();
+    let scene = Scene::bright_ball();
     let mut rig = Rig::emulated(false, &scene, options.seed)?;
     rig.stopped_by(STOP.clone());
     let mut features = Watched {

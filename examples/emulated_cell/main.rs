@@ -21,8 +21,7 @@ use example_support::program::stopped;
 use example_support::trial::ball_in_view;
 use hough_heuristic::image::GrayImage;
 use hough_heuristic::{FrameSource, Y4mWriter};
-use pipeline_sim::{CellCamera, ErrorLevel, Renderer, SharedCell};
-use puma_grasp::bright_ball_scene;
+use pipeline_sim::{CellCamera, ErrorLevel, Renderer, Scene, SharedCell};
 use puma_val2::{Emulator, EmulatorServer, Gripper, Profile, PumaParams, ServeConfig};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -96,7 +95,7 @@ fn run(options: &Options) -> Outcome {
     let pose = move || links.links(&arm.with_emulator(|emulator| emulator.joints()));
     let mut camera = CellCamera::new(
         cell.clone(),
-        Renderer::new(&bright_ball_scene(), options.seed),
+        Renderer::new(&Scene::bright_ball(), options.seed),
         pose.clone(),
     );
     let (mut frame, mut jaws) = (GrayImage::default(), Gripper::Open);

@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use grasp_agent::{Agent, AgentConfig, Learned, OnlineLearning, RunEvent, SavedRun};
-use pipeline_sim::Workspace;
-use puma_grasp::bright_ball_scene;
+use pipeline_sim::{Scene, Workspace};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -45,7 +44,7 @@ fn run(options: &Options) -> Outcome {
     let pair = behaviours(options)?;
     let policy = options.policy.as_deref();
     let loaded = policy.map(|path| Taught::load(path, &pair)).transpose()?;
-    let (real, scene) = (&options.real, bright_ball_scene());
+    let (real, scene) = (&options.real, Scene::bright_ball());
     let opened = real.open(options.detector, options.realtime, &scene, options.seed);
     let (mut rig, mut detector) = opened?;
     options.say(format_args!(

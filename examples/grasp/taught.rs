@@ -11,7 +11,7 @@ use grasp_agent::{
 };
 use hough_heuristic::{CircleDetector, Features};
 use pipeline_sim::{MoveSample, Workspace};
-use puma_grasp::{Rig, RigParts, Simulator, sample_on_arm};
+use puma_grasp::{Rig, RigParts, Simulator};
 use puma_val2::Joints;
 use rand::Rng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -163,7 +163,7 @@ fn samples(
     let bar = progress_bar(2 * count as u64, "moves", options.quiet);
     let RigParts { camera, arm, .. } = rig.parts();
     let mut eye = CameraEye::new(camera, &mut **detector);
-    let mut taken = sample_on_arm(&mut eye, arm, &cell, count, rng, &mut |done| {
+    let mut taken = Simulator::sample_on_arm(&mut eye, arm, &cell, count, rng, &mut |done| {
         bar.set_position(done as u64);
         !stopped()
     })?;

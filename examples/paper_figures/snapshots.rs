@@ -6,8 +6,8 @@ use hough_heuristic::{Canny, CannyConfig, EdgeDetector};
 use image::RgbImage;
 use image::imageops::{FilterType, replace, resize};
 use nalgebra::{Point3, Rotation3, Vector3};
-use pipeline_sim::{Ball, Workspace};
-use puma_grasp::{BallDetector, Rig, bright_ball_scene};
+use pipeline_sim::{Ball, Scene, Workspace};
+use puma_grasp::{BallDetector, Rig};
 use puma_val2::{Joint, Joints, PumaParams};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -33,7 +33,7 @@ struct Moment {
 /// Draws four columns, from the first sighting to the goal, of three rows: the pose from the side,
 /// the frame with the circle, its edges.
 pub(crate) fn snapshots(learned: &Learned, seed: u64) -> Outcome<RgbImage> {
-    let mut rig = Rig::emulated(false, &bright_ball_scene(), seed)?;
+    let mut rig = Rig::emulated(false, &Scene::bright_ball(), seed)?;
     rig.stopped_by(STOP.clone());
     let mut detector = BallDetector::default().build(seed)?;
     let config = AgentConfig::paper(Workspace::paper().search_poses());

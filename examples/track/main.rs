@@ -22,8 +22,8 @@ use hough_heuristic::CircleDetector;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use indicatif::ProgressBar;
-use pipeline_sim::{Cell, ErrorLevel, Workspace};
-use puma_grasp::{BallDetector, Rig, bright_ball_scene};
+use pipeline_sim::{Cell, ErrorLevel, Scene, Workspace};
+use puma_grasp::{BallDetector, Rig};
 use puma_val2::Joints;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -169,7 +169,7 @@ impl Place {
             return Ok(Self::Shortcut(Box::new(cell)));
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut scene = bright_ball_scene();
+        let mut scene = Scene::bright_ball();
         scene.sensor.read_noise = options.noise.unwrap_or(scene.sensor.read_noise);
         let errors = options.level.draw(&mut rng);
         let (rig, for_its_frames) = options.real.open(options.detector, false, &scene, seed)?;

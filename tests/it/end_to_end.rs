@@ -4,8 +4,8 @@
 
 use grasp_agent::{Agent, AgentConfig, EventKind, GaveUp};
 use hough_heuristic::CircleDetector;
-use pipeline_sim::{Ball, Workspace};
-use puma_grasp::{BallDetector, Rig, bright_ball_scene};
+use pipeline_sim::{Ball, Scene, Workspace};
+use puma_grasp::{BallDetector, Rig};
 use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
 
@@ -24,7 +24,7 @@ fn agent() -> Agent {
 fn balls_are_gripped_and_the_same_seed_repeats_the_run() {
     let run = |balls| {
         let mut rig =
-            Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
+            Rig::emulated(false, &Scene::bright_ball(), 3).expect("an emulated controller");
         let mut agent = agent();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut log = Vec::new();
@@ -55,7 +55,7 @@ fn balls_are_gripped_and_the_same_seed_repeats_the_run() {
 
 #[test]
 fn a_ball_out_of_view_is_reported_and_not_gripped() {
-    let mut rig = Rig::emulated(false, &bright_ball_scene(), 3).expect("an emulated controller");
+    let mut rig = Rig::emulated(false, &Scene::bright_ball(), 3).expect("an emulated controller");
     let mut agent = agent();
     // Behind the arm.
     rig.place(&Ball::at(-0.6, 0.0, -0.1))

@@ -7,8 +7,8 @@ use grasp_agent::{
 };
 use hough_heuristic::image::{GrayImage, Luma};
 use hough_heuristic::{Circle, CircleDetector, Detection, FrameError, FrameRefused, FrameSource};
-use pipeline_sim::{Ball, Workspace};
-use puma_grasp::{BallDetector, Rig, RigParts, bright_ball_scene};
+use pipeline_sim::{Ball, Scene, Workspace};
+use puma_grasp::{BallDetector, Rig, RigParts};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints, Manipulator};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -17,7 +17,7 @@ const IN_VIEW: [f64; 3] = [0.6, 0.1, -0.1];
 const BEHIND_THE_ARM: [f64; 3] = [-0.6, 0.0, -0.1];
 
 fn rig(ball: [f64; 3]) -> Rig {
-    let mut rig = Rig::emulated(false, &bright_ball_scene(), 5).expect("an emulated controller");
+    let mut rig = Rig::emulated(false, &Scene::bright_ball(), 5).expect("an emulated controller");
     rig.place(&Ball::at(ball[0], ball[1], ball[2]))
         .expect("away from the hand");
     rig
@@ -312,7 +312,7 @@ fn a_line_that_dies_ends_the_run_and_keeps_the_belief() {
             EmulatorServer::pty(emulator, ServeConfig::default()).expect("a pseudo-terminal");
         let path = server.address().to_owned();
         let mut rig =
-            Rig::on_port(&path, 100.0, &bright_ball_scene(), 5).expect("the controller answers");
+            Rig::on_port(&path, 100.0, &Scene::bright_ball(), 5).expect("the controller answers");
         rig.place(&Ball::at(IN_VIEW[0], IN_VIEW[1], IN_VIEW[2]))
             .expect("away from the hand");
         let (mut agent, mut log, mut moves) = (agent(), EventLog::default(), 0);

@@ -7,12 +7,12 @@ use grasp_agent::{
     Agent, AgentConfig, Controller, Decision, EventKind, EventLog, Feedback, GaveUp, Request,
     Servo, ServoLaw, ServoSettings, Sighting,
 };
-use pipeline_sim::{Ball, Cell, ErrorLevel, FeatureCamera, Grasp, Workspace};
-use puma_grasp::{Rig, RigParts, bright_ball_scene};
+use pipeline_sim::{Ball, Cell, ErrorLevel, FeatureCamera, Grasp, Scene, Workspace};
+use puma_grasp::{Rig, RigParts};
 use puma_val2::{ArmError, Gripper, JointDelta, Joints};
 
 fn rig() -> Rig {
-    Rig::emulated(false, &bright_ball_scene(), 5).expect("an emulated controller")
+    Rig::emulated(false, &Scene::bright_ball(), 5).expect("an emulated controller")
 }
 
 /// A ball in view of a search pose, the pose in which it shows in the middle of the goal, and the

@@ -277,11 +277,6 @@ impl MoveModel {
         self.0.form.outputs().iter().map(output).collect()
     }
 
-    /// Condition number of each elbow interval's design matrix, columns scaled to unit length.
-    pub fn condition_numbers(&self) -> Vec<f64> {
-        self.0.pieces.iter().map(|fit| fit.condition).collect()
-    }
-
     fn piece(&self, jt3_degrees: f64) -> usize {
         let edges = self.0.edges.iter();
         edges.filter(|edge| jt3_degrees >= **edge).count()

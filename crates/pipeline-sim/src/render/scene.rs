@@ -284,6 +284,22 @@ impl Scene {
             sensor: Sensor::default(),
         }
     }
+
+    /// Returns a scene of a bright ball over a dark wooden table with boxes and tape on it.
+    ///
+    /// Nothing else in the scene is round: the outline of a disc seen straight on is that of a
+    /// ball.
+    pub fn bright_ball() -> Self {
+        let mut scene = Self::laboratory();
+        (scene.table.albedo, scene.table.texture) = (0.20, 0.30);
+        scene
+            .things
+            .retain(|thing| matches!(thing.shape, Shape::Box { .. } | Shape::Tape { .. }));
+        for thing in &mut scene.things {
+            thing.appearance.albedo *= 0.5;
+        }
+        scene
+    }
 }
 
 impl Default for Scene {

@@ -57,8 +57,7 @@ impl ModelEnvironment {
 
     /// Counts a termination as a success only if its reward is positive. By default every
     /// termination is one.
-    #[must_use]
-    pub fn with_success_by_reward(self) -> Self {
+    pub(crate) fn with_success_by_reward(self) -> Self {
         Self {
             only_reward_succeeds: true,
             ..self

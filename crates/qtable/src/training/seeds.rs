@@ -1,7 +1,5 @@
 //! Experiments over many seeds, and means with their intervals.
 
-use crate::training::curve::Record;
-
 /// Runs an experiment once for every seed and returns the results in the order of the seeds.
 ///
 /// With the feature `parallel` the runs are spread over all processor cores; the results are the
@@ -76,23 +74,6 @@ impl Estimate {
             half_width,
             count,
         }
-    }
-
-    /// Estimates the mean of a quantity at each point of several learning curves, up to the end of
-    /// the shortest. Runs in which it is `None` are left out at that point.
-    pub fn of_curves(
-        curves: &[Vec<Record>],
-        quantity: impl Fn(&Record) -> Option<f64> + Copy,
-    ) -> Vec<Self> {
-        let points = curves.iter().map(Vec::len).min().unwrap_or(0);
-        let at = |point: usize| {
-            curves
-                .iter()
-                .filter_map(move |curve| quantity(&curve[point]))
-        };
-        (0..points)
-            .map(|point| Self::of(&at(point).collect::<Vec<_>>()))
-            .collect()
     }
 }
 
