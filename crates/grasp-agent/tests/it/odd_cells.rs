@@ -4,7 +4,7 @@ use grasp_agent::puma_val2::{Joint, JointDelta};
 use grasp_agent::{Agent, AgentError, EventKind, EventLog, GaveUp, Hybrid, Misfit};
 
 use crate::cell::{config, hybrid};
-use crate::plant::{EXTREME, Level, MODERATE, Odd, Plant};
+use crate::plant::{EXTREME, HEAVY, Level, MODERATE, Odd, Plant};
 
 /// An agent with the goal taught in this cell; `None` where it cannot be.
 fn taught(plant: &Plant) -> Option<Agent<Hybrid>> {
@@ -254,4 +254,44 @@ fn a_run_with_freed_joints_is_replayed() {
             .any(|event| event.kind == EventKind::Freed)
     );
     assert_eq!(log.replay(&agent).unwrap().1, log);
+}
+
+/// Shares of the cells in which the 95 % interval of each parameter holds the truth, after so many
+/// balls without a taught goal.
+fn coverage(level: Level, cells: u64, balls: u64) -> [f64; 13] {
+    let mut inside = [0.0; 13];
+    for cell in 0..cells {
+        let plant = Plant::new(level, Odd::default(), 1000 + cell);
+        let mut agent = Agent::with_controller(config(), hybrid()).unwrap();
+        for ball in 0..balls {
+            let run = plant.run(&mut agent, 1000 * cell + ball, &mut EventLog::default());
+            run.0.unwrap();
+        }
+        let belief = agent.controller().belief();
+        let (mean, deviation, truth) = (belief.mean(), belief.deviations(), plant.parameters());
+        for (i, inside) in inside.iter_mut().enumerate() {
+            let within = (mean[i] - truth[i]).abs() < 1.96 * deviation[i];
+            *inside += f64::from(u8::from(within)) / cells as f64;
+        }
+    }
+    inside
+}
+
+/// `GRASP_CELLS=200 cargo test --release -p grasp-agent --test it -- intervals --nocapture` draws
+/// more cells, at two levels.
+#[test]
+fn intervals_of_95_percent_hold_the_truth() {
+    let cells = std::env::var("GRASP_CELLS").ok();
+    let cells: Option<u64> = cells.map(|cells| cells.parse().unwrap());
+    for (name, level) in [("heavy", HEAVY), ("extreme", EXTREME)] {
+        let Some(cells) = cells else {
+            let shares = coverage(MODERATE, 3, 4);
+            assert!(shares.iter().sum::<f64>() > 0.85 * 13.0, "{shares:.3?}");
+            return;
+        };
+        let shares = coverage(level, cells, 10);
+        println!("{name}, {cells} cells: {shares:.3?}");
+        let lowest = shares.iter().copied().fold(1.0, f64::min);
+        assert!(lowest > 0.88, "{name}: {shares:.3?}");
+    }
 }

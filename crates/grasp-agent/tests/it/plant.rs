@@ -150,6 +150,23 @@ impl Plant {
         self.0.borrow().truth
     }
 
+    /// The true values of a belief's parameters of camera, ball and play.
+    pub(crate) fn parameters(&self) -> [f64; 13] {
+        let state = self.0.borrow();
+        let (truth, nominal) = (&state.truth, &state.site.nominal);
+        let off = nominal.mount.inverse() * truth.mount;
+        let (turn, shift) = (off.rotation.scaled_axis(), off.translation.vector);
+        let centre: [f64; 2] = std::array::from_fn(|i| truth.centre[i] - nominal.centre[i]);
+        let focal = (truth.focal / nominal.focal).ln();
+        let radius = (truth.ball_radius / nominal.ball_radius).ln();
+        let [cx, cy] = centre;
+        let play = state.play;
+        [
+            focal, cx, cy, turn.x, turn.y, turn.z, shift.x, shift.y, shift.z, radius, play, play,
+            play,
+        ]
+    }
+
     pub(crate) fn misses(&self) -> usize {
         self.0.borrow().misses
     }
@@ -333,8 +350,8 @@ impl Manipulator for Plant {
         }
         state.motors = motors;
         let turned = state.turned(&motors);
-        let half = 0.5 * state.play;
         for i in 0..6 {
+            let half = if i < 3 { 0.5 * state.play } else { 0.0 };
             state.links.0[i] = state.links.0[i].clamp(turned.0[i] - half, turned.0[i] + half);
         }
         state.reported = if state.odd.dishonest { target } else { motors };

@@ -52,6 +52,17 @@ impl Evidence {
         self.held = index.map(|index| (index, unsure));
     }
 
+    pub(crate) fn is_held(&self) -> bool {
+        self.held.is_some()
+    }
+
+    /// Changes the standard deviation of a ball that is held.
+    pub(crate) fn hold_within(&mut self, deviation: f64) {
+        if let Some((_, unsure)) = &mut self.held {
+            *unsure = deviation;
+        }
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.sightings.len()
     }

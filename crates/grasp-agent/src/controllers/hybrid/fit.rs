@@ -5,7 +5,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, SMatrix, Vector3};
 use crate::controllers::hybrid::belief::Belief;
 use crate::controllers::hybrid::evidence::{Evidence, Stands};
 use crate::controllers::hybrid::parameters::{
-    Information, LEARNED, METRE_STEP, Numbers, STEPS, ThreeBy, WithBall, at, corrected, vector,
+    Information, LEARNED, METRE_STEP, Numbers, STEPS, ThreeBy, WIDE_STEPS, WithBall, at, corrected,
+    vector,
 };
 use crate::sight::camera_model::CameraModel;
 
@@ -23,6 +24,12 @@ pub(crate) struct Fit {
 const ITERATIONS: usize = 12;
 /// Threshold of the Huber loss (Huber 1964), standard deviations. False circles exceed it.
 const OUTLIER: f64 = 3.0;
+/// Threshold of the Cauchy loss of a grip, standard deviations. A ball that was taken for held may
+/// lie anywhere.
+const NOT_HELD: f64 = 1.5;
+/// Increase of the variances over those of the linear model, per squared share of the noise in the
+/// radius: by it, 95 % intervals hold in drawn cells at every level of errors.
+const NONLINEAR: f64 = 9.0;
 
 impl Fit {
     /// Finds the most probable parameters and ball positions by Levenberg–Marquardt iteration.
@@ -87,7 +94,9 @@ impl Fit {
 
     /// Returns the posterior belief.
     pub(crate) fn belief(&self, noise: f64) -> Belief {
-        Belief::of(self.numbers, self.normal.marginal(), noise)
+        let coarse = self.normal.coarse / self.normal.sightings.max(1) as f64;
+        let information = self.normal.marginal() / (1.0 + NONLINEAR * coarse);
+        Belief::of(self.numbers, information, noise)
     }
 
     /// Returns the covariance of the parameters and the last ball.
@@ -103,9 +112,7 @@ impl Fit {
     /// the logarithm of the determinant of its information (Tierney and Kadane 1986).
     #[must_use]
     pub(crate) fn over_all_places(mut self, nominal: &CameraModel, evidence: &[&Evidence]) -> Self {
-        /// Steps of this derivative over those of the derivatives that it derives.
-        const WIDER: f64 = 100.0;
-        let varied = Varied::new(nominal, &self.numbers, WIDER);
+        let varied = Varied::new(nominal, &self.numbers, &WIDE_STEPS);
         let mut gradient = Numbers::zeros();
         for ((evidence, ball), block) in evidence.iter().zip(&self.balls).zip(&self.normal.balls) {
             let (Some(ball), Some(block)) = (ball, block) else {
@@ -133,7 +140,7 @@ impl Fit {
             };
             let before = views(&here, &varied.model, ball);
             for i in 0..LEARNED {
-                let step = WIDER * STEPS[i];
+                let step = WIDE_STEPS[i];
                 let moved = ball - inverse * block.cross.row(i).transpose() * step;
                 let after = match i.checked_sub(at::PLAY) {
                     None => views(&here, &varied.models[i], &moved),
@@ -237,7 +244,8 @@ fn cost(
         None => INEXPLICABLE,
     };
     let of_grip = held.map_or(0.0, |(joints, unsure)| {
-        ((model.tool_point(&joints) - ball) / unsure).norm_squared()
+        let off = (model.tool_point(&joints) - ball).norm() / (unsure * NOT_HELD);
+        NOT_HELD.powi(2) * (off * off).ln_1p()
     });
     views.iter().map(|(j, f)| of_view((j, f))).sum::<f64>() + of_grip
 }
@@ -249,6 +257,9 @@ struct Normal {
     balls: Vec<Option<BallBlock>>,
     squares: f64,
     spare: f64,
+    sightings: usize,
+    /// Sum of the squared shares of the noise in the radius.
+    coarse: f64,
 }
 
 struct BallBlock {
@@ -275,8 +286,10 @@ impl Normal {
             balls: Vec::with_capacity(balls.len()),
             squares: 0.0,
             spare: -(LEARNED as f64),
+            sightings: 0,
+            coarse: 0.0,
         };
-        let varied = Varied::new(nominal, numbers, 1.0);
+        let varied = Varied::new(nominal, numbers, &STEPS);
         for (evidence, ball) in evidence.iter().zip(balls) {
             let block = ball.map(|ball| normal.add(&varied, evidence, &ball, noise));
             normal.balls.push(block);
@@ -334,6 +347,8 @@ impl Normal {
             block.gradient += by_place.transpose() * weighed * residual;
             self.squares += residual.component_mul(&residual).dot(&weights) * noise * noise;
             self.spare += 3.0;
+            self.sightings += 1;
+            self.coarse += (noise / features.r).powi(2);
         }
         if let Some((joints, unsure)) = held {
             let tool = varied.model.tool_point(&joints);
@@ -344,7 +359,9 @@ impl Normal {
                         .set_column(i, &((tool - varied.model.tool_point(joints)) / STEPS[i]));
                 }
             }
-            let (residual, weight) = (ball - tool, unsure.powi(-2));
+            let residual = ball - tool;
+            let off = residual.norm() / (unsure * NOT_HELD);
+            let weight = unsure.powi(-2) / (1.0 + off * off);
             self.numbers += by_numbers.transpose() * by_numbers * weight;
             self.gradient += by_numbers.transpose() * residual * weight;
             block.own += Matrix3::identity() * weight;
@@ -440,11 +457,11 @@ struct Varied {
 }
 
 impl Varied {
-    /// Varies each parameter by so many times its step.
-    fn new(nominal: &CameraModel, numbers: &Numbers, times: f64) -> Self {
+    /// Varies each parameter by its step.
+    fn new(nominal: &CameraModel, numbers: &Numbers, steps: &[f64; LEARNED]) -> Self {
         let other = |i: usize| {
             let mut other = *numbers;
-            other[i] += times * STEPS[i];
+            other[i] += steps[i];
             other
         };
         Self {

@@ -29,11 +29,23 @@ pub(crate) type Information = SMatrix<f64, LEARNED, LEARNED>;
 pub(crate) const WITH_BALL: usize = LEARNED + 3;
 pub(crate) type WithBall = SMatrix<f64, WITH_BALL, WITH_BALL>;
 
+/// Step of the derivatives by a backlash. Sightings depend on it with kinks, so that its error is
+/// given by the slope over a whole step.
+const ACROSS_KINKS: f64 = 2e-3;
 /// Steps of the numerical derivatives, for each parameter.
-pub(crate) const STEPS: [f64; LEARNED] = [
-    1e-5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5,
-    1e-5, 1e-5,
-];
+pub(crate) const STEPS: [f64; LEARNED] = steps(1.0);
+/// Steps of the derivatives of derivatives.
+pub(crate) const WIDE_STEPS: [f64; LEARNED] = steps(100.0);
+
+const fn steps(times: f64) -> [f64; LEARNED] {
+    let (one, unit, metre) = (1e-5 * times, 1e-3 * times, 1e-6 * times);
+    let play = ACROSS_KINKS;
+    [
+        one, unit, unit, one, one, one, metre, metre, metre, one, play, play, play, one, one, one,
+        one, one,
+    ]
+}
+
 /// Step of the derivatives by a coordinate, metres.
 pub(crate) const METRE_STEP: f64 = 1e-6;
 

@@ -1,7 +1,7 @@
 //! Learning from one run to the next, and the doubt in what was learned.
 
 use crate::controllers::hybrid::belief::Belief;
-use crate::controllers::hybrid::controller::Hybrid;
+use crate::controllers::hybrid::controller::{HELD, Hybrid};
 use crate::controllers::hybrid::evidence::Evidence;
 use crate::controllers::hybrid::fit::Fit;
 use crate::controllers::hybrid::misfit::{ENOUGH, Misfit, misfit};
@@ -19,8 +19,10 @@ impl Hybrid {
         if self.learning && self.run.evidence.tells() {
             self.remembered.push(self.run.evidence.clone());
             self.news = true;
-            let forgotten = self.remembered.len().saturating_sub(self.settings.memory);
-            self.remembered.drain(..forgotten);
+            let taught = usize::from(self.shown);
+            let least = self.settings.memory + taught;
+            let forgotten = self.remembered.len().saturating_sub(least);
+            self.remembered.drain(taught..taught + forgotten);
         }
     }
 
@@ -66,6 +68,13 @@ impl Hybrid {
         }
         if !self.learning || !std::mem::take(&mut self.news) {
             return;
+        }
+        // Grips by one belief miss alike: together, they are as sure as one.
+        let taught = usize::from(self.shown);
+        let grips = self.remembered.iter().skip(taught).filter(|e| e.is_held());
+        let deviation = HELD * (grips.count() as f64).sqrt();
+        for evidence in self.remembered.iter_mut().skip(taught) {
+            evidence.hold_within(deviation);
         }
         let all: Vec<&Evidence> = self.remembered.iter().collect();
         let before = self.before.clone().with_noise(self.belief.noise());

@@ -113,8 +113,8 @@ const FAR_OFF: f64 = 40.0;
 const STILL_MOVING: usize = 3;
 /// Standard deviation of a ball that was put between the jaws from their middle, metres.
 const SHOWN: f64 = 0.002;
-/// Standard deviation of a ball that the jaws have closed around.
-const HELD: f64 = 0.004;
+/// Standard deviation of the balls that the jaws have closed around.
+const HELD: f64 = 0.008;
 /// Margin to the border of the frame, feature units.
 const MARGIN: f64 = 4.0;
 /// Radius at which the ball is still detected reliably, feature units.
@@ -174,13 +174,14 @@ impl Hybrid {
     pub fn shown(mut self, goal: &TaughtGoal) -> Self {
         let (nominal, from) = (&self.settings.nominal, goal.seen_from());
         let shown = Evidence::shown(goal.features(), [from, from + goal.grip()], SHOWN);
-        self.shown = true;
-        for belief in [&mut self.before, &mut self.belief] {
-            *belief = belief.with_arm(&self.settings.prior);
-            if let Some(fit) = Fit::of(belief, &belief.numbers(), nominal, &[&shown]) {
-                *belief = fit.belief(belief.noise());
-            }
+        self.before = self.before.with_arm(&self.settings.prior);
+        self.belief = self.belief.with_arm(&self.settings.prior);
+        if let Some(fit) = Fit::of(&self.belief, &self.belief.numbers(), nominal, &[&shown]) {
+            self.belief = fit.belief(self.belief.noise());
         }
+        // Evidence as long as the camera stays in its mount: as a prior it would be linear.
+        self.shown = true;
+        self.remembered.insert(0, shown);
         self.settings.goal = goal.features();
         self.settings.grip_turn = goal.grip()[Joint::J5];
         self.settings.grip_aside = goal.grip()[Joint::J4];
